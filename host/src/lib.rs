@@ -1,0 +1,16 @@
+//! Everything that the `rig` program does, as a library.
+//!
+//! A sample's way: a [`link`] or a file in [`data`] → [`prepare`] → [`identify`] → [`report`];
+//! [`robot`] is what is known beforehand, [`excite`] and [`simulate`] make motions, [`plant`] is the
+//! emulated rig that stands in for hardware, and [`commands`] are the program's verbs.
+
+pub mod commands;
+pub mod data;
+pub mod excite;
+pub mod identify;
+pub mod link;
+pub mod plant;
+pub mod prepare;
+pub mod report;
+pub mod robot;
+pub mod simulate;

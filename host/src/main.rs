@@ -1,0 +1,2 @@
+//! The `rig` program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Several scalars side by side.

@@ -1,0 +1,21 @@
+//! The mathematics of the rig: one source for the microcontroller, the desktop and wide batches.
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod control;
+pub mod drive;
+pub mod encoder;
+pub mod estimation;
+pub mod friction;
+pub mod lanes;
+pub mod link;
+pub mod model;
+pub mod multibody;
+pub mod precompensation;
+pub mod safety;
+pub mod scalar;
+pub mod trajectory;
+pub mod units;
+pub mod wire;

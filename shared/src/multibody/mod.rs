@@ -1,0 +1,1 @@
+//! Serial chains of any length.
