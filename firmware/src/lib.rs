@@ -1,2 +1,4 @@
-//! firmware
+//! The control application of the rig, free of hardware.
 #![no_std]
+
+pub mod sample;

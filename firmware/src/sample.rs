@@ -1,0 +1,58 @@
+//! The seam between the control application and whatever carries it: board or emulated rig.
+
+use rig_shared::units::{AdcCode, Duty, EncoderCount};
+
+/// What one control tick sees, all taken at the same instant by one hardware trigger.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sample {
+    /// Encoder timer, motor side.
+    pub encoder: EncoderCount,
+    /// Motor current, converter code.
+    pub current: AdcCode,
+    /// Supply voltage, converter code.
+    pub supply: AdcCode,
+    /// Motor temperature, converter code.
+    pub temperature: AdcCode,
+    /// The driver or the comparator has pulled the break input.
+    pub driver_fault: bool,
+    /// The previous tick had not finished when this one was due.
+    pub overrun: bool,
+}
+
+/// What one control tick orders. It takes effect at the next tick's sampling instant (preloaded PWM).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// Bridge duty cycle; 0 while the bridge is off.
+    pub duty: Duty,
+    /// Whether the bridge's outputs are driven. Off leaves the motor open-circuit.
+    pub bridge: bool,
+}
+
+/// How converter codes become quantities, linear: quantity = (code − zero) · per_code.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scaling {
+    /// Code at no current (nominal; the offset is measured at start).
+    pub current_zero: f32,
+    /// A per code.
+    pub current_per_code: f32,
+    /// V per code, zero at code 0.
+    pub supply_per_code: f32,
+    /// Temperature at code 0, °C.
+    pub temperature_at_zero: f32,
+    /// °C per code.
+    pub temperature_per_code: f32,
+}
+
+impl Default for Scaling {
+    /// Mid-supply current sense of ±16.5 A, a 1:11 supply divider and a 10 mV/K sensor with 0.5 V at 0 °C
+    /// (the common analogue one) into a 3.3 V, 12-bit converter.
+    fn default() -> Self {
+        Self {
+            current_zero: 2048.0,
+            current_per_code: 33.0 / 4096.0,
+            supply_per_code: 3.3 * 11.0 / 4096.0,
+            temperature_at_zero: -50.0,
+            temperature_per_code: 330.0 / 4096.0,
+        }
+    }
+}
