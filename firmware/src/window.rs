@@ -1,0 +1,59 @@
+//! Averages over a window of control ticks, so that slower consumers see no aliases.
+
+use rig_shared::safety::LimitSet;
+
+/// Sums over the ticks of one window. Position and current are taken at the same instants, so their means
+/// belong to the same instant too.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Window {
+    /// Ticks so far.
+    pub ticks: u16,
+    /// Unwrapped counts, exact.
+    pub position: i64,
+    /// Motor current, A.
+    pub current: f32,
+    /// Motor voltage, V.
+    pub voltage: f32,
+    /// Reference position, rad.
+    pub reference: f32,
+    /// Commanded joint torque, N·m.
+    pub torque: f32,
+    /// Limits that acted at some tick.
+    pub limits: LimitSet,
+}
+
+/// What one control tick adds to a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tick {
+    /// Unwrapped counts.
+    pub position: i64,
+    /// Motor current, A.
+    pub current: f32,
+    /// Motor voltage that acts now, V.
+    pub voltage: f32,
+    /// Reference position, rad.
+    pub reference: f32,
+    /// Commanded joint torque, N·m.
+    pub torque: f32,
+    /// Limits acting.
+    pub limits: LimitSet,
+}
+
+impl Window {
+    /// Adds a tick; gives the finished window once `length` ticks are in, and starts anew.
+    pub fn push(&mut self, tick: &Tick, length: u16) -> Option<Self> {
+        self.ticks += 1;
+        self.position += tick.position;
+        self.current += tick.current;
+        self.voltage += tick.voltage;
+        self.reference += tick.reference;
+        self.torque += tick.torque;
+        self.limits = self.limits.union(tick.limits);
+        (self.ticks >= length).then(|| core::mem::take(self))
+    }
+
+    /// Mean of one of the window's sums.
+    pub fn mean(&self, sum: f32) -> f32 {
+        sum / f32::from(self.ticks.max(1))
+    }
+}

@@ -1,0 +1,100 @@
+//! Limits: what the rig must stay within, and which of them act now. A limit is no fault: the rig goes on,
+//! and says why torque is missing.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::Real;
+
+/// What the rig must stay within, joint-side unless said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Limits<T> {
+    /// Lowest reference position, rad.
+    pub position_low: T,
+    /// Highest reference position, rad.
+    pub position_high: T,
+    /// Highest speed, rad/s.
+    pub velocity: T,
+    /// Highest acceleration of a reference, rad/s².
+    pub acceleration: T,
+    /// Highest torque, N·m.
+    pub torque: T,
+    /// Highest continuous motor current, A.
+    pub continuous_current: T,
+    /// Highest motor current, A.
+    pub peak_current: T,
+}
+
+impl<T: Real<Mask = bool>> Limits<T> {
+    /// Whether every limit is a finite positive number and the position range is not empty.
+    ///
+    /// Written so that NaN fails each comparison.
+    pub fn is_valid(&self) -> bool {
+        let huge = T::from_f64(1e9);
+        let positive = |x: T| T::ZERO.lt(x) && x.lt(huge);
+        positive(self.velocity)
+            && positive(self.acceleration)
+            && positive(self.torque)
+            && positive(self.continuous_current)
+            && self.continuous_current.le(self.peak_current)
+            && positive(self.peak_current)
+            && self.position_low.lt(self.position_high)
+            && positive(self.position_high - self.position_low)
+    }
+}
+
+/// A limit that can act.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Limit {
+    /// The commanded joint torque was cut to `Limits::torque`.
+    Torque = 1,
+    /// The commanded current was cut to `Limits::peak_current`.
+    Current = 2,
+    /// The supply voltage was used up.
+    Voltage = 4,
+    /// The reference was held at the edge of the position range.
+    Position = 8,
+    /// The host is silent: the rig comes to rest.
+    HostSilent = 16,
+}
+
+impl Limit {
+    /// Every limit, for listing.
+    pub const ALL: [Self; 5] = [Self::Torque, Self::Current, Self::Voltage, Self::Position, Self::HostSilent];
+
+    /// What a plot or table calls it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Torque => "torque",
+            Self::Current => "current",
+            Self::Voltage => "voltage",
+            Self::Position => "position",
+            Self::HostSilent => "host silent",
+        }
+    }
+}
+
+/// Limits that act now, as a set of bits (the values of [`Limit`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LimitSet(pub u8);
+
+impl LimitSet {
+    /// Adds a limit if `acting`.
+    pub fn set(&mut self, limit: Limit, acting: bool) {
+        if acting {
+            self.0 |= limit as u8;
+        }
+    }
+
+    /// Whether the limit is in the set.
+    pub const fn has(self, limit: Limit) -> bool {
+        self.0 & limit as u8 != 0
+    }
+
+    /// Limits in either set.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}

@@ -1,0 +1,156 @@
+//! The checks of every control tick.
+//!
+//! Each looks at measured values only, never at what the controller believes, so that a wrong model
+//! cannot hide a fault. Leaves out: everything that hardware must catch within a tick (short circuits go
+//! to the timer's break input and arrive here as [`Fault::Driver`]).
+
+use super::fault::Fault;
+use super::limit::Limits;
+
+/// Thresholds that do not come with [`Limits`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MonitorConfig {
+    /// Control period, s.
+    pub period: f32,
+    /// Supply range, V.
+    pub supply: [f32; 2],
+    /// Highest temperature, °C.
+    pub temperature: f32,
+    /// Hard current limit over `Limits::peak_current`.
+    pub current_margin: f32,
+    /// Hard speed limit over `Limits::velocity`.
+    pub velocity_margin: f32,
+    /// How far beyond the position limits the link may be, rad.
+    pub position_margin: f32,
+    /// Largest plausible encoder step in a tick, counts.
+    pub largest_step: i32,
+    /// Ticks in a row that a single-sample check must fail, so that one disturbed sample stops nothing.
+    pub persistence: u16,
+    /// Ticks without one encoder count, at more than half the peak current, that mean a lost encoder.
+    pub encoder_lost_ticks: u32,
+    /// Ticks with one and the same current code, while the duty varied, that mean a stuck converter.
+    pub stuck_ticks: u32,
+    /// Duty variation within `stuck_ticks` that a live converter must have answered.
+    pub stuck_duty: f32,
+    /// Thermal time constant of the winding behind the i²t limit, s.
+    pub thermal_time: f32,
+}
+
+/// What the checks look at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Readings {
+    /// Break input.
+    pub driver_fault: bool,
+    /// The previous tick overran.
+    pub overrun: bool,
+    /// Converter code of the current.
+    pub current_code: u16,
+    /// Whether that code is at a rail.
+    pub current_at_rail: bool,
+    /// Motor current, A.
+    pub current: f32,
+    /// Supply, V.
+    pub supply: f32,
+    /// Temperature, °C.
+    pub temperature: f32,
+    /// Encoder step of this tick, counts.
+    pub encoder_step: i32,
+    /// Joint position, rad.
+    pub position: f32,
+    /// Joint velocity, rad/s.
+    pub velocity: f32,
+    /// Duty cycle that acts now, −1 to 1.
+    pub duty: f32,
+    /// Whether the bridge drives.
+    pub driving: bool,
+}
+
+/// Counters behind the checks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MonitorState {
+    over_current: u16,
+    at_rail: u16,
+    bad_supply: u16,
+    hot: u16,
+    over_speed: u16,
+    still: u32,
+    same_code: u32,
+    last_code: u16,
+    duty_low: f32,
+    duty_high: f32,
+    /// Filtered square of the current, A².
+    heat: f32,
+}
+
+/// Counts up while `failing`; true once `persistence` ticks in a row failed.
+fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
+    *counter = if failing { counter.saturating_add(1) } else { 0 };
+    *counter >= persistence
+}
+
+// A comparison with NaN is false: written as `!(value <= limit)`, a NaN is a fault.
+#[allow(clippy::neg_cmp_op_on_partial_ord)]
+/// One tick of all checks: the first fault found, with the value that was out of range.
+pub fn step(
+    config: &MonitorConfig,
+    limits: &Limits<f32>,
+    state: &mut MonitorState,
+    now: &Readings,
+) -> Option<(Fault, f32)> {
+    let magnitude = now.current.abs();
+    let n = config.persistence;
+    state.heat += (now.current * now.current - state.heat) * (config.period / config.thermal_time);
+
+    // Every counter is brought up to date before any is judged: an early return must not stop the others.
+    let over_current = persists(
+        &mut state.over_current,
+        !(magnitude <= limits.peak_current * config.current_margin),
+        n,
+    );
+    let at_rail = persists(&mut state.at_rail, now.current_at_rail, n);
+    let bad_supply =
+        persists(&mut state.bad_supply, !(config.supply[0] <= now.supply && now.supply <= config.supply[1]), n);
+    let hot = persists(&mut state.hot, !(now.temperature <= config.temperature), n);
+    let over_speed =
+        persists(&mut state.over_speed, !(now.velocity.abs() <= limits.velocity * config.velocity_margin), n);
+    let pushing = now.driving && magnitude > 0.5 * limits.peak_current;
+    state.still = if pushing && now.encoder_step == 0 { state.still.saturating_add(1) } else { 0 };
+    let stuck = converter_is_stuck(config, state, now);
+    let outside = now.driving
+        && !(limits.position_low - config.position_margin <= now.position
+            && now.position <= limits.position_high + config.position_margin);
+
+    let faults = [
+        (now.driver_fault, Fault::Driver, 0.0),
+        (over_current, Fault::OverCurrent, now.current),
+        (at_rail || stuck, Fault::AdcStuck, f32::from(now.current_code)),
+        (now.encoder_step.abs() > config.largest_step, Fault::EncoderJump, now.encoder_step as f32),
+        (state.still >= config.encoder_lost_ticks, Fault::EncoderLost, now.current),
+        (over_speed, Fault::OverSpeed, now.velocity),
+        (outside, Fault::Position, now.position),
+        (bad_supply, Fault::Supply, now.supply),
+        (hot, Fault::Temperature, now.temperature),
+        (
+            state.heat > limits.continuous_current * limits.continuous_current,
+            Fault::Overload,
+            libm::sqrtf(state.heat),
+        ),
+        (now.overrun && now.driving, Fault::Deadline, 0.0),
+    ];
+    faults.into_iter().find(|(failing, _, _)| *failing).map(|(_, fault, value)| (fault, value))
+}
+
+/// A converter that is alive follows the duty; one that is stuck keeps its code whatever is applied.
+fn converter_is_stuck(config: &MonitorConfig, state: &mut MonitorState, now: &Readings) -> bool {
+    if !now.driving || now.current_code != state.last_code {
+        state.last_code = now.current_code;
+        state.same_code = 0;
+        state.duty_low = now.duty;
+        state.duty_high = now.duty;
+        return false;
+    }
+    state.same_code = state.same_code.saturating_add(1);
+    state.duty_low = state.duty_low.min(now.duty);
+    state.duty_high = state.duty_high.max(now.duty);
+    state.same_code >= config.stuck_ticks && state.duty_high - state.duty_low > config.stuck_duty
+}

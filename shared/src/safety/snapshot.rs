@@ -1,0 +1,131 @@
+//! The last control ticks before the first fault, kept as they were.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// One control tick as the snapshot keeps it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SnapshotSample {
+    /// Control tick.
+    pub tick: u64,
+    /// Unwrapped encoder counts.
+    pub position: i64,
+    /// Motor current, A.
+    pub current: f32,
+    /// Duty cycle, −1 to 1.
+    pub duty: f32,
+    /// Supply voltage, V.
+    pub supply: f32,
+    /// Reference position, rad.
+    pub reference: f32,
+}
+
+/// A ring of the last `N` ticks that stops turning a few ticks after the first fault.
+#[derive(Clone, Debug)]
+pub struct Snapshot<const N: usize> {
+    ring: [SnapshotSample; N],
+    next: usize,
+    filled: usize,
+    /// Ticks still to be kept once a fault has latched; `None` while no fault has.
+    remaining: Option<usize>,
+}
+
+impl<const N: usize> Default for Snapshot<N> {
+    fn default() -> Self {
+        Self { ring: [SnapshotSample::default(); N], next: 0, filled: 0, remaining: None }
+    }
+}
+
+impl<const N: usize> Snapshot<N> {
+    /// Ticks kept after the fault: an eighth of the ring shows what the fault reaction did.
+    pub const AFTER: usize = N / 8;
+
+    /// Keeps a tick, unless the snapshot is frozen.
+    pub fn push(&mut self, sample: SnapshotSample) {
+        match &mut self.remaining {
+            Some(0) => return,
+            Some(remaining) => *remaining -= 1,
+            None => {}
+        }
+        if let Some(slot) = self.ring.get_mut(self.next) {
+            *slot = sample;
+        }
+        self.next = if self.next + 1 < N { self.next + 1 } else { 0 };
+        self.filled = (self.filled + 1).min(N);
+    }
+
+    /// Freezes the snapshot after [`Self::AFTER`] more ticks. Further calls change nothing.
+    pub fn freeze(&mut self) {
+        self.remaining.get_or_insert(Self::AFTER);
+    }
+
+    /// Whether nothing more will be written.
+    pub fn is_frozen(&self) -> bool {
+        self.remaining == Some(0)
+    }
+
+    /// Starts turning again; what was kept is overwritten by and by.
+    pub fn release(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Ticks kept.
+    pub fn len(&self) -> usize {
+        self.filled
+    }
+
+    /// Whether nothing has been kept yet.
+    pub fn is_empty(&self) -> bool {
+        self.filled == 0
+    }
+
+    /// The `index`-th kept tick, 0 the oldest.
+    pub fn get(&self, index: usize) -> Option<&SnapshotSample> {
+        if index >= self.filled {
+            return None;
+        }
+        // While the ring is not yet full, `next` equals `filled` and the oldest is at 0.
+        let oldest = if self.filled < N { 0 } else { self.next };
+        let position = oldest + index;
+        self.ring.get(if position < N { position } else { position - N })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn at(tick: u64) -> SnapshotSample {
+        SnapshotSample { tick, ..Default::default() }
+    }
+
+    #[test]
+    fn keeps_what_came_before_the_fault_and_a_little_after() {
+        let mut snapshot = Snapshot::<16>::default();
+        for tick in 0..100 {
+            snapshot.push(at(tick));
+        }
+        snapshot.freeze();
+        for tick in 100..200 {
+            snapshot.push(at(tick));
+            snapshot.freeze();
+        }
+        assert!(snapshot.is_frozen());
+        let ticks: std::vec::Vec<u64> = (0..snapshot.len()).map(|k| snapshot.get(k).unwrap().tick).collect();
+        assert_eq!(ticks, (86..102).collect::<std::vec::Vec<_>>());
+        assert!(snapshot.get(16).is_none());
+    }
+
+    #[test]
+    fn a_young_ring_starts_at_its_first_tick() {
+        let mut snapshot = Snapshot::<16>::default();
+        assert!(snapshot.is_empty());
+        for tick in 5..9 {
+            snapshot.push(at(tick));
+        }
+        assert_eq!(snapshot.get(0).unwrap().tick, 5);
+        assert_eq!(snapshot.get(3).unwrap().tick, 8);
+        assert!(snapshot.get(4).is_none());
+    }
+}
