@@ -12,14 +12,21 @@ pub struct Braking {
 impl Braking {
     /// Starts from where the reference is now.
     pub fn from(reference: Reference<f32>) -> Self {
-        Self { position: reference.position, velocity: reference.velocity }
+        Self {
+            position: reference.position,
+            velocity: reference.velocity,
+        }
     }
 
     /// One tick of `period` seconds at `deceleration` rad/s². The velocity ends at exactly zero.
     pub fn step(&mut self, deceleration: f32, period: f32) -> Reference<f32> {
         let change = deceleration * period;
         let before = self.velocity;
-        self.velocity = if before.abs() <= change { 0.0 } else { before - change.copysign(before) };
+        self.velocity = if before.abs() <= change {
+            0.0
+        } else {
+            before - change.copysign(before)
+        };
         self.position += 0.5 * (before + self.velocity) * period;
         Reference {
             position: self.position,
@@ -40,7 +47,11 @@ mod tests {
 
     #[test]
     fn braking_distance_is_that_of_constant_deceleration() {
-        let start = Reference { position: 1.0, velocity: -2.0, acceleration: 0.0 };
+        let start = Reference {
+            position: 1.0,
+            velocity: -2.0,
+            acceleration: 0.0,
+        };
         let mut braking = Braking::from(start);
         let (deceleration, period) = (8.0, 1e-4);
         let mut ticks = 0;

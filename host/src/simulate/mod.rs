@@ -1,8 +1,12 @@
 //! The closed loop of a model and its controller.
 
 mod step;
+#[cfg(test)]
+mod tests;
 
-use rig_shared::multibody::{COLUMNS, Chain, ChainError, JointGeometry, JointKind as Kind, MultibodyError, inertia_matrix};
+use rig_shared::multibody::{
+    COLUMNS, Chain, ChainError, JointGeometry, JointKind as Kind, MultibodyError, inertia_matrix,
+};
 use thiserror::Error;
 
 use crate::robot::{Controller, JointKind, Robot};
@@ -16,7 +20,9 @@ pub const STAND_IN_BANDWIDTH: f64 = 5.0;
 #[derive(Debug, Error)]
 pub enum SimulateError {
     /// Friction that feeds energy in.
-    #[error("{parameter} is {value}: friction below zero would drive the joint; give 0 or more, or identify it anew.")]
+    #[error(
+        "{parameter} is {value}: friction below zero would drive the joint; give 0 or more, or identify it anew."
+    )]
     NegativeFriction {
         /// Name with the joint's number.
         parameter: String,
@@ -24,19 +30,25 @@ pub enum SimulateError {
         value: f64,
     },
     /// A link without inertia.
-    #[error("the inertia that joint {joint} has to move is not positive: give its link a mass and an inertia, or its drive a rotor inertia.")]
+    #[error(
+        "the inertia that joint {joint} has to move is not positive: give its link a mass and an inertia, or its drive a rotor inertia."
+    )]
     NotPositiveDefinite {
         /// From 1 at the base.
         joint: usize,
     },
     /// A joint's inertial parameters are unknown.
-    #[error("joint \"{joint}\" has no [joint.inertial] and no drive inertia, so it cannot be simulated; `rig identify` writes a description that can.")]
+    #[error(
+        "joint \"{joint}\" has no [joint.inertial] and no drive inertia, so it cannot be simulated; `rig identify` writes a description that can."
+    )]
     NoInertia {
         /// The joint's name.
         joint: String,
     },
     /// The motion left what numbers can hold.
-    #[error("the simulated motion of joint \"{joint}\" grew beyond all bounds after {time:.3} s: the controller's gains do not fit the model.")]
+    #[error(
+        "the simulated motion of joint \"{joint}\" grew beyond all bounds after {time:.3} s: the controller's gains do not fit the model."
+    )]
     Diverged {
         /// The joint's name.
         joint: String,
@@ -107,7 +119,11 @@ impl Model {
 ///
 /// # Errors
 /// [`SimulateError::NoInertia`] where there is nothing to design it for.
-pub fn controllers(robot: &Robot, model: &Model, q: &[f64]) -> Result<(Vec<Controller>, Vec<String>), SimulateError> {
+pub fn controllers(
+    robot: &Robot,
+    model: &Model,
+    q: &[f64],
+) -> Result<(Vec<Controller>, Vec<String>), SimulateError> {
     let n = robot.joints.len();
     let mut mass = vec![0.0; n * n];
     inertia_matrix(&model.chain, &model.parameters, q, &mut mass)?;
@@ -120,7 +136,9 @@ pub fn controllers(robot: &Robot, model: &Model, q: &[f64]) -> Result<(Vec<Contr
         }
         let inertia = mass[i * n + i];
         if inertia.is_nan() || inertia <= 0.0 {
-            return Err(SimulateError::NoInertia { joint: joint.name.clone() });
+            return Err(SimulateError::NoInertia {
+                joint: joint.name.clone(),
+            });
         }
         let omega = core::f64::consts::TAU * STAND_IN_BANDWIDTH;
         stand_ins.push(joint.name.clone());
@@ -188,15 +206,26 @@ pub fn closed_loop(
     for k in 0..samples {
         for i in 0..n {
             let c = &controllers[i];
-            let wish =
-                c.torque_gain * c.velocity_gain * (c.position_gain * (inputs.reference[i][k] - q[i]) - v[i]);
-            let limit = robot.joints[i].limits.as_ref().and_then(|l| l.torque).unwrap_or(f64::INFINITY);
+            let wish = c.torque_gain
+                * c.velocity_gain
+                * (c.position_gain * (inputs.reference[i][k] - q[i]) - v[i]);
+            let limit = robot.joints[i]
+                .limits
+                .as_ref()
+                .and_then(|l| l.torque)
+                .unwrap_or(f64::INFINITY);
             let applied = wish.max(-limit).min(limit);
             motion.saturated[i] += usize::from(applied != wish);
             motion.q[i].push(q[i]);
             motion.qd[i].push(v[i]);
             motion.tau[i].push(applied);
-            torque[i] = applied + inputs.added.get(i).and_then(|a| a.get(k)).copied().unwrap_or(0.0);
+            torque[i] = applied
+                + inputs
+                    .added
+                    .get(i)
+                    .and_then(|a| a.get(k))
+                    .copied()
+                    .unwrap_or(0.0);
             if !(q[i].is_finite() && v[i].is_finite() && applied.is_finite()) {
                 return Err(SimulateError::Diverged {
                     joint: robot.joints[i].name.clone(),

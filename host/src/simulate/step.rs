@@ -73,12 +73,23 @@ impl<'a> Stepper<'a> {
     ///
     /// # Errors
     /// [`SimulateError::Multibody`] where the inertia matrix is not positive definite.
-    pub fn step(&mut self, q: &mut [f64], v: &mut [f64], torque: &[f64], dt: f64) -> Result<(), SimulateError> {
+    pub fn step(
+        &mut self,
+        q: &mut [f64],
+        v: &mut [f64],
+        torque: &[f64],
+        dt: f64,
+    ) -> Result<(), SimulateError> {
         let n = q.len();
         for i in 0..n {
             self.middle[i] = q[i] + 0.5 * dt * v[i];
         }
-        inertia_matrix(&self.model.chain, &self.smooth, &self.middle, &mut self.mass)?;
+        inertia_matrix(
+            &self.model.chain,
+            &self.smooth,
+            &self.middle,
+            &mut self.mass,
+        )?;
         // Viscous friction acts on the mean velocity of the step: half of it belongs to the unknown.
         self.factor.copy_from_slice(&self.mass);
         for i in 0..n {
@@ -87,11 +98,19 @@ impl<'a> Stepper<'a> {
         invert(&mut self.factor, &mut self.inverse, n)?;
         self.mean_velocity.copy_from_slice(v);
         for _ in 0..PASSES {
-            bias_torque(&self.model.chain, &self.smooth, &self.middle, &self.mean_velocity, &mut self.bias)?;
+            bias_torque(
+                &self.model.chain,
+                &self.smooth,
+                &self.middle,
+                &self.mean_velocity,
+                &mut self.bias,
+            )?;
             for i in 0..n {
                 let own = &self.model.parameters[i];
-                let driving =
-                    torque[i] - self.bias[i] - own[column::OFFSET] - 0.5 * own[column::VISCOUS] * v[i];
+                let driving = torque[i]
+                    - self.bias[i]
+                    - own[column::OFFSET]
+                    - 0.5 * own[column::VISCOUS] * v[i];
                 let momentum: f64 = (0..n).map(|k| self.mass[i * n + k] * v[k]).sum();
                 self.next[i] = momentum + dt * driving;
             }
@@ -116,13 +135,16 @@ impl<'a> Stepper<'a> {
         for _ in 0..SWEEPS {
             let mut change = 0.0_f64;
             for i in 0..n {
-                let coupled: f64 = (0..n).map(|k| self.inverse[i * n + k] * self.friction[k]).sum();
+                let coupled: f64 = (0..n)
+                    .map(|k| self.inverse[i * n + k] * self.friction[k])
+                    .sum();
                 let velocity = self.free[i] - dt * coupled;
                 let limit = self.model.parameters[i][column::COULOMB];
                 let before = self.friction[i];
                 let wanted = before + velocity / (dt * self.inverse[i * n + i]);
                 self.friction[i] = wanted.clamp(-limit, limit);
-                change = change.max((self.friction[i] - before).abs() / limit.max(f64::MIN_POSITIVE));
+                change =
+                    change.max((self.friction[i] - before).abs() / limit.max(f64::MIN_POSITIVE));
             }
             // A single joint is exact after one sweep; the comparison ends it after the second.
             if change < 1e-12 {
@@ -130,7 +152,9 @@ impl<'a> Stepper<'a> {
             }
         }
         for i in 0..n {
-            let coupled: f64 = (0..n).map(|k| self.inverse[i * n + k] * self.friction[k]).sum();
+            let coupled: f64 = (0..n)
+                .map(|k| self.inverse[i * n + k] * self.friction[k])
+                .sum();
             let velocity = self.free[i] - dt * coupled;
             // A stuck joint is at rest exactly, not to rounding: drift over minutes would otherwise add up.
             let stuck = self.friction[i].abs() < self.model.parameters[i][column::COULOMB];

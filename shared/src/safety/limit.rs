@@ -61,7 +61,13 @@ pub enum Limit {
 
 impl Limit {
     /// Every limit, for listing.
-    pub const ALL: [Self; 5] = [Self::Torque, Self::Current, Self::Voltage, Self::Position, Self::HostSilent];
+    pub const ALL: [Self; 5] = [
+        Self::Torque,
+        Self::Current,
+        Self::Voltage,
+        Self::Position,
+        Self::HostSilent,
+    ];
 
     /// What a plot or table calls it.
     pub const fn name(self) -> &'static str {

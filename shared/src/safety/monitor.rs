@@ -84,7 +84,11 @@ pub struct MonitorState {
 
 /// Counts up while `failing`; true once `persistence` ticks in a row failed.
 fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
-    *counter = if failing { counter.saturating_add(1) } else { 0 };
+    *counter = if failing {
+        counter.saturating_add(1)
+    } else {
+        0
+    };
     *counter >= persistence
 }
 
@@ -108,13 +112,23 @@ pub fn step(
         n,
     );
     let at_rail = persists(&mut state.at_rail, now.current_at_rail, n);
-    let bad_supply =
-        persists(&mut state.bad_supply, !(config.supply[0] <= now.supply && now.supply <= config.supply[1]), n);
+    let bad_supply = persists(
+        &mut state.bad_supply,
+        !(config.supply[0] <= now.supply && now.supply <= config.supply[1]),
+        n,
+    );
     let hot = persists(&mut state.hot, !(now.temperature <= config.temperature), n);
-    let over_speed =
-        persists(&mut state.over_speed, !(now.velocity.abs() <= limits.velocity * config.velocity_margin), n);
+    let over_speed = persists(
+        &mut state.over_speed,
+        !(now.velocity.abs() <= limits.velocity * config.velocity_margin),
+        n,
+    );
     let pushing = now.driving && magnitude > 0.5 * limits.peak_current;
-    state.still = if pushing && now.encoder_step == 0 { state.still.saturating_add(1) } else { 0 };
+    state.still = if pushing && now.encoder_step == 0 {
+        state.still.saturating_add(1)
+    } else {
+        0
+    };
     let stuck = converter_is_stuck(config, state, now);
     let outside = now.driving
         && !(limits.position_low - config.position_margin <= now.position
@@ -123,9 +137,21 @@ pub fn step(
     let faults = [
         (now.driver_fault, Fault::Driver, 0.0),
         (over_current, Fault::OverCurrent, now.current),
-        (at_rail || stuck, Fault::AdcStuck, f32::from(now.current_code)),
-        (now.encoder_step.abs() > config.largest_step, Fault::EncoderJump, now.encoder_step as f32),
-        (state.still >= config.encoder_lost_ticks, Fault::EncoderLost, now.current),
+        (
+            at_rail || stuck,
+            Fault::AdcStuck,
+            f32::from(now.current_code),
+        ),
+        (
+            now.encoder_step.abs() > config.largest_step,
+            Fault::EncoderJump,
+            now.encoder_step as f32,
+        ),
+        (
+            state.still >= config.encoder_lost_ticks,
+            Fault::EncoderLost,
+            now.current,
+        ),
         (over_speed, Fault::OverSpeed, now.velocity),
         (outside, Fault::Position, now.position),
         (bad_supply, Fault::Supply, now.supply),
@@ -137,7 +163,10 @@ pub fn step(
         ),
         (now.overrun && now.driving, Fault::Deadline, 0.0),
     ];
-    faults.into_iter().find(|(failing, _, _)| *failing).map(|(_, fault, value)| (fault, value))
+    faults
+        .into_iter()
+        .find(|(failing, _, _)| *failing)
+        .map(|(_, fault, value)| (fault, value))
 }
 
 /// A converter that is alive follows the duty; one that is stuck keeps its code whatever is applied.

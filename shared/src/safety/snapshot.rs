@@ -32,7 +32,12 @@ pub struct Snapshot<const N: usize> {
 
 impl<const N: usize> Default for Snapshot<N> {
     fn default() -> Self {
-        Self { ring: [SnapshotSample::default(); N], next: 0, filled: 0, remaining: None }
+        Self {
+            ring: [SnapshotSample::default(); N],
+            next: 0,
+            filled: 0,
+            remaining: None,
+        }
     }
 }
 
@@ -87,7 +92,8 @@ impl<const N: usize> Snapshot<N> {
         // While the ring is not yet full, `next` equals `filled` and the oldest is at 0.
         let oldest = if self.filled < N { 0 } else { self.next };
         let position = oldest + index;
-        self.ring.get(if position < N { position } else { position - N })
+        self.ring
+            .get(if position < N { position } else { position - N })
     }
 }
 
@@ -97,7 +103,10 @@ mod tests {
     use super::*;
 
     fn at(tick: u64) -> SnapshotSample {
-        SnapshotSample { tick, ..Default::default() }
+        SnapshotSample {
+            tick,
+            ..Default::default()
+        }
     }
 
     #[test]
@@ -112,7 +121,9 @@ mod tests {
             snapshot.freeze();
         }
         assert!(snapshot.is_frozen());
-        let ticks: std::vec::Vec<u64> = (0..snapshot.len()).map(|k| snapshot.get(k).unwrap().tick).collect();
+        let ticks: std::vec::Vec<u64> = (0..snapshot.len())
+            .map(|k| snapshot.get(k).unwrap().tick)
+            .collect();
         assert_eq!(ticks, (86..102).collect::<std::vec::Vec<_>>());
         assert!(snapshot.get(16).is_none());
     }

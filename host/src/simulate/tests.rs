@@ -1,0 +1,161 @@
+#![allow(clippy::unwrap_used)]
+
+use rig_shared::multibody::{column, kinetic_energy, potential_energy};
+
+use super::*;
+use crate::robot::Robot;
+
+/// A pendulum on a gear; `fc` and `fv` are its friction.
+fn pendulum(fc: f64, fv: f64) -> Robot {
+    toml::from_str(&format!(
+        r#"
+        name = "pendulum"
+        gravity = [0.0, 0.0, -9.81]
+        [[joint]]
+        name = "link"
+        kind = "revolute"
+        alpha = 1.5707963267948966
+        a = 0.0
+        theta = 0.0
+        d = 0.0
+        [joint.inertial]
+        mass = 1.0
+        first_moment = [0.3, 0.0, 0.0]
+        inertia = [0.0, 0.0, 0.0, 0.0, 0.0, 0.12]
+        [joint.friction]
+        coulomb = {fc:?}
+        viscous = {fv:?}
+        "#
+    ))
+    .unwrap()
+}
+
+/// Two links that swing against each other under gravity.
+fn double_pendulum(fc: f64) -> Robot {
+    let mut robot = pendulum(fc, 0.0);
+    let mut second = robot.joints[0].clone();
+    second.name = "second".into();
+    second.alpha = 0.0;
+    second.a = 0.5;
+    robot.joints.push(second);
+    robot
+}
+
+fn energy(model: &Model, q: &[f64], v: &[f64]) -> f64 {
+    kinetic_energy(&model.chain, &model.parameters, q, v).unwrap()
+        + potential_energy(&model.chain, &model.parameters, q).unwrap()
+}
+
+/// Swings freely and gives the final state and the energy that friction took.
+fn swing(robot: &Robot, dt: f64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
+    let model = Model::from_robot(robot).unwrap();
+    let n = robot.joints.len();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, mut v, none) = (vec![0.3; n], vec![0.0; n], vec![0.0; n]);
+    for _ in 0..(seconds / dt).round() as usize {
+        stepper.step(&mut q, &mut v, &none, dt).unwrap();
+    }
+    (q, v)
+}
+
+#[test]
+fn without_friction_energy_stays_and_the_error_falls_with_the_square_of_the_step() {
+    let robot = double_pendulum(0.0);
+    let model = Model::from_robot(&robot).unwrap();
+    let before = energy(&model, &[0.3, 0.3], &[0.0, 0.0]);
+    let drift = |dt| {
+        let (q, v) = swing(&robot, dt, 2.0);
+        (energy(&model, &q, &v) - before).abs()
+    };
+    let (coarse, fine) = (drift(1e-3), drift(5e-4));
+    assert!(coarse < 1e-3, "{coarse}");
+    assert!(fine < coarse / 3.0, "{coarse} {fine}");
+}
+
+#[test]
+fn a_frictionless_swing_converges_to_the_fine_solution() {
+    let robot = double_pendulum(0.0);
+    let (reference, _) = swing(&robot, 1e-5, 1.0);
+    let error = |dt| (swing(&robot, dt, 1.0).0[1] - reference[1]).abs();
+    assert!(error(1e-3) < 1e-3);
+    assert!(error(5e-4) < error(1e-3) / 3.0);
+}
+
+#[test]
+fn coulomb_friction_takes_exactly_its_torque_times_the_way() {
+    // Far from its rest position the pendulum swings to one side only: the way is the change of angle.
+    let robot = pendulum(0.4, 0.0);
+    let frictionless = Model::from_robot(&pendulum(0.0, 0.0)).unwrap();
+    let (q, v) = swing(&robot, 1e-5, 0.25);
+    let lost = energy(&frictionless, &[0.3], &[0.0]) - energy(&frictionless, &q, &v);
+    let way = (q[0] - 0.3).abs();
+    assert!(way > 0.2);
+    assert!((lost - 0.4 * way).abs() < 1e-6, "{lost} {way}");
+}
+
+#[test]
+fn below_breakaway_nothing_creeps() {
+    // Gravity of 2.94 N·m against 3 N·m of friction.
+    let model = Model::from_robot(&pendulum(3.0, 0.1)).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, mut v) = (vec![0.0], vec![0.0]);
+    for _ in 0..600_000 {
+        stepper.step(&mut q, &mut v, &[0.0], 1e-4).unwrap();
+    }
+    assert_eq!((q[0], v[0]), (0.0, 0.0));
+}
+
+#[test]
+fn one_stuck_joint_carries_the_load_of_the_moving_one() {
+    let mut robot = double_pendulum(0.0);
+    robot.joints[0].friction.as_mut().unwrap().coulomb = 50.0;
+    let (q, v) = swing(&robot, 1e-4, 1.0);
+    assert_eq!((q[0], v[0]), (0.3, 0.0));
+    // The second then swings as a simple pendulum about a fixed pivot: its energy is its own.
+    assert!((q[1] - 0.3).abs() > 0.5);
+    let model = Model::from_robot(&robot).unwrap();
+    let start = energy(&model, &[0.3, 0.3], &[0.0, 0.0]);
+    assert!((energy(&model, &q, &v) - start).abs() < 1e-5);
+}
+
+#[test]
+fn viscous_friction_decays_as_the_exponential() {
+    let mut robot = pendulum(0.0, 0.6);
+    robot.gravity = [0.0; 3];
+    let model = Model::from_robot(&robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, mut v) = (vec![0.0], vec![2.0]);
+    for _ in 0..2000 {
+        stepper.step(&mut q, &mut v, &[0.0], 1e-4).unwrap();
+    }
+    let exact = 2.0 * (-0.6_f64 / 0.12 * 0.2).exp();
+    assert!((v[0] / exact - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_stand_in_controller_tracks_a_slow_sine() {
+    let robot = pendulum(0.0, 0.1);
+    let model = Model::from_robot(&robot).unwrap();
+    let reference: Vec<f64> = (0..4000).map(|k| 0.5 * (0.001 * f64::from(k)).sin()).collect();
+    let (controllers, stand_ins) = controllers(&robot, &model, &[0.0]).unwrap();
+    assert_eq!(stand_ins, ["link"]);
+    let inputs = Inputs { period: 1e-3, reference: &[reference], added: &[], q: &[0.0], v: &[0.0], substeps: 4 };
+    let motion = closed_loop(&robot, &model, &controllers, &inputs, |_| ()).unwrap();
+    // What a cascade without feed-forward leaves: gravity and viscous friction over the stiffness J·ω², and the
+    // lag of the velocity over the position gain.
+    let omega = core::f64::consts::TAU * STAND_IN_BANDWIDTH;
+    let last = 3999;
+    let speed = motion.qd[0][last];
+    let load = 0.3 * 9.81 * motion.q[0][last].cos() + 0.1 * speed;
+    let expected = -load / (0.12 * omega * omega) - speed / (0.5 * omega);
+    let error = motion.q[0][last] - inputs.reference[0][last];
+    assert!((error - expected).abs() < 5e-4, "{error} {expected}");
+}
+
+#[test]
+fn friction_below_zero_is_refused_by_name() {
+    let mut model = Model::from_robot(&pendulum(0.4, 0.1)).unwrap();
+    model.parameters[0][column::VISCOUS] = -0.2;
+    let error = Stepper::new(&model).err().unwrap().to_string();
+    assert!(error.contains("fv1") && error.contains("-0.2"), "{error}");
+}
