@@ -1,7 +1,19 @@
 //! Control laws of the one-link rig.
+//!
+//! Each law is a pure function `step(&Config, &mut State, Input) -> Output` (or without a state where it has
+//! none). [`law`] picks among the position laws by [`ControlKind`]; [`current`] turns the torque's current into a
+//! bridge duty cycle.
+
+pub mod adaptive;
+pub mod computed_torque;
+pub mod current;
+pub mod law;
+pub mod pd;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
+
+use crate::scalar::Real;
 
 /// Which law turns reference and measurement into a joint torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -26,4 +38,180 @@ pub struct Gains<T> {
     pub adaptation: T,
     /// Closed-loop bandwidth of the current loop, Hz.
     pub current_bandwidth: T,
+}
+
+impl<T: Real> Gains<T> {
+    /// Gains that give an inertia (kg·m²) the undamped natural frequency `bandwidth` (Hz) and the damping ratio:
+    /// kp = J·ω², kd = 2ζ·J·ω. The current loop is made ten times as fast, so that its lag takes
+    /// less than 6° of phase at ω, and adaptation runs at ω.
+    pub fn design(inertia: T, bandwidth: T, damping: T) -> Self {
+        let omega = T::from_f64(core::f64::consts::TAU) * bandwidth;
+        Self {
+            proportional: inertia * omega.squared(),
+            derivative: T::from_f64(2.0) * damping * inertia * omega,
+            adaptation: omega,
+            current_bandwidth: T::from_f64(10.0) * bandwidth,
+        }
+    }
+}
+
+impl<T: Real<Mask = bool>> Gains<T> {
+    /// Whether all gains are finite, none negative, and those that are divided by above zero.
+    pub fn usable(&self) -> bool {
+        let most = T::from_f64(1.0e30);
+        let within = |x: T| T::ZERO.le(x) && x.le(most);
+        within(self.proportional)
+            && within(self.derivative)
+            && within(self.adaptation)
+            && within(self.current_bandwidth)
+            && T::ZERO.lt(self.derivative)
+            && T::ZERO.lt(self.current_bandwidth)
+    }
+}
+
+/// Where the link is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured<T> {
+    /// Joint position, rad.
+    pub position: T,
+    /// Joint velocity, rad/s.
+    pub velocity: T,
+}
+
+/// A joint torque within its limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Torque<T> {
+    /// What is to be applied, N·m.
+    pub value: T,
+    /// Whether the limit took something away.
+    pub limited: bool,
+    /// Part of the unlimited torque that came from friction precompensation, N·m.
+    pub friction: T,
+}
+
+impl<T: Real<Mask = bool>> Torque<T> {
+    /// A wished torque cut to ±`limit`, N·m. A wish that is not a number becomes 0 and counts as limited.
+    #[inline]
+    pub fn within(limit: T, wish: T, friction: T) -> Self {
+        let number = wish.le(wish);
+        let wish = T::select(number, wish, T::ZERO);
+        let value = wish.clamp_to(-limit, limit);
+        Self {
+            value,
+            limited: !number || limit.lt(wish.abs()),
+            friction,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod rig {
+    //! A link for the tests of the position laws, with friction that is smooth and monotone in velocity.
+    use super::*;
+    use crate::link::LinkParameters;
+    use crate::trajectory::Reference;
+
+    pub(crate) const LINK: LinkParameters<f64> = LinkParameters {
+        inertia: 0.17,
+        gravity_cos: 2.9,
+        gravity_sin: -0.4,
+        viscous: 0.3,
+        coulomb: 0.4,
+        offset: 0.05,
+    };
+
+    /// Two sines, starting at rest.
+    pub(crate) fn reference(t: f64) -> Reference<f64> {
+        let (w1, w2) = (2.0, 5.0);
+        Reference {
+            position: 0.8 * (1.0 - libm::cos(w1 * t)) + 0.2 * (1.0 - libm::cos(w2 * t)),
+            velocity: 0.8 * w1 * libm::sin(w1 * t) + 0.2 * w2 * libm::sin(w2 * t),
+            acceleration: 0.8 * w1 * w1 * libm::cos(w1 * t) + 0.2 * w2 * w2 * libm::cos(w2 * t),
+        }
+    }
+
+    /// The link over `step` seconds under a constant torque, ten substeps.
+    pub(crate) fn advance(
+        link: &LinkParameters<f64>,
+        x: &mut Measured<f64>,
+        torque: f64,
+        step: f64,
+    ) {
+        let h = step / 10.0;
+        for _ in 0..10 {
+            let friction = link.friction_torque(x.velocity, libm::tanh(x.velocity / 0.01));
+            let torque = torque - link.gravity_torque(x.position) - friction - link.offset;
+            x.velocity += h * torque / link.inertia;
+            x.position += h * x.velocity;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn designed_gains_place_the_poles() {
+        let inertia = 0.17;
+        let gains = Gains::<f64>::design(inertia, 8.0, 0.7);
+        let omega = libm::sqrt(gains.proportional / inertia);
+        assert!((omega / core::f64::consts::TAU - 8.0).abs() < 1e-12);
+        let damping = gains.derivative / (2.0 * libm::sqrt(gains.proportional * inertia));
+        assert!((damping - 0.7).abs() < 1e-12 && gains.usable());
+    }
+
+    #[test]
+    fn gains_that_cannot_work_are_not_usable() {
+        let good = Gains::<f32>::design(0.2, 5.0, 1.0);
+        assert!(
+            !Gains {
+                derivative: 0.0,
+                ..good
+            }
+            .usable()
+        );
+        assert!(
+            !Gains {
+                proportional: f32::NAN,
+                ..good
+            }
+            .usable()
+        );
+        assert!(
+            !Gains {
+                adaptation: -1.0,
+                ..good
+            }
+            .usable()
+        );
+    }
+
+    #[test]
+    fn torque_limit_is_kept_and_reported() {
+        assert_eq!(
+            Torque::within(2.0, 1.5, 0.0),
+            Torque {
+                value: 1.5,
+                limited: false,
+                friction: 0.0
+            }
+        );
+        assert_eq!(
+            Torque::within(2.0, -3.0, 0.1),
+            Torque {
+                value: -2.0,
+                limited: true,
+                friction: 0.1
+            }
+        );
+        assert_eq!(
+            Torque::within(2.0_f32, f32::NAN, 0.0),
+            Torque {
+                value: 0.0,
+                limited: true,
+                friction: 0.0
+            }
+        );
+    }
 }
