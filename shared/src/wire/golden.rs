@@ -24,17 +24,17 @@ use crate::trajectory::Trajectory;
 
 fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
     std::vec![
-        ("Hello", RequestBody::Hello, "@Hello@"),
-        ("KeepAlive", RequestBody::KeepAlive, "@KeepAlive@"),
-        ("Arm", RequestBody::Arm, "@Arm@"),
-        ("Disarm", RequestBody::Disarm, "@Disarm@"),
-        ("Start", RequestBody::Start, "@Start@"),
-        ("Stop", RequestBody::Stop, "@Stop@"),
-        ("ClearFault", RequestBody::ClearFault, "@ClearFault@"),
+        ("Hello", RequestBody::Hello, "03820205dab6698300"),
+        ("KeepAlive", RequestBody::KeepAlive, "08820201d935027100"),
+        ("Arm", RequestBody::Arm, "088202022dc6526200"),
+        ("Disarm", RequestBody::Disarm, "088202032e45399000"),
+        ("Start", RequestBody::Start, "08820204c521f34400"),
+        ("Stop", RequestBody::Stop, "08820205c6a298b600"),
+        ("ClearFault", RequestBody::ClearFault, "088202063251c8a500"),
         (
             "SetTrajectory",
             RequestBody::SetTrajectory(Trajectory::Hold(1.5)),
-            "@SetTrajectory@"
+            "04820207010107c03ff5323a1600"
         ),
         (
             "SetGains",
@@ -44,12 +44,12 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 adaptation: 0.5,
                 current_bandwidth: 800.0
             }),
-            "@SetGains@"
+            "0482020801032042010320400101023f01074844257bf2b600"
         ),
         (
             "SetControl",
             RequestBody::SetControl(ControlKind::Adaptive),
-            "@SetControl@"
+            "09820209024cd8428500"
         ),
         (
             "SetModel",
@@ -61,7 +61,7 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 coulomb: 0.4,
                 offset: 0.01
             }),
-            "@SetModel@"
+            "2082020a8fc2f53d9a993940cdccccbd9a99993ecdcccc3e0ad7233c1401307300"
         ),
         (
             "SetFriction",
@@ -74,7 +74,7 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 viscous_asymmetry: -0.02,
                 load_coefficient: 0.03
             }),
-            "@SetFriction@"
+            "2482020bcdcccc3e9a99993ecdcc4c3ecdcc4c3d0ad7233c0ad7a3bc8fc2f53c4e153bfd00"
         ),
         (
             "SetPrecompensation",
@@ -84,7 +84,7 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 gain_at_rest: 0.7,
                 velocity_threshold: 0.02
             }),
-            "@SetPrecompensation@"
+            "1582020c013333733f3333333f0ad7a33cb820be2800"
         ),
         (
             "SetLimits",
@@ -97,7 +97,7 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 continuous_current: 3.0,
                 peak_current: 9.0
             }),
-            "@SetLimits@"
+            "0482020d010340c0010340400103c0400103704201010241010340400107104110f68af900"
         ),
         (
             "SetEstimator",
@@ -108,11 +108,19 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 lower: [0.0, -9.0, -9.0, 0.0, 0.0, -1.0],
                 upper: [1.0, 9.0, 9.0, 2.0, 2.0, 1.0]
             }),
-            "@SetEstimator@"
+            "0582020e010103a0410103704101010101010310c1010310c10101010101010101010380bf0103803f010310410103104101010240010102400107803f3178087e00"
         ),
-        ("StartStream", RequestBody::StartStream, "@StartStream@"),
-        ("StopStream", RequestBody::StopStream, "@StopStream@"),
-        ("GetSnapshot", RequestBody::GetSnapshot, "@GetSnapshot@"),
+        (
+            "StartStream",
+            RequestBody::StartStream,
+            "0882020ffe8a7add00"
+        ),
+        ("StopStream", RequestBody::StopStream, "08820210b571379300"),
+        (
+            "GetSnapshot",
+            RequestBody::GetSnapshot,
+            "08820211b6f25c6100"
+        ),
     ]
 }
 
@@ -131,7 +139,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 gear_ratio: 50.0,
                 torque_constant: 0.05
             }),
-            "@Greeting@"
+            "011701ef9bafcdf8acd1910105302e312e30904e0a148040010b4842cdcc4c3dd2bf6f7700"
         ),
         (
             "Acknowledge",
@@ -139,7 +147,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 id: 300,
                 result: Ok(())
             }),
-            "@Acknowledge@"
+            "0401ac020519c78b7e00"
         ),
         (
             "Acknowledge, refused",
@@ -147,7 +155,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 id: 301,
                 result: Err(Refusal::OutsideLimits)
             }),
-            "@Acknowledge, refused@"
+            "0a01ad020104e561923300"
         ),
         (
             "Batch",
@@ -169,7 +177,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 )
                 .collect()
             }),
-            "@Batch@"
+            "090207f0883d02a3130101023f0103a0bf010340410103403f010760400503a3130101023f0103a0bf010340410103403f01096040050398450ac600"
         ),
         (
             "Estimate",
@@ -180,7 +188,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 trusted: [true, true, false, true, false, true],
                 residual_rms: 0.05
             }),
-            "@Estimate@"
+            "3603a01f8fc2f53d9a993940cdccccbd9a99993ecdcccc3e0ad7233c6f12833a0ad7a33c0ad7a33ca69b443b6f12833b6f12033a010102010a01cdcc4c3d0d371fd600"
         ),
         (
             "Fault",
@@ -189,7 +197,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 tick: 99,
                 value: 12.5
             }),
-            "@Fault@"
+            "04040a63010748416ee38d1000"
         ),
         (
             "Snapshot",
@@ -206,7 +214,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 })
                 .collect()
             }),
-            "@Snapshot@"
+            "08050840015b990101030841010380be0103bc410101063e9252dd2000"
         ),
         (
             "StreamEnd",
@@ -216,7 +224,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 dropped: 16,
                 first_tick: 1_000_000
             }),
-            "@StreamEnd@"
+            "0c060b5510c0843d6827e16500"
         ),
     ]
 }
