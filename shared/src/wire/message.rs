@@ -2,7 +2,7 @@
 //!
 //! Requests go to the rig, each with a number that the acknowledgement repeats; reports come from it.
 //! Floating-point values are SI and joint-side unless their name says otherwise. A change to any type
-//! here changes [`schema`](super::schema), and both ends then refuse each other by name.
+//! here changes [`schema`](super::schema()), and both ends then refuse each other by name.
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
@@ -35,7 +35,7 @@ pub struct Request {
 /// What the host can ask for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum RequestBody {
-    /// Ask for the [`Greeting`].
+    /// Ask for the [`Greeting`]; first in every version, so that it is always understood.
     Hello,
     /// Nothing but a sign of life; without one the rig stops after its host time-out.
     KeepAlive,
@@ -65,9 +65,9 @@ pub enum RequestBody {
     SetLimits(Limits<f32>),
     /// Replace the on-line estimator's settings and start it anew.
     SetEstimator(EstimatorSettings<f32>),
-    /// Send telemetry until `StopStream`.
+    /// Send telemetry until `StopStream`; a stream that runs is ended without [`StreamEnd`].
     StartStream,
-    /// End the telemetry with [`StreamEnd`].
+    /// End the telemetry with [`StreamEnd`]. Without a stream the last one's end is sent again.
     StopStream,
     /// Send the snapshot of the first latched fault, part by part.
     GetSnapshot,
@@ -77,7 +77,7 @@ pub enum RequestBody {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 #[allow(clippy::large_enum_variant)] // the batch is the common case; boxing needs an allocator
 pub enum Report {
-    /// Who speaks, in which version, at which rates.
+    /// Who speaks, in which version, at which rates; first in every version.
     Greeting(Greeting),
     /// Answer to a [`Request`].
     Acknowledge(Acknowledge),
@@ -96,9 +96,9 @@ pub enum Report {
 /// Who speaks, in which version, at which rates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Greeting {
-    /// [`super::PROTOCOL_VERSION`] of the rig.
+    /// [`super::PROTOCOL_VERSION`] of the rig. This and `schema` come first in every version.
     pub protocol: u16,
-    /// [`super::schema`] of the rig: a fingerprint of every type in this file.
+    /// [`super::schema()`] of the rig: a fingerprint of every type in this file.
     pub schema: u64,
     /// Firmware version as text.
     pub firmware: String<24>,
@@ -145,7 +145,7 @@ pub enum Refusal {
 /// Consecutive state samples, oldest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Batch {
-    /// Counts batches since `StartStream`; a gap is a loss.
+    /// Counts batches since `StartStream`, those that the rig had to drop too; a gap is a loss.
     pub sequence: u32,
     /// Control tick at which the first sample's averaging window began.
     pub first_tick: u64,
@@ -209,4 +209,6 @@ pub struct StreamEnd {
     pub samples: u64,
     /// Samples the rig itself had to drop because its transmit queue was full.
     pub dropped: u64,
+    /// Control tick at which the stream's first window began; places a loss of the whole stream.
+    pub first_tick: u64,
 }

@@ -1,3 +1,31 @@
 //! The wire format: postcard messages in COBS frames with a CRC.
+//!
+//! ```text
+//!  message ──postcard──► bytes ++ CRC-32C ──COBS──► no zero byte ++ 0x00 ──► line
+//! ```
+//!
+//! * [`message`]: what is said; [`mod@schema`]: how both ends make sure that they mean the same by it;
+//! * [`frame`]: messages to bytes and back, over a line that may lose, flip or add bytes;
+//! * [`batch`]: the rig collects its telemetry, [`loss`]: the host says exactly what of it is missing;
+//! * [`ledger`]: a request that was sent twice is carried out once.
+//!
+//! Nothing here allocates, and no sequence of bytes makes it panic.
 
+pub mod batch;
+pub mod frame;
+pub mod ledger;
+pub mod loss;
 pub mod message;
+pub mod schema;
+
+#[cfg(test)]
+mod golden;
+
+pub use batch::Batcher;
+pub use frame::{
+    DecodeError, Decoder, EncodeError, FrameCounts, MAX_FRAME, MAX_MESSAGE, MAX_PAYLOAD,
+    MessageDecoder, encode,
+};
+pub use ledger::Ledger;
+pub use loss::{BatchRefusal, EndMismatch, Gap, LossCounts, Reassembly};
+pub use schema::{PROTOCOL_VERSION, schema, version_of_greeting};
