@@ -1,0 +1,100 @@
+//! What is fixed while the rig runs: rates, nameplate, thresholds; and what the host may replace.
+
+use rig_shared::control::{ControlKind, Gains};
+use rig_shared::drive::Drive;
+use rig_shared::estimation::EstimatorSettings;
+use rig_shared::friction::Friction;
+use rig_shared::link::LinkParameters;
+use rig_shared::precompensation::PrecompensationSettings;
+use rig_shared::safety::Limits;
+use rig_shared::safety::monitor::MonitorConfig;
+
+use crate::sample::Scaling;
+
+/// Rates, as integers so that every dependent constant is exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rates {
+    /// Control ticks per second.
+    pub control_hz: u32,
+    /// Control ticks averaged into one telemetry sample.
+    pub telemetry_decimation: u16,
+    /// Control ticks averaged into one estimator update.
+    pub estimator_decimation: u16,
+    /// Estimator updates between two reports of the estimate.
+    pub estimate_report_decimation: u16,
+}
+
+impl Default for Rates {
+    /// Control at 10 kHz, telemetry and estimator at 1 kHz, the estimate reported at 20 Hz.
+    fn default() -> Self {
+        Self {
+            control_hz: 10_000,
+            telemetry_decimation: 10,
+            estimator_decimation: 10,
+            estimate_report_decimation: 50,
+        }
+    }
+}
+
+impl Rates {
+    /// Estimator updates per second.
+    pub fn estimator_hz(&self) -> f32 {
+        self.control_hz as f32 / f32::from(self.estimator_decimation.max(1))
+    }
+
+    /// Telemetry samples per second.
+    pub fn telemetry_hz(&self) -> f32 {
+        self.control_hz as f32 / f32::from(self.telemetry_decimation.max(1))
+    }
+}
+
+/// Motor encoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Encoder {
+    /// Counts per motor turn after quadrature.
+    pub counts_per_motor_turn: u32,
+    /// Bandwidth of the velocity observer, Hz.
+    pub observer_bandwidth: f32,
+}
+
+/// Fixed while the rig runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Rates.
+    pub rates: Rates,
+    /// Converter scaling.
+    pub scaling: Scaling,
+    /// Motor and gear.
+    pub drive: Drive<f32>,
+    /// Motor encoder.
+    pub encoder: Encoder,
+    /// Thresholds of the checks.
+    pub monitor: MonitorConfig,
+    /// Ticks over which the current offset is measured at start.
+    pub calibration_ticks: u32,
+    /// Largest plausible current offset, A.
+    pub largest_offset: f32,
+    /// Silence of the host after which the rig comes to rest, ticks.
+    pub host_silent_ticks: u32,
+    /// Further silence after which the bridge goes off and the fault latches, ticks.
+    pub host_lost_ticks: u32,
+}
+
+/// What the host may replace while the rig stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Control law.
+    pub control: ControlKind,
+    /// Feedback gains.
+    pub gains: Gains<f32>,
+    /// Model behind the feed-forward.
+    pub model: LinkParameters<f32>,
+    /// Friction law behind the precompensation.
+    pub friction: Friction<f32>,
+    /// How the friction law is used near zero speed.
+    pub precompensation: PrecompensationSettings<f32>,
+    /// Limits.
+    pub limits: Limits<f32>,
+    /// On-line estimator.
+    pub estimator: EstimatorSettings<f32>,
+}

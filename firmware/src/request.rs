@@ -1,0 +1,169 @@
+//! What the host may change, when, and what it is refused.
+
+use rig_shared::control::{adaptive, current};
+use rig_shared::estimation::EstimatorSettings;
+use rig_shared::link::LinkParameters;
+use rig_shared::precompensation::PrecompensationSettings;
+use rig_shared::safety::{Fault, Limits, Mode};
+use rig_shared::trajectory::Trajectory;
+use rig_shared::wire::message::{Refusal, RequestBody};
+
+use crate::config::{Config, Settings};
+use crate::state::{Calibration, Run, State};
+use crate::step::brake;
+
+/// Carries out a request, or says why not; nothing has changed then.
+///
+/// Requests about the conversation itself (`Hello`, streams, the snapshot) are the
+/// [`Speaker`](crate::speaker::Speaker)'s and are accepted here without effect.
+///
+/// # Errors
+/// The [`Refusal`] that goes back to the host.
+pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Result<(), Refusal> {
+    match body {
+        RequestBody::Hello
+        | RequestBody::KeepAlive
+        | RequestBody::StartStream
+        | RequestBody::StopStream
+        | RequestBody::GetSnapshot => Ok(()),
+        RequestBody::Arm => arm(state),
+        RequestBody::Disarm => {
+            if state.mode.drives() {
+                state.mode = Mode::Disarmed;
+            }
+            Ok(())
+        }
+        RequestBody::Start => start(state),
+        RequestBody::Stop => match state.mode {
+            Mode::Running => {
+                brake(state);
+                Ok(())
+            }
+            Mode::Holding | Mode::Stopping => Ok(()),
+            _ => Err(Refusal::WrongMode),
+        },
+        RequestBody::ClearFault => clear_fault(config, state),
+        RequestBody::SetTrajectory(trajectory) => {
+            refuse_in_motion(state)?;
+            fits(trajectory, &state.settings.limits, None)?;
+            state.trajectory = Some(trajectory.clone());
+            Ok(())
+        }
+        _ => {
+            refuse_in_motion(state)?;
+            let settings = with(&state.settings, body);
+            usable(&settings)?;
+            state.apply(config, settings);
+            Ok(())
+        }
+    }
+}
+
+/// The settings as the request wants them.
+fn with(now: &Settings, body: &RequestBody) -> Settings {
+    let mut settings = *now;
+    match body {
+        RequestBody::SetGains(gains) => settings.gains = *gains,
+        RequestBody::SetControl(kind) => settings.control = *kind,
+        RequestBody::SetModel(model) => settings.model = *model,
+        RequestBody::SetFriction(friction) => settings.friction = *friction,
+        RequestBody::SetPrecompensation(precompensation) => settings.precompensation = *precompensation,
+        RequestBody::SetLimits(limits) => settings.limits = *limits,
+        RequestBody::SetEstimator(estimator) => settings.estimator = *estimator,
+        _ => {}
+    }
+    settings
+}
+
+fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
+    if matches!(state.mode, Mode::Running | Mode::Stopping) { Err(Refusal::WrongMode) } else { Ok(()) }
+}
+
+fn arm(state: &mut State) -> Result<(), Refusal> {
+    match state.mode {
+        Mode::Disarmed => {
+            state.run = Run { base: state.position, ..Run::default() };
+            state.current_loop = current::State::default();
+            state.law.adaptive = adaptive::State::new(state.settings.model);
+            state.mode = Mode::Holding;
+            Ok(())
+        }
+        Mode::Fault => Err(Refusal::FaultLatched),
+        _ => Err(Refusal::WrongMode),
+    }
+}
+
+fn start(state: &mut State) -> Result<(), Refusal> {
+    match state.mode {
+        Mode::Holding => {}
+        Mode::Fault => return Err(Refusal::FaultLatched),
+        _ => return Err(Refusal::WrongMode),
+    }
+    let trajectory = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
+    fits(trajectory, &state.settings.limits, Some(state.run.base))?;
+    state.run.start = state.tick;
+    state.mode = Mode::Running;
+    Ok(())
+}
+
+fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
+    if state.mode != Mode::Fault {
+        return Ok(());
+    }
+    if state.cause_acting {
+        return Err(Refusal::CauseActing);
+    }
+    // An implausible offset is measured again: it may have been a motor turned by hand.
+    let offset = state.latch.first().is_some_and(|record| record.fault == Fault::CurrentOffset);
+    state.latch.clear();
+    state.snapshot.release();
+    if offset {
+        state.calibration = Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() };
+        state.mode = Mode::Calibrating;
+    } else {
+        state.mode = Mode::Disarmed;
+    }
+    Ok(())
+}
+
+/// Whether values are physical; everything written so that NaN is refused.
+fn usable(settings: &Settings) -> Result<(), Refusal> {
+    let good = settings.limits.is_valid()
+        && settings.gains.usable()
+        && settings.friction.check().is_ok()
+        && model_is_usable(&settings.model)
+        && precompensation_is_usable(&settings.precompensation)
+        && estimator_is_usable(&settings.estimator);
+    if good { Ok(()) } else { Err(Refusal::BadValue) }
+}
+
+fn model_is_usable(model: &LinkParameters<f32>) -> bool {
+    model.to_array().iter().all(|value| value.is_finite())
+        && model.inertia > 0.0
+        && model.viscous >= 0.0
+        && model.coulomb >= 0.0
+}
+
+fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
+    let share = |x: f32| (0.0..=1.0).contains(&x);
+    share(settings.gain)
+        && share(settings.gain_at_rest)
+        && settings.gain_at_rest <= settings.gain
+        && settings.velocity_threshold > 0.0
+        && settings.velocity_threshold.is_finite()
+}
+
+fn estimator_is_usable(settings: &EstimatorSettings<f32>) -> bool {
+    let bands = settings.lower.iter().zip(&settings.upper);
+    settings.memory > 0.0
+        && settings.memory.is_finite()
+        && settings.bandwidth > 0.0
+        && settings.bandwidth.is_finite()
+        && bands.clone().all(|(low, high)| low < high && low.is_finite() && high.is_finite())
+}
+
+/// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
+/// about which point it will run.
+fn fits(trajectory: &Trajectory<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
+    todo!("{trajectory:?}{limits:?}{base:?}")
+}

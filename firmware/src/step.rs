@@ -1,0 +1,277 @@
+//! The control tick: the one function that board, emulated rig and tests all call.
+
+use rig_shared::control::{Measured, current, law};
+use rig_shared::encoder;
+use rig_shared::link::PARAMETER_COUNT;
+use rig_shared::safety::monitor::{self, Readings};
+use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, SnapshotSample};
+use rig_shared::trajectory::Reference;
+use rig_shared::units::Duty;
+use rig_shared::wire::message::{Estimate, StateSample};
+
+use crate::config::Config;
+use crate::reference::Braking;
+use crate::sample::{Command, Sample};
+use crate::state::{Run, State};
+use crate::window::{Tick, Window};
+
+/// What a control tick gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output {
+    /// For the bridge.
+    pub command: Command,
+    /// A telemetry window that is complete: the tick it began at, and its sample.
+    pub state: Option<(u64, StateSample)>,
+    /// The on-line estimate, when one is due.
+    pub estimate: Option<Estimate>,
+    /// A fault that has just latched.
+    pub fault: Option<FaultRecord>,
+}
+
+/// One control tick. Takes the samples of one instant, gives the command that acts from the next one on.
+pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
+    let readings = read(config, state, sample);
+    let mut output = Output::default();
+    let found = monitor::step(&config.monitor, &state.settings.limits, &mut state.monitor, &readings);
+    state.cause_acting = found.is_some();
+    let found = found.or_else(|| calibrate(config, state, sample)).or_else(|| listen(config, state));
+    if let Some((fault, value)) = found {
+        output.fault = fall(state, fault, value);
+    }
+
+    let mut limits = LimitSet::default();
+    state.reference = reference(config, state, &mut limits);
+    let (duty, torque) = if state.mode.drives() { drive(config, state, &readings, &mut limits) } else { (0.0, 0.0) };
+    state.limits = limits;
+
+    let tick = Tick {
+        position: state.counts,
+        current: readings.current,
+        voltage: state.duty * readings.supply,
+        reference: state.reference.position,
+        torque,
+        limits,
+    };
+    state.snapshot.push(SnapshotSample {
+        tick: state.tick,
+        position: state.counts,
+        current: readings.current,
+        duty: state.duty,
+        supply: readings.supply,
+        reference: state.reference.position,
+    });
+    output.state = telemetry(config, state, &tick);
+    output.estimate = estimate(config, state, &tick);
+    output.command = Command { duty: Duty(duty), bridge: state.mode.drives() };
+    state.duty = duty;
+    state.tick += 1;
+    output
+}
+
+/// Raw codes to quantities: the one place where units begin.
+fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
+    let scaling = &config.scaling;
+    let before = state.encoder;
+    let motion = encoder::step(&state.derived.observer, &mut state.encoder, sample.encoder);
+    let origin = *state.origin.get_or_insert(motion.counts);
+    let counts = motion.counts - origin;
+    let step = if before == encoder::State::default() { 0 } else { counts - state.counts };
+    state.counts = counts;
+    // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
+    state.position = counts as f32 * state.derived.radians_per_count;
+    state.velocity = motion.velocity * state.derived.radians_per_count;
+    Readings {
+        driver_fault: sample.driver_fault,
+        overrun: sample.overrun,
+        current_code: sample.current.0,
+        current_at_rail: sample.current.at_rail(),
+        current: (f32::from(sample.current.0) - state.calibration.zero_code) * scaling.current_per_code,
+        supply: f32::from(sample.supply.0) * scaling.supply_per_code,
+        temperature: scaling.temperature_at_zero
+            + f32::from(sample.temperature.0) * scaling.temperature_per_code,
+        encoder_step: step as i32,
+        position: state.position,
+        velocity: state.velocity,
+        duty: state.duty,
+        driving: state.mode.drives(),
+    }
+}
+
+/// Measures the current offset while the bridge is off; a fault where it is implausible.
+fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Fault, f32)> {
+    if state.mode != Mode::Calibrating {
+        return None;
+    }
+    state.calibration.ticks += 1;
+    state.calibration.sum += u64::from(sample.current.0);
+    if state.calibration.ticks < config.calibration_ticks {
+        return None;
+    }
+    let zero_code = state.calibration.sum as f32 / state.calibration.ticks as f32;
+    let offset = (zero_code - config.scaling.current_zero) * config.scaling.current_per_code;
+    if offset.abs() > config.largest_offset {
+        return Some((Fault::CurrentOffset, offset));
+    }
+    state.calibration.zero_code = zero_code;
+    state.mode = Mode::Disarmed;
+    None
+}
+
+/// A silent host: first a controlled stop, then, if it stays silent, the fault.
+fn listen(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
+    if !state.mode.drives() {
+        return None;
+    }
+    let silent = state.tick.saturating_sub(state.heard);
+    let patience = u64::from(config.host_silent_ticks);
+    if silent > patience && state.mode == Mode::Running {
+        brake(state);
+    }
+    (silent > patience + u64::from(config.host_lost_ticks))
+        .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
+}
+
+/// Bridge off, fault latched, snapshot kept.
+fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
+    let record = FaultRecord { fault, tick: state.tick, value };
+    state.mode = Mode::Fault;
+    let first = state.latch.latch(record);
+    if first {
+        state.snapshot.freeze();
+    }
+    first.then_some(record)
+}
+
+/// Begins a controlled stop from where the reference is.
+pub(crate) fn brake(state: &mut State) {
+    state.run.braking = Braking::from(state.reference);
+    state.mode = Mode::Stopping;
+}
+
+/// The reference of this tick, by mode; modes that end by themselves end here.
+fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Reference<f32> {
+    let Run { start, base, .. } = state.run;
+    let standing = |position| Reference { position, ..Reference::default() };
+    let wish = match state.mode {
+        Mode::Calibrating | Mode::Disarmed | Mode::Fault => return standing(state.position),
+        Mode::Holding => standing(base),
+        Mode::Running => {
+            let elapsed = state.tick - start;
+            match &state.trajectory {
+                Some(trajectory) if !trajectory.is_over(elapsed, config.rates.control_hz) => {
+                    let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
+                    Reference { position: base + offset.position, ..offset }
+                }
+                _ => {
+                    state.run.base = state.reference.position;
+                    state.mode = Mode::Holding;
+                    standing(state.reference.position)
+                }
+            }
+        }
+        Mode::Stopping => {
+            let next = state.run.braking.step(state.settings.limits.acceleration, state.derived.period);
+            if state.run.braking.at_rest() {
+                state.run.base = next.position;
+                state.mode = Mode::Holding;
+            }
+            next
+        }
+    };
+    let silent = state.tick.saturating_sub(state.heard) > u64::from(config.host_silent_ticks);
+    limits.set(Limit::HostSilent, silent);
+    within_range(&state.settings.limits, wish, limits)
+}
+
+/// Holds a reference at the edge of the position range.
+fn within_range(
+    range: &rig_shared::safety::Limits<f32>,
+    wish: Reference<f32>,
+    limits: &mut LimitSet,
+) -> Reference<f32> {
+    let position = wish.position.max(range.position_low).min(range.position_high);
+    let outside = position != wish.position;
+    limits.set(Limit::Position, outside);
+    if outside { Reference { position, ..Reference::default() } } else { wish }
+}
+
+/// Position law, then current loop: duty cycle and commanded joint torque.
+fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> (f32, f32) {
+    let measured = Measured { position: state.position, velocity: state.velocity };
+    let torque = law::step(&state.derived.law, &mut state.law, measured, state.reference);
+    limits.set(Limit::Torque, torque.limited);
+    let wish = config.drive.current(torque.value);
+    let peak = state.settings.limits.peak_current;
+    let wanted = wish.max(-peak).min(peak);
+    limits.set(Limit::Current, wanted != wish);
+    let output = current::step(
+        &state.derived.current,
+        &mut state.current_loop,
+        current::Input {
+            reference: wanted,
+            current: now.current,
+            back_emf: config.drive.back_emf(state.velocity),
+            supply: now.supply,
+        },
+    );
+    limits.set(Limit::Voltage, output.limited);
+    (output.duty, torque.value)
+}
+
+/// Closes a telemetry window when it is full.
+fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, StateSample)> {
+    let first_tick = state.window_start();
+    let window = state.telemetry.push(tick, config.rates.telemetry_decimation)?;
+    let sample = StateSample {
+        position_sum: window.position,
+        velocity: state.velocity,
+        current: window.mean(window.current),
+        voltage: window.mean(window.voltage),
+        reference: window.mean(window.reference),
+        torque_command: window.mean(window.torque),
+        limits: window.limits,
+        mode: state.mode,
+    };
+    Some((first_tick, sample))
+}
+
+/// Feeds the on-line estimator when a window is full, and reports at its own, slower pace.
+///
+/// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
+/// same two windows: all belong to the instant between them, and no column lags another.
+fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
+    let window = state.estimation.push(tick, config.rates.estimator_decimation)?;
+    let before = state.previous.replace(window)?;
+    if state.mode == Mode::Calibrating {
+        return None;
+    }
+    let ticks = f32::from(config.rates.estimator_decimation);
+    let per_count = state.derived.radians_per_count / ticks;
+    // The difference is taken in integers: exact at any position.
+    let qd = (window.position - before.position) as f32 * per_count / state.derived.estimator_period;
+    let q = 0.5 * (window.position + before.position) as f32 * per_count;
+    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
+    state.estimator.step(q, qd, current * state.derived.torque_per_ampere);
+    state.updates_since_report += 1;
+    if state.updates_since_report < config.rates.estimate_report_decimation {
+        return None;
+    }
+    state.updates_since_report = 0;
+    Some(estimate_report(state))
+}
+
+/// The estimate as it goes over the wire.
+fn estimate_report(state: &State) -> Estimate {
+    let report = state.estimator.report();
+    let mut estimate = Estimate {
+        tick: state.tick,
+        value: [0.0; PARAMETER_COUNT],
+        std: [0.0; PARAMETER_COUNT],
+        trusted: [false; PARAMETER_COUNT],
+        residual_rms: report.residual_rms,
+    };
+    estimate.value = report.value;
+    estimate.std = report.std;
+    estimate.trusted = report.trusted;
+    estimate
+}

@@ -1,0 +1,208 @@
+//! From a robot description to what the firmware is told.
+
+use core::f64::consts::FRAC_PI_2;
+
+use rig_firmware::config::{Config, Encoder, Rates, Settings};
+use rig_firmware::sample::Scaling;
+use rig_shared::control::{ControlKind, Gains};
+use rig_shared::drive::Drive;
+use rig_shared::estimation::EstimatorSettings;
+use rig_shared::friction::Friction;
+use rig_shared::link::LinkParameters;
+use rig_shared::multibody::{gravity_vector, inertia_matrix};
+use rig_shared::precompensation::PrecompensationSettings;
+use rig_shared::safety::Limits;
+use rig_shared::safety::monitor::MonitorConfig;
+use thiserror::Error;
+
+use crate::robot::{Joint, JointKind, Robot};
+use crate::simulate::{Model, SimulateError};
+
+/// Natural frequency of the position loop, Hz: slow enough for the current loop ten times as fast to stay
+/// below a twentieth of the 10 kHz control rate.
+const POSITION_BANDWIDTH: f64 = 6.0;
+/// Bandwidth of the velocity observer, Hz: ten times the position loop, so that its phase does not show.
+const OBSERVER_BANDWIDTH: f32 = 200.0;
+/// Speed below which the measured velocity says nothing about the direction, rad/s.
+const DIRECTION_THRESHOLD: f32 = 0.01;
+
+/// Why a description does not make a one-link rig.
+#[derive(Debug, Error)]
+pub enum NameplateError {
+    /// Not one joint.
+    #[error("the one-link rig has one joint, but \"{robot}\" has {joints}: give the description of a one-link rig (`rig init one-link` writes one).")]
+    JointCount {
+        /// Name of the robot.
+        robot: String,
+        /// Joints it has.
+        joints: usize,
+    },
+    /// Not a revolute joint.
+    #[error("joint \"{0}\" is prismatic: the rig's link turns, so its kind must be \"revolute\".")]
+    Prismatic(String),
+    /// A value that the firmware cannot do without.
+    #[error("joint \"{joint}\" has no {what}: the firmware needs it to run the rig.")]
+    Missing {
+        /// Name of the joint.
+        joint: String,
+        /// What is missing, with its key.
+        what: &'static str,
+    },
+    /// The model behind the feed-forward.
+    #[error(transparent)]
+    Model(#[from] SimulateError),
+}
+
+/// What the firmware is told at its start: fixed configuration, and the settings that the host may replace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nameplate {
+    /// Fixed while the rig runs.
+    pub config: Config,
+    /// Replaceable over the wire.
+    pub settings: Settings,
+}
+
+impl Nameplate {
+    /// The nameplate of a one-link rig.
+    ///
+    /// # Errors
+    /// [`NameplateError`] naming what is missing.
+    pub fn from_robot(robot: &Robot) -> Result<Self, NameplateError> {
+        let [joint] = robot.joints.as_slice() else {
+            return Err(NameplateError::JointCount { robot: robot.name.clone(), joints: robot.joints.len() });
+        };
+        if joint.kind == JointKind::Prismatic {
+            return Err(NameplateError::Prismatic(joint.name.clone()));
+        }
+        let missing = |what| NameplateError::Missing { joint: joint.name.clone(), what };
+        let drive = joint.drive.as_ref().ok_or_else(|| missing("[joint.drive]"))?;
+        let rates = Rates::default();
+        let counts = drive.encoder_counts_per_rev.ok_or_else(|| missing("drive.encoder_counts_per_rev"))?;
+        let limits = limits(joint, drive)?;
+        let model = link_parameters(robot)?;
+        let config = Config {
+            rates,
+            scaling: Scaling::default(),
+            drive: Drive {
+                gear_ratio: drive.gear_ratio as f32,
+                rotor_inertia: drive.rotor_inertia as f32,
+                torque_constant: drive.torque_constant as f32,
+                resistance: drive.resistance.ok_or_else(|| missing("drive.resistance"))? as f32,
+                inductance: drive.inductance.ok_or_else(|| missing("drive.inductance"))? as f32,
+            },
+            encoder: Encoder {
+                counts_per_motor_turn: counts as u32,
+                observer_bandwidth: OBSERVER_BANDWIDTH,
+            },
+            monitor: monitor(&rates, &limits, counts, drive.gear_ratio),
+            calibration_ticks: rates.control_hz / 2,
+            largest_offset: 0.5,
+            host_silent_ticks: rates.control_hz / 2,
+            host_lost_ticks: rates.control_hz,
+        };
+        let gains = Gains::design(f64::from(model.inertia), POSITION_BANDWIDTH, 1.0);
+        let settings = Settings {
+            control: ControlKind::ProportionalDerivative,
+            gains: Gains {
+                proportional: gains.proportional as f32,
+                derivative: gains.derivative as f32,
+                adaptation: gains.adaptation as f32,
+                // A twentieth of the control rate is the fastest that the one-period delay allows.
+                current_bandwidth: rates.control_hz as f32 / 20.0,
+            },
+            model,
+            friction: friction(joint),
+            precompensation: PrecompensationSettings {
+                enabled: false,
+                gain: 0.95,
+                gain_at_rest: 0.8,
+                velocity_threshold: DIRECTION_THRESHOLD,
+            },
+            limits,
+            estimator: estimator(&model, &limits),
+        };
+        Ok(Self { config, settings })
+    }
+}
+
+/// The six one-link parameters that a description states.
+///
+/// # Errors
+/// [`NameplateError::Model`] where the description makes no chain, [`NameplateError::Missing`] without inertia.
+pub fn link_parameters(robot: &Robot) -> Result<LinkParameters<f32>, NameplateError> {
+    let model = Model::from_robot(robot)?;
+    let mut inertia = [0.0];
+    let (mut at_zero, mut at_quarter) = ([0.0], [0.0]);
+    let numbers = |result: Result<(), rig_shared::multibody::MultibodyError>| {
+        result.map_err(|error| NameplateError::Model(SimulateError::Multibody(error)))
+    };
+    numbers(inertia_matrix(&model.chain, &model.parameters, &[0.0], &mut inertia))?;
+    numbers(gravity_vector(&model.chain, &model.parameters, &[0.0], &mut at_zero))?;
+    numbers(gravity_vector(&model.chain, &model.parameters, &[FRAC_PI_2], &mut at_quarter))?;
+    if inertia[0].is_nan() || inertia[0] <= 0.0 {
+        let joint = robot.joints.first().map(|joint| joint.name.clone()).unwrap_or_default();
+        return Err(NameplateError::Missing { joint, what: "[joint.inertial] or drive.rotor_inertia" });
+    }
+    let [.., viscous, coulomb, offset] = model.parameters[0];
+    Ok(LinkParameters {
+        inertia: inertia[0] as f32,
+        gravity_cos: at_zero[0] as f32,
+        gravity_sin: at_quarter[0] as f32,
+        viscous: viscous as f32,
+        coulomb: coulomb as f32,
+        offset: offset as f32,
+    })
+}
+
+fn limits(joint: &Joint, drive: &crate::robot::Drive) -> Result<Limits<f32>, NameplateError> {
+    let missing = |what| NameplateError::Missing { joint: joint.name.clone(), what };
+    let limits = joint.limits.as_ref().ok_or_else(|| missing("[joint.limits]"))?;
+    let torque = limits.torque.ok_or_else(|| missing("limits.torque"))?;
+    let peak = torque / (drive.torque_constant * drive.gear_ratio).abs();
+    Ok(Limits {
+        position_low: limits.position[0] as f32,
+        position_high: limits.position[1] as f32,
+        velocity: limits.velocity as f32,
+        acceleration: limits.acceleration.ok_or_else(|| missing("limits.acceleration"))? as f32,
+        torque: torque as f32,
+        // The description has one torque; a small motor stands about half of its peak current for good.
+        continuous_current: (0.5 * peak) as f32,
+        peak_current: peak as f32,
+    })
+}
+
+fn friction(joint: &Joint) -> Friction<f32> {
+    let prior = joint.friction.clone().unwrap_or_default();
+    Friction { coulomb: prior.coulomb as f32, viscous: prior.viscous as f32, ..Friction::default() }
+}
+
+/// Thresholds of the checks, from what the limits allow.
+fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, gear_ratio: f64) -> MonitorConfig {
+    let rate = rates.control_hz;
+    let counts_per_radian = counts * gear_ratio.abs() / core::f64::consts::TAU;
+    let fastest = f64::from(limits.velocity) * counts_per_radian / f64::from(rate);
+    MonitorConfig {
+        period: 1.0 / rate as f32,
+        supply: [18.0, 30.0],
+        temperature: 85.0,
+        current_margin: 1.5,
+        velocity_margin: 1.25,
+        position_margin: 0.1,
+        // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
+        largest_step: (4.0 * fastest).ceil() as i32 + 4,
+        persistence: 3,
+        encoder_lost_ticks: rate / 10,
+        stuck_ticks: rate / 20,
+        stuck_duty: 0.02,
+        thermal_time: 10.0,
+    }
+}
+
+/// Bands wide enough for any rig that the description could be wrong about, narrow enough to catch a run-away.
+fn estimator(model: &LinkParameters<f32>, limits: &Limits<f32>) -> EstimatorSettings<f32> {
+    let torque = limits.torque;
+    let lower = [0.1 * model.inertia, -torque, -torque, 0.0, 0.0, -0.5 * torque];
+    let upper =
+        [10.0 * model.inertia, torque, torque, torque / limits.velocity * 4.0, 0.5 * torque, 0.5 * torque];
+    EstimatorSettings::for_band(lower, upper)
+}
