@@ -31,6 +31,12 @@ mod spatial;
 mod lagrangian;
 #[cfg(test)]
 mod samples;
+#[cfg(test)]
+mod structure;
+#[cfg(test)]
+mod textbook;
+#[cfg(test)]
+mod timing;
 
 pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
 pub use coriolis::coriolis_matrix;
