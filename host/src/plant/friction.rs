@@ -116,7 +116,8 @@ pub(super) struct Scale {
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     torque: [f64; ELEMENTS],
-    slipping: [bool; ELEMENTS],
+    /// 1 where the element slips, 0 where it sticks: a number, so that the elements share vector lanes.
+    slipping: [f64; ELEMENTS],
     forward: bool,
     stiffness: [f64; ELEMENTS],
     level: [f64; 2],
@@ -138,7 +139,7 @@ impl Contact {
         }
         Self {
             torque: [0.0; ELEMENTS],
-            slipping: [false; ELEMENTS],
+            slipping: [0.0; ELEMENTS],
             forward: true,
             stiffness,
             level: [1.0 + friction.asymmetry, 1.0 - friction.asymmetry]
@@ -170,25 +171,25 @@ impl Contact {
         let steady =
             scale.coulomb * level * (1.0 + self.excess / (1.0 + relative * relative)) + scale.load;
         let sign = if forward { 1.0 } else { -1.0 };
-        let mut sum = 0.0;
-        let mut stuck = 0.0;
+        let catch = if kept { 1.0 } else { 0.0 };
+        let step = sign * displacement;
+        let mut torque = [0.0; ELEMENTS];
+        let mut stuck = [0.0; ELEMENTS];
         for k in 0..ELEMENTS {
             let limit = SHARE[k] * steady;
-            let trial = sign * (self.torque[k] + self.stiffness[k] * displacement);
-            let slipped = sign * self.torque[k];
-            let was = self.slipping[k] & kept;
-            let now = was | (trial >= limit);
+            let last = sign * self.torque[k];
+            let trial = last + self.stiffness[k] * step;
+            let was = catch * self.slipping[k];
+            let now = if trial >= limit { 1.0 } else { was };
             let held = if trial >= limit { limit } else { trial };
-            let next = if was {
-                limit + (slipped - limit) * self.keep
-            } else {
-                held
-            };
+            let relaxed = limit + (last - limit) * self.keep;
+            torque[k] = if was > 0.5 { relaxed } else { held };
+            stuck[k] = (1.0 - now) * self.stiffness[k];
             self.slipping[k] = now;
-            self.torque[k] = sign * next;
-            sum += next;
-            stuck += if now { 0.0 } else { self.stiffness[k] };
+            self.torque[k] = sign * torque[k];
         }
+        let sum = (torque[0] + torque[1]) + (torque[2] + torque[3]);
+        let stuck = (stuck[0] + stuck[1]) + (stuck[2] + stuck[3]);
         Reaction {
             torque: sign * sum,
             damping: self.damping_time * stuck,

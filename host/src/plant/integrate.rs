@@ -165,6 +165,9 @@ impl Dynamics {
                 self.substep_rigid(config, held, gravity, motor_scale, link_scale);
             }
         }
+        if self.transmission.is_none() {
+            self.rotor = self.link;
+        }
         self.bus = if held.on {
             held.supply - config.bridge.supply_resistance * held.duty * self.current
         } else {
@@ -231,7 +234,6 @@ impl Dynamics {
         );
         self.book_stops(config, angle, middle);
         self.link.set(angle, middle, half);
-        self.rotor = self.link;
     }
 
     fn substep_two_masses(
