@@ -1,0 +1,18 @@
+//! Friction that grows with the torque carried (tooth and bearing load).
+//!
+//! Source: Hamon, Gautier & Garrec (2010), friction proportional to |load|.
+
+/// Friction torque added per transmitted torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadFriction {
+    /// N·m of friction per N·m transmitted through the gear, both joint-side.
+    pub ratio: f64,
+}
+
+impl LoadFriction {
+    /// Friction added while `transmitted` N·m pass, N·m.
+    #[inline]
+    pub fn torque(&self, transmitted: f64) -> f64 {
+        self.ratio * transmitted.abs()
+    }
+}

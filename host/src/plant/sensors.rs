@@ -1,0 +1,82 @@
+//! From the rig's true state to raw codes.
+//!
+//! Leaves out: converter nonlinearity, drift of offsets, missed counts (see the injected faults),
+//! sampling jitter.
+
+use core::f64::consts::TAU;
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::SeedableRng;
+use rig_shared::units::{AdcCode, EncoderCount};
+
+use super::config::{Channel, Encoder};
+
+/// An independent random stream for one purpose, so that one noise switched off leaves the others as they
+/// were. The odd multiplier spreads the streams over the seeds (Steele, Lea & Flood 2014, γ of SplitMix64).
+pub(crate) fn stream(seed: u64, purpose: u64) -> Pcg64Mcg {
+    Pcg64Mcg::seed_from_u64(seed ^ (purpose + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15))
+}
+
+/// A running analogue channel.
+#[derive(Clone, Debug)]
+pub(crate) struct Converter {
+    channel: Channel,
+    zero: f64,
+    codes_per_unit: f64,
+    follow: f64,
+    filtered: Option<f64>,
+    rng: Pcg64Mcg,
+}
+
+impl Converter {
+    /// A channel whose code is nominally `zero` at 0 and grows by one per `per_code`.
+    pub(crate) fn new(
+        channel: Channel,
+        zero: f64,
+        per_code: f64,
+        tick: f64,
+        rng: Pcg64Mcg,
+    ) -> Self {
+        Self {
+            channel,
+            zero,
+            codes_per_unit: 1.0 / per_code,
+            follow: channel.lag.map_or(1.0, |lag| 1.0 - (-tick / lag).exp()),
+            filtered: None,
+            rng,
+        }
+    }
+
+    /// One conversion of the true `quantity`.
+    pub(crate) fn convert(&mut self, quantity: f64) -> AdcCode {
+        let last = self.filtered.unwrap_or(quantity);
+        let filtered = last + self.follow * (quantity - last);
+        self.filtered = Some(filtered);
+        let noise = self.channel.noise.map_or(0.0, |std| {
+            let normal: f64 = StandardNormal.sample(&mut self.rng);
+            std * normal
+        });
+        let sensed = filtered * (1.0 + self.channel.gain_error) + self.channel.offset + noise;
+        // A converter stops at its rails; the cast saturates there too and takes NaN to 0.
+        let code = (sensed * self.codes_per_unit + self.zero + 0.5).floor();
+        AdcCode(code.clamp(0.0, f64::from(AdcCode::FULL_SCALE)) as u16)
+    }
+}
+
+impl Encoder {
+    /// Counts since the zero at true motor angle `angle` (0 where the joint's angle is 0), not wrapped.
+    pub(crate) fn count(&self, angle: f64, ratio: f64) -> i64 {
+        let shaft = angle - self.zero * ratio;
+        let read = shaft
+            + self
+                .eccentricity
+                .map_or(0.0, |e| e.error(shaft) - e.error(0.0));
+        (read / TAU * self.counts_per_turn).floor() as i64
+    }
+}
+
+/// The counter register: the low sixteen bits.
+pub(crate) fn register(count: i64) -> EncoderCount {
+    EncoderCount(count.rem_euclid(1 << 16) as u16)
+}

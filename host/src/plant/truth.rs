@@ -1,0 +1,77 @@
+//! What is really going on, for tests and plots: no controller may look here.
+
+/// True state at the last sampling instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Truth {
+    /// s since start.
+    pub time: f64,
+    /// Link angle q, rad.
+    pub position: f64,
+    /// rad/s.
+    pub velocity: f64,
+    /// Link acceleration over the last substep, rad/s².
+    pub acceleration: f64,
+    /// Rotor angle, rad of the rotor, 0 where a rigid gear has the link at 0.
+    pub motor_position: f64,
+    /// rad/s of the rotor.
+    pub motor_velocity: f64,
+    /// A.
+    pub current: f64,
+    /// Mean terminal voltage over the last substep, V.
+    pub voltage: f64,
+    /// Supply voltage, V.
+    pub supply: f64,
+    /// Electromagnetic torque at the joint, N·m, over the last substep.
+    pub drive_torque: f64,
+    /// Friction of motor and link at the joint against positive motion, with viscous part and drag, N·m.
+    pub friction_torque: f64,
+    /// Torque passed through the gear to the link, N·m.
+    pub transmitted_torque: f64,
+    /// Winding, °C.
+    pub winding_temperature: f64,
+    /// Gear and grease, °C.
+    pub gear_temperature: f64,
+    /// Where the energy is and where it went.
+    pub energy: Energy,
+}
+
+/// Energies in J. The flows count from the start; the stores are what is there now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Flow out of the ideal supply (negative: fed back).
+    pub supply: f64,
+    /// Flow into the supply's internal resistance, the bridge and its diodes.
+    pub bridge: f64,
+    /// Flow into the winding's resistance.
+    pub joule: f64,
+    /// Flow into friction, what its bent asperities hold included.
+    pub friction: f64,
+    /// Flow into the damping of gear and end stops.
+    pub contact: f64,
+    /// Flow in from external, disturbing and constant torques and with an attached payload.
+    pub external: f64,
+    /// Store ½·L·i².
+    pub magnetic: f64,
+    /// Store of rotor and link.
+    pub kinetic: f64,
+    /// Store of gravity, spring, cogging and gear eccentricity.
+    pub potential: f64,
+    /// Store of gear and end stops.
+    pub elastic: f64,
+    /// Of `friction`: still held by bent asperities.
+    pub asperities: f64,
+}
+
+impl Energy {
+    /// All stores, J (asperities are counted with friction).
+    pub fn stored(&self) -> f64 {
+        self.magnetic + self.kinetic + self.potential + self.elastic
+    }
+
+    /// Energy that appeared from nowhere since `start`, J: 0 but for the integration error.
+    pub fn defect_since(&self, start: &Self) -> f64 {
+        let came = |e: &Self| e.supply + e.external;
+        let went = |e: &Self| e.bridge + e.joule + e.friction + e.contact;
+        (self.stored() - start.stored()) + (went(self) - went(start)) - (came(self) - came(start))
+    }
+}
