@@ -1,0 +1,81 @@
+//! Text from outside on its way into a page: it must arrive as text.
+
+/// Characters that a page must not carry as they are: controls, which XML forbids, and the
+/// overrides of writing direction, with which a name could make its surroundings read backwards.
+fn visible(c: char) -> char {
+    match c {
+        '\n' | '\t' => c,
+        '\u{0}'..='\u{1f}' | '\u{7f}'..='\u{9f}' => '\u{fffd}',
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => '\u{fffd}',
+        '\u{fffe}' | '\u{ffff}' => '\u{fffd}',
+        c => c,
+    }
+}
+
+/// Text for HTML and SVG, in element content and in quoted attributes alike.
+pub(crate) fn text(source: &str) -> String {
+    let mut out = String::with_capacity(source.len());
+    for c in source.chars().map(visible) {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// A JSON string, quotes included, that neither ends a script element nor a line of one.
+pub(crate) fn json(source: &str) -> String {
+    use std::fmt::Write;
+    let mut out = String::with_capacity(source.len() + 2);
+    out.push('"');
+    for c in source.chars().map(visible) {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            '<' | '>' | '&' | '\'' | '\u{2028}' | '\u{2029}' => {
+                // Writing into a String cannot fail.
+                let _ = write!(out, "\\u{:04x}", c as u32);
+            }
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const HOSTILE: &str = "</script><script>alert('x')</script><!-- \" & \\ \u{2028}\u{202e}\u{0}";
+
+    #[test]
+    fn html_comes_out_as_text() {
+        let out = text(HOSTILE);
+        assert!(!out.contains(['<', '>', '"', '\'', '\u{0}', '\u{202e}']));
+        let page = format!("<p title=\"{out}\">{out}</p>");
+        let parsed = roxmltree::Document::parse(&page).unwrap();
+        let clean = HOSTILE.replace(['\u{202e}', '\u{0}'], "\u{fffd}");
+        assert_eq!(parsed.root_element().text(), Some(clean.as_str()));
+        assert_eq!(
+            parsed.root_element().attribute("title"),
+            Some(clean.as_str())
+        );
+    }
+
+    #[test]
+    fn json_comes_back_and_cannot_end_a_script() {
+        let out = json(HOSTILE);
+        assert!(!out.contains(['<', '>', '&', '\u{2028}']));
+        let back: String = serde_json::from_str(&out).unwrap();
+        assert_eq!(back, HOSTILE.replace(['\u{202e}', '\u{0}'], "\u{fffd}"));
+    }
+}

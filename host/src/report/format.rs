@@ -1,0 +1,206 @@
+//! Numbers as a reader wants them: as many digits as are known, and no more.
+
+/// Minus sign of typography, as wide as a digit.
+const MINUS: char = '−';
+/// What stands where there is no value.
+const NONE: &str = "–";
+
+/// A power of ten as it is printed: `10⁻⁵`.
+pub(crate) fn power_of_ten(exponent: i32) -> String {
+    let mut text = String::from("10");
+    for c in exponent.to_string().chars() {
+        text.push(match c {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            '4' => '⁴',
+            '5' => '⁵',
+            '6' => '⁶',
+            '7' => '⁷',
+            '8' => '⁸',
+            '9' => '⁹',
+            _ => '⁰',
+        });
+    }
+    text
+}
+
+/// A number with a fixed count of decimals; never `−0`.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.bytes().all(|b| b == b'0' || b == b'.') => rest.to_owned(),
+        Some(rest) => format!("{MINUS}{rest}"),
+        None => text,
+    }
+}
+
+/// Decimal exponent of a value after rounding to so many significant digits, and that mantissa.
+fn scientific(value: f64, digits: usize) -> (f64, i32) {
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    let mut parts = text.split('e');
+    let mantissa = parts.next().and_then(|m| m.parse().ok()).unwrap_or(0.0);
+    let exponent = parts.next().and_then(|e| e.parse().ok()).unwrap_or(0);
+    (mantissa, exponent)
+}
+
+/// Whether a number of this decimal exponent reads better as a plain decimal.
+fn plain(exponent: i32) -> bool {
+    (-4..6).contains(&exponent)
+}
+
+/// A value with so many significant digits, trailing zeros kept because they are known:
+/// `format_significant(0.50012, 3)` is `0.500`, `1.2345e-7` is `1.23·10⁻⁷`, no value is `–`.
+#[must_use]
+pub fn format_significant(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return NONE.to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "∞" } else { "−∞" }.to_owned();
+    }
+    let digits = digits.clamp(1, 15);
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let (mantissa, exponent) = scientific(value, digits);
+    if plain(exponent) {
+        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+        fixed(value, decimals)
+    } else {
+        format!("{}·{}", fixed(mantissa, digits - 1), power_of_ten(exponent))
+    }
+}
+
+/// A value and its standard deviation, both rounded to the deviation's two significant digits
+/// (the rule of the Guide to the Expression of Uncertainty in Measurement, JCGM 100:2008, 7.2.6):
+/// `format_value(95.1123, 0.1083)` is `95.11 ± 0.11`.
+///
+/// Very large or small ones share a power of ten: `(1.235 ± 0.012)·10⁻⁵`. A deviation of zero means
+/// an exact value; one that is not a number, an unknown uncertainty: `95.11 ± –`.
+#[must_use]
+pub fn format_value(value: f64, std: f64) -> String {
+    let std = std.abs();
+    if !value.is_finite() {
+        return format_significant(value, 4);
+    }
+    if std == 0.0 {
+        return format_significant(value, 4);
+    }
+    if !std.is_finite() {
+        return format!(
+            "{} ± {}",
+            format_significant(value, 4),
+            format_significant(std, 2)
+        );
+    }
+    let (_, std_exponent) = scientific(std, 2);
+    let (_, value_exponent) = scientific(value, 2);
+    let exponent = if value == 0.0 {
+        std_exponent
+    } else {
+        value_exponent.max(std_exponent)
+    };
+    // A deviation far below the value's own digits: writing them all would claim nothing.
+    if exponent - std_exponent > 15 {
+        return format_significant(value, 15);
+    }
+    let decimals = 1 - std_exponent;
+    if plain(exponent) && decimals <= 8 {
+        if decimals >= 0 {
+            let decimals = decimals as usize;
+            return format!("{} ± {}", fixed(value, decimals), fixed(std, decimals));
+        }
+        let unit = 10f64.powi(-decimals);
+        let round = |v: f64| fixed((v / unit).round() * unit, 0);
+        return format!("{} ± {}", round(value), round(std));
+    }
+    // Through text, not through powi: 10^-320 has no exact double.
+    let shift = |v: f64| {
+        format!("{v:e}")
+            .split_once('e')
+            .and_then(|(m, e)| {
+                let e: i32 = e.parse().ok()?;
+                format!("{m}e{}", e - exponent).parse::<f64>().ok()
+            })
+            .unwrap_or(0.0)
+    };
+    let decimals = (1 - std_exponent + exponent).max(0) as usize;
+    format!(
+        "({} ± {})·{}",
+        fixed(shift(value), decimals),
+        fixed(shift(std), decimals),
+        power_of_ten(exponent)
+    )
+}
+
+/// A probability: `0.031`, `4·10⁻¹²`, and `< 10⁻³⁰⁰` where the computation ran out of exponents.
+#[must_use]
+pub fn format_p_value(p: f64) -> String {
+    if p.is_nan() {
+        NONE.to_owned()
+    } else if p < 1e-300 {
+        format!("< {}", power_of_ten(-300))
+    } else if p >= 0.001 {
+        format_significant(p, 2)
+    } else {
+        let (mantissa, exponent) = scientific(p, 1);
+        format!("{}·{}", fixed(mantissa, 0), power_of_ten(exponent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_rounded_to_two_digits_of_their_deviation() {
+        assert_eq!(format_value(95.1123, 0.1083), "95.11 ± 0.11");
+        assert_eq!(format_value(-0.04567, 0.00123), "−0.0457 ± 0.0012");
+        assert_eq!(format_value(1234.0, 234.0), "1230 ± 230");
+        assert_eq!(format_value(0.0, 0.5), "0.00 ± 0.50");
+        assert_eq!(format_value(3.0, 40.0), "3 ± 40");
+    }
+
+    #[test]
+    fn rounding_up_into_the_next_decade_keeps_two_digits() {
+        assert_eq!(format_value(1.0, 0.0996), "1.00 ± 0.10");
+        assert_eq!(format_value(1.0, 9.96), "1 ± 10");
+    }
+
+    #[test]
+    fn small_and_large_values_share_a_power_of_ten() {
+        assert_eq!(format_value(1.23456e-5, 1.2e-7), "(1.235 ± 0.012)·10⁻⁵");
+        assert_eq!(format_value(-2.5e9, 1.5e7), "(−2.500 ± 0.015)·10⁹");
+        assert_eq!(format_value(5e-320, 1e-321), "(5.00 ± 0.10)·10⁻³²⁰");
+        // Without such a form, this would need twelve decimals.
+        assert_eq!(format_value(0.001, 1e-9), "(1.0000000 ± 0.0000010)·10⁻³");
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_invented() {
+        assert_eq!(format_value(f64::NAN, 0.1), "–");
+        assert_eq!(format_value(95.1123, f64::NAN), "95.11 ± –");
+        assert_eq!(format_value(95.1123, f64::INFINITY), "95.11 ± ∞");
+        assert_eq!(format_value(2.0, 0.0), "2.000");
+        assert_eq!(format_value(1.0, 1e-300), "1.00000000000000");
+    }
+
+    #[test]
+    fn significant_digits() {
+        assert_eq!(format_significant(0.50012, 3), "0.500");
+        assert_eq!(format_significant(-12345.6, 3), "−12346");
+        assert_eq!(format_significant(1.2345e-7, 3), "1.23·10⁻⁷");
+        assert_eq!(format_significant(999.96, 4), "1000");
+        assert_eq!(format_significant(f64::NEG_INFINITY, 3), "−∞");
+        assert_eq!(format_significant(-0.0, 3), "0");
+    }
+
+    #[test]
+    fn p_values() {
+        assert_eq!(format_p_value(0.0312), "0.031");
+        assert_eq!(format_p_value(4.2e-12), "4·10⁻¹²");
+        assert_eq!(format_p_value(0.0), "< 10⁻³⁰⁰");
+    }
+}
