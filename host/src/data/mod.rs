@@ -53,3 +53,11 @@ impl Block {
         self.t.is_empty()
     }
 }
+
+/// Folder of real recordings: the environment variable `RIG_DATA`, else `../shared/data` beside the
+/// project; none where neither is there.
+pub fn data_dir() -> Option<std::path::PathBuf> {
+    let named = std::env::var_os("RIG_DATA").map(std::path::PathBuf::from);
+    let beside = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    named.or(Some(beside)).filter(|p| p.is_dir())
+}
