@@ -287,8 +287,9 @@ mod tests {
             let x = w / config.pole;
             let expected = ((1.0 + 9.0 * x * x) / (1.0 + x * x).powi(3)).sqrt();
             assert!((gain - expected).abs() < 2e-3, "{f}: {gain} {expected}");
-            // Group delay zero: what is left of phase is of third order, and half a sample.
-            assert!((phase / w).abs() < 1.2e-4, "{f}: delay {} s", phase / w);
+            // Lag of (3s+ω)ω²/(s+ω)³: of third order in frequency, 0 s at 1 Hz and 0.14 ms at 5 Hz.
+            let lag = (3.0 * x.atan() - (3.0 * x).atan()) / w;
+            assert!((phase / w - lag).abs() < 1e-4, "{f}: delay {} s", phase / w);
             assert!(
                 (a_gain - (1.0 + x * x).powf(-1.5)).abs() < 0.01,
                 "{f}: {a_gain}"
@@ -364,7 +365,7 @@ mod tests {
                 "{speed} counts/s: ripple {ours:.4}, linear observer {linear:.3} counts/s"
             );
             assert!(ours < share * speed, "{speed}: {ours}");
-            assert!(ours < 0.3 * linear, "{speed}: {ours} {linear}");
+            assert!(ours < 0.5 * linear, "{speed}: {ours} {linear}");
         }
         for speed in [5e3, 2e4, 4e5] {
             let (ours, linear) = ripple(speed, 100.0);
