@@ -366,6 +366,37 @@ fn csv_and_mcap_read_back_bit_for_bit_and_are_deterministic() {
 }
 
 #[test]
+fn mcap_files_carry_what_other_players_look_for() {
+    let folder = Folder::new();
+    let path = folder.path("a.mcap");
+    write(&path, &awkward_rows()[..100]);
+    let bytes = std::fs::read(&path).unwrap();
+    let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    let statistics = summary.stats.unwrap();
+    assert_eq!(
+        (statistics.message_count, statistics.channel_count),
+        (100, 1)
+    );
+    assert_eq!(
+        (statistics.message_start_time, statistics.message_end_time),
+        (0, 99_000_000)
+    );
+    let channel = summary.channels.values().next().unwrap();
+    assert_eq!(
+        (channel.topic.as_str(), channel.message_encoding.as_str()),
+        ("/joint/state", "json")
+    );
+    let schema = channel.schema.as_ref().unwrap();
+    assert_eq!(schema.encoding, "jsonschema");
+    let schema: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+    assert_eq!(schema["properties"]["tau1"]["description"], "N*m");
+    for message in ::mcap::MessageStream::new(&bytes).unwrap() {
+        let sample: serde_json::Value = serde_json::from_slice(&message.unwrap().data).unwrap();
+        assert!(sample["q1"].is_number());
+    }
+}
+
+#[test]
 fn damaged_mcap_gets_a_sentence() {
     let folder = Folder::new();
     let path = folder.path("a.mcap");
@@ -457,7 +488,7 @@ fn wrong_units_are_named_and_right_ones_are_not() {
     );
     assert!(scaled(&|b| all(&mut b.joints[0].q, 1000.0)).contains("far outside"));
     assert!(
-        scaled(&|b| all(&mut b.joints[0].qd.as_mut().unwrap().as_mut(), 57.296))
+        scaled(&|b| all(b.joints[0].qd.as_mut().unwrap(), 57.296))
             .contains("do not belong together")
     );
     assert!(scaled(&|b| all(&mut b.joints[0].tau, 1000.0)).contains("tau1 looks too large"));
