@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-use super::{Elapsed, Reference, Trajectory};
+use super::segment::Segment;
+use super::{Elapsed, Reference, SlowReversals, Trajectory};
 use crate::safety::Limits;
 use crate::scalar::Scalar;
 
@@ -114,6 +115,24 @@ struct Probe<T> {
     high: Reference<T>,
 }
 
+/// Looks at a segment that begins at a time (µs); gives its length, µs.
+fn probe_segment<T: Scalar>(
+    segment: Segment<T>,
+    before: u64,
+    visit: &mut dyn FnMut(Probe<T>),
+) -> u64 {
+    for share in segment.candidates() {
+        let micros = (share * f64::from(segment.micros)) as u32;
+        let at = segment.at(micros, T::ZERO);
+        visit(Probe {
+            micros: before + u64::from(micros),
+            low: at,
+            high: at,
+        });
+    }
+    u64::from(segment.micros)
+}
+
 impl<T: Scalar> Trajectory<T> {
     /// Whether every value is finite and makes a motion.
     ///
@@ -213,19 +232,26 @@ impl<T: Scalar> Trajectory<T> {
                     visit(Probe { micros, low, high });
                 }
             }
-            Self::Staircase(_) | Self::SlowReversals(_) | Self::FrictionSweep(_) => {
+            Self::SlowReversals(m) => {
+                // One triangle of each amplitude: the others repeat it.
+                let once = SlowReversals {
+                    cycles: 1,
+                    ..m.clone()
+                };
+                let mut start = 0_u64;
+                for quarter in m.quarter_us.iter().copied() {
+                    let mut before = start;
+                    let _ = once.triangles(quarter, 0, &mut |segment| {
+                        before += probe_segment(segment, before, visit);
+                        true
+                    });
+                    start += m.amplitude_micros(quarter);
+                }
+            }
+            Self::Staircase(_) | Self::FrictionSweep(_) => {
                 let mut before = 0_u64;
                 self.segments(&mut |segment| {
-                    for share in segment.candidates() {
-                        let micros = (share * f64::from(segment.micros)) as u32;
-                        let at = segment.at(micros, T::ZERO);
-                        visit(Probe {
-                            micros: before + u64::from(micros),
-                            low: at,
-                            high: at,
-                        });
-                    }
-                    before += u64::from(segment.micros);
+                    before += probe_segment(segment, before, visit);
                     true
                 });
             }

@@ -137,7 +137,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
         self.half_turn_us.saturating_mul(2)
     }
 
-    fn amplitude_micros(&self, quarter: u32) -> u64 {
+    pub(super) fn amplitude_micros(&self, quarter: u32) -> u64 {
         let straight = 2 * u64::from(quarter);
         let cycles = u64::from(self.cycles);
         let turn = u64::from(self.turn_us());
@@ -207,7 +207,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
     }
 
     /// The segments of one amplitude from the first of a cycle on; cycles count from 1, 0 begins with the start.
-    fn triangles(
+    pub(super) fn triangles(
         &self,
         quarter: u32,
         first: u16,
