@@ -42,6 +42,7 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             _ => Err(Refusal::WrongMode),
         },
         RequestBody::ClearFault => clear_fault(config, state),
+        RequestBody::SetPosition(position) => set_position(state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
             fits(trajectory, &state.settings.limits, None)?;
@@ -101,6 +102,28 @@ fn start(state: &mut State) -> Result<(), Refusal> {
     fits(trajectory, &state.settings.limits, Some(state.run.base))?;
     state.run.start = state.tick;
     state.mode = Mode::Running;
+    Ok(())
+}
+
+/// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
+fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
+    if state.mode != Mode::Disarmed {
+        return Err(Refusal::WrongMode);
+    }
+    let counts = position / state.derived.radians_per_count;
+    // Above 2²⁴ counts an f32 no longer names single counts.
+    if !(counts.abs() < 16_777_216.0) {
+        return Err(Refusal::BadValue);
+    }
+    let shift = libm::roundf(counts) as i64 - state.counts;
+    state.origin = state.origin.map(|origin| origin - shift);
+    state.counts += shift;
+    state.position = state.counts as f32 * state.derived.radians_per_count;
+    state.reference.position = state.position;
+    // Windows that are open hold counts from the old origin.
+    state.telemetry.position += shift * i64::from(state.telemetry.ticks);
+    state.estimation.position += shift * i64::from(state.estimation.ticks);
+    state.previous = None;
     Ok(())
 }
 

@@ -51,15 +51,13 @@ impl Speaker {
     fn answer(&mut self, config: &Config, state: &mut State, request: &Request, transmit: &mut impl Transmit) {
         if request.body == RequestBody::Hello {
             self.ledger.clear();
-            send(&Report::Greeting(greeting(config)), transmit);
         }
-        let acknowledge = match self.ledger.answered(request.id) {
-            Some(earlier) => earlier,
-            None => {
-                let result = carry_out(config, state, &request.body);
-                self.ledger.answer(request.id, result)
-            }
-        };
+        if let Some(earlier) = self.ledger.answered(request.id) {
+            send(&Report::Acknowledge(earlier), transmit);
+            return;
+        }
+        let result = carry_out(config, state, &request.body);
+        let acknowledge = self.ledger.answer(request.id, result);
         let accepted = acknowledge.result.is_ok();
         send(&Report::Acknowledge(acknowledge), transmit);
         if accepted {
@@ -67,8 +65,7 @@ impl Speaker {
         }
     }
 
-    /// The requests about the conversation itself. Each may be repeated without harm: a stream that is
-    /// started again begins anew, its end and the snapshot are sent again.
+    /// The requests about the conversation itself, carried out after their acknowledgement.
     fn converse(
         &mut self,
         config: &Config,
@@ -77,6 +74,9 @@ impl Speaker {
         transmit: &mut impl Transmit,
     ) {
         match body {
+            RequestBody::Hello => {
+                send(&Report::Greeting(greeting(config)), transmit);
+            }
             RequestBody::StartStream => {
                 self.batcher.start(state.window_start(), config.rates.telemetry_decimation);
             }
