@@ -99,6 +99,11 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.known
     }
 
+    /// Whether the last block was one that Σ and r cannot explain.
+    pub fn suspicious(&self) -> bool {
+        self.alarms > 0
+    }
+
     /// Mean square of the residual; zero before the first block.
     pub fn mean_square(&self) -> T {
         self.mean_square
