@@ -135,7 +135,8 @@ impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
 /// Whether a value is neither infinite nor NaN.
 #[inline(always)]
 pub(super) fn finite<T: Real<Mask = bool>>(value: T) -> bool {
-    (value - value).le(T::ZERO)
+    // ∞·0 and NaN·0 are NaN, and no comparison with NaN is true.
+    (value * T::ZERO).le(T::ZERO)
 }
 
 /// Takes in one measurement y = row·θ + noise. Nothing is changed by input that is not finite.

@@ -68,6 +68,8 @@ pub struct Uncertainty<T, const N: usize> {
     filled: u32,
     blocks: T,
     long_run: T,
+    /// r: the long-run variance, corrected for the freedom that the estimate took.
+    noise: T,
     mean_square: T,
     known: bool,
     alarms: u8,
@@ -88,6 +90,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
             filled: 0,
             blocks: T::ZERO,
             long_run: T::ZERO,
+            noise: T::ONE,
             mean_square: T::ZERO,
             known: false,
             alarms: 0,
@@ -133,7 +136,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
         // What is left of the residual after the update: the start's large errors are not noise.
         let residual = residual * (T::ONE - taken);
-        let noise = if self.known { self.long_run } else { T::ONE };
+        let noise = if self.known { self.noise } else { T::ONE };
         let square = spread + noise;
         for i in 0..N {
             for j in i..N {
@@ -170,7 +173,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.rows = [T::ZERO; N];
         self.filled = 0;
         if self.known {
-            let expected = self.long_run * config.inverse_block + spread;
+            let expected = self.noise * config.inverse_block + spread;
             let odd = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);
             if odd {
@@ -193,13 +196,15 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         let length = T::ONE / config.inverse_block;
         self.long_run += share * (length * mean * mean - self.long_run);
         self.mean_square += share * (square - self.mean_square);
-        // The estimate itself has taken up to N block means' freedom away from the residuals.
+        // The estimate follows the noise itself and so takes up to N block means' freedom away from the
+        // residuals, with forgetting as without.
+        let free = (self.blocks - parameters).max(T::ONE);
+        self.noise = self.long_run * self.blocks / free;
         let enough = T::from_f64((N + BLOCKS_PER_PARAMETER * N) as f64);
         if !self.known && enough.le(self.blocks) {
-            self.long_run *= self.blocks / (self.blocks - parameters);
             for i in 0..N {
                 for j in 0..N {
-                    self.sigma[i][j] *= self.long_run;
+                    self.sigma[i][j] *= self.noise;
                 }
             }
             self.known = true;
