@@ -4,6 +4,9 @@
 //! [`filtered`]) and whether it is *informative* (leverage against noise). Memory and forgetting count
 //! valid, informative samples alone, so that standing still forgets nothing.
 //!
+//! Cost of a step, counted by the test `operations_are_as_stated`: at most 788 sums and products, 18 divisions, one sine and
+//! cosine (628 and 15 on the mean); the dearest step is the one that closes a residual block.
+//!
 //! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both
 //! show in `residual_rms`.
 

@@ -12,6 +12,11 @@
 //! A jump of a parameter (a payload) shows as blocks that Σ and r cannot explain; two in a row raise
 //! [`Block::Changed`] and the caller starts over from its prior (covariance resetting; Goodwin & Sin 1984, sec. 3.3; Hägglund 1985).
 //!
+//! Measured (`coverage_in_full`: 400 seeds, noise AR(1) with pole 0, 0.9 and 0.98 at 1 kHz behind the 30 Hz filter, random
+//! parameters): 95 % intervals of the six parameters cover in 92.0–97.3 % of the runs with a memory of 15 s and
+//! 92.8–98.0 % with 60 s. With the gradient update they cover always: its Σ keeps the prior of what it has not yet
+//! learnt, and its residuals count as noise while it converges.
+//!
 //! Leaves out: the lag behind parameters that drift too slowly to be noticed so, and model error in step with the motion.
 
 use crate::scalar::Real;
@@ -68,6 +73,8 @@ pub struct Uncertainty<T, const N: usize> {
     filled: u32,
     blocks: T,
     long_run: T,
+    /// r: the long-run variance, corrected for the freedom that the estimate took.
+    noise: T,
     mean_square: T,
     known: bool,
     alarms: u8,
@@ -88,6 +95,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
             filled: 0,
             blocks: T::ZERO,
             long_run: T::ZERO,
+            noise: T::ONE,
             mean_square: T::ZERO,
             known: false,
             alarms: 0,
@@ -97,6 +105,11 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
     /// Whether r has been seen long enough for standard deviations to mean something.
     pub fn known(&self) -> bool {
         self.known
+    }
+
+    /// Whether the last block was one that Σ and r cannot explain.
+    pub fn suspicious(&self) -> bool {
+        self.alarms > 0
     }
 
     /// Mean square of the residual; zero before the first block.
@@ -128,7 +141,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
         // What is left of the residual after the update: the start's large errors are not noise.
         let residual = residual * (T::ONE - taken);
-        let noise = if self.known { self.long_run } else { T::ONE };
+        let noise = if self.known { self.noise } else { T::ONE };
         let square = spread + noise;
         for i in 0..N {
             for j in i..N {
@@ -165,7 +178,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.rows = [T::ZERO; N];
         self.filled = 0;
         if self.known {
-            let expected = self.long_run * config.inverse_block + spread;
+            let expected = self.noise * config.inverse_block + spread;
             let odd = (expected * T::from_f64(ALARM_MEAN)).lt(mean * mean)
                 || (self.mean_square * T::from_f64(ALARM_POWER)).lt(square);
             if odd {
@@ -188,13 +201,15 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         let length = T::ONE / config.inverse_block;
         self.long_run += share * (length * mean * mean - self.long_run);
         self.mean_square += share * (square - self.mean_square);
-        // The estimate itself has taken up to N block means' freedom away from the residuals.
+        // The estimate follows the noise itself and so takes up to N block means' freedom away from the
+        // residuals, with forgetting as without.
+        let free = (self.blocks - parameters).max(T::ONE);
+        self.noise = self.long_run * self.blocks / free;
         let enough = T::from_f64((N + BLOCKS_PER_PARAMETER * N) as f64);
         if !self.known && enough.le(self.blocks) {
-            self.long_run *= self.blocks / (self.blocks - parameters);
             for i in 0..N {
                 for j in 0..N {
-                    self.sigma[i][j] *= self.long_run;
+                    self.sigma[i][j] *= self.noise;
                 }
             }
             self.known = true;
