@@ -13,7 +13,7 @@ use rig_shared::estimation::SettingsFault;
 use crate::link::Device;
 use crate::plant::{Plant, PlantConfig};
 
-pub use nameplate::{Nameplate, NameplateError};
+pub use nameplate::{Nameplate, NameplateError, link_parameters};
 
 /// The control application, run tick by tick against the plant, with the real wire protocol at its end.
 pub struct EmulatedRig {
