@@ -1,1 +1,64 @@
-//! Serial chains of any length.
+//! Serial chains of rigid links, any length up to [`MAX_JOINTS`], revolute and prismatic joints mixed.
+//!
+//! Everything is linear in one vector π of [`COLUMNS`] parameters a joint, named by [`COLUMN_NAMES`]:
+//! the ten inertial parameters of link i in frame i (inertia about the ORIGIN of that frame), the drive's
+//! inertia seen at the joint, viscous and Coulomb friction, and a constant torque:
+//!
+//! τ = A(q)·q̈ + C(q, q̇)·q̇ + g(q) + Ia·q̈ + fv·q̇ + fc·sgn q̇ + off = Y(q, q̇, q̈)·π
+//!
+//! Frames follow the modified Denavit–Hartenberg convention (Craig 1986; Khalil & Dombre 2002, sec. 3.2).
+//! All quantities are SI and joint-side; an entry that belongs to a prismatic joint is in metres and newtons
+//! where that of a revolute joint is in radians and newton metres. Matrices are row-major slices.
+//!
+//! Every function checks the lengths of its slices and answers [`MultibodyError::WrongLength`] where one is
+//! wrong; outputs are then untouched. No function allocates or branches on a value of `T`.
+//!
+//! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of
+//! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
+//! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
+
+mod chain;
+mod coriolis;
+mod energy;
+mod forward;
+mod inertia_matrix;
+mod inverse;
+mod parameters;
+mod regressor;
+mod spatial;
+
+#[cfg(test)]
+mod lagrangian;
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod structure;
+#[cfg(test)]
+mod textbook;
+#[cfg(test)]
+mod timing;
+
+pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
+pub use coriolis::coriolis_matrix;
+pub use energy::{
+    energy_regressor, friction_power_regressor, kinetic_energy, kinetic_energy_regressor,
+    potential_energy, potential_energy_regressor,
+};
+pub use forward::forward_dynamics;
+pub use inertia_matrix::inertia_matrix;
+pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
+pub use parameters::{COLUMN_NAMES, COLUMNS, column};
+pub use regressor::differential_regressor;
+
+/// Calls a kernel with the smallest of a few fixed capacities that holds the chain: one joint must not pay for
+/// buffers of sixteen, and one copy of the code for each length would not fit the microcontroller.
+macro_rules! with_capacity {
+    ($n:expr, $kernel:ident($($argument:expr),* $(,)?)) => {
+        match $n {
+            0 | 1 => $kernel::<_, 1>($($argument),*),
+            2..=8 => $kernel::<_, 8>($($argument),*),
+            _ => $kernel::<_, { $crate::multibody::MAX_JOINTS }>($($argument),*),
+        }
+    };
+}
+use with_capacity;

@@ -1,0 +1,92 @@
+//! Forward dynamics.
+
+use super::chain::{Chain, MAX_JOINTS, MultibodyError, check};
+use super::inertia_matrix::inertia_matrix;
+use super::inverse::bias_torque;
+use super::parameters::COLUMNS;
+use super::with_capacity;
+use crate::scalar::{Mask, Real};
+
+/// Accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix from the
+/// composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2; for the lengths
+/// supported here it costs less than the articulated-body algorithm, and it says when A is not positive definite).
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`], also where a number is NaN. `qdd` is
+/// then untouched.
+pub fn forward_dynamics<T: Real>(
+    chain: &Chain<T>,
+    parameters: &[[T; COLUMNS]],
+    q: &[T],
+    qd: &[T],
+    tau: &[T],
+    qdd: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    check("tau", n, tau.len())?;
+    check("qdd", n, qdd.len())?;
+    let mut free = [T::ZERO; MAX_JOINTS];
+    let free = &mut free[..n];
+    bias_torque(chain, parameters, q, qd, free)?;
+    for (entry, &torque) in free.iter_mut().zip(tau) {
+        *entry = torque - *entry;
+    }
+    with_capacity!(n, accelerate(chain, parameters, q, free))?;
+    qdd.copy_from_slice(free);
+    Ok(())
+}
+
+/// Replaces the net torques by the accelerations.
+fn accelerate<T: Real, const CAPACITY: usize>(
+    chain: &Chain<T>,
+    parameters: &[[T; COLUMNS]],
+    q: &[T],
+    x: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    // A square of constant generics is not expressible; the rows of a CAPACITY × CAPACITY array are.
+    let mut square = [[T::ZERO; CAPACITY]; CAPACITY];
+    let matrix = square.as_flattened_mut();
+    let matrix = &mut matrix[..n * n];
+    inertia_matrix(chain, parameters, q, matrix)?;
+    factorise(matrix, n)?;
+    for i in 0..n {
+        let mut value = x[i];
+        for k in 0..i {
+            value -= matrix[i * n + k] * x[k];
+        }
+        x[i] = value / matrix[i * n + i];
+    }
+    for i in (0..n).rev() {
+        let mut value = x[i];
+        for k in i + 1..n {
+            value -= matrix[k * n + i] * x[k];
+        }
+        x[i] = value / matrix[i * n + i];
+    }
+    Ok(())
+}
+
+/// Replaces the lower triangle of an n × n matrix by its Cholesky factor L, A = L·Lᵀ.
+fn factorise<T: Real>(matrix: &mut [T], n: usize) -> Result<(), MultibodyError> {
+    for j in 0..n {
+        let mut pivot = matrix[j * n + j];
+        for k in 0..j {
+            pivot -= matrix[j * n + k].squared();
+        }
+        // NaN fails this comparison too.
+        if !T::ZERO.lt(pivot).all() {
+            return Err(MultibodyError::NotPositiveDefinite { joint: j });
+        }
+        let root = pivot.sqrt();
+        matrix[j * n + j] = root;
+        for i in j + 1..n {
+            let mut value = matrix[i * n + j];
+            for k in 0..j {
+                value -= matrix[i * n + k] * matrix[j * n + k];
+            }
+            matrix[i * n + j] = value / root;
+        }
+    }
+    Ok(())
+}
