@@ -127,7 +127,11 @@ fn emps_explore() {
             show(&format!("defaults {model:?} {estimator:?}"), &identify(&robot, &list, &[&test0], &o).unwrap());
         }
     }
-    for window in [0.02, 0.05, 0.1, 0.2, 0.4] {
+    for gain in [-1.0, 1.0] {
+        let t = emps_recording("test_pulses.csv", gain).unwrap();
+        show(&format!("pulses gain {gain}"), &identify(&robot, &[&t], &[], &a).unwrap());
+    }
+    for window in [0.005, 0.01, 0.02] {
         let o = Options { model: ModelKind::Integral, window: Some(window), ..Default::default() };
         show(&format!("integral {window}"), &identify(&robot, &list, &[&test0], &o).unwrap());
     }

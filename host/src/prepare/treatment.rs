@@ -103,6 +103,10 @@ pub struct Treatment {
 /// motion itself (customary: five to ten times; Gautier, Janot & Vandanjon 2013).
 const LEAST_HEADROOM: f64 = 5.0;
 
+/// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion: reversals of
+/// friction have harmonics well above the motion itself, and the residual is to show them.
+const PARALLEL_HEADROOM: f64 = 10.0;
+
 impl Treatment {
     /// Decides from the surveys of all training recordings and the robot's torque limits.
     ///
@@ -142,11 +146,13 @@ impl Treatment {
         let (decimation, decimation_reason) = match options.decimation {
             Choice::Fixed(n) => (n, format!("Every {n}th row, as given.")),
             Choice::Auto => {
-                let n = ((0.4 * rate / cutoff).floor() as u64).clamp(1, most) as usize;
+                // Torque and regressor pass the same filter, so this band costs no bias; it drops noise.
+                let band = (PARALLEL_HEADROOM * motion).min(cutoff);
+                let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
                 (
                     n,
                     format!(
-                        "One row in {n}: the low-pass before it passes up to {:.3} Hz, the band that the position filter leaves.",
+                        "One row in {n}: the low-pass before it passes up to {:.3} Hz, at least ten times the highest frequency of the motion ({motion:.3} Hz) or all that the position filter leaves.",
                         if n > 1 { decimator_edge(n, rate) } else { cutoff }
                     ),
                 )
