@@ -1,4 +1,21 @@
 //! Recordings: columns with units, checked line by line, read in blocks so that memory does not grow.
+//!
+//! [`Source`] reads CSV and MCAP alike, as many passes as asked; [`RecordingWriter`] writes both;
+//! [`plausibility`] notices wrong units before they become wrong parameters.
+
+mod columns;
+mod csv;
+mod error;
+mod mcap_rows;
+mod plausibility;
+mod source;
+mod writer;
+
+pub use columns::EffortNeed;
+pub use error::{DataError, Warning};
+pub use plausibility::{Implausible, plausibility};
+pub use source::{Blocks, Sampling, Source};
+pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
 /// Where the effort (torque or force) of a joint comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +31,8 @@ pub enum EffortKind {
 pub struct JointColumns {
     /// Position, rad or m.
     pub q: Vec<f64>,
-    /// Joint torque or force, N·m or N (from `tau<k>`, or from `i<k>` through the drive).
+    /// Joint torque or force, N·m or N (from `tau<k>`, or from `i<k>` through the drive); empty where
+    /// the recording has neither and was opened with [`EffortNeed::Optional`].
     pub tau: Vec<f64>,
     /// Measured velocity, if recorded.
     pub qd: Option<Vec<f64>>,
@@ -22,7 +40,7 @@ pub struct JointColumns {
     pub qdd: Option<Vec<f64>>,
     /// Reference position, if recorded.
     pub reference: Option<Vec<f64>>,
-    /// Motor voltage, if recorded, V.
+    /// Motor voltage, if recorded (`u<k>`, or `duty<k>` times `supply`), V.
     pub voltage: Option<Vec<f64>>,
     /// Temperature, if recorded, °C.
     pub temperature: Option<Vec<f64>>,
@@ -37,7 +55,7 @@ pub struct Block {
     pub joints: Vec<JointColumns>,
     /// Columns that have no meaning to the model, kept by name (for instance `pulses`).
     pub extra: Vec<(String, Vec<f64>)>,
-    /// Line of the file (1-based) that the first row came from.
+    /// Line of the file (1-based; in MCAP the message's number) that the first row came from.
     pub first_line: u64,
     /// Whether this block follows the previous one without a gap in time.
     pub continues: bool,
@@ -53,3 +71,20 @@ impl Block {
         self.t.is_empty()
     }
 }
+
+/// Folder of real recordings: the environment variable `RIG_DATA`, else `../shared/data` beside the
+/// project; none where neither is there.
+pub fn data_dir() -> Option<std::path::PathBuf> {
+    if let Some(named) = std::env::var_os("RIG_DATA") {
+        return Some(std::path::PathBuf::from(named)).filter(|p| p.is_dir());
+    }
+    // Cargo names the crate's folder while it runs something; a program run by hand starts where it is.
+    let start = std::env::var_os("CARGO_MANIFEST_DIR").map(std::path::PathBuf::from);
+    let start = start.or_else(|| std::env::current_dir().ok())?;
+    // Crate, project, folder of the project, and one more for projects checked out one level deeper.
+    let mut folders = start.ancestors().skip(1).take(3);
+    folders.find_map(|f| Some(f.join("shared/data")).filter(|p| p.is_dir()))
+}
+
+#[cfg(test)]
+mod tests;

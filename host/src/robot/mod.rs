@@ -1,8 +1,34 @@
 //! The robot description: read from TOML or URDF, written back.
 //!
 //! Joint-side SI units throughout; angles grow in the positive sense of the joint axis.
+//!
+//! Frames follow the modified Denavit–Hartenberg convention (Craig, *Introduction to Robotics*, 1989,
+//! eq. 3.6; Khalil & Dombre 2002, sec. 3.2): frame i−1 → i is
+//! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
+
+mod check;
+mod dh;
+mod error;
+mod text;
+mod urdf;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+
+pub use check::EFFECT_NAMES;
+pub use error::{Place, RobotError};
+
+/// Largest robot description that is read; the largest published URDF files are a hundredth of it.
+pub const MAX_BYTES: u64 = 16 << 20;
+
+/// What `rig init one-link` writes: the one-link rig, every line with its unit and meaning.
+pub const ONE_LINK_TEMPLATE: &str = include_str!("../../robots/one-link.toml");
+
+/// The EMPS axis (Janot, Gautier, Brunot 2019) without any prior inertial or friction value.
+pub const EMPS: &str = include_str!("../../robots/emps.toml");
 
 /// A serial robot as a file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,7 +105,7 @@ pub struct Inertial {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointLimits {
-    /// Lowest and highest position, rad or m.
+    /// Lowest and highest position, rad or m; −∞ and ∞ where a revolute joint turns endlessly.
     pub position: [f64; 2],
     /// Highest speed, rad/s or m/s.
     pub velocity: f64,
@@ -113,7 +139,8 @@ pub struct Drive {
     /// kg·m², on the motor side
     #[serde(default)]
     pub rotor_inertia: f64,
-    /// N·m/A, on the motor side
+    /// N·m/A, on the motor side; 0 (key absent) where unknown, so that motor currents cannot be used
+    #[serde(default)]
     pub torque_constant: f64,
     /// Ω
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -146,3 +173,86 @@ pub struct Controller {
 fn one() -> f64 {
     1.0
 }
+
+impl Robot {
+    /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
+    pub fn load(path: &Path) -> Result<Self, RobotError> {
+        let text = read_text(path)?;
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        match extension.as_deref() {
+            Some("toml") => Self::from_toml(&text, path),
+            Some("urdf") => Self::from_urdf(&text, path),
+            _ if text.trim_start().starts_with('<') => Self::from_urdf(&text, path),
+            _ => Self::from_toml(&text, path),
+        }
+    }
+
+    /// Reads TOML text; `path` only names the source in messages.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, RobotError> {
+        text::read(text, path)
+    }
+
+    /// Reads URDF text (serial chain; fixed joints are merged) and converts it to modified
+    /// Denavit–Hartenberg frames; `path` only names the source in messages.
+    ///
+    /// Every joint keeps the URDF's zero and positive sense: z of its frame is the URDF axis.
+    pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
+        let chain = urdf::read(text, path)?;
+        Ok(dh::convert(&chain).robot)
+    }
+
+    /// The description as TOML with units in comments; [`Robot::from_toml`] reads it back equal.
+    pub fn to_toml(&self) -> Result<String, RobotError> {
+        text::write(self)
+    }
+
+    /// Index (from 0) of the joint called `name`.
+    pub fn joint_index(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|j| j.name == name)
+    }
+}
+
+/// The whole file as text, refusing what cannot be a description before reading it.
+fn read_text(path: &Path) -> Result<String, RobotError> {
+    let failed = |source| RobotError::Read {
+        path: path.into(),
+        source,
+    };
+    if std::fs::metadata(path).map_err(failed)?.is_dir() {
+        return Err(RobotError::Directory { path: path.into() });
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells too large from just fitting, also where the length is unknown.
+    let mut limited = File::open(path).map_err(failed)?.take(MAX_BYTES + 1);
+    limited.read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(RobotError::TooLarge { path: path.into() });
+    }
+    let unprintable = bytes
+        .iter()
+        .position(|&b| b < 0x20 && !matches!(b, b'\t' | b'\n' | b'\r'));
+    if let Some(offset) = unprintable {
+        return Err(RobotError::NotText {
+            path: path.into(),
+            offset,
+        });
+    }
+    let text = String::from_utf8(bytes).map_err(|e| RobotError::NotText {
+        path: path.into(),
+        offset: e.utf8_error().valid_up_to(),
+    })?;
+    let text = match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    };
+    if text.trim().is_empty() {
+        return Err(RobotError::Empty { path: path.into() });
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests;

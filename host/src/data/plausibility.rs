@@ -1,0 +1,280 @@
+//! Wrong units, noticed before they become wrong parameters.
+//!
+//! Every rule leaves at least a factor of ten between what honest recordings do and what raises it;
+//! factors of unit mistakes are 57 (degrees) and 1000 (milli). Without limits in the robot's description
+//! only what the columns say about each other is checked.
+
+use super::{Block, JointColumns};
+use crate::robot::{Joint, JointKind, Robot};
+
+/// A column that cannot be in the unit of the contract.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Implausible {
+    /// Position of a revolute joint in degrees.
+    #[error(
+        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad"
+    )]
+    Degrees {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Lowest value.
+        lowest: f64,
+        /// Highest value.
+        highest: f64,
+        /// Farthest position limit, rad.
+        limit: f64,
+    },
+    /// Position far outside the limits.
+    #[error(
+        "q{joint} lies far outside the joint's range ({lowest:.4} to {highest:.4}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits"
+    )]
+    Position {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Lowest value.
+        lowest: f64,
+        /// Highest value.
+        highest: f64,
+        /// Lower limit.
+        lower: f64,
+        /// Upper limit.
+        upper: f64,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Faster than ten times the limit.
+    #[error(
+        "q{joint} moves at up to {speed:.4} {unit}/s, more than ten times its limit of {limit} {unit}/s; check the units of q{joint} and t and the limit"
+    )]
+    Velocity {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Highest speed, over ten samples.
+        speed: f64,
+        /// Limit.
+        limit: f64,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Measured velocity and change of position do not belong together.
+    #[error(
+        "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
+    )]
+    VelocityScale {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Change of position over integral of velocity; 1 would be right.
+        ratio: f64,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Effort far above the limit.
+    #[error(
+        "tau{joint} looks too large by a factor of about 1000 (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
+    )]
+    EffortTooLarge {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Largest magnitude.
+        highest: f64,
+        /// Limit.
+        limit: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
+    /// Effort far below what moves the joint.
+    #[error(
+        "tau{joint} looks too small by a factor of about 1000 (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint"
+    )]
+    EffortTooSmall {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Largest magnitude.
+        highest: f64,
+        /// What it is compared with.
+        of: &'static str,
+        /// That value.
+        expected: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
+    /// Time in milliseconds.
+    #[error("t looks like milliseconds (its steps are {step:.4}); give it in s")]
+    Milliseconds {
+        /// Median step.
+        step: f64,
+    },
+}
+
+/// Everything in `block` that cannot be in SI units for `robot`; empty where all is well.
+pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let mut found = Vec::new();
+    let mut steps: Vec<f64> = block
+        .t
+        .iter()
+        .zip(block.t.iter().skip(1))
+        .map(|(a, b)| b - a)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    // Motion sampled at 5 Hz or less cannot be identified anyway; 0.2 ms as milliseconds is this much.
+    if let Some(&step) = steps.get(steps.len() / 2)
+        && step >= 0.2
+    {
+        found.push(Implausible::Milliseconds { step });
+    }
+    for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
+        check_joint(k, &block.t, columns, joint, &mut found);
+    }
+    found
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        })
+}
+
+fn check_joint(
+    k: usize,
+    t: &[f64],
+    columns: &JointColumns,
+    joint: &Joint,
+    found: &mut Vec<Implausible>,
+) {
+    let (unit, effort_unit) = match joint.kind {
+        JointKind::Revolute => ("rad", "N·m"),
+        JointKind::Prismatic => ("m", "N"),
+    };
+    let (lowest, highest) = range(&columns.q);
+    if columns.q.is_empty() {
+        return;
+    }
+    if let Some(limits) = &joint.limits {
+        let [lower, upper] = limits.position;
+        let reach = lower.abs().max(upper.abs());
+        let farthest = lowest.abs().max(highest.abs());
+        let degrees = farthest.to_radians() <= 1.2 * reach;
+        if reach.is_finite() && farthest > 5.0 * reach {
+            found.push(if joint.kind == JointKind::Revolute && degrees {
+                Implausible::Degrees {
+                    joint: k,
+                    lowest,
+                    highest,
+                    limit: reach,
+                }
+            } else {
+                Implausible::Position {
+                    joint: k,
+                    lowest,
+                    highest,
+                    lower,
+                    upper,
+                    unit,
+                }
+            });
+        } else if let Some(speed) = highest_speed(t, &columns.q)
+            && speed > 10.0 * limits.velocity
+        {
+            found.push(Implausible::Velocity {
+                joint: k,
+                speed,
+                limit: limits.velocity,
+                unit,
+            });
+        }
+    }
+    if let Some(ratio) = columns
+        .qd
+        .as_ref()
+        .and_then(|qd| velocity_scale(t, &columns.q, qd))
+    {
+        // Degrees or rpm against rad are at least 6 apart, milli 1000.
+        if !(0.2..5.0).contains(&ratio.abs()) {
+            found.push(Implausible::VelocityScale {
+                joint: k,
+                ratio,
+                unit,
+            });
+        }
+    }
+    check_effort(k, columns, joint, effort_unit, highest - lowest, found);
+}
+
+/// Highest mean speed over ten samples: a single step of a coarse encoder is no speed.
+fn highest_speed(t: &[f64], q: &[f64]) -> Option<f64> {
+    const SPAN: usize = 10;
+    let rows = t.iter().zip(q);
+    let later = rows.clone().skip(SPAN);
+    rows.zip(later)
+        .map(|((t0, q0), (t1, q1))| ((q1 - q0) / (t1 - t0)).abs())
+        .reduce(f64::max)
+}
+
+/// Least-squares factor between changes of q and the integral of qd over windows of twenty samples, if
+/// both go together.
+fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
+    const SPAN: usize = 20;
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for start in (SPAN..q.len()).step_by(SPAN) {
+        let rows = start - SPAN..start;
+        let x: f64 = rows
+            .clone()
+            .map(|i| 0.5 * (qd[i] + qd[i + 1]) * (t[i + 1] - t[i]))
+            .sum();
+        let y = q[start] - q[start - SPAN];
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    // Only where the two are clearly the same motion: correlation above 0.8.
+    (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
+}
+
+fn check_effort(
+    k: usize,
+    columns: &JointColumns,
+    joint: &Joint,
+    unit: &'static str,
+    travel: f64,
+    found: &mut Vec<Implausible>,
+) {
+    let highest = columns.tau.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let limit = joint.limits.as_ref().and_then(|l| l.torque);
+    if let Some(limit) = limit
+        && highest > 20.0 * limit
+    {
+        found.push(Implausible::EffortTooLarge {
+            joint: k,
+            highest,
+            limit,
+            unit,
+        });
+        return;
+    }
+    // 0.05 rad or 5 cm of travel: a joint that hardly moves may well need next to nothing.
+    if columns.tau.is_empty() || travel < 0.05 {
+        return;
+    }
+    // A joint cannot move against its friction with a hundredth of it, whatever else acts.
+    let coulomb = joint
+        .friction
+        .as_ref()
+        .map(|f| f.coulomb)
+        .filter(|c| *c > 0.0);
+    let too_small = match (coulomb, limit) {
+        (Some(c), _) if highest < 0.01 * c => Some(("Coulomb friction", c)),
+        (None, Some(l)) if highest < 5e-4 * l => Some(("limit", l)),
+        _ => None,
+    };
+    if let Some((of, expected)) = too_small {
+        found.push(Implausible::EffortTooSmall {
+            joint: k,
+            highest,
+            of,
+            expected,
+            unit,
+        });
+    }
+}

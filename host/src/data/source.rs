@@ -1,0 +1,412 @@
+//! A recording as a stream of blocks, as often as asked.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::columns::{EffortNeed, Layout, Role, layout};
+use super::csv::CsvRows;
+use super::error::{DataError, Warning};
+use super::mcap_rows::{MAGIC, McapRows};
+use super::{Block, JointColumns};
+use crate::robot::Robot;
+
+/// Rows that decide on the sample period.
+const PROBED_ROWS: usize = 1001;
+
+/// Spread of the intervals (5th to 95th percentile over the median) above which the recording counts
+/// as irregular. Clocked recordings stay below 0.03 (KUKA LWR over a network: 0.02), polled servos
+/// begin at 0.07.
+const IRREGULAR: f64 = 0.05;
+
+/// Intervals longer than this many periods are a gap: one sample is missing.
+const GAP: f64 = 1.5;
+
+/// The same for irregular recordings, whose intervals vary by nature.
+const IRREGULAR_GAP: f64 = 5.0;
+
+/// Warnings that are kept; more are only counted, so that memory does not grow.
+const KEPT_WARNINGS: usize = 1000;
+
+/// How a recording is sampled, judged by its first 1001 rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Median interval, s; 0 where there is a single row.
+    pub period: f64,
+    /// Whether the intervals vary so much (5th to 95th percentile more than 5 % of the median apart)
+    /// that the rows must not be taken as evenly spaced.
+    pub irregular: bool,
+}
+
+impl Sampling {
+    fn of(times: &[f64]) -> Self {
+        let mut intervals: Vec<f64> = times
+            .iter()
+            .zip(times.iter().skip(1))
+            .map(|(a, b)| b - a)
+            .collect();
+        intervals.sort_by(f64::total_cmp);
+        let Some(last) = intervals.len().checked_sub(1) else {
+            return Self {
+                period: 0.0,
+                irregular: false,
+            };
+        };
+        let at = |share: f64| intervals[(share * last as f64).round() as usize];
+        let period = at(0.5);
+        Self {
+            period,
+            irregular: at(0.95) - at(0.05) > IRREGULAR * period,
+        }
+    }
+
+    /// Longest interval within one block, s.
+    pub fn longest_interval(&self) -> f64 {
+        self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
+    }
+}
+
+/// A recording that was opened and whose header fits the robot.
+#[derive(Clone, Debug)]
+pub struct Source {
+    path: PathBuf,
+    layout: Layout,
+    sampling: Sampling,
+    is_mcap: bool,
+    bytes: u64,
+}
+
+enum Rows {
+    Csv(CsvRows),
+    Mcap(Box<McapRows>),
+}
+
+impl Rows {
+    fn open(path: &Path, is_mcap: bool) -> Result<(Self, Vec<String>), DataError> {
+        if is_mcap {
+            McapRows::open(path).map(|(r, n)| (Self::Mcap(Box::new(r)), n))
+        } else {
+            CsvRows::open(path).map(|(r, n)| (Self::Csv(r), n))
+        }
+    }
+
+    fn next_row(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
+        match self {
+            Self::Csv(r) => r.next_row(layout, values),
+            Self::Mcap(r) => r.next_row(layout, values),
+        }
+    }
+
+    fn bytes_read(&self) -> u64 {
+        match self {
+            Self::Csv(r) => r.bytes_read(),
+            Self::Mcap(r) => r.bytes_read(),
+        }
+    }
+}
+
+impl Source {
+    /// Opens a recording (CSV, or MCAP by its first bytes) in which every joint has its torque.
+    ///
+    /// Reads the header and the first 1001 rows; what is wrong with them is said here, what is wrong
+    /// later by [`Blocks`].
+    pub fn open(path: &Path, robot: &Robot) -> Result<Self, DataError> {
+        Self::open_with(path, robot, EffortNeed::Required)
+    }
+
+    /// As [`Source::open`], saying whether the torque may be missing.
+    pub fn open_with(path: &Path, robot: &Robot, need: EffortNeed) -> Result<Self, DataError> {
+        let failed = |source| DataError::Read {
+            path: path.into(),
+            source,
+        };
+        let metadata = std::fs::metadata(path).map_err(failed)?;
+        if metadata.is_dir() {
+            return Err(DataError::Directory { path: path.into() });
+        }
+        let mut start = Vec::new();
+        let mut head = File::open(path).map_err(failed)?.take(MAGIC.len() as u64);
+        head.read_to_end(&mut start).map_err(failed)?;
+        let is_mcap = start == MAGIC;
+        let (mut rows, names) = Rows::open(path, is_mcap)?;
+        let layout = layout(path, &names, robot, need)?;
+        let mut values = vec![0.0; layout.columns.len()];
+        let mut times = Vec::new();
+        while times.len() < PROBED_ROWS
+            && let Some(line) = rows.next_row(&layout, &mut values)?
+        {
+            let now = values[layout.time];
+            check_growth(path, line, times.last().copied(), now)?;
+            times.push(now);
+        }
+        if times.is_empty() {
+            return Err(DataError::NoRows { path: path.into() });
+        }
+        let sampling = Sampling::of(&times);
+        Ok(Self {
+            path: path.into(),
+            layout,
+            sampling,
+            is_mcap,
+            bytes: metadata.len(),
+        })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Length of the file in bytes, for progress.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// How the recording is sampled.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Names of the file's columns in their order.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.layout.columns.iter().map(|c| c.name.as_str())
+    }
+
+    /// What the header makes worth saying; [`Blocks::warnings`] adds what the rows do.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.layout.warnings
+    }
+
+    /// One pass over the recording in blocks of at most `rows_per_block` rows (at least 1); a block ends
+    /// early before a gap in time. After an error there are no further blocks.
+    pub fn blocks(&self, rows_per_block: usize) -> Blocks<'_> {
+        Blocks {
+            source: self,
+            rows_per_block: rows_per_block.max(1),
+            rows: None,
+            values: vec![0.0; self.layout.columns.len()],
+            pending: None,
+            previous: None,
+            continues: false,
+            finished: false,
+            warnings: Vec::new(),
+            gaps: 0,
+            named_extras: vec![false; self.layout.columns.len()],
+        }
+    }
+
+    /// The whole recording, one block per stretch without a gap, and the warnings.
+    pub fn read_all(&self) -> Result<(Vec<Block>, Vec<Warning>), DataError> {
+        let mut blocks = self.blocks(usize::MAX);
+        let mut all = Vec::new();
+        for block in blocks.by_ref() {
+            all.push(block?);
+        }
+        let warnings = [self.warnings(), blocks.warnings()].concat();
+        Ok((all, warnings))
+    }
+}
+
+fn check_growth(path: &Path, line: u64, previous: Option<f64>, now: f64) -> Result<(), DataError> {
+    match previous {
+        Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
+            path: path.into(),
+            line,
+            previous,
+            now,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// One pass over a recording; see [`Source::blocks`].
+pub struct Blocks<'a> {
+    source: &'a Source,
+    rows_per_block: usize,
+    rows: Option<Rows>,
+    values: Vec<f64>,
+    /// Line of the row in `values` that is not in a block yet.
+    pending: Option<u64>,
+    previous: Option<f64>,
+    continues: bool,
+    finished: bool,
+    warnings: Vec<Warning>,
+    gaps: u64,
+    named_extras: Vec<bool>,
+}
+
+impl Blocks<'_> {
+    /// What the rows read so far make worth saying; at most 1000 are kept.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Gaps in time so far.
+    pub fn gaps(&self) -> u64 {
+        self.gaps
+    }
+
+    /// Bytes read so far, for progress.
+    pub fn bytes_read(&self) -> u64 {
+        self.rows.as_ref().map_or(0, Rows::bytes_read)
+    }
+
+    fn warn(&mut self, warning: Warning) {
+        if self.warnings.len() < KEPT_WARNINGS {
+            self.warnings.push(warning);
+        }
+    }
+
+    fn empty_block(&self, first_line: u64) -> Block {
+        let layout = &self.source.layout;
+        let room = self.rows_per_block.min(1 << 16);
+        let column = || Vec::with_capacity(room);
+        let mut block = Block {
+            t: column(),
+            joints: vec![JointColumns::default(); layout.joints],
+            extra: Vec::with_capacity(layout.extras),
+            first_line,
+            continues: self.continues,
+        };
+        for c in &layout.columns {
+            if c.extra.is_some() {
+                block.extra.push((c.name.clone(), column()));
+            }
+            let Some(joint) = joint_of(c.role).and_then(|k| block.joints.get_mut(k)) else {
+                continue;
+            };
+            match c.role {
+                Role::Position(_) => joint.q = column(),
+                Role::Effort(..) => joint.tau = column(),
+                Role::Velocity(_) => joint.qd = Some(column()),
+                Role::Acceleration(_) => joint.qdd = Some(column()),
+                Role::Reference(_) => joint.reference = Some(column()),
+                Role::Voltage(_) | Role::Duty(..) => joint.voltage = Some(column()),
+                Role::Temperature(_) => joint.temperature = Some(column()),
+                Role::Time | Role::None => {}
+            }
+        }
+        block
+    }
+
+    fn push_row(&mut self, block: &mut Block, line: u64) {
+        let layout = &self.source.layout;
+        for (i, (c, &value)) in layout.columns.iter().zip(&self.values).enumerate() {
+            if let Some((_, column)) = c.extra.and_then(|e| block.extra.get_mut(e)) {
+                column.push(value);
+                if value.is_nan() && !self.named_extras[i] {
+                    self.named_extras[i] = true;
+                    // At most one per column: no cap needed.
+                    self.warnings.push(Warning::ExtraNotANumber {
+                        line,
+                        column: c.name.clone(),
+                    });
+                }
+            }
+            if c.role == Role::Time {
+                block.t.push(value);
+            }
+            let Some(joint) = joint_of(c.role).and_then(|k| block.joints.get_mut(k)) else {
+                continue;
+            };
+            let (column, value) = match c.role {
+                Role::Position(_) => (Some(&mut joint.q), value),
+                Role::Effort(_, factor) => (Some(&mut joint.tau), value * factor),
+                Role::Velocity(_) => (joint.qd.as_mut(), value),
+                Role::Acceleration(_) => (joint.qdd.as_mut(), value),
+                Role::Reference(_) => (joint.reference.as_mut(), value),
+                Role::Voltage(_) => (joint.voltage.as_mut(), value),
+                Role::Duty(_, supply) => (joint.voltage.as_mut(), value * self.values[supply]),
+                Role::Temperature(_) => (joint.temperature.as_mut(), value),
+                Role::Time | Role::None => (None, value),
+            };
+            if let Some(column) = column {
+                column.push(value);
+            }
+        }
+    }
+
+    fn next_block(&mut self) -> Result<Option<Block>, DataError> {
+        let source = self.source;
+        if self.rows.is_none() {
+            self.rows = Some(Rows::open(&source.path, source.is_mcap)?.0);
+        }
+        let mut block: Option<Block> = None;
+        loop {
+            if block
+                .as_ref()
+                .is_some_and(|b| b.len() >= self.rows_per_block)
+            {
+                self.continues = true;
+                return Ok(block);
+            }
+            let line = match self.pending.take() {
+                Some(line) => line,
+                None => {
+                    let Some(rows) = self.rows.as_mut() else {
+                        return Ok(block);
+                    };
+                    let Some(line) = rows.next_row(&source.layout, &mut self.values)? else {
+                        self.finished = true;
+                        return Ok(block);
+                    };
+                    let now = self.values[source.layout.time];
+                    check_growth(&source.path, line, self.previous, now)?;
+                    let before = self.previous.replace(now);
+                    if let Some(from) = before
+                        && now - from > source.sampling.longest_interval()
+                    {
+                        self.gaps += 1;
+                        self.warn(Warning::Gap {
+                            line,
+                            from,
+                            lost: now - from - source.sampling.period,
+                        });
+                        self.continues = false;
+                        if block.is_some() {
+                            self.pending = Some(line);
+                            return Ok(block);
+                        }
+                    }
+                    line
+                }
+            };
+            let mut current = match block.take() {
+                Some(current) => current,
+                None => self.empty_block(line),
+            };
+            self.push_row(&mut current, line);
+            block = Some(current);
+        }
+    }
+}
+
+/// The joint that a role belongs to.
+fn joint_of(role: Role) -> Option<usize> {
+    match role {
+        Role::Time | Role::None => None,
+        Role::Position(k)
+        | Role::Effort(k, _)
+        | Role::Velocity(k)
+        | Role::Acceleration(k)
+        | Role::Reference(k)
+        | Role::Voltage(k)
+        | Role::Duty(k, _)
+        | Role::Temperature(k) => Some(k),
+    }
+}
+
+impl Iterator for Blocks<'_> {
+    type Item = Result<Block, DataError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.finished {
+            return None;
+        }
+        let block = self.next_block().transpose();
+        if !matches!(block, Some(Ok(_))) {
+            self.finished = true;
+        }
+        block
+    }
+}

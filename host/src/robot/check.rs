@@ -1,0 +1,356 @@
+//! What a description must satisfy beyond its syntax.
+//!
+//! Physical consistency of the inertia (a density realises it) is not asked here: values that are
+//! identified from data are often only fixed up to combinations, and are read back as they are.
+
+use std::collections::HashSet;
+
+use super::{Joint, JointKind, Robot};
+
+/// Names of effects beyond the standard model.
+pub const EFFECT_NAMES: [&str; 22] = [
+    "stribeck",
+    "asymmetric_coulomb",
+    "quadratic_drag",
+    "load_friction",
+    "position_friction",
+    "presliding",
+    "viscous_warmup",
+    "cogging",
+    "torque_ripple",
+    "gear_eccentricity",
+    "backlash",
+    "joint_elasticity",
+    "encoder_eccentricity",
+    "current_offset",
+    "torque_saturation",
+    "measurement_delay",
+    "gravity_tilt",
+    "payload",
+    "spring",
+    "drive_deadzone",
+    "inertia_coupling",
+    "torque_offset",
+];
+
+/// One step of the way to a value in the tree of a description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// A key of a table.
+    Key(&'static str),
+    /// An index of a list.
+    At(usize),
+}
+
+/// A value that cannot be right.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub way: Vec<Step>,
+    pub what: String,
+    pub found: String,
+    pub right: String,
+}
+
+/// The first fault of `robot`, if any.
+pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
+    use Step::{At, Key};
+    for (i, g) in robot.gravity.iter().enumerate() {
+        if !g.is_finite() {
+            return Err(fault(
+                &[Key("gravity"), At(i)],
+                "gravity",
+                g,
+                "it must be three finite numbers, in m/s²",
+            ));
+        }
+    }
+    if robot.joints.is_empty() {
+        return Err(Fault {
+            way: vec![Key("joint")],
+            what: "the list of joints".into(),
+            found: "empty".into(),
+            right: "a robot has at least one [[joint]]".into(),
+        });
+    }
+    let mut names = HashSet::new();
+    for (i, joint) in robot.joints.iter().enumerate() {
+        if joint.name.trim().is_empty() {
+            return Err(Fault {
+                way: vec![Key("joint"), At(i), Key("name")],
+                what: format!("the name of joint {}", i + 1),
+                found: "empty".into(),
+                right: "every joint has a name of its own".into(),
+            });
+        }
+        if !names.insert(joint.name.as_str()) {
+            return Err(Fault {
+                way: vec![Key("joint"), At(i), Key("name")],
+                what: format!("the name of joint {}", i + 1),
+                found: format!("`{}` again", joint.name),
+                right: "every joint has a name of its own".into(),
+            });
+        }
+        check_joint(joint).map_err(|mut f| {
+            f.way.splice(0..0, [Key("joint"), At(i)]);
+            f
+        })?;
+    }
+    check_effects(robot)
+}
+
+fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
+    Fault {
+        way: way.to_vec(),
+        what: what.into(),
+        found: found.to_string(),
+        right: right.into(),
+    }
+}
+
+/// What a number must be.
+#[derive(Clone, Copy)]
+enum Must {
+    Finite,
+    Positive,
+    NotNegative,
+    NotZero,
+}
+
+fn number(
+    joint: &Joint,
+    way: &[Step],
+    what: &str,
+    unit: &str,
+    must: Must,
+    value: f64,
+) -> Result<(), Fault> {
+    let (good, right) = match must {
+        Must::Finite => (true, "a finite number"),
+        Must::Positive => (value > 0.0, "greater than 0"),
+        Must::NotNegative => (value >= 0.0, "0 or greater"),
+        Must::NotZero => (value != 0.0, "different from 0"),
+    };
+    if good && value.is_finite() {
+        return Ok(());
+    }
+    let what = format!("the {what} of joint `{}`", joint.name);
+    Err(fault(
+        way,
+        &what,
+        &value,
+        &format!("it must be {right}, in {unit}"),
+    ))
+}
+
+fn check_joint(joint: &Joint) -> Result<(), Fault> {
+    use Must::{Finite, NotNegative, NotZero, Positive};
+    use Step::{At, Key};
+    let (angle, force) = match joint.kind {
+        JointKind::Revolute => ("rad", "N·m"),
+        JointKind::Prismatic => ("m", "N"),
+    };
+    number(joint, &[Key("alpha")], "alpha", "rad", Finite, joint.alpha)?;
+    number(joint, &[Key("a")], "a", "m", Finite, joint.a)?;
+    number(joint, &[Key("theta")], "theta", "rad", Finite, joint.theta)?;
+    number(joint, &[Key("d")], "d", "m", Finite, joint.d)?;
+    if let Some(inertial) = &joint.inertial {
+        let key = Key("inertial");
+        number(
+            joint,
+            &[key, Key("mass")],
+            "mass",
+            "kg",
+            NotNegative,
+            inertial.mass,
+        )?;
+        for (i, v) in inertial.first_moment.iter().enumerate() {
+            let way = [key, Key("first_moment"), At(i)];
+            number(joint, &way, "first_moment", "kg·m", Finite, *v)?;
+        }
+        for (i, v) in inertial.inertia.iter().enumerate() {
+            number(
+                joint,
+                &[key, Key("inertia"), At(i)],
+                "inertia",
+                "kg·m²",
+                Finite,
+                *v,
+            )?;
+        }
+    }
+    if let Some(limits) = &joint.limits {
+        check_position_limits(joint, limits.position, angle)?;
+        let way = |k| [Key("limits"), Key(k)];
+        number(
+            joint,
+            &way("velocity"),
+            "velocity limit",
+            &format!("{angle}/s"),
+            Positive,
+            limits.velocity,
+        )?;
+        if let Some(v) = limits.acceleration {
+            number(
+                joint,
+                &way("acceleration"),
+                "acceleration limit",
+                &format!("{angle}/s²"),
+                Positive,
+                v,
+            )?;
+        }
+        if let Some(v) = limits.torque {
+            number(joint, &way("torque"), "torque limit", force, Positive, v)?;
+        }
+    }
+    if let Some(friction) = &joint.friction {
+        let way = |k| [Key("friction"), Key(k)];
+        number(
+            joint,
+            &way("coulomb"),
+            "Coulomb friction",
+            force,
+            Finite,
+            friction.coulomb,
+        )?;
+        let unit = format!("{force}·s/{angle}");
+        number(
+            joint,
+            &way("viscous"),
+            "viscous friction",
+            &unit,
+            Finite,
+            friction.viscous,
+        )?;
+        number(
+            joint,
+            &way("offset"),
+            "constant torque",
+            force,
+            Finite,
+            friction.offset,
+        )?;
+    }
+    if let Some(drive) = &joint.drive {
+        let way = |k| [Key("drive"), Key(k)];
+        number(
+            joint,
+            &way("gear_ratio"),
+            "gear ratio",
+            "motor turns per joint turn",
+            NotZero,
+            drive.gear_ratio,
+        )?;
+        number(
+            joint,
+            &way("rotor_inertia"),
+            "rotor inertia",
+            "kg·m²",
+            NotNegative,
+            drive.rotor_inertia,
+        )?;
+        number(
+            joint,
+            &way("torque_constant"),
+            "torque constant",
+            "N·m/A",
+            NotNegative,
+            drive.torque_constant,
+        )?;
+        let optional = [
+            ("resistance", "Ω", drive.resistance),
+            ("inductance", "H", drive.inductance),
+            (
+                "encoder_counts_per_rev",
+                "counts per motor turn",
+                drive.encoder_counts_per_rev,
+            ),
+        ];
+        for (key, unit, value) in optional {
+            if let Some(v) = value {
+                number(joint, &way(key), key, unit, Positive, v)?;
+            }
+        }
+    }
+    if let Some(controller) = &joint.controller {
+        let way = |k| [Key("controller"), Key(k)];
+        number(
+            joint,
+            &way("position_gain"),
+            "position gain",
+            "1/s",
+            NotNegative,
+            controller.position_gain,
+        )?;
+        let unit = format!("controller output per {angle}/s");
+        number(
+            joint,
+            &way("velocity_gain"),
+            "velocity gain",
+            &unit,
+            Finite,
+            controller.velocity_gain,
+        )?;
+        let unit = format!("{force} per controller output");
+        number(
+            joint,
+            &way("torque_gain"),
+            "torque gain",
+            &unit,
+            NotZero,
+            controller.torque_gain,
+        )?;
+    }
+    Ok(())
+}
+
+fn check_position_limits(joint: &Joint, [lower, upper]: [f64; 2], unit: &str) -> Result<(), Fault> {
+    let endless =
+        joint.kind == JointKind::Revolute && lower == f64::NEG_INFINITY && upper == f64::INFINITY;
+    if endless || (lower.is_finite() && upper.is_finite() && lower < upper) {
+        return Ok(());
+    }
+    Err(Fault {
+        way: vec![Step::Key("limits"), Step::Key("position")],
+        what: format!("the position range of joint `{}`", joint.name),
+        found: format!("[{lower}, {upper}]"),
+        right: format!(
+            "it must be [lowest, highest], two finite numbers in {unit} (or [-inf, inf] for a revolute joint that turns endlessly)"
+        ),
+    })
+}
+
+fn check_effects(robot: &Robot) -> Result<(), Fault> {
+    use Step::{At, Key};
+    for (i, effect) in robot.effects.iter().enumerate() {
+        let describe = |key| match effect.get(key) {
+            None => "missing".to_owned(),
+            Some(toml::Value::String(s)) => format!("`{s}`"),
+            Some(other) => other.to_string(),
+        };
+        let known = |key, names: &[&str]| {
+            effect
+                .get(key)
+                .and_then(toml::Value::as_str)
+                .is_some_and(|s| names.contains(&s))
+        };
+        if !known("kind", &EFFECT_NAMES) {
+            return Err(Fault {
+                way: vec![Key("effect"), At(i), Key("kind")],
+                what: format!("the kind of effect {}", i + 1),
+                found: describe("kind"),
+                right: format!("it must be one of {}", EFFECT_NAMES.join(", ")),
+            });
+        }
+        let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+        if effect.contains_key("joint") && !known("joint", &joints) {
+            return Err(Fault {
+                way: vec![Key("effect"), At(i), Key("joint")],
+                what: format!("the joint of effect {}", i + 1),
+                found: describe("joint"),
+                right: format!("this robot's joints are {}", joints.join(", ")),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,385 @@
+//! What is read back, and what is said about wrong descriptions.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::path::Path;
+
+use super::*;
+
+fn example() -> Robot {
+    Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
+}
+
+fn toml_says(text: &str) -> String {
+    Robot::from_toml(text, Path::new("r.toml"))
+        .unwrap_err()
+        .to_string()
+}
+
+fn urdf_says(text: &str) -> String {
+    Robot::from_urdf(text, Path::new("r.urdf"))
+        .unwrap_err()
+        .to_string()
+}
+
+/// The template with one line replaced.
+fn with(old: &str, new: &str) -> String {
+    let lines: Vec<&str> = ONE_LINK_TEMPLATE
+        .lines()
+        .map(|l| if l.starts_with(old) { new } else { l })
+        .collect();
+    assert!(
+        lines.contains(&new),
+        "nothing in the template begins with {old}"
+    );
+    lines.join("\n")
+}
+
+fn line_of(text: &str, part: &str) -> usize {
+    text.lines().position(|l| l.contains(part)).unwrap() + 1
+}
+
+#[test]
+fn shipped_descriptions_read_and_survive_writing() {
+    let rig = example();
+    assert_eq!(
+        rig.joints[0].drive.as_ref().unwrap().encoder_counts_per_rev,
+        Some(8192.0)
+    );
+    let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
+    // The slide is along z: gravity must have no component there.
+    assert_eq!(
+        (emps.gravity[2], emps.joints[0].alpha, emps.joints[0].kind),
+        (0.0, 0.0, JointKind::Prismatic)
+    );
+    for robot in [rig, emps] {
+        let text = robot.to_toml().unwrap();
+        assert_eq!(Robot::from_toml(&text, Path::new("x.toml")).unwrap(), robot);
+    }
+}
+
+#[test]
+fn everything_optional_survives_writing() {
+    let mut robot = example();
+    robot.name = "quote \" backslash \\ line\nend".into();
+    let joint = &mut robot.joints[0];
+    joint.limits.as_mut().unwrap().position = [f64::NEG_INFINITY, f64::INFINITY];
+    joint.drive.as_mut().unwrap().torque_constant = 0.0;
+    joint.drive.as_mut().unwrap().gear_ratio = -1.0 / 3.0;
+    joint.inertial.as_mut().unwrap().inertia =
+        [1e-300, -0.0, 0.1 + 0.2, 5e20, -1e-7, 123_456_789.0];
+    joint.controller = Some(Controller {
+        position_gain: 1.0,
+        velocity_gain: 1e-9,
+        torque_gain: -2.5,
+    });
+    let effect: toml::Table = toml::from_str(
+        "kind = 'stribeck'\njoint = 'link'\nbreakaway = 0.31\n[nested]\nlist = [1, 2.5, 'x']\n",
+    )
+    .unwrap();
+    let mut second = effect.clone();
+    second.insert("kind".into(), "cogging".into());
+    robot.effects = vec![effect, second];
+    let text = robot.to_toml().unwrap();
+    assert_eq!(
+        Robot::from_toml(&text, Path::new("x.toml")).unwrap(),
+        robot,
+        "{text}"
+    );
+}
+
+#[test]
+fn wrong_toml_is_named_by_line_and_mend() {
+    let cases: [(&str, &str, &[&str]); 16] = [
+        (
+            "mass",
+            "mass = -1.0",
+            &["mass of joint `link` is -1", "0 or greater, in kg"],
+        ),
+        ("mass", "mass = nan", &["mass of joint `link` is NaN", "kg"]),
+        ("mass", "mass = \"heavy\"", &["heavy", "expected a number"]),
+        ("mass", "mas = 1.0", &["unknown field `mas`", "mass"]),
+        (
+            "gear_ratio",
+            "gear_ratio = 0",
+            &["gear ratio of joint `link` is 0", "different from 0"],
+        ),
+        (
+            "torque_constant",
+            "torque_constant = 0.0",
+            &["torque constant", "greater than 0"],
+        ),
+        (
+            "resistance",
+            "resistance = -0.1",
+            &["resistance", "greater than 0, in Ω"],
+        ),
+        (
+            "position",
+            "position = [3.1, -3.1]",
+            &["[3.1, -3.1]", "[lowest, highest]"],
+        ),
+        ("position", "position = [1.0, 1.0]", &["position range"]),
+        ("position", "position = [-1.0, inf]", &["position range"]),
+        (
+            "first_moment",
+            "first_moment = [0.3, 0.0]",
+            &["length 2", "3"],
+        ),
+        (
+            "first_moment",
+            "first_moment = [0.3, inf, 0.0]",
+            &["first_moment of joint `link` is inf"],
+        ),
+        (
+            "kind",
+            "kind = \"linear\"",
+            &["linear", "revolute", "prismatic"],
+        ),
+        ("velocity", "velocity = 0.0", &["velocity limit", "rad/s"]),
+        (
+            "gravity",
+            "gravity = [0.0, nan, -9.81]",
+            &["gravity is NaN", "m/s²"],
+        ),
+        ("alpha", "alpha = 1.5 rad", &["TOML"]),
+    ];
+    for (old, new, parts) in cases {
+        let text = with(old, new);
+        let said = toml_says(&text);
+        let place = format!("r.toml:{}:", line_of(&text, new));
+        assert!(said.starts_with(&place), "{new}: {said}");
+        assert!(!said.contains('\n'), "{new}: {said}");
+        for part in parts {
+            assert!(said.contains(part), "{new}: {said}");
+        }
+    }
+}
+
+#[test]
+fn missing_and_repeated_parts_are_named() {
+    let said = toml_says(&with("alpha", "# gone"));
+    assert!(said.contains("missing field `alpha`"), "{said}");
+    assert_eq!(
+        said.split(':').nth(1).unwrap(),
+        line_of(ONE_LINK_TEMPLATE, "[[joint]]").to_string(),
+        "{said}"
+    );
+    assert!(toml_says("name = 'x'\ngravity = [0, 0, 0]\n").contains("missing field `joint`"));
+    assert!(
+        toml_says("name = 'x'\ngravity = [0, 0, 0]\njoint = []\n")
+            .contains("at least one [[joint]]")
+    );
+    let joint = ONE_LINK_TEMPLATE.split_once("[[joint]]").unwrap().1;
+    let twice = format!("{ONE_LINK_TEMPLATE}\n[[joint]]{joint}");
+    let said = toml_says(&twice);
+    assert!(said.contains("`link` again"), "{said}");
+    let effect = |body: &str| toml_says(&format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{body}\n"));
+    assert!(effect("kind = 'magic'").contains("`magic`, but it must be one of stribeck"));
+    assert!(effect("joint = 'link'").contains("kind of effect 1 is missing"));
+    assert!(effect("kind = 'stribeck'\njoint = 'elbow'").contains("joints are link"));
+}
+
+#[test]
+fn wrong_files_are_refused_without_reading_them_through() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, bytes: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        Robot::load(&path).unwrap_err()
+    };
+    assert!(matches!(
+        Robot::load(dir.path()).unwrap_err(),
+        RobotError::Directory { .. }
+    ));
+    assert!(matches!(
+        Robot::load(&dir.path().join("none.toml")).unwrap_err(),
+        RobotError::Read { .. }
+    ));
+    assert!(matches!(file("a.toml", b""), RobotError::Empty { .. }));
+    assert!(matches!(file("a.toml", b" \n\n"), RobotError::Empty { .. }));
+    assert!(matches!(
+        file("a.toml", &[0x7f, b'E', b'L', b'F', 2, 0]),
+        RobotError::NotText { offset: 4, .. }
+    ));
+    assert!(matches!(
+        file("a.urdf", &[b'<', 0xff, 0xfe]),
+        RobotError::NotText { offset: 1, .. }
+    ));
+    let huge = dir.path().join("huge.toml");
+    std::fs::File::create(&huge)
+        .unwrap()
+        .set_len(2 << 30)
+        .unwrap();
+    assert!(matches!(
+        Robot::load(&huge).unwrap_err(),
+        RobotError::TooLarge { .. }
+    ));
+    // An unknown ending: the content decides.
+    let path = dir.path().join("robot.txt");
+    std::fs::write(&path, format!("\u{feff}{ONE_LINK_TEMPLATE}")).unwrap();
+    assert_eq!(Robot::load(&path).unwrap(), example());
+    std::fs::write(&path, "<robot/>").unwrap();
+    assert!(matches!(
+        Robot::load(&path).unwrap_err(),
+        RobotError::Urdf { .. }
+    ));
+}
+
+const LINK: &str = "<link name='NAME'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>";
+
+fn urdf(body: &str) -> String {
+    let mut text = String::from("<robot name='r'>\n<link name='base'/>\n");
+    for name in ["a", "b"] {
+        text += &LINK.replace("NAME", name);
+        text.push('\n');
+    }
+    format!("{text}{body}\n</robot>")
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> String {
+    format!(
+        "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{more}</joint>\n"
+    )
+}
+
+#[test]
+fn urdf_drives_friction_and_limits_are_kept() {
+    let text = urdf(&format!(
+        "{}{}<transmission name='t'><joint name='one'/><actuator name='m'><mechanicalReduction>-50</mechanicalReduction></actuator></transmission>",
+        joint(
+            "one",
+            "revolute",
+            "base",
+            "a",
+            "<axis xyz='0 0 2'/><limit lower='-1' upper='2' velocity='3' effort='4'/><dynamics damping='0.5' friction='0.25'/>"
+        ),
+        joint("two", "prismatic", "a", "b", "")
+    ));
+    let robot = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap();
+    let [one, two] = robot.joints.as_slice() else {
+        panic!("two joints expected")
+    };
+    assert_eq!(
+        one.limits,
+        Some(JointLimits {
+            position: [-1.0, 2.0],
+            velocity: 3.0,
+            acceleration: None,
+            torque: Some(4.0)
+        })
+    );
+    assert_eq!(
+        one.friction,
+        Some(JointFriction {
+            coulomb: 0.25,
+            viscous: 0.5,
+            offset: 0.0
+        })
+    );
+    assert_eq!(one.drive.as_ref().map(|d| d.gear_ratio), Some(-50.0));
+    assert_eq!(
+        (two.kind, &two.limits, &two.friction, &two.drive),
+        (JointKind::Prismatic, &None, &None, &None)
+    );
+    let text = robot.to_toml().unwrap();
+    assert_eq!(Robot::from_toml(&text, Path::new("x.toml")).unwrap(), robot);
+}
+
+#[test]
+fn what_is_no_serial_chain_is_refused_by_name() {
+    let one = joint("one", "continuous", "base", "a", "");
+    let cases: [(String, &[&str]); 14] = [
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "base", "b", ""))),
+            &["branches at link `base`", "`one`", "`two`"],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "floating", "a", "b", ""))),
+            &["`two` is of type \"floating\""],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<mimic joint='one'/>"))),
+            &["`two` mimics"],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "c", ""))),
+            &["link `c`", "does not describe"],
+        ),
+        (urdf(&one), &["`base` and `b`", "one base"]),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "b", "a", ""))),
+            &["closed loop", "`one`", "`two`"],
+        ),
+        (
+            urdf(&(one.clone() + &one)),
+            &["joint `one` was already described at 5:1"],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<axis xyz='0 0 0'/>"))),
+            &["axis of joint `two` is the zero vector"],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<axis xyz='0 1'/>"))),
+            &["three numbers"],
+        ),
+        (
+            urdf(&(one.clone() + &joint("two", "revolute", "a", "b", "<origin xyz='0 ${l} 1'/>"))),
+            &["run xacro"],
+        ),
+        (
+            urdf(
+                &(one.clone()
+                    + &joint(
+                        "two",
+                        "revolute",
+                        "a",
+                        "b",
+                        "<limit lower='1' upper='1' velocity='1' effort='1'/>",
+                    )),
+            ),
+            &["lower must be below upper"],
+        ),
+        (
+            urdf(
+                &(one.clone()
+                    + &joint(
+                        "two",
+                        "revolute",
+                        "a",
+                        "b",
+                        "<limit lower='0' upper='1' effort='1'/>",
+                    )),
+            ),
+            &["<limit> has no `velocity`"],
+        ),
+        ("<html></html>".into(), &["<html>", "<robot>"]),
+        ("<robot name='x'><link".into(), &["not well-formed XML"]),
+    ];
+    for (text, parts) in cases {
+        let said = urdf_says(&text);
+        assert!(
+            said.starts_with("r.urdf:") && !said.contains('\n'),
+            "{said}"
+        );
+        for part in parts {
+            assert!(said.contains(part), "{said}");
+        }
+    }
+    let all_fixed = joint("one", "fixed", "base", "a", "") + &joint("two", "fixed", "a", "b", "");
+    assert!(urdf_says(&urdf(&all_fixed)).contains("no movable joint"));
+}
+
+#[test]
+fn a_moved_link_without_inertial_is_named_with_its_line() {
+    let text = "<robot name='r'>\n<link name='base'/>\n<link name='arm'/>\n<joint name='one' type='continuous'><parent link='base'/><child link='arm'/></joint>\n</robot>";
+    let said = urdf_says(text);
+    assert!(
+        said.starts_with("r.urdf:3:1: link `arm` is moved by joint `one` but has no <inertial>"),
+        "{said}"
+    );
+    let negative = text.replace(
+        "<link name='arm'/>",
+        "<link name='arm'><inertial><mass value='-1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>",
+    );
+    assert!(urdf_says(&negative).contains("mass of link `arm` is -1"));
+}

@@ -1,0 +1,292 @@
+//! TOML in and out.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::check::{Step, check};
+use super::error::{Place, RobotError};
+use super::{Joint, JointKind, Robot};
+
+pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
+    let robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
+        path: path.into(),
+        place: Place::of(text, e.span().map_or(0, |s| s.start)),
+        message: sentence(&e),
+    })?;
+    check(&robot).map_err(|f| RobotError::Value {
+        path: path.into(),
+        place: Place::of(text, offset(text, &f.way)),
+        what: f.what,
+        found: f.found,
+        right: f.right,
+    })?;
+    for (i, joint) in robot.joints.iter().enumerate() {
+        let way = [
+            Step::Key("joint"),
+            Step::At(i),
+            Step::Key("drive"),
+            Step::Key("torque_constant"),
+        ];
+        // Absent means unknown; written out, zero can only be a slip.
+        if joint
+            .drive
+            .as_ref()
+            .is_some_and(|d| d.torque_constant == 0.0)
+            && reaches(text, &way)
+        {
+            return Err(RobotError::Value {
+                path: path.into(),
+                place: Place::of(text, offset(text, &way)),
+                what: format!("the torque constant of joint `{}`", joint.name),
+                found: "0".into(),
+                right: "it must be greater than 0, in N·m/A, or left out where unknown".into(),
+            });
+        }
+    }
+    Ok(robot)
+}
+
+/// What the TOML reader said, on one line, with the mend where it is ours to know.
+fn sentence(error: &toml::de::Error) -> String {
+    let said = error
+        .message()
+        .lines()
+        .map(str::trim)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let mend = if said.starts_with("missing field") {
+        "; add this key to the table that begins here (`rig init one-link` writes an example)"
+    } else if said.starts_with("unknown field") {
+        "; correct or remove this key"
+    } else if said.starts_with("invalid length") {
+        "; give exactly that many numbers in brackets"
+    } else if said.starts_with("invalid type") || said.starts_with("unknown variant") {
+        "; give a value of that kind"
+    } else {
+        " (this is not valid TOML; `rig init one-link` writes an example)"
+    };
+    said.replace("expected f64", "expected a number") + mend
+}
+
+/// Byte offset of the deepest value that `way` reaches.
+fn offset(text: &str, way: &[Step]) -> usize {
+    walk(text, way).0
+}
+
+fn reaches(text: &str, way: &[Step]) -> bool {
+    walk(text, way).1
+}
+
+fn walk(text: &str, way: &[Step]) -> (usize, bool) {
+    let Ok(root) = DeTable::parse(text) else {
+        return (0, false);
+    };
+    let root = root.into_inner();
+    let Some((Step::Key(first), rest)) = way.split_first() else {
+        return (0, true);
+    };
+    let Some(mut here): Option<&Spanned<DeValue<'_>>> = root.get(*first) else {
+        return (0, false);
+    };
+    for step in rest {
+        let next = match step {
+            Step::Key(key) => here.get_ref().get(*key),
+            Step::At(index) => here.get_ref().get(*index),
+        };
+        match next {
+            Some(value) => here = value,
+            None => return (here.span().start, false),
+        }
+    }
+    (here.span().start, true)
+}
+
+/// Shortest form that reads back to the same number, always with a point or an exponent.
+fn float(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn list(values: &[f64]) -> String {
+    let items: Vec<String> = values.iter().map(|v| float(*v)).collect();
+    format!("[{}]", items.join(", "))
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+fn line(out: &mut String, key: &str, value: &str, comment: &str) {
+    let assignment = format!("{key} = {value}");
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "{assignment:<40} # {comment}");
+}
+
+pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
+    let mut out = String::new();
+    line(
+        &mut out,
+        "name",
+        &quoted(&robot.name),
+        "for titles and files",
+    );
+    line(
+        &mut out,
+        "gravity",
+        &list(&robot.gravity),
+        "in the base frame, m/s^2",
+    );
+    if robot.joints.is_empty() {
+        out.push_str("joint = []\n");
+    }
+    for joint in &robot.joints {
+        write_joint(&mut out, joint);
+    }
+    #[derive(Serialize)]
+    struct Effects<'a> {
+        effect: [&'a toml::Table; 1],
+    }
+    for (i, effect) in robot.effects.iter().enumerate() {
+        let text =
+            toml::to_string(&Effects { effect: [effect] }).map_err(|e| RobotError::Write {
+                robot: robot.name.clone(),
+                number: i + 1,
+                message: e.to_string(),
+            })?;
+        out.push('\n');
+        out.push_str(&text);
+    }
+    Ok(out)
+}
+
+fn write_joint(out: &mut String, joint: &Joint) {
+    let (kind, angle, force) = match joint.kind {
+        JointKind::Revolute => ("revolute", "rad", "N*m"),
+        JointKind::Prismatic => ("prismatic", "m", "N"),
+    };
+    out.push_str("\n[[joint]]\n");
+    line(out, "name", &quoted(&joint.name), "unique in the robot");
+    line(out, "kind", &quoted(kind), "revolute or prismatic");
+    line(
+        out,
+        "alpha",
+        &float(joint.alpha),
+        "rad, rotation about x of frame i-1 (modified Denavit-Hartenberg)",
+    );
+    line(
+        out,
+        "a",
+        &float(joint.a),
+        "m, translation along x of frame i-1",
+    );
+    line(
+        out,
+        "theta",
+        &float(joint.theta),
+        "rad, rotation about z of frame i (offset where revolute)",
+    );
+    line(
+        out,
+        "d",
+        &float(joint.d),
+        "m, translation along z of frame i (offset where prismatic)",
+    );
+    if let Some(i) = &joint.inertial {
+        out.push_str("\n[joint.inertial]\n");
+        line(out, "mass", &float(i.mass), "kg");
+        line(
+            out,
+            "first_moment",
+            &list(&i.first_moment),
+            "m*c in frame i, kg*m",
+        );
+        line(
+            out,
+            "inertia",
+            &list(&i.inertia),
+            "Ixx Ixy Ixz Iyy Iyz Izz about the origin of frame i, kg*m^2",
+        );
+    }
+    if let Some(l) = &joint.limits {
+        out.push_str("\n[joint.limits]\n");
+        line(out, "position", &list(&l.position), angle);
+        line(out, "velocity", &float(l.velocity), &format!("{angle}/s"));
+        optional(out, "acceleration", l.acceleration, &format!("{angle}/s^2"));
+        optional(out, "torque", l.torque, force);
+    }
+    if let Some(f) = &joint.friction {
+        out.push_str("\n[joint.friction]\n");
+        line(out, "coulomb", &float(f.coulomb), force);
+        line(
+            out,
+            "viscous",
+            &float(f.viscous),
+            &format!("{force}*s/{angle}"),
+        );
+        line(
+            out,
+            "offset",
+            &float(f.offset),
+            &format!("{force}, constant torque or force at the joint"),
+        );
+    }
+    if let Some(d) = &joint.drive {
+        out.push_str("\n[joint.drive]\n");
+        line(
+            out,
+            "gear_ratio",
+            &float(d.gear_ratio),
+            "motor turns per joint turn, negative where the gear reverses",
+        );
+        line(
+            out,
+            "rotor_inertia",
+            &float(d.rotor_inertia),
+            "kg*m^2, on the motor side",
+        );
+        if d.torque_constant != 0.0 {
+            line(
+                out,
+                "torque_constant",
+                &float(d.torque_constant),
+                "N*m/A, on the motor side",
+            );
+        }
+        optional(out, "resistance", d.resistance, "ohm");
+        optional(out, "inductance", d.inductance, "H");
+        optional(
+            out,
+            "encoder_counts_per_rev",
+            d.encoder_counts_per_rev,
+            "counts per motor turn after quadrature",
+        );
+        if let Some(p) = d.pole_pairs {
+            line(out, "pole_pairs", &p.to_string(), "0 where brushed");
+        }
+    }
+    if let Some(c) = &joint.controller {
+        out.push_str("\n[joint.controller]\n");
+        line(out, "position_gain", &float(c.position_gain), "1/s");
+        line(
+            out,
+            "velocity_gain",
+            &float(c.velocity_gain),
+            &format!("controller output per {angle}/s"),
+        );
+        line(
+            out,
+            "torque_gain",
+            &float(c.torque_gain),
+            &format!("{force} per controller output"),
+        );
+    }
+}
+
+fn optional(out: &mut String, key: &str, value: Option<f64>, comment: &str) {
+    if let Some(v) = value {
+        line(out, key, &float(v), comment);
+    }
+}
