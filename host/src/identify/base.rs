@@ -57,7 +57,9 @@ pub struct Independent {
 /// Columns shorter than `tolerance_zero` times the longest count as zero.
 pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f64) -> Independent {
     let all = matrix.ncols();
-    let longest = (0..all).map(|c| matrix.column(c).norm()).fold(0.0, f64::max);
+    let longest = (0..all)
+        .map(|c| matrix.column(c).norm())
+        .fold(0.0, f64::max);
     let mut basis: Vec<nalgebra::DVector<f64>> = Vec::new();
     let mut visited: Vec<usize> = Vec::new();
     // Coordinates of every column in the orthonormal basis, filled as the basis grows.
@@ -92,7 +94,11 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     }
     let rank = visited.len();
     let triangle = DMatrix::from_fn(rank, rank, |i, j| {
-        if i <= j { coordinates[visited[j]][i] } else { 0.0 }
+        if i <= j {
+            coordinates[visited[j]][i]
+        } else {
+            0.0
+        }
     });
     let mut order_of: Vec<usize> = (0..rank).collect();
     order_of.sort_by_key(|&k| visited[k]);
@@ -137,7 +143,11 @@ pub struct Base {
 pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
     let revolute: &[usize] = &[4, 5, 6, 8, 9, 1, 2];
     let prismatic: &[usize] = &[0, 1, 2, 3];
-    let of = |joint: usize, list: &[usize]| list.iter().map(move |c| joint * COLUMNS + c).collect::<Vec<_>>();
+    let of = |joint: usize, list: &[usize]| {
+        list.iter()
+            .map(move |c| joint * COLUMNS + c)
+            .collect::<Vec<_>>()
+    };
     let own = |j: usize| match kinds[j] {
         robot::JointKind::Revolute => revolute,
         robot::JointKind::Prismatic => prismatic,
@@ -177,7 +187,8 @@ impl Base {
                 let mut matrix = DMatrix::zeros(states * n, width);
                 let mut out = vec![0.0; n * width];
                 for s in 0..states {
-                    let [q, qd, qdd] = [3.0, 2.0, 5.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                    let [q, qd, qdd] = [3.0, 2.0, 5.0]
+                        .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
                     differential_regressor(&chain, &q, &qd, &qdd, &mut out)
                         .map_err(|e| IdentifyError::Model(e.to_string()))?;
                     for j in 0..n {
@@ -193,7 +204,8 @@ impl Base {
                 let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
                 for row in 0..3 * width {
                     for out in [&mut before, &mut after] {
-                        let [q, qd] = [3.0, 2.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                        let [q, qd] = [3.0, 2.0]
+                            .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
                         energy_regressor(&chain, &q, &qd, out)
                             .map_err(|e| IdentifyError::Model(e.to_string()))?;
                     }

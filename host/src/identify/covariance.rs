@@ -124,10 +124,7 @@ impl Groups {
             let d = shift - &mean;
             covariance.ger(1.0, &d, &d, 1.0);
         }
-        Some((
-            covariance * ((groups - 1) as f64 / groups as f64),
-            groups,
-        ))
+        Some((covariance * ((groups - 1) as f64 / groups as f64), groups))
     }
 }
 

@@ -57,7 +57,8 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         let mut inertia = [0.0; 6];
         inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
         if let Some(drive) = &mut joint.drive {
-            drive.rotor_inertia = row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
+            drive.rotor_inertia =
+                row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
         } else {
             // Without a drive there is no place for its inertia but the link's own.
             inertia[5] += row[column::DRIVE_INERTIA];
@@ -81,7 +82,12 @@ fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {
 }
 
 /// Distributes the base parameters of one link.
-fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64>, remarks: &mut Vec<String>) {
+fn one_link(
+    robot: &Robot,
+    identification: &Identification,
+    pi: &mut DVector<f64>,
+    remarks: &mut Vec<String>,
+) {
     let details = &identification.details;
     let identified = |c: usize| {
         details
@@ -104,14 +110,20 @@ fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64
             let Some(total) = identified(column::MASS) else {
                 return;
             };
-            let drive = if prior_drive < total { prior_drive } else { 0.0 };
+            let drive = if prior_drive < total {
+                prior_drive
+            } else {
+                0.0
+            };
             if drive != prior_drive {
                 remarks.push(format!("The drive's inertia of {prior_drive} kg in the description exceeds the identified {total} kg and was set to zero."));
             }
             pi[column::DRIVE_INERTIA] = drive;
             pi[column::MASS] = total - drive;
             if total <= 0.0 {
-                remarks.push(format!("The identified mass of {total} kg is not positive: no simulation can use it."));
+                remarks.push(format!(
+                    "The identified mass of {total} kg is not positive: no simulation can use it."
+                ));
             }
         }
         JointKind::Revolute => {
@@ -122,16 +134,30 @@ fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64
             let mut drive = prior_drive;
             let prior_mass = pi[column::MASS];
             // Izz about the joint is at least (m·c)²/m: with the mass given that bounds the drive's share.
-            let least = |mass: f64| if mass > 0.0 { moment * moment / mass } else { 0.0 };
+            let least = |mass: f64| {
+                if mass > 0.0 {
+                    moment * moment / mass
+                } else {
+                    0.0
+                }
+            };
             if total - drive < least(prior_mass) || total - drive <= 0.0 {
-                drive = if total - least(prior_mass) > 0.0 { (total - least(prior_mass)).min(drive) * 0.5 } else { 0.0 };
+                drive = if total - least(prior_mass) > 0.0 {
+                    (total - least(prior_mass)).min(drive) * 0.5
+                } else {
+                    0.0
+                };
                 remarks.push(format!("The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {total} kg*m^2; {drive} kg*m^2 were left to it."));
             }
             let link = total - drive;
             let mass = if prior_mass > 0.0 && least(prior_mass) <= link {
                 prior_mass
             } else {
-                let mass = if moment > 0.0 && link > 0.0 { 2.0 * moment * moment / link } else { 1.0 };
+                let mass = if moment > 0.0 && link > 0.0 {
+                    2.0 * moment * moment / link
+                } else {
+                    1.0
+                };
                 remarks.push(format!("The mass does not follow from this motion; {mass} kg was chosen, twice the smallest that the inertia allows."));
                 mass
             };

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::base::{Base, Independent, chain_of, column_name, expression, independent_columns, preference};
+use super::base::{
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference,
+};
 use super::covariance::{Estimate, Groups, Memory, t_quantile};
 use super::factor::TriangularFactor;
 use super::model::{Plan, Tally, each_rows};
@@ -68,7 +70,12 @@ pub fn identify(
         window,
         stride: (window / 4).max(1),
         loudness: (0..joints)
-            .map(|j| surveys.iter().map(|s| s.joints[j].torque_rms).fold(0.0, f64::max))
+            .map(|j| {
+                surveys
+                    .iter()
+                    .map(|s| s.joints[j].torque_rms)
+                    .fold(0.0, f64::max)
+            })
             .collect(),
     };
     let p = base.len();
@@ -127,7 +134,10 @@ pub fn identify(
     if options.estimator != Estimator::Ols {
         let full = spread(&beta, &data.kept, p);
         for (weight, factor) in weights.iter_mut().zip(&factors) {
-            let freedom = factor.rows().saturating_sub(p as u64 / equations as u64).max(1);
+            let freedom = factor
+                .rows()
+                .saturating_sub(p as u64 / equations as u64)
+                .max(1);
             let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
             *weight = if sigma > 0.0 { 1.0 / sigma } else { 1.0 };
         }
@@ -138,7 +148,13 @@ pub fn identify(
     let mut passes = 0;
     let mut converged = true;
     if options.estimator == Estimator::Robust {
-        let mut scale = spread_of(training, &plan, options, &spread(&beta, &data.kept, p), equations)?;
+        let mut scale = spread_of(
+            training,
+            &plan,
+            options,
+            &spread(&beta, &data.kept, p),
+            equations,
+        )?;
         converged = false;
         while passes < MOST_PASSES && !converged {
             let (next_factor, next_scale) = reweighted(
@@ -165,7 +181,9 @@ pub fn identify(
     // Second look: residuals of the fitted equations, for the covariance.
     let full = spread(&beta, &data.kept, p);
     let loss = scales.as_ref().map(|s| (options.loss, s.as_slice()));
-    let estimate = covariance(training, &plan, options, &factor, &data, &beta, &weights, loss, instants)?;
+    let estimate = covariance(
+        training, &plan, options, &factor, &data, &beta, &weights, loss, instants,
+    )?;
     let residuals = |recordings: &[&dyn Recording], surveys: &[Survey]| {
         torque_residuals(recordings, surveys, &plan, &full)
     };
@@ -186,13 +204,16 @@ pub fn identify(
             relative_std_percent: 100.0 * estimate.std[k] / estimate.values[k].abs(),
             unit: super::unit(columns[k], &base.kinds).to_owned(),
             interval: estimate.interval[k],
-            classical_relative_std_percent: 100.0 * estimate.classical_std[k] / estimate.values[k].abs(),
+            classical_relative_std_percent: 100.0 * estimate.classical_std[k]
+                / estimate.values[k].abs(),
         })
         .collect();
     let not_excited = not_excited(&base, &data, &base.kinds);
     let mut warnings = Vec::new();
     if !converged {
-        warnings.push(format!("The robust fit had not settled after {MOST_PASSES} passes; its values may still move."));
+        warnings.push(format!(
+            "The robust fit had not settled after {MOST_PASSES} passes; its values may still move."
+        ));
     }
     if estimate.scaled_condition > 100.0 {
         warnings.push(format!(
@@ -208,7 +229,9 @@ pub fn identify(
                 100.0 * report.relative_error
             ));
         }
-        if let Some(held) = holdout_residuals.as_ref().map(|h: &Vec<ResidualReport>| &h[j])
+        if let Some(held) = holdout_residuals
+            .as_ref()
+            .map(|h: &Vec<ResidualReport>| &h[j])
             && held.rms > 1.5 * report.rms
         {
             warnings.push(format!(
@@ -219,7 +242,9 @@ pub fn identify(
         }
     }
     if !robot.effects.is_empty() {
-        warnings.push("The description's effects beyond the standard model are not part of this fit.".into());
+        warnings.push(
+            "The description's effects beyond the standard model are not part of this fit.".into(),
+        );
     }
     Ok(Identification {
         schema: "rig-identification/1".into(),
@@ -261,6 +286,7 @@ pub fn identify(
 
 fn add(total: &mut Tally, part: &Tally) {
     total.used += part.used;
+    total.short += part.short;
     for (list, more) in [
         (&mut total.slow, &part.slow),
         (&mut total.saturated, &part.saturated),
@@ -329,7 +355,11 @@ fn kept_columns(factor: &TriangularFactor, data: &Independent) -> (DMatrix<f64>,
 }
 
 /// Triangular R of the kept columns alone and their solution.
-fn least_squares(factor: &TriangularFactor, data: &Independent, base: &Base) -> Result<Vec<f64>, IdentifyError> {
+fn least_squares(
+    factor: &TriangularFactor,
+    data: &Independent,
+    base: &Base,
+) -> Result<Vec<f64>, IdentifyError> {
     let (a, z) = kept_columns(factor, data);
     let qr = a.clone().qr();
     let right = qr.q().transpose() * z;
@@ -348,7 +378,11 @@ fn least_squares(factor: &TriangularFactor, data: &Independent, base: &Base) -> 
 }
 
 /// Standard deviations of the textbook, σ²·(XᵀX)⁻¹, and the inverse of the triangular factor.
-fn classical(factor: &TriangularFactor, data: &Independent, beta: &[f64]) -> Result<(Vec<f64>, DMatrix<f64>), IdentifyError> {
+fn classical(
+    factor: &TriangularFactor,
+    data: &Independent,
+    beta: &[f64],
+) -> Result<(Vec<f64>, DMatrix<f64>), IdentifyError> {
     let (a, _) = kept_columns(factor, data);
     let r = a.qr().r();
     let inverse = r.try_inverse().ok_or(IdentifyError::Singular {
@@ -357,7 +391,9 @@ fn classical(factor: &TriangularFactor, data: &Independent, beta: &[f64]) -> Res
     let full = spread(beta, &data.kept, factor.columns());
     let freedom = factor.rows().saturating_sub(beta.len() as u64).max(1);
     let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
-    let std = (0..beta.len()).map(|k| sigma * inverse.row(k).norm()).collect();
+    let std = (0..beta.len())
+        .map(|k| sigma * inverse.row(k).norm())
+        .collect();
     Ok((std, inverse))
 }
 
@@ -498,7 +534,10 @@ fn covariance(
     let memory = memories.iter().map(Memory::length).fold(1.0, f64::max);
     let rows: u64 = memories.iter().map(Memory::seen).sum();
     let (white, count) = groups.jackknife(memory).ok_or_else(|| {
-        let seconds = training.len() as f64 * instants as f64 * plan.treatment.decimation as f64 * plan.treatment.dt();
+        let seconds = training.len() as f64
+            * instants as f64
+            * plan.treatment.decimation as f64
+            * plan.treatment.dt();
         IdentifyError::TooShortForIntervals {
             rows,
             memory,
@@ -506,7 +545,9 @@ fn covariance(
         }
     })?;
     let covariance = &inverse * white * inverse.transpose();
-    let std: Vec<f64> = (0..size).map(|k| covariance[(k, k)].max(0.0).sqrt()).collect();
+    let std: Vec<f64> = (0..size)
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
     let quantile = t_quantile(count - 1);
     let (a, _) = kept_columns(factor, data);
     let condition = |m: DMatrix<f64>| {
@@ -519,7 +560,9 @@ fn covariance(
         column /= norm;
     }
     let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
-        (0..size).map(|i| (0..size).map(|j| m(i, j)).collect()).collect::<Vec<Vec<f64>>>()
+        (0..size)
+            .map(|i| (0..size).map(|j| m(i, j)).collect())
+            .collect::<Vec<Vec<f64>>>()
     };
     Ok(Estimate {
         interval: (0..size)
@@ -553,10 +596,12 @@ fn torque_residuals(
         .sum();
     let joints = surveys.first().map_or(0, |s| s.joints.len());
     let extremes = |j: usize, of: &dyn Fn(&crate::prepare::JointSurvey) -> [f64; 2]| {
-        surveys.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| {
-            let [low, high] = of(&s.joints[j]);
-            [l.min(low), h.max(high)]
-        })
+        surveys
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| {
+                let [low, high] = of(&s.joints[j]);
+                [l.min(low), h.max(high)]
+            })
     };
     let p = full.len();
     // The survey's peak speed is that of raw differences, noise included; the filtered one needs a look.
@@ -587,7 +632,15 @@ fn torque_residuals(
             for i in 0..rows.t.len() {
                 for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
                     let predicted = product(&equation.x[i * p..(i + 1) * p], full);
-                    stream.push(index, rows.t[i], rows.q[j][i], rows.qd[j][i], equation.y[i], predicted, equation.keep[i]);
+                    stream.push(
+                        index,
+                        rows.t[i],
+                        rows.q[j][i],
+                        rows.qd[j][i],
+                        equation.y[i],
+                        predicted,
+                        equation.keep[i],
+                    );
                 }
                 index += 1;
             }

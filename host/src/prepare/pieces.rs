@@ -37,6 +37,22 @@ impl Recording for InMemory {
     }
 }
 
+impl Recording for crate::data::Source {
+    fn label(&self) -> String {
+        self.path().display().to_string()
+    }
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        for block in self.blocks(rows) {
+            take(block.map_err(|e| PrepareError::Read(e.to_string()))?)?;
+        }
+        Ok(())
+    }
+}
+
 /// Rows that are processed together, and which of them are to be used.
 #[derive(Clone, Debug)]
 pub struct Piece {
@@ -116,7 +132,11 @@ pub fn each_piece(
     let mut done = 0usize;
     let mut segment = 0usize;
     let mut started = false;
-    let flush = |buffer: &mut Block, offset: &mut u64, done: &mut usize, segment: usize, take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
+    let flush = |buffer: &mut Block,
+                 offset: &mut u64,
+                 done: &mut usize,
+                 segment: usize,
+                 take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
         if !buffer.is_empty() {
             let piece = Piece {
                 core_start: *done,

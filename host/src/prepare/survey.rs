@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
-use super::PrepareError;
 
 /// Steps may differ from the mean by this share: time stamps written with single precision or by a jittery
 /// clock pass, a lost or doubled row does not.
