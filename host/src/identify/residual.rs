@@ -165,6 +165,15 @@ impl Binned {
     }
 }
 
+/// A small p-value in words; below the smallest number it is not zero.
+fn p_text(p: f64) -> String {
+    if p < 1e-300 {
+        "p < 1e-300".to_owned()
+    } else {
+        format!("p = {p:.1e}")
+    }
+}
+
 /// Ranges that the bins span.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ranges {
@@ -278,14 +287,16 @@ impl ResidualStream {
         ResidualReport {
             whiteness: if whiteness_p < 0.01 {
                 format!(
-                    "The residual is correlated in time (memory {length:.1} rows, p = {whiteness_p:.1e}): standard deviations that take it as white are too small."
+                    "The residual is correlated in time (memory {length:.1} rows, {}): standard deviations that take it as white are too small.",
+                    p_text(whiteness_p)
                 )
             } else {
                 format!("The residual cannot be told from white noise (p = {whiteness_p:.2}).")
             },
             normality: if normality_p < 0.01 {
                 format!(
-                    "The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, p = {normality_p:.1e})."
+                    "The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, {}).",
+                    p_text(normality_p)
                 )
             } else {
                 format!(

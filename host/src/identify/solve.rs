@@ -201,9 +201,21 @@ pub fn identify(
         .collect();
     let not_excited = not_excited(&base, &data);
     let mut warnings = Vec::new();
+    let row_period = match options.model {
+        ModelKind::Differential => treatment.decimation,
+        ModelKind::Integral => plan.stride,
+    } as f64
+        * treatment.dt();
     if !converged {
         warnings.push(format!(
             "The robust fit had not settled after {MOST_PASSES} passes; its values may still move."
+        ));
+    }
+    let groups = instants as f64 / (10.0 * estimate.memory_rows);
+    if groups < 8.0 {
+        warnings.push(format!(
+            "The residuals remember {:.2} s, so the recording holds only {groups:.1} independent stretches; the intervals, formed from eight, may be too narrow. A longer recording would mend that.",
+            estimate.memory_rows * row_period
         ));
     }
     if estimate.scaled_condition > 100.0 {
