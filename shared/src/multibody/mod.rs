@@ -11,7 +11,8 @@
 //! where that of a revolute joint is in radians and newton metres. Matrices are row-major slices.
 //!
 //! Every function checks the lengths of its slices and answers [`MultibodyError::WrongLength`] where one is
-//! wrong; outputs are then untouched. No function allocates or branches on a value of `T`.
+//! wrong; outputs are then untouched. No function allocates, and none branches on a value of `T` save
+//! [`forward_dynamics`], which stops where the inertia matrix of some lane is not positive definite.
 //!
 //! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction

@@ -32,7 +32,7 @@ pub fn differential_regressor<T: Real>(
 }
 
 /// One pass outwards. The axes of the joints below are carried along in the frame of the current link, two
-/// vectors each; carrying the ten wrenches of a link inwards instead would take five times as many products.
+/// vectors each; the other way round, ten wrenches a link would have to be carried inwards to every joint.
 fn regressor<T: Real, const CAPACITY: usize>(
     chain: &Chain<T>,
     q: &[T],
