@@ -65,6 +65,11 @@ impl Progress {
         self.bar.set_position(done);
     }
 
+    /// So many steps more are done.
+    pub fn advance(&mut self, steps: u64) {
+        self.at(self.bar.position() + steps);
+    }
+
     /// So many of so many steps are done.
     pub fn at_of(&mut self, done: u64, total: u64) {
         self.bar.set_length(total);
