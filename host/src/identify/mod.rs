@@ -1,1 +1,283 @@
-//! identify
+//! Identification: from prepared motion to base parameters with honest uncertainty.
+//!
+//! Rows of a model stream into triangular factors ([`TriangularFactor`]); the base parameters of the robot
+//! ([`Base`]) are estimated from them, what the data do not excite is named, and further passes over the
+//! recordings give residuals and a covariance that allows for their correlation in time. Memory does not grow
+//! with the recordings.
+//!
+//! Leaves out: instrumental variables and output-error methods; physical consistency as a constraint of the fit;
+//! errors in the regressor (kept small by the choice of the cut-off, [`crate::prepare::NOISE_SHARE`]).
+
+mod base;
+mod covariance;
+mod describe;
+mod factor;
+mod model;
+mod residual;
+mod solve;
+
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+pub use base::{Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit};
+pub use covariance::{Ellipse, Estimate, t_quantile};
+pub use describe::identified_robot;
+pub use factor::TriangularFactor;
+pub use model::{Equation, Plan, Rows, Tally, each_rows};
+pub use residual::{Dependence, ResidualReport, Series};
+pub use solve::identify;
+
+use crate::prepare::{Masked, PrepareError, PrepareOptions, Survey, Treatment};
+
+/// Which equations are fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ModelKind {
+    /// Torque against acceleration, velocity and position.
+    #[default]
+    Differential,
+    /// Work against change of energy over windows; needs no acceleration.
+    Integral,
+}
+
+/// How they are fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimator {
+    /// Ordinary least squares.
+    Ols,
+    /// Each joint's rows divided by the standard deviation of its residual.
+    #[default]
+    Weighted,
+    /// Weighted, and rows with large residuals count less (iteratively reweighted least squares).
+    Robust,
+}
+
+/// Which large residuals count less, and how much.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Loss {
+    /// Huber 1964, k = 1.345 (95 % efficient for normal residuals): bounded influence.
+    #[default]
+    Huber,
+    /// Tukey's bisquare, c = 4.685 (95 % efficient): outliers count nothing.
+    Bisquare,
+}
+
+impl Loss {
+    /// Weight of a residual of `u` standard deviations.
+    pub fn weight(self, u: f64) -> f64 {
+        let u = u.abs();
+        match self {
+            Self::Huber if u <= 1.345 => 1.0,
+            Self::Huber => 1.345 / u,
+            Self::Bisquare if u < 4.685 => (1.0 - (u / 4.685).powi(2)).powi(2),
+            Self::Bisquare => 0.0,
+        }
+    }
+}
+
+/// Settings of an identification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Equations.
+    pub model: ModelKind,
+    /// Fit.
+    pub estimator: Estimator,
+    /// Loss of the robust estimator.
+    pub loss: Loss,
+    /// Filters, decimation, masks.
+    pub prepare: PrepareOptions,
+    /// Length of the integral model's windows, s; chosen from the motion where absent.
+    pub window: Option<f64>,
+    /// Seed of the random states from which the base parameters are found.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            model: ModelKind::default(),
+            estimator: Estimator::default(),
+            loss: Loss::default(),
+            prepare: PrepareOptions::default(),
+            window: None,
+            seed: 1,
+        }
+    }
+}
+
+/// Why an identification is not possible.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// Reading or preparing has failed.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// The robot has no valid model.
+    #[error("The robot's model cannot be built: {0}")]
+    Model(String),
+    /// Base parameters cannot be decided.
+    #[error(
+        "The base parameters of {robot} cannot be decided: a column of its regressor is independent of the others by only {least:e} of its length; write lengths and angles that are meant to be zero, or multiples of a right angle, exactly."
+    )]
+    Undecided {
+        /// Remainder of the doubtful column.
+        least: f64,
+        /// Name of the robot.
+        robot: String,
+    },
+    /// No recording.
+    #[error("No training recording was given; name at least one.")]
+    NoRecording,
+    /// Everything was masked.
+    #[error(
+        "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}); record a longer or livelier motion."
+    )]
+    NothingLeft {
+        /// Rows left.
+        used: u64,
+        /// Parameters.
+        unknown: usize,
+        /// Rows that were too slow.
+        slow: u64,
+        /// Rows at a torque limit.
+        saturated: u64,
+    },
+    /// The torque is zero throughout.
+    #[error("The torque of joint {joint} is zero throughout; record the torque or the motor current.")]
+    NoTorque {
+        /// Number of the joint, from 1.
+        joint: usize,
+    },
+    /// The fit is singular.
+    #[error("The least-squares problem is singular although its columns looked independent; the smallest of them is {column}.")]
+    Singular {
+        /// Its name.
+        column: String,
+    },
+    /// No honest interval.
+    #[error(
+        "{rows} rows whose residuals remember {memory:.0} rows are too few for a confidence interval; record at least {needed} s."
+    )]
+    TooShortForIntervals {
+        /// Rows.
+        rows: u64,
+        /// Memory of the residuals, rows.
+        memory: f64,
+        /// Duration needed, s.
+        needed: u64,
+    },
+    /// A window that no integral model can have.
+    #[error("A window of {window} s is not possible for the integral model; it must last between {least} s and {most} s here.")]
+    Window {
+        /// Asked for, s.
+        window: f64,
+        /// Shortest possible, s.
+        least: f64,
+        /// Longest possible, s.
+        most: f64,
+    },
+    /// A friction map cannot be drawn.
+    #[error("{0}")]
+    FrictionMap(String),
+}
+
+/// One identified combination.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BaseParameter {
+    /// As a paper prints it: `m1 + Ia1`.
+    pub expression: String,
+    /// SI
+    pub value: f64,
+    /// Standard deviation, correlation of the residuals allowed for.
+    pub std: f64,
+    /// `100·std/|value|`
+    pub relative_std_percent: f64,
+    /// ASCII
+    pub unit: String,
+    /// 95 % interval.
+    pub interval: [f64; 2],
+    /// What the literature prints: residuals taken as white.
+    pub classical_relative_std_percent: f64,
+}
+
+/// One joint's residuals in figures.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JointFigures {
+    /// Name of the joint.
+    pub name: String,
+    /// N·m or N
+    pub train_residual_rms: f64,
+    /// N·m or N; null without a hold-out.
+    pub holdout_residual_rms: Option<f64>,
+    /// RMS of the residual over RMS of the torque.
+    pub train_relative_error: f64,
+    /// The same over the hold-out.
+    pub holdout_relative_error: Option<f64>,
+}
+
+/// A combination that these data say nothing about.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotExcited {
+    /// The base parameter that was not identified on its own.
+    pub combination: String,
+    /// Why.
+    pub why: String,
+    /// A motion that would change that.
+    pub motion: String,
+}
+
+/// The result; serialises to `identification.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Identification {
+    /// `rig-identification/1`
+    pub schema: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Equations fitted.
+    pub model: ModelKind,
+    /// Fit.
+    pub estimator: Estimator,
+    /// Number of base parameters that the data determine.
+    pub rank: usize,
+    /// Condition number of the regressor of these parameters.
+    pub condition_number: f64,
+    /// The parameters.
+    pub base_parameters: Vec<BaseParameter>,
+    /// Residuals by joint.
+    pub joints: Vec<JointFigures>,
+    /// What the data say nothing about.
+    pub not_excited: Vec<NotExcited>,
+    /// Sentences.
+    pub warnings: Vec<String>,
+    /// What a report shows beyond that.
+    #[serde(skip)]
+    pub details: Details,
+}
+
+/// What a report shows beyond `identification.json`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Details {
+    /// Preparation.
+    pub treatment: Treatment,
+    /// What was left out of the fit.
+    pub masked: Vec<Masked>,
+    /// The training recordings at a glance.
+    pub training: Vec<Survey>,
+    /// The hold-out recordings at a glance.
+    pub holdout: Vec<Survey>,
+    /// Values, covariance, condition numbers.
+    pub estimate: Estimate,
+    /// K with identified values = K·π, π the 14 standard parameters of each joint; rows as `base_parameters`.
+    pub combination: nalgebra::DMatrix<f64>,
+    /// Standard column that stands for each base parameter.
+    pub columns: Vec<usize>,
+    /// Residuals of the training recordings by joint (torque, differential form).
+    pub train: Vec<ResidualReport>,
+    /// Residuals of the hold-out, where given.
+    pub holdout_residuals: Option<Vec<ResidualReport>>,
+    /// Length of the integral model's windows, s, and why; absent for the differential model.
+    pub window: Option<(f64, String)>,
+}

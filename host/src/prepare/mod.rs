@@ -1,1 +1,125 @@
-//! prepare
+//! From a recording to filtered, differentiated, masked motion, with a record of what was done to it.
+//!
+//! Two passes: a [`Survey`] looks at the whole recording (rate, ranges, spectrum of the position) and a
+//! [`Treatment`] is decided from it; then [`each_motion`] gives the motion piece by piece. Filters are
+//! zero-phase and the pieces overlap by what the filters remember, so the result does not depend on the cuts.
+//!
+//! Leaves out: resampling of irregularly sampled recordings (they are refused), correction of a delay between
+//! torque and position.
+
+mod filter;
+mod motion;
+mod pieces;
+mod spectrum;
+mod survey;
+mod treatment;
+
+pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
+pub use motion::{JointMotion, Motion, each_motion};
+pub use pieces::{InMemory, Piece, Recording, each_piece};
+pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
+pub use survey::{JointSurvey, Survey};
+pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
+
+/// Why a recording cannot be prepared.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// The reader of the recording has failed; its own sentence.
+    #[error("{0}")]
+    Read(String),
+    /// Too few rows.
+    #[error("{label} has {rows} rows; at least {needed} are needed.")]
+    TooShort {
+        /// The recording.
+        label: String,
+        /// Rows it has.
+        rows: u64,
+        /// Rows that are needed.
+        needed: u64,
+    },
+    /// The rows are not evenly spaced in time.
+    #[error(
+        "{label} is not evenly sampled: near line {line} the time advances by {step} s where {mean} s is usual; resample it to a constant rate."
+    )]
+    Irregular {
+        /// The recording.
+        label: String,
+        /// Line of the file.
+        line: u64,
+        /// Step found, s.
+        step: f64,
+        /// Usual step, s.
+        mean: f64,
+    },
+    /// A joint stands still throughout.
+    #[error(
+        "Joint {joint} does not move in {label}: its position stays at {position}; record a motion in which it does."
+    )]
+    NotMoving {
+        /// The recording.
+        label: String,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Where it stands.
+        position: f64,
+    },
+    /// The recordings have different rates.
+    #[error(
+        "{label} is sampled at {rate} Hz and the first recording at {first} Hz; recordings that are identified together must have one rate."
+    )]
+    RateMismatch {
+        /// The recording.
+        label: String,
+        /// Its rate, Hz.
+        rate: f64,
+        /// Rate of the first, Hz.
+        first: f64,
+    },
+    /// The number of joints differs.
+    #[error("{label} has columns for {found} joints and the robot has {expected}.")]
+    JointCount {
+        /// The recording.
+        label: String,
+        /// Joints in the recording.
+        found: usize,
+        /// Joints of the robot.
+        expected: usize,
+    },
+    /// A cut-off that no filter can have.
+    #[error(
+        "A cut-off of {cutoff} Hz is not possible at {rate} Hz; it must lie between 0 and {nyquist} Hz."
+    )]
+    Cutoff {
+        /// Asked for, Hz.
+        cutoff: f64,
+        /// Sample rate, Hz.
+        rate: f64,
+        /// Half of it, Hz.
+        nyquist: f64,
+    },
+    /// A decimation that leaves too little.
+    #[error(
+        "Decimation by {factor} is not possible for {rows} rows; it must lie between 1 and {most}."
+    )]
+    Decimation {
+        /// Asked for.
+        factor: usize,
+        /// Rows of the shortest recording.
+        rows: u64,
+        /// Highest possible.
+        most: u64,
+    },
+    /// Measured derivatives were asked for and are not in the recording.
+    #[error(
+        "{label} has no column {column}; record it or let the derivative be taken from the position."
+    )]
+    NoDerivative {
+        /// The recording.
+        label: String,
+        /// Missing column.
+        column: String,
+    },
+    /// What takes the rows has failed; its own sentence.
+    #[error("{0}")]
+    Stopped(String),
+}

@@ -1,0 +1,289 @@
+//! Base (canonical) parameters: the combinations of parameters that the torque depends on.
+
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rig_shared::multibody::{
+    COLUMN_NAMES, COLUMNS, Chain, JointGeometry, JointKind, column, differential_regressor,
+    energy_regressor,
+};
+
+use super::{IdentifyError, ModelKind};
+use crate::robot::{self, Robot};
+
+/// A column counts as dependent when, scaled to length one, less than this is left of it after the columns
+/// before it are taken away; rounding leaves about 1e-14 of a column at random states.
+const DEPENDENT: f64 = 1e-10;
+/// … and as independent when more than this is left. Between the two lies nothing for a real geometry;
+/// something there means link lengths or angles that are zero only by intention, and is an error.
+const INDEPENDENT: f64 = 1e-7;
+
+/// The chain of a robot description.
+///
+/// # Errors
+/// [`IdentifyError::Model`] where the geometry is not one.
+pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
+    let joints: Vec<JointGeometry> = robot
+        .joints
+        .iter()
+        .map(|j| JointGeometry {
+            kind: match j.kind {
+                robot::JointKind::Revolute => JointKind::Revolute,
+                robot::JointKind::Prismatic => JointKind::Prismatic,
+            },
+            alpha: j.alpha,
+            a: j.a,
+            theta: j.theta,
+            d: j.d,
+        })
+        .collect();
+    Chain::new(&joints, robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
+}
+
+/// Independent columns of a matrix and how the others follow from them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Independent {
+    /// Kept columns, in ascending order.
+    pub kept: Vec<usize>,
+    /// kept × all columns: column j = Σ kept columns · entries of column j. Identity on the kept ones.
+    pub combination: DMatrix<f64>,
+    /// Smallest remainder of a kept column and largest of a dropped one, both relative to the column.
+    pub remainders: (f64, f64),
+    /// Remainder of every column relative to its length; 0 for a column of zeros.
+    pub remainder: Vec<f64>,
+}
+
+/// Visits the columns of `matrix` in `order` and keeps those that are not, to within `tolerance` of their
+/// length, combinations of the ones kept before: a QR factorisation pivoted by preference (Gautier 1991).
+/// Columns shorter than `tolerance_zero` times the longest count as zero.
+pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f64) -> Independent {
+    let all = matrix.ncols();
+    let longest = (0..all).map(|c| matrix.column(c).norm()).fold(0.0, f64::max);
+    let mut basis: Vec<nalgebra::DVector<f64>> = Vec::new();
+    let mut visited: Vec<usize> = Vec::new();
+    // Coordinates of every column in the orthonormal basis, filled as the basis grows.
+    let mut coordinates: Vec<Vec<f64>> = vec![Vec::new(); all];
+    let (mut least_kept, mut most_dropped) = (f64::INFINITY, 0.0f64);
+    let mut remainder = vec![0.0; all];
+    for &c in order {
+        let length = matrix.column(c).norm();
+        if !(length > 1e-12 * longest) {
+            continue;
+        }
+        let mut rest = matrix.column(c).into_owned() / length;
+        // Twice is enough (Kahan): the second pass removes what rounding left in the first.
+        for _ in 0..2 {
+            for b in &basis {
+                let along = b.dot(&rest);
+                rest.axpy(-along, b, 1.0);
+            }
+        }
+        let left = rest.norm();
+        remainder[c] = left;
+        if left > tolerance {
+            least_kept = least_kept.min(left);
+            basis.push(rest / left);
+            visited.push(c);
+        } else {
+            most_dropped = most_dropped.max(left);
+        }
+    }
+    for c in 0..all {
+        coordinates[c] = basis.iter().map(|b| b.dot(&matrix.column(c))).collect();
+    }
+    let rank = visited.len();
+    let triangle = DMatrix::from_fn(rank, rank, |i, j| {
+        if i <= j { coordinates[visited[j]][i] } else { 0.0 }
+    });
+    let mut order_of: Vec<usize> = (0..rank).collect();
+    order_of.sort_by_key(|&k| visited[k]);
+    let mut combination = DMatrix::zeros(rank, all);
+    for c in 0..all {
+        let right = nalgebra::DVector::from_column_slice(&coordinates[c]);
+        let solution = triangle
+            .solve_upper_triangular(&right)
+            .unwrap_or_else(|| nalgebra::DVector::zeros(rank));
+        for (row, &k) in order_of.iter().enumerate() {
+            combination[(row, c)] = solution[k];
+        }
+    }
+    let kept: Vec<usize> = order_of.iter().map(|&k| visited[k]).collect();
+    // Exactly the identity on the kept columns, whatever rounding says.
+    for (row, &c) in kept.iter().enumerate() {
+        combination.column_mut(c).fill(0.0);
+        combination[(row, c)] = 1.0;
+    }
+    Independent {
+        kept,
+        combination,
+        remainders: (least_kept, most_dropped),
+        remainder,
+    }
+}
+
+/// The base parameters of a robot: β = K·π.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Base {
+    /// Columns of the standard regressor (14 a joint) that stand for the base parameters.
+    pub columns: Vec<usize>,
+    /// K, base parameters × 14n.
+    pub combination: DMatrix<f64>,
+    /// Kinds of the joints, for units and names.
+    pub kinds: Vec<robot::JointKind>,
+}
+
+/// Order in which columns are preferred as representatives, so that the expressions group as the literature
+/// groups them (Khalil & Dombre 2002, ch. 9): of a revolute link `Iyy`, `mz` and `m` go to the link before,
+/// of a prismatic link its inertia; drive inertia joins the link's own where it cannot be told from it.
+pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
+    let revolute: &[usize] = &[4, 5, 6, 8, 9, 1, 2];
+    let prismatic: &[usize] = &[0, 1, 2, 3];
+    let of = |joint: usize, list: &[usize]| list.iter().map(move |c| joint * COLUMNS + c).collect::<Vec<_>>();
+    let own = |j: usize| match kinds[j] {
+        robot::JointKind::Revolute => revolute,
+        robot::JointKind::Prismatic => prismatic,
+    };
+    let mut order: Vec<usize> = Vec::new();
+    for j in 0..kinds.len() {
+        order.extend(of(j, own(j)));
+        order.extend(of(j, &[column::VISCOUS, column::COULOMB, column::OFFSET]));
+    }
+    for j in 0..kinds.len() {
+        order.extend(of(j, &[column::DRIVE_INERTIA]));
+    }
+    for c in 0..kinds.len() * COLUMNS {
+        if !order.contains(&c) {
+            order.push(c);
+        }
+    }
+    order
+}
+
+impl Base {
+    /// Finds the base parameters of `robot` for a model from random states of it.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] where a column is
+    /// neither clearly dependent nor clearly independent.
+    pub fn structural(robot: &Robot, model: ModelKind, seed: u64) -> Result<Self, IdentifyError> {
+        let chain = chain_of(robot)?;
+        let n = robot.joints.len();
+        let width = n * COLUMNS;
+        let mut generator = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut symmetric = |scale: f64| scale * (2.0 * generator.random::<f64>() - 1.0);
+        // Three times as many rows as unknowns: a chance dependence of random rows has probability zero.
+        let matrix = match model {
+            ModelKind::Differential => {
+                let states = (3 * width).div_ceil(n);
+                let mut matrix = DMatrix::zeros(states * n, width);
+                let mut out = vec![0.0; n * width];
+                for s in 0..states {
+                    let [q, qd, qdd] = [3.0, 2.0, 5.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                    differential_regressor(&chain, &q, &qd, &qdd, &mut out)
+                        .map_err(|e| IdentifyError::Model(e.to_string()))?;
+                    for j in 0..n {
+                        for c in 0..width {
+                            matrix[(s * n + j, c)] = out[j * width + c];
+                        }
+                    }
+                }
+                matrix
+            }
+            ModelKind::Integral => {
+                let mut matrix = DMatrix::zeros(3 * width, width);
+                let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
+                for row in 0..3 * width {
+                    for out in [&mut before, &mut after] {
+                        let [q, qd] = [3.0, 2.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                        energy_regressor(&chain, &q, &qd, out)
+                            .map_err(|e| IdentifyError::Model(e.to_string()))?;
+                    }
+                    for c in 0..width {
+                        // What friction takes over a window depends on the whole way, not on its ends.
+                        matrix[(row, c)] = if c % COLUMNS >= column::VISCOUS {
+                            symmetric(2.0)
+                        } else {
+                            after[c] - before[c]
+                        };
+                    }
+                }
+                matrix
+            }
+        };
+        let kinds: Vec<robot::JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let found = independent_columns(&matrix, &preference(&kinds), DEPENDENT);
+        if found.remainders.0 < INDEPENDENT {
+            return Err(IdentifyError::Undecided {
+                least: found.remainders.0,
+                robot: robot.name.clone(),
+            });
+        }
+        Ok(Self {
+            columns: found.kept,
+            combination: found.combination,
+            kinds,
+        })
+    }
+
+    /// Number of base parameters.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether the torque depends on nothing (never for a chain, whose joints have friction).
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// The combination a base parameter stands for, as a paper prints it: `Izz1 + Ia1`.
+    pub fn expression(&self, row: usize) -> String {
+        expression(&self.combination, row, self.columns[row])
+    }
+
+    /// Unit of a base parameter, ASCII.
+    pub fn unit(&self, row: usize) -> &'static str {
+        unit(self.columns[row], &self.kinds)
+    }
+}
+
+/// Name of a standard column with the joint's number.
+pub fn column_name(c: usize) -> String {
+    format!("{}{}", COLUMN_NAMES[c % COLUMNS], c / COLUMNS + 1)
+}
+
+/// A row of a combination matrix in words, its own column first.
+pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String {
+    let mut text = column_name(own);
+    for c in 0..combination.ncols() {
+        let k = combination[(row, c)];
+        // Rounding of the text only: the values are computed with the coefficients as they are.
+        if c == own || k.abs() < 1e-9 {
+            continue;
+        }
+        let sign = if k < 0.0 { '-' } else { '+' };
+        let size = k.abs();
+        let name = column_name(c);
+        if (size - 1.0).abs() < 1e-9 {
+            text.push_str(&format!(" {sign} {name}"));
+        } else {
+            let digits = format!("{size:.4e}").parse::<f64>().unwrap_or(size);
+            text.push_str(&format!(" {sign} {digits} {name}"));
+        }
+    }
+    text
+}
+
+/// Unit of a standard column.
+pub fn unit(c: usize, kinds: &[robot::JointKind]) -> &'static str {
+    let revolute = matches!(kinds.get(c / COLUMNS), Some(robot::JointKind::Revolute));
+    match (c % COLUMNS, revolute) {
+        (column::MASS, _) => "kg",
+        (1..=3, _) => "kg*m",
+        (4..=9, _) => "kg*m^2",
+        (column::DRIVE_INERTIA, true) => "kg*m^2",
+        (column::DRIVE_INERTIA, false) => "kg",
+        (column::VISCOUS, true) => "N*m*s/rad",
+        (column::VISCOUS, false) => "N*s/m",
+        (_, true) => "N*m",
+        (_, false) => "N",
+    }
+}

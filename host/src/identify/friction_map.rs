@@ -1,0 +1,1 @@
+//! Friction against speed, from a recording with stretches of constant speed.

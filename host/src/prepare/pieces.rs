@@ -1,0 +1,190 @@
+//! A recording in pieces with margins: whole-recording filters in constant memory.
+
+use super::PrepareError;
+use crate::data::Block;
+
+/// Something that gives its rows in blocks, as often as asked.
+pub trait Recording {
+    /// Name for messages and reports.
+    fn label(&self) -> String;
+    /// Calls `take` with each block in turn, from the first row on.
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError>;
+}
+
+/// A recording held in memory.
+#[derive(Clone, Debug, Default)]
+pub struct InMemory {
+    /// Name for messages.
+    pub label: String,
+    /// Its rows.
+    pub blocks: Vec<Block>,
+}
+
+impl Recording for InMemory {
+    fn label(&self) -> String {
+        self.label.clone()
+    }
+    fn each_block(
+        &self,
+        _rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        self.blocks.iter().cloned().try_for_each(take)
+    }
+}
+
+/// Rows that are processed together, and which of them are to be used.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    /// The rows with margins on both sides (no margin where the segment ends).
+    pub rows: Block,
+    /// First row to be used.
+    pub core_start: usize,
+    /// One past the last row to be used.
+    pub core_end: usize,
+    /// Index of the first row of `rows` within its segment.
+    pub offset: u64,
+    /// Stretches of the recording without a gap in time are numbered from zero.
+    pub segment: usize,
+    /// Whether `rows` starts and ends where the segment does.
+    pub at_ends: [bool; 2],
+}
+
+fn append(block: &mut Block, mut more: Block) {
+    if block.is_empty() {
+        *block = more;
+        return;
+    }
+    fn join(a: &mut Option<Vec<f64>>, b: Option<Vec<f64>>) {
+        match (a.as_mut(), b) {
+            (Some(a), Some(b)) => a.extend(b),
+            _ => *a = None,
+        }
+    }
+    block.t.append(&mut more.t);
+    for (a, b) in block.joints.iter_mut().zip(more.joints) {
+        a.q.extend(b.q);
+        a.tau.extend(b.tau);
+        join(&mut a.qd, b.qd);
+        join(&mut a.qdd, b.qdd);
+        join(&mut a.reference, b.reference);
+        join(&mut a.voltage, b.voltage);
+        join(&mut a.temperature, b.temperature);
+    }
+    for ((_, a), (_, b)) in block.extra.iter_mut().zip(more.extra) {
+        a.extend(b);
+    }
+}
+
+fn drop_front(block: &mut Block, rows: usize) {
+    block.t.drain(..rows);
+    block.first_line += rows as u64;
+    for joint in &mut block.joints {
+        joint.q.drain(..rows);
+        joint.tau.drain(..rows);
+        for column in [
+            &mut joint.qd,
+            &mut joint.qdd,
+            &mut joint.reference,
+            &mut joint.voltage,
+            &mut joint.temperature,
+        ] {
+            if let Some(column) = column {
+                column.drain(..rows);
+            }
+        }
+    }
+    for (_, column) in &mut block.extra {
+        column.drain(..rows);
+    }
+}
+
+/// Calls `take` with pieces of `core` rows and `margin` rows beside them, in order; a segment that fits
+/// into one piece is one. Holds at most `2·(core + 2·margin)` rows.
+pub fn each_piece(
+    recording: &dyn Recording,
+    core: usize,
+    margin: usize,
+    take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>,
+) -> Result<(), PrepareError> {
+    let mut buffer = Block::default();
+    let mut offset = 0u64;
+    let mut done = 0usize;
+    let mut segment = 0usize;
+    let mut started = false;
+    let flush = |buffer: &mut Block, offset: &mut u64, done: &mut usize, segment: usize, take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
+        if !buffer.is_empty() {
+            let piece = Piece {
+                core_start: *done,
+                core_end: buffer.len(),
+                rows: std::mem::take(buffer),
+                offset: *offset,
+                segment,
+                at_ends: [*offset == 0, true],
+            };
+            take(&piece)?;
+        }
+        *buffer = Block::default();
+        (*offset, *done) = (0, 0);
+        Ok::<(), PrepareError>(())
+    };
+    recording.each_block(core.min(1 << 16), &mut |block| {
+        if block.is_empty() {
+            return Ok(());
+        }
+        if started && !block.continues {
+            flush(&mut buffer, &mut offset, &mut done, segment, take)?;
+            segment += 1;
+        }
+        started = true;
+        append(&mut buffer, block);
+        // Twice the margin: what is left for the last piece is then never only a margin.
+        while buffer.len() >= done + core + 2 * margin {
+            let piece_len = done + core + margin;
+            let mut rest = buffer.clone();
+            truncate(&mut buffer, piece_len);
+            let piece = Piece {
+                core_start: done,
+                core_end: done + core,
+                rows: std::mem::take(&mut buffer),
+                offset,
+                segment,
+                at_ends: [offset == 0, false],
+            };
+            take(&piece)?;
+            let drop = (done + core).saturating_sub(margin);
+            drop_front(&mut rest, drop);
+            done = done + core - drop;
+            offset += drop as u64;
+            buffer = rest;
+        }
+        Ok(())
+    })?;
+    flush(&mut buffer, &mut offset, &mut done, segment, take)
+}
+
+fn truncate(block: &mut Block, rows: usize) {
+    block.t.truncate(rows);
+    for joint in &mut block.joints {
+        joint.q.truncate(rows);
+        joint.tau.truncate(rows);
+        for column in [
+            &mut joint.qd,
+            &mut joint.qdd,
+            &mut joint.reference,
+            &mut joint.voltage,
+            &mut joint.temperature,
+        ] {
+            if let Some(column) = column {
+                column.truncate(rows);
+            }
+        }
+    }
+    for (_, column) in &mut block.extra {
+        column.truncate(rows);
+    }
+}

@@ -1,0 +1,215 @@
+//! Power spectral density of the position (Welch), and what it says about a cut-off.
+
+use std::f64::consts::PI;
+
+use realfft::RealFftPlanner;
+use serde::Serialize;
+
+/// Welch's estimate, accumulated sample by sample (Welch 1967; Hann window, half overlapping).
+///
+/// The second difference of the position is what is transformed, and its transfer |2·sin(ω/2)|⁴ is divided
+/// out again: the position falls by many decades with frequency, and a window's side lobes would otherwise
+/// bury its noise floor.
+pub struct Welch {
+    segment: usize,
+    window: Vec<f64>,
+    buffer: Vec<f64>,
+    last: [f64; 2],
+    seen: usize,
+    sum: Vec<f64>,
+    count: usize,
+    fft: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
+}
+
+impl Welch {
+    /// Segments of `segment` samples (a power of two is fastest).
+    pub fn new(segment: usize) -> Self {
+        let segment = segment.max(16);
+        Self {
+            segment,
+            window: (0..segment)
+                .map(|k| 0.5 - 0.5 * (2.0 * PI * k as f64 / segment as f64).cos())
+                .collect(),
+            buffer: Vec::with_capacity(segment),
+            last: [0.0; 2],
+            seen: 0,
+            sum: vec![0.0; segment / 2 + 1],
+            count: 0,
+            fft: RealFftPlanner::new().plan_fft_forward(segment),
+        }
+    }
+
+    /// Forgets the last samples: the next one does not follow them.
+    pub fn interrupt(&mut self) {
+        self.buffer.clear();
+        self.seen = 0;
+    }
+
+    /// Takes one sample.
+    pub fn push(&mut self, x: f64) {
+        if self.seen >= 2 {
+            self.buffer.push(x - 2.0 * self.last[0] + self.last[1]);
+        }
+        self.last = [x, self.last[0]];
+        self.seen += 1;
+        if self.buffer.len() == self.segment {
+            let mut input: Vec<f64> = self.buffer.iter().zip(&self.window).map(|(x, w)| x * w).collect();
+            let mut output = self.fft.make_output_vec();
+            // The lengths are those of the plan; the only error of this call is another length.
+            if self.fft.process(&mut input, &mut output).is_ok() {
+                for (s, z) in self.sum.iter_mut().zip(&output) {
+                    *s += z.norm_sqr();
+                }
+                self.count += 1;
+            }
+            self.buffer.drain(..self.segment / 2);
+        }
+    }
+
+    /// Frequencies [Hz] and the one-sided density of the POSITION [unit²/Hz], without zero frequency.
+    pub fn density(&self, sample_rate: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        if self.count == 0 {
+            return None;
+        }
+        let power: f64 = self.window.iter().map(|w| w * w).sum();
+        let scale = 2.0 / (sample_rate * power * self.count as f64);
+        let pairs = (1..self.sum.len()).map(|k| {
+            let w = 2.0 * PI * k as f64 / self.segment as f64;
+            let transfer = (2.0 * (w / 2.0).sin()).powi(4);
+            (
+                k as f64 * sample_rate / self.segment as f64,
+                self.sum[k] * scale / transfer,
+            )
+        });
+        Some(pairs.unzip())
+    }
+}
+
+/// What the spectrum of one joint's position says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PositionSpectrum {
+    /// Hz
+    pub frequency: Vec<f64>,
+    /// One-sided density, rad²/Hz or m²/Hz.
+    pub density: Vec<f64>,
+    /// Level of the white noise floor, same unit.
+    pub floor: f64,
+    /// Where the signal sinks to the floor, Hz.
+    pub crossing: f64,
+    /// Frequency below which 99 % of the power of the velocity lies, Hz.
+    pub motion: f64,
+    /// Highest cut-off at which the noise in the acceleration stays below [`NOISE_SHARE`] of its power, Hz.
+    pub clean: f64,
+}
+
+/// Share of noise in the power of the filtered acceleration that the automatic cut-off allows. Least squares
+/// with a noisy regressor column underestimates its parameter by about this share (attenuation; Fuller 1987,
+/// §1.1): a thousandth is well below what such a test bench repeats to.
+pub const NOISE_SHARE: f64 = 1e-3;
+
+/// The signal counts as sunk where the density stays below this multiple of the floor: there the
+/// signal-to-noise ratio is one, and the best linear filter (Wiener) passes half.
+const SUNK: f64 = 2.0;
+
+impl PositionSpectrum {
+    /// Judges a density estimate.
+    pub fn judge(frequency: Vec<f64>, density: Vec<f64>) -> Self {
+        let n = density.len();
+        // The floor: median over the upper quarter of the band, where a mechanism no longer moves.
+        let mut top: Vec<f64> = density[n - n / 4 - 1..].to_vec();
+        top.sort_by(f64::total_cmp);
+        let floor = top[top.len() / 2];
+        // A tenth of a decade of smoothing, so that one low bin does not end the signal.
+        let smooth: Vec<f64> = (0..n)
+            .map(|k| {
+                let reach = (k as f64 * 0.12) as usize;
+                let part = &density[k.saturating_sub(reach)..(k + reach + 1).min(n)];
+                part.iter().sum::<f64>() / part.len() as f64
+            })
+            .collect();
+        let sunk = (0..n).find(|&k| {
+            // Sunk for good means: over the next half octave too.
+            let end = ((k as f64 + 1.0) * 1.4) as usize;
+            smooth[k..end.clamp(k + 1, n)].iter().all(|d| *d < SUNK * floor)
+        });
+        let crossing = sunk.map_or(frequency[n - 1], |k| frequency[k]);
+        let velocity: Vec<f64> = frequency
+            .iter()
+            .zip(&density)
+            .map(|(f, d)| if *f <= crossing { (d - floor).max(0.0) * f * f } else { 0.0 })
+            .collect();
+        let total: f64 = velocity.iter().sum();
+        let mut sum = 0.0;
+        let mut motion = frequency[0];
+        for (f, v) in frequency.iter().zip(&velocity) {
+            sum += v;
+            motion = *f;
+            if sum >= 0.99 * total {
+                break;
+            }
+        }
+        let (mut noise, mut signal, mut clean) = (0.0, 0.0, frequency[0]);
+        for (f, d) in frequency.iter().zip(&density) {
+            noise += floor * f.powi(4);
+            signal += (d - floor).max(0.0) * f.powi(4);
+            if noise <= NOISE_SHARE * signal {
+                clean = *f;
+            }
+        }
+        Self {
+            frequency,
+            density,
+            floor,
+            crossing,
+            motion,
+            clean,
+        }
+    }
+
+    /// RMS of the velocity, rad/s or m/s, noise beyond the crossing left out.
+    pub fn velocity_rms(&self) -> f64 {
+        let step = self.frequency[0];
+        let sum: f64 = self
+            .frequency
+            .iter()
+            .zip(&self.density)
+            .take_while(|(f, _)| **f <= self.crossing)
+            .map(|(f, d)| (2.0 * PI * f).powi(2) * (d - self.floor).max(0.0) * step)
+            .sum();
+        sum.sqrt()
+    }
+
+    /// Standard deviation of the noise that remains in the velocity behind a cut-off, rad/s or m/s.
+    pub fn velocity_noise(&self, cutoff: f64) -> f64 {
+        // ∫₀^fc N·(2πf)² df
+        (self.floor * (2.0 * PI).powi(2) * cutoff.powi(3) / 3.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn welch_finds_the_level_of_white_noise_and_the_end_of_a_signal() {
+        let rate = 1000.0;
+        let mut generator = rand_pcg::Pcg64::seed_from_u64(1);
+        let mut welch = Welch::new(1024);
+        let sigma = 1e-4;
+        // A signal that ends at 20 Hz for sure: a sum of sines below it.
+        for k in 0..60_000 {
+            let t = k as f64 / rate;
+            let signal: f64 = (1..=40).map(|m| (2.0 * PI * 0.5 * m as f64 * t + (m * m) as f64).sin() / m as f64).sum();
+            let noise: f64 = (0..12).map(|_| generator.random::<f64>()).sum::<f64>() - 6.0;
+            welch.push(0.1 * signal + sigma * noise);
+        }
+        let (f, d) = welch.density(rate).unwrap();
+        let spectrum = PositionSpectrum::judge(f, d);
+        // White noise of variance σ² spread over 0 … fs/2.
+        assert!((spectrum.floor / (sigma * sigma / 500.0) - 1.0).abs() < 0.1, "{}", spectrum.floor);
+        assert!((19.0..28.0).contains(&spectrum.crossing), "{}", spectrum.crossing);
+        assert!((15.0..=21.0).contains(&spectrum.motion), "{}", spectrum.motion);
+    }
+}
