@@ -30,7 +30,7 @@ use crate::friction::Friction;
 use crate::scalar::Real;
 
 /// Reference velocity, as a share of the velocity threshold, at which the direction is 76 % certain (tanh 1).
-/// A choice: two decades below the noise that the threshold stands for, far above the rounding of `f32`.
+/// A choice: a fiftieth of the noise that the threshold stands for, far above the rounding of `f32`.
 pub const REFERENCE_SHARE: f64 = 0.02;
 
 /// How the friction law is turned into a feed-forward torque.

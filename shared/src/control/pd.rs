@@ -2,7 +2,7 @@
 //!
 //! τ = kp·e + kd·ė + J·q̈r + g(q) + off + friction, gravity at the measured position so that the fixed point is
 //! stable whatever the gains (Takegaki and Arimoto 1981). The friction part is that of
-//! [`precompensation`](crate::precompensation); without it the model's friction is left to the feedback.
+//! [`precompensation`]; without it the model's friction is left to the feedback.
 
 use super::law::Config;
 use super::{Measured, Torque};

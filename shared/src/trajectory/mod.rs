@@ -1,12 +1,44 @@
 //! Reference trajectories of one joint.
+//!
+//! Positions are offsets from where the trajectory is started; every kind begins and ends at rest, and position,
+//! velocity and acceleration are continuous and belong to each other exactly.
+//!
+//! # Time
+//! Every duration is a whole number of microseconds. The chip asks [`Trajectory::at_tick`] with its tick counter, and
+//! whole periods and segments are taken off in integers before anything becomes a floating-point number: after days an
+//! `f32` sees the same phase as in the first period. [`Trajectory::at`] takes seconds and is for the desktop; seconds
+//! in `f32` would be 60 µs coarse after 20 minutes. Host (`f64`) and chip (`f32`) share all durations exactly.
+//!
+//! Leaves out: the joint's zero position and its limits, which [`Trajectory::check`] is given.
+
+mod chirp;
+mod fourier;
+mod limits;
+mod segment;
+mod staged;
+
+pub use chirp::{Chirp, Sweep};
+pub use fourier::Fourier;
+pub use limits::{Extremes, TrajectoryError};
+pub use staged::{FrictionSweep, SlowReversals, Staircase};
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
+
+use crate::scalar::{Real, Scalar};
+use segment::Segment;
 
 /// Largest number of harmonics of a Fourier trajectory.
 pub const HARMONICS: usize = 8;
 /// Largest number of speeds of a friction sweep.
 pub const SPEEDS: usize = 16;
+/// Largest number of levels of a staircase.
+pub const LEVELS: usize = 16;
+/// Largest number of amplitudes of slow reversals.
+pub const AMPLITUDES: usize = 8;
+
+/// Microseconds in a second.
+const MICROS: u64 = 1_000_000;
 
 /// Position, velocity and acceleration of the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,9 +51,157 @@ pub struct Reference<T> {
     pub acceleration: T,
 }
 
-/// A reference motion about the point where it is started; placeholder variants are filled in by files here.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub enum Trajectory<T> {
-    /// Stand still for a time, s.
-    Hold(T),
+impl<T: Real> Reference<T> {
+    /// Standing at a position.
+    fn rest(position: T) -> Self {
+        Self {
+            position,
+            velocity: T::ZERO,
+            acceleration: T::ZERO,
+        }
+    }
+
+    /// The motion times an envelope that has its own rate and second derivative (product rule).
+    fn under(self, envelope: Self) -> Self {
+        let two = T::from_f64(2.0);
+        Self {
+            position: envelope.position * self.position,
+            velocity: envelope.velocity * self.position + envelope.position * self.velocity,
+            acceleration: envelope.acceleration * self.position
+                + two * envelope.velocity * self.velocity
+                + envelope.position * self.acceleration,
+        }
+    }
 }
+
+/// A reference motion about the point where it is started.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[allow(clippy::large_enum_variant)] // it crosses the wire whole; boxing needs an allocator
+pub enum Trajectory<T> {
+    /// Stand still for a time, µs.
+    Hold(u32),
+    /// Periodic sum of harmonics: excitation for identification.
+    Fourier(Fourier<T>),
+    /// Swept sine.
+    Chirp(Chirp<T>),
+    /// Steps with dwell.
+    Staircase(Staircase<T>),
+    /// Slow triangles of several amplitudes: presliding, breakaway, backlash.
+    SlowReversals(SlowReversals<T>),
+    /// Pairs of constant speed: the friction map.
+    FrictionSweep(FrictionSweep<T>),
+}
+
+/// A point in time: whole microseconds and what is left over.
+#[derive(Clone, Copy, Debug)]
+struct Elapsed<T> {
+    micros: u64,
+    /// Share of a microsecond, 0 to 1.
+    fraction: T,
+}
+
+impl<T: Real> Elapsed<T> {
+    fn from_tick(tick: u64, rate_hz: u32) -> Self {
+        let rate = u64::from(rate_hz.max(1));
+        let within = (tick % rate) * MICROS;
+        // The rate fits 32 bits, so does a remainder by it.
+        let rest = T::from_u32((within % rate) as u32) / T::from_u32(rate_hz.max(1));
+        Self {
+            micros: (tick / rate)
+                .saturating_mul(MICROS)
+                .saturating_add(within / rate),
+            fraction: rest,
+        }
+    }
+
+    /// Time within a span, s; the span is short enough for its microseconds to fit 32 bits.
+    fn seconds(micros: u32, fraction: T) -> T {
+        (T::from_u32(micros) + fraction) * T::from_f64(1.0e-6)
+    }
+}
+
+impl<T: Scalar> Trajectory<T> {
+    /// Length, µs.
+    pub fn duration_micros(&self) -> u64 {
+        match self {
+            Self::Hold(micros) => u64::from(*micros),
+            Self::Fourier(motion) => motion.duration_micros(),
+            Self::Chirp(motion) => u64::from(motion.duration_us),
+            Self::Staircase(motion) => motion.duration_micros(),
+            Self::SlowReversals(motion) => motion.duration_micros(),
+            Self::FrictionSweep(motion) => motion.duration_micros(),
+        }
+    }
+
+    /// Length, s.
+    pub fn duration(&self) -> T {
+        T::from_f64(self.duration_micros() as f64 / MICROS as f64)
+    }
+
+    /// The reference at a control tick; at rest before the start and after the end.
+    pub fn at_tick(&self, tick: u64, rate_hz: u32) -> Reference<T> {
+        self.at_elapsed(Elapsed::from_tick(tick, rate_hz))
+    }
+
+    /// The reference at a time in seconds since the start. Precise for `f64`; for long runs in `f32` use
+    /// [`at_tick`](Self::at_tick).
+    pub fn at(&self, time: T) -> Reference<T> {
+        let micros = time.to_f64() * MICROS as f64;
+        // A cast from floating point saturates, and takes NaN for zero.
+        let whole = micros as u64;
+        let fraction = (micros - whole as f64).clamp_to(0.0, 1.0);
+        self.at_elapsed(Elapsed {
+            micros: whole,
+            fraction: T::from_f64(fraction),
+        })
+    }
+
+    fn at_elapsed(&self, time: Elapsed<T>) -> Reference<T> {
+        if time.micros >= self.duration_micros() {
+            return Reference::rest(T::ZERO);
+        }
+        match self {
+            Self::Hold(_) => Reference::rest(T::ZERO),
+            Self::Fourier(motion) => motion.at(time),
+            Self::Chirp(motion) => motion.at(time),
+            Self::Staircase(motion) => segment::at(|visit| motion.segments(visit), time),
+            Self::SlowReversals(motion) => motion.at(time),
+            Self::FrictionSweep(motion) => segment::at(|visit| motion.segments(visit), time),
+        }
+    }
+
+    /// Calls `visit` with each segment in turn until it returns false.
+    fn segments(&self, visit: &mut dyn FnMut(Segment<T>) -> bool) {
+        match self {
+            Self::Staircase(motion) => motion.segments(visit),
+            Self::SlowReversals(motion) => motion.segments(visit),
+            Self::FrictionSweep(motion) => motion.segments(visit),
+            Self::Hold(_) | Self::Fourier(_) | Self::Chirp(_) => {}
+        }
+    }
+}
+
+macro_rules! convert {
+    ($name:ident $from:ty => $to:ty, $doc:literal) => {
+        impl Trajectory<$from> {
+            #[doc = $doc]
+            pub fn $name(&self) -> Trajectory<$to> {
+                let to = |x: $from| x as $to;
+                match self {
+                    Self::Hold(micros) => Trajectory::Hold(*micros),
+                    Self::Fourier(motion) => Trajectory::Fourier(motion.map(to)),
+                    Self::Chirp(motion) => Trajectory::Chirp(motion.map(to)),
+                    Self::Staircase(motion) => Trajectory::Staircase(motion.map(to)),
+                    Self::SlowReversals(motion) => Trajectory::SlowReversals(motion.map(to)),
+                    Self::FrictionSweep(motion) => Trajectory::FrictionSweep(motion.map(to)),
+                }
+            }
+        }
+    };
+}
+
+convert!(to_f32 f64 => f32, "The same trajectory as the rig runs it: values rounded, durations exact.");
+convert!(to_f64 f32 => f64, "The rig's trajectory in double precision, exactly.");
+
+#[cfg(test)]
+mod tests;

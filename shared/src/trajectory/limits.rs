@@ -1,0 +1,322 @@
+//! Whether a trajectory stays within the limits.
+
+use core::fmt;
+
+use super::segment::Segment;
+use super::{Elapsed, Reference, SlowReversals, Trajectory};
+use crate::safety::Limits;
+use crate::scalar::Scalar;
+
+/// Samples of a Fourier trajectory per period of its fastest harmonic. Between them a peak hides at most
+/// (π/256)²/2 = 8·10⁻⁵ of that harmonic's amplitude.
+const SAMPLES: u32 = 256;
+/// Samples of a sweep's amplitude bound, which is smooth over its whole length.
+const SWEEP_SAMPLES: u32 = 1024;
+
+/// The furthest that a trajectory goes, relative to its start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extremes<T> {
+    /// Lowest position, rad.
+    pub lowest: T,
+    /// Highest position, rad.
+    pub highest: T,
+    /// Highest speed, rad/s.
+    pub velocity: T,
+    /// Highest acceleration, rad/s².
+    pub acceleration: T,
+}
+
+/// Why a trajectory cannot run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TrajectoryError<T> {
+    /// A value is not finite or makes no motion; the field's name.
+    BadValue(&'static str),
+    /// Below the lowest position.
+    PositionLow {
+        /// Time of the first violation, s.
+        time: T,
+        /// Position there, rad.
+        value: T,
+        /// The limit, rad.
+        limit: T,
+    },
+    /// Above the highest position.
+    PositionHigh {
+        /// Time of the first violation, s.
+        time: T,
+        /// Position there, rad.
+        value: T,
+        /// The limit, rad.
+        limit: T,
+    },
+    /// Faster than allowed.
+    Velocity {
+        /// Time of the first violation, s.
+        time: T,
+        /// Speed there, rad/s.
+        value: T,
+        /// The limit, rad/s.
+        limit: T,
+    },
+    /// Accelerates harder than allowed.
+    Acceleration {
+        /// Time of the first violation, s.
+        time: T,
+        /// Acceleration there, rad/s².
+        value: T,
+        /// The limit, rad/s².
+        limit: T,
+    },
+}
+
+impl<T: Scalar> fmt::Display for TrajectoryError<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, unit, time, value, limit) = match *self {
+            Self::BadValue(name) => {
+                return write!(f, "trajectory value {name} is out of its range");
+            }
+            Self::PositionLow { time, value, limit } => {
+                ("falls below its lowest position", "rad", time, value, limit)
+            }
+            Self::PositionHigh { time, value, limit } => (
+                "rises above its highest position",
+                "rad",
+                time,
+                value,
+                limit,
+            ),
+            Self::Velocity { time, value, limit } => {
+                ("exceeds its highest speed", "rad/s", time, value, limit)
+            }
+            Self::Acceleration { time, value, limit } => (
+                "exceeds its highest acceleration",
+                "rad/s^2",
+                time,
+                value,
+                limit,
+            ),
+        };
+        write!(
+            f,
+            "the trajectory {what} at {:.3} s: {:.4} {unit} where {:.4} is allowed",
+            time.to_f64(),
+            value.to_f64(),
+            limit.to_f64()
+        )
+    }
+}
+
+impl<T: Scalar> core::error::Error for TrajectoryError<T> {}
+
+/// One place to look at: a time, and the lowest and highest that the motion does there.
+struct Probe<T> {
+    micros: u64,
+    low: Reference<T>,
+    high: Reference<T>,
+}
+
+/// Looks at a segment that begins at a time (µs); gives its length, µs.
+fn probe_segment<T: Scalar>(
+    segment: Segment<T>,
+    before: u64,
+    visit: &mut dyn FnMut(Probe<T>),
+) -> u64 {
+    for share in segment.candidates() {
+        let micros = (share * f64::from(segment.micros)) as u32;
+        let at = segment.at(micros, T::ZERO);
+        visit(Probe {
+            micros: before + u64::from(micros),
+            low: at,
+            high: at,
+        });
+    }
+    u64::from(segment.micros)
+}
+
+impl<T: Scalar> Trajectory<T> {
+    /// Whether every value is finite and makes a motion.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::BadValue`] with the first field that is not.
+    pub fn validate(&self) -> Result<(), TrajectoryError<T>> {
+        let finite = |x: &T| x.abs().le(T::from_f64(1.0e6));
+        let positive = |x: &T| finite(x) && T::ZERO.lt(*x);
+        let check = |good: bool, name| {
+            if good {
+                Ok(())
+            } else {
+                Err(TrajectoryError::BadValue(name))
+            }
+        };
+        match self {
+            Self::Hold(_) => Ok(()),
+            Self::Fourier(m) => {
+                check(m.period_us > 0, "period_us")?;
+                check(m.ramp_us > 0 && m.ramp_us / 4 <= m.period_us, "ramp_us")?;
+                check(m.sine.iter().all(finite), "sine")?;
+                check(m.cosine.iter().all(finite), "cosine")
+            }
+            Self::Chirp(m) => {
+                check(positive(&m.start_hz), "start_hz")?;
+                check(positive(&m.end_hz), "end_hz")?;
+                check(m.duration_us > 0, "duration_us")?;
+                check(m.ramp_us > 0 && m.ramp_us <= m.duration_us / 2, "ramp_us")?;
+                check(positive(&m.amplitude), "amplitude")?;
+                check(positive(&m.velocity), "velocity")?;
+                check(positive(&m.acceleration), "acceleration")
+            }
+            Self::Staircase(m) => {
+                check(m.levels.iter().all(finite), "levels")?;
+                check(m.move_us > 0, "move_us")
+            }
+            Self::SlowReversals(m) => {
+                check(positive(&m.speed), "speed")?;
+                check(
+                    m.half_turn_us > 0 && m.half_turn_us <= u32::MAX / 2,
+                    "half_turn_us",
+                )?;
+                let fits = |q: &u32| *q >= m.half_turn_us && *q <= u32::MAX / 2;
+                check(m.quarter_us.iter().all(fits), "quarter_us")?;
+                check(m.cycles > 0, "cycles")
+            }
+            Self::FrictionSweep(m) => {
+                check(positive(&m.half_span), "half_span")?;
+                let fits = |c: &u32| *c > 0 && c.checked_add(m.ramp_us).is_some();
+                check(m.cruise_us.iter().all(fits), "cruise_us")?;
+                check(m.ramp_us > 0, "ramp_us")?;
+                check(m.lead_us > 0, "lead_us")
+            }
+        }
+    }
+
+    /// Calls `visit` wherever the motion can be extreme.
+    fn probe(&self, visit: &mut dyn FnMut(Probe<T>)) {
+        let mut point = |micros: u64| {
+            let at = self.at_elapsed(Elapsed {
+                micros,
+                fraction: T::ZERO,
+            });
+            visit(Probe {
+                micros,
+                low: at,
+                high: at,
+            });
+        };
+        match self {
+            Self::Hold(_) => point(0),
+            Self::Fourier(m) => {
+                let harmonics = m.sine.len().max(m.cosine.len()).max(1) as u32;
+                let step = u64::from((m.period_us / (SAMPLES * harmonics)).max(1));
+                let (ramp, period) = (u64::from(m.ramp_us), u64::from(m.period_us));
+                // Both ramps and one period: the others repeat it.
+                let end = self.duration_micros();
+                let whole = if m.periods > 0 { period } else { 0 };
+                for (from, length) in [(0, ramp + whole), (end - ramp, ramp)] {
+                    for k in 0..=length / step {
+                        point(from + k * step);
+                    }
+                }
+            }
+            Self::Chirp(m) => {
+                // Thousands of oscillations: bound them by their amplitude instead of looking at each.
+                for k in 0..=u64::from(SWEEP_SAMPLES) {
+                    let micros = u64::from(m.duration_us) * k / u64::from(SWEEP_SAMPLES);
+                    let high = m.bound(Elapsed {
+                        micros,
+                        fraction: T::ZERO,
+                    });
+                    let low = Reference {
+                        position: -high.position,
+                        ..high
+                    };
+                    visit(Probe { micros, low, high });
+                }
+            }
+            Self::SlowReversals(m) => {
+                // One triangle of each amplitude: the others repeat it.
+                let once = SlowReversals {
+                    cycles: 1,
+                    ..m.clone()
+                };
+                let mut start = 0_u64;
+                for quarter in m.quarter_us.iter().copied() {
+                    let mut before = start;
+                    let _ = once.triangles(quarter, 0, &mut |segment| {
+                        before += probe_segment(segment, before, visit);
+                        true
+                    });
+                    start += m.amplitude_micros(quarter);
+                }
+            }
+            Self::Staircase(_) | Self::FrictionSweep(_) => {
+                let mut before = 0_u64;
+                self.segments(&mut |segment| {
+                    before += probe_segment(segment, before, visit);
+                    true
+                });
+            }
+        }
+    }
+
+    /// How far the trajectory goes. A chirp is bounded from above, a Fourier series found to 10⁻⁴, the others exact.
+    pub fn extremes(&self) -> Extremes<T> {
+        let mut found = Extremes::<T>::default();
+        self.probe(&mut |probe| {
+            found.lowest = found.lowest.min(probe.low.position);
+            found.highest = found.highest.max(probe.high.position);
+            found.velocity = found.velocity.max(probe.high.velocity.abs());
+            found.acceleration = found.acceleration.max(probe.high.acceleration.abs());
+        });
+        found
+    }
+
+    /// Whether the trajectory, started at `start` (rad), stays within the limits.
+    ///
+    /// # Errors
+    /// [`TrajectoryError`]: a value that makes no motion, or the first limit left, with the time.
+    pub fn check(&self, limits: &Limits<T>, start: T) -> Result<Extremes<T>, TrajectoryError<T>> {
+        self.validate()?;
+        // Rounding of the peak itself must not refuse a motion designed to touch its limit.
+        let slack = T::from_f64(1.0 + 1.0e-6);
+        let mut failed = None;
+        self.probe(&mut |probe| {
+            if failed.is_some() {
+                return;
+            }
+            let time = T::from_f64(probe.micros as f64 * 1.0e-6);
+            let low = start + probe.low.position;
+            let high = start + probe.high.position;
+            let speed = probe.high.velocity.abs();
+            let acceleration = probe.high.acceleration.abs();
+            if !limits.position_low.le(low) {
+                failed = Some(TrajectoryError::PositionLow {
+                    time,
+                    value: low,
+                    limit: limits.position_low,
+                });
+            } else if !high.le(limits.position_high) {
+                failed = Some(TrajectoryError::PositionHigh {
+                    time,
+                    value: high,
+                    limit: limits.position_high,
+                });
+            } else if !speed.le(limits.velocity * slack) {
+                failed = Some(TrajectoryError::Velocity {
+                    time,
+                    value: speed,
+                    limit: limits.velocity,
+                });
+            } else if !acceleration.le(limits.acceleration * slack) {
+                failed = Some(TrajectoryError::Acceleration {
+                    time,
+                    value: acceleration,
+                    limit: limits.acceleration,
+                });
+            }
+        });
+        match failed {
+            Some(error) => Err(error),
+            None => Ok(self.extremes()),
+        }
+    }
+}
