@@ -1,0 +1,146 @@
+//! The on-line estimator of the one-link model: filtered differential model, gate, update, report.
+//!
+//! Two questions are kept apart: whether a row is *valid* (the filter's start and presliding forgotten:
+//! [`filtered`]) and whether it is *informative* (leverage against noise). Memory and forgetting count
+//! valid, informative samples alone, so that standing still forgets nothing.
+//!
+//! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both
+//! show in `residual_rms`.
+
+use super::{EstimatorSettings, Report, SettingsFault, Update, recursive};
+use crate::link::PARAMETER_COUNT;
+use crate::model::filtered;
+use crate::scalar::Real;
+
+/// Length of a residual block, s: many times the filter's memory (27 ms at 30 Hz) and a typical correlation of
+/// current noise, short enough that the twenty-four before anything is trusted last six seconds.
+const BLOCK_SECONDS: f64 = 0.25;
+/// Assumed noise as a share of the torque that the band allows.
+const NOISE_SHARE: f64 = 0.01;
+/// Inputs beyond this (rad, rad/s, N·m) are refused: squares of filtered values stay finite in `f32`.
+const LARGEST_INPUT: f64 = 1e6;
+
+/// Constants of the estimator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config<T> {
+    filter: filtered::Config<T>,
+    estimator: recursive::Config<T, PARAMETER_COUNT>,
+}
+
+/// Memory of the estimator.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State<T: Real<Mask = bool>> {
+    filter: filtered::State<T>,
+    estimator: recursive::State<T, PARAMETER_COUNT>,
+}
+
+/// The on-line estimator: [`OneLinkEstimator::step`] at a fixed rate, [`OneLinkEstimator::report`] when asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneLinkEstimator<T: Real<Mask = bool>> {
+    config: Config<T>,
+    state: State<T>,
+}
+
+impl<T: Real<Mask = bool>> Config<T> {
+    /// `update_rate_hz`: calls of [`step`] a second, at least ten times the bandwidth.
+    pub fn new(settings: &EstimatorSettings<T>, update_rate_hz: T) -> Result<Self, SettingsFault> {
+        settings.check(update_rate_hz)?;
+        let mut square = T::ZERO;
+        for i in [1, 2, 4, 5] {
+            square += (T::from_f64(0.5) * (settings.upper[i] - settings.lower[i])).squared();
+        }
+        let range = if T::ZERO.lt(square) {
+            square.sqrt()
+        } else {
+            T::ONE
+        };
+        // Counted by comparison, as a `Real` has no conversion to an integer.
+        let wanted = update_rate_hz * T::from_f64(BLOCK_SECONDS);
+        let mut block = 1_u32;
+        while block < 1 << 20 && T::from_f64(f64::from(block)).lt(wanted) {
+            block += 1;
+        }
+        Ok(Self {
+            filter: filtered::Config::new(
+                settings.bandwidth,
+                update_rate_hz,
+                settings.slip_velocity,
+            ),
+            estimator: recursive::Config::new(
+                settings.kind,
+                &settings.lower,
+                &settings.upper,
+                range * T::from_f64(NOISE_SHARE),
+                T::ONE / (settings.memory * update_rate_hz),
+                block,
+            ),
+        })
+    }
+
+    /// Replaces the adaptation gain matrix Γ of the gradient update: see [`recursive::Config::with_adaptation`].
+    pub fn with_adaptation(mut self, gain: &[[T; PARAMETER_COUNT]; PARAMETER_COUNT]) -> Self {
+        self.estimator = self.estimator.with_adaptation(gain);
+        self
+    }
+}
+
+/// One sample: position (rad, best reduced to a turn), velocity (rad/s), joint torque (N·m).
+///
+/// What is not finite, or beyond any rig, is refused before it reaches a filter.
+#[inline]
+pub fn step<T: Real<Mask = bool>>(
+    config: &Config<T>,
+    state: &mut State<T>,
+    q: T,
+    qd: T,
+    tau: T,
+) -> Update {
+    let largest = T::from_f64(LARGEST_INPUT);
+    if !(q.abs().le(largest) && qd.abs().le(largest) && tau.abs().le(largest)) {
+        return Update::Refused;
+    }
+    let filtered = filtered::step(&config.filter, &mut state.filter, q, qd, tau);
+    if !filtered.valid {
+        return Update::Masked;
+    }
+    recursive::update(
+        &config.estimator,
+        &mut state.estimator,
+        &filtered.row,
+        filtered.torque,
+    )
+}
+
+/// What may be published now, in the order of the parameter names.
+pub fn report<T: Real<Mask = bool>>(
+    config: &Config<T>,
+    state: &State<T>,
+) -> Report<T, PARAMETER_COUNT> {
+    recursive::report(&config.estimator, &state.estimator)
+}
+
+impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
+    /// An estimator that knows nothing but the band.
+    pub fn new(settings: &EstimatorSettings<T>, update_rate_hz: T) -> Result<Self, SettingsFault> {
+        Ok(Self {
+            config: Config::new(settings, update_rate_hz)?,
+            state: State::default(),
+        })
+    }
+
+    /// See [`step`].
+    #[inline]
+    pub fn step(&mut self, q: T, qd: T, tau: T) -> Update {
+        step(&self.config, &mut self.state, q, qd, tau)
+    }
+
+    /// See [`report`].
+    pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
+        report(&self.config, &self.state)
+    }
+
+    /// How often the parameters were seen to jump.
+    pub fn changes(&self) -> u32 {
+        self.state.estimator.changes()
+    }
+}
