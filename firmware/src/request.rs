@@ -1,11 +1,10 @@
 //! What the host may change, when, and what it is refused.
 
 use rig_shared::control::{adaptive, current};
-use rig_shared::estimation::EstimatorSettings;
 use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::{Fault, Limits, Mode};
-use rig_shared::trajectory::Trajectory;
+use rig_shared::trajectory::{Trajectory, TrajectoryError};
 use rig_shared::wire::message::{Refusal, RequestBody};
 
 use crate::config::{Config, Settings};
@@ -53,8 +52,7 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             refuse_in_motion(state)?;
             let settings = with(&state.settings, body);
             usable(&settings)?;
-            state.apply(config, settings);
-            Ok(())
+            state.apply(config, settings).map_err(|_| Refusal::BadValue)
         }
     }
 }
@@ -132,8 +130,7 @@ fn usable(settings: &Settings) -> Result<(), Refusal> {
         && settings.gains.usable()
         && settings.friction.check().is_ok()
         && model_is_usable(&settings.model)
-        && precompensation_is_usable(&settings.precompensation)
-        && estimator_is_usable(&settings.estimator);
+        && precompensation_is_usable(&settings.precompensation);
     if good { Ok(()) } else { Err(Refusal::BadValue) }
 }
 
@@ -153,17 +150,17 @@ fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
         && settings.velocity_threshold.is_finite()
 }
 
-fn estimator_is_usable(settings: &EstimatorSettings<f32>) -> bool {
-    let bands = settings.lower.iter().zip(&settings.upper);
-    settings.memory > 0.0
-        && settings.memory.is_finite()
-        && settings.bandwidth > 0.0
-        && settings.bandwidth.is_finite()
-        && bands.clone().all(|(low, high)| low < high && low.is_finite() && high.is_finite())
-}
-
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run.
 fn fits(trajectory: &Trajectory<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
-    todo!("{trajectory:?}{limits:?}{base:?}")
+    let anywhere = Limits { position_low: -f32::MAX, position_high: f32::MAX, ..*limits };
+    let checked = match base {
+        Some(base) => trajectory.check(limits, base),
+        None => trajectory.check(&anywhere, 0.0),
+    };
+    match checked {
+        Ok(_) => Ok(()),
+        Err(TrajectoryError::BadValue(_)) => Err(Refusal::BadValue),
+        Err(_) => Err(Refusal::OutsideLimits),
+    }
 }

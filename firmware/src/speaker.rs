@@ -1,9 +1,7 @@
 //! The rig's end of the conversation: bytes in, requests carried out, reports out.
 
 use heapless::String;
-use rig_shared::wire::message::{
-    Acknowledge, Batch, Greeting, Refusal, Report, Request, RequestBody, SNAPSHOT_PART, SnapshotPart,
-};
+use rig_shared::wire::message::{Batch, Greeting, Report, Request, RequestBody, SNAPSHOT_PART, SnapshotPart};
 use rig_shared::wire::{Batcher, Ledger, MAX_FRAME, MessageDecoder, PROTOCOL_VERSION, encode, schema};
 
 use crate::config::Config;
@@ -62,8 +60,11 @@ impl Speaker {
                 self.ledger.answer(request.id, result)
             }
         };
+        let accepted = acknowledge.result.is_ok();
         send(&Report::Acknowledge(acknowledge), transmit);
-        self.converse(config, state, &request.body, acknowledge, transmit);
+        if accepted {
+            self.converse(config, state, &request.body, transmit);
+        }
     }
 
     /// The requests about the conversation itself. Each may be repeated without harm: a stream that is
@@ -73,12 +74,8 @@ impl Speaker {
         config: &Config,
         state: &State,
         body: &RequestBody,
-        acknowledge: Acknowledge,
         transmit: &mut impl Transmit,
     ) {
-        if acknowledge.result != Ok::<(), Refusal>(()) {
-            return;
-        }
         match body {
             RequestBody::StartStream => {
                 self.batcher.start(state.window_start(), config.rates.telemetry_decimation);

@@ -2,7 +2,7 @@
 
 use rig_shared::control::{current, law};
 use rig_shared::encoder;
-use rig_shared::estimation::OneLinkEstimator;
+use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
 use rig_shared::trajectory::{Reference, Trajectory};
@@ -86,9 +86,12 @@ pub(crate) struct Calibration {
 
 impl State {
     /// The state at power on: calibrating, bridge off.
-    pub fn new(config: &Config, settings: Settings) -> Self {
+    ///
+    /// # Errors
+    /// What is wrong with the estimator's settings.
+    pub fn new(config: &Config, settings: Settings) -> Result<Self, SettingsFault> {
         let derived = Derived::new(config, &settings);
-        Self {
+        Ok(Self {
             tick: 0,
             mode: Mode::Calibrating,
             trajectory: None,
@@ -100,7 +103,7 @@ impl State {
             reference: Reference::default(),
             limits: LimitSet::default(),
             cause_acting: false,
-            estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()),
+            estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?,
             settings,
             derived,
             calibration: Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() },
@@ -116,7 +119,7 @@ impl State {
             updates_since_report: 0,
             duty: 0.0,
             run: Run::default(),
-        }
+        })
     }
 
     /// What the host may replace, as it is now.
@@ -129,13 +132,14 @@ impl State {
         self.tick - u64::from(self.telemetry.ticks)
     }
 
-    /// Replaces settings and everything that follows from them.
-    pub(crate) fn apply(&mut self, config: &Config, settings: Settings) {
+    /// Replaces settings and everything that follows from them; nothing where they cannot be used.
+    pub(crate) fn apply(&mut self, config: &Config, settings: Settings) -> Result<(), SettingsFault> {
         if settings.estimator != self.settings.estimator {
-            self.estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz());
+            self.estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
             self.previous = None;
         }
         self.derived = Derived::new(config, &settings);
         self.settings = settings;
+        Ok(())
     }
 }

@@ -5,7 +5,7 @@ use rig_shared::encoder;
 use rig_shared::link::PARAMETER_COUNT;
 use rig_shared::safety::monitor::{self, Readings};
 use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, SnapshotSample};
-use rig_shared::trajectory::Reference;
+use rig_shared::trajectory::{Reference, Trajectory};
 use rig_shared::units::Duty;
 use rig_shared::wire::message::{Estimate, StateSample};
 
@@ -13,7 +13,7 @@ use crate::config::Config;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
-use crate::window::{Tick, Window};
+use crate::window::Tick;
 
 /// What a control tick gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,11 +71,11 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
 /// Raw codes to quantities: the one place where units begin.
 fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let scaling = &config.scaling;
-    let before = state.encoder;
     let motion = encoder::step(&state.derived.observer, &mut state.encoder, sample.encoder);
     let origin = *state.origin.get_or_insert(motion.counts);
     let counts = motion.counts - origin;
-    let step = if before == encoder::State::default() { 0 } else { counts - state.counts };
+    // At the first tick both are zero: where the counter stands at power on is no jump.
+    let step = counts - state.counts;
     state.counts = counts;
     // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
     state.position = counts as f32 * state.derived.radians_per_count;
@@ -158,7 +158,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         Mode::Running => {
             let elapsed = state.tick - start;
             match &state.trajectory {
-                Some(trajectory) if !trajectory.is_over(elapsed, config.rates.control_hz) => {
+                Some(trajectory) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
                     Reference { position: base + offset.position, ..offset }
                 }
@@ -181,6 +181,10 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
     let silent = state.tick.saturating_sub(state.heard) > u64::from(config.host_silent_ticks);
     limits.set(Limit::HostSilent, silent);
     within_range(&state.settings.limits, wish, limits)
+}
+
+fn is_over(trajectory: &Trajectory<f32>, elapsed: u64, rate_hz: u32) -> bool {
+    elapsed.saturating_mul(1_000_000) >= trajectory.duration_micros().saturating_mul(u64::from(rate_hz))
 }
 
 /// Holds a reference at the edge of the position range.

@@ -6,7 +6,9 @@
 
 pub mod commands;
 pub mod data;
+pub mod emulated;
 pub mod excite;
+pub mod files;
 pub mod identify;
 pub mod link;
 pub mod plant;

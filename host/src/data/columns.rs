@@ -95,20 +95,6 @@ pub(super) fn layout(
         message,
     };
     let joints = robot.joints.len();
-    let mut seen = HashSet::new();
-    for (i, name) in names.iter().enumerate() {
-        if name.is_empty() {
-            return Err(header(format!(
-                "column {} has no name; every column needs one (is there a comma too many?)",
-                i + 1
-            )));
-        }
-        if !seen.insert(name.as_str()) {
-            return Err(header(format!(
-                "column `{name}` is there twice; every column must have a name of its own"
-            )));
-        }
-    }
     let find = |name: &str| names.iter().position(|n| n == name);
     let Some(time) = find("t") else {
         let only = names.first().map_or("", String::as_str);
@@ -124,6 +110,20 @@ pub(super) fn layout(
             shown(names)
         )));
     };
+    let mut seen = HashSet::new();
+    for (i, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            return Err(header(format!(
+                "column {} has no name; every column needs one (is there a comma too many?)",
+                i + 1
+            )));
+        }
+        if !seen.insert(name.as_str()) {
+            return Err(header(format!(
+                "column `{name}` is there twice; every column must have a name of its own"
+            )));
+        }
+    }
     for name in names {
         if let Some((quantity, k)) = split(name)
             && (k == 0 || k > joints)

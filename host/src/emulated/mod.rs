@@ -2,11 +2,13 @@
 
 mod nameplate;
 
-use rig_firmware::config::{Config, Settings};
+use rig_firmware::config::Config;
 use rig_firmware::sample::Command;
 use rig_firmware::speaker::Speaker;
 use rig_firmware::state::State;
 use rig_firmware::step::{Output, step};
+
+use rig_shared::estimation::SettingsFault;
 
 use crate::link::Device;
 use crate::plant::{Plant, PlantConfig};
@@ -24,15 +26,18 @@ pub struct EmulatedRig {
 
 impl EmulatedRig {
     /// A rig at power on. `nameplate` is what the firmware was told, `plant` what is true.
-    pub fn new(nameplate: &Nameplate, plant: PlantConfig, seed: u64) -> Self {
-        let (config, settings): (Config, Settings) = (nameplate.config, nameplate.settings);
-        Self {
+    ///
+    /// # Errors
+    /// What is wrong with the nameplate's estimator settings.
+    pub fn new(nameplate: &Nameplate, plant: PlantConfig, seed: u64) -> Result<Self, SettingsFault> {
+        let (config, settings) = (nameplate.config, nameplate.settings);
+        Ok(Self {
             config,
-            state: State::new(&config, settings),
+            state: State::new(&config, settings)?,
             speaker: Speaker::new(),
             plant: Plant::new(plant, seed),
             command: Command::default(),
-        }
+        })
     }
 
     /// The plant, to look into.

@@ -1,1 +1,23 @@
-//! link
+//! The line to the rig: ports, the conversation over them, and recording.
+//!
+//! [`port`] is the seam: a [`serial`] device, an [`emulated`] rig in this process, or either of them behind a
+//! [`lossy`] line. [`session`] greets the rig and has requests carried out exactly once; [`recorder`] runs a
+//! stream and knows what of it is missing; [`convert`] turns samples into rows of SI quantities.
+
+pub mod convert;
+pub mod emulated;
+pub mod error;
+pub mod lossy;
+pub mod port;
+pub mod recorder;
+pub mod serial;
+pub mod session;
+
+pub use convert::{COLUMNS, Converter, Row};
+pub use emulated::{Device, EmulatedPort};
+pub use error::LinkError;
+pub use lossy::{Disturbance, Lossy};
+pub use port::Port;
+pub use recorder::{Event, LossReport, RecordSettings, record};
+pub use serial::SerialLine;
+pub use session::{Session, SessionSettings};

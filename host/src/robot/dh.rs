@@ -6,8 +6,10 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+#[cfg(test)]
+use super::JointKind;
 use super::urdf::{Body, Chain};
-use super::{Drive, Inertial, Joint, JointKind, Robot};
+use super::{Drive, Inertial, Joint, Robot};
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
 /// base link, the customary rounded value that robot descriptions and simulators are used with.

@@ -174,6 +174,14 @@ fn one() -> f64 {
     1.0
 }
 
+/// The commented description that `rig init <kind>` writes, if there is one of that kind.
+pub fn template(kind: &str) -> Option<&'static str> {
+    match kind {
+        "one-link" => Some(ONE_LINK_TEMPLATE),
+        _ => None,
+    }
+}
+
 impl Robot {
     /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
     pub fn load(path: &Path) -> Result<Self, RobotError> {

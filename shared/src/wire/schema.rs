@@ -1,6 +1,5 @@
 //! Version and fingerprint, by which rig and host make sure that they speak the same language.
 
-use postcard_schema::Schema;
 use postcard_schema::key::Key;
 
 use super::message::{BATCH, PARAMETERS, Report, Request, SNAPSHOT_PART};
