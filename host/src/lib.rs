@@ -6,6 +6,7 @@
 
 pub mod commands;
 pub mod data;
+pub mod demo;
 pub mod emulated;
 pub mod excite;
 pub mod files;

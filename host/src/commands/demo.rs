@@ -38,8 +38,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let demo = demo::run(&args.out, args.seed, |share| progress.at((1000.0 * share) as u64))?;
     drop(progress);
     let path = args.out.join("report.html");
-    report::write(&path, &demo.page(&command_line()))?;
-    for line in demo.summary() {
+    report::write(&path, &demo.page(&command_line())?)?;
+    for line in demo.summary()? {
         ui.say(&line);
     }
     ui.remark(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));

@@ -9,7 +9,7 @@ use super::input::{Inputs, RobotArg, command_line};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{FrictionMapOptions, Options, friction_map, identify};
-use crate::pages;
+use crate::pages::{self, Context};
 use crate::report;
 
 /// Draws friction over speed from a recording of a friction sweep.
@@ -54,13 +54,18 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         )));
     };
     folder(&args.out)?;
+    let context = Context {
+        command: command_line(),
+        warnings: training.warnings().chain(sweep.warnings()).collect(),
+        ..Context::default()
+    };
     let identification = identify(&robot, &training.recordings(), &[], &Options::default())?;
     for source in sweep.recordings() {
         let map = friction_map(&robot, &identification, source, joint, FrictionMapOptions::default())?;
         let json = serde_json::to_string_pretty(&map)
             .map_err(|error| CommandError::Sentence(format!("The map cannot be written as JSON: {error}.")))?;
         write_whole(&args.out.join("friction-map.json"), (json + "\n").as_bytes())?;
-        report::write(&args.out.join("report.html"), &pages::friction_map(&robot, &map, &command_line()))?;
+        report::write(&args.out.join("report.html"), &pages::friction_map(&robot, &map, &context))?;
         ui.say(&map.text);
     }
     ui.say(&format!("report: {}", args.out.join("report.html").display()));

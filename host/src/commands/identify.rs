@@ -10,7 +10,7 @@ use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify};
-use crate::pages;
+use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
 use crate::report::format_value;
@@ -140,11 +140,18 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     drop(progress);
     let (identified, remarks) = identified_robot(&robot, &identification);
-    let page = pages::identification(&robot, &identification, &remarks, &command_line());
+    let text = identified.to_toml()?;
+    let context = Context {
+        command: command_line(),
+        identified: Some(("identified.toml".into(), text.clone())),
+        remarks,
+        warnings: training.warnings().chain(holdout.warnings()).collect(),
+    };
+    let page = pages::identification(&robot, &identification, &context);
 
     let json = serde_json::to_string_pretty(&identification)
         .map_err(|error| CommandError::Sentence(format!("The result cannot be written as JSON: {error}.")))?;
-    write_whole(&args.out.join("identified.toml"), identified.to_toml()?.as_bytes())?;
+    write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
     write_whole(&args.out.join("identification.json"), (json + "\n").as_bytes())?;
     report::write(&args.out.join("report.html"), &page)?;
     print(ui, &identification, &args.out);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args as ClapArgs};
 use rig_shared::safety::{Limit, Mode};
+use rig_shared::trajectory::Trajectory;
 use rig_shared::wire::message::RequestBody;
 
 use super::error::CommandError;
@@ -69,7 +70,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         settings.extend(upload(&Nameplate::from_robot(robot)?, args.precompensation));
     }
     let trajectory = match &args.trajectory {
-        Some(path) => Some(TrajectoryFile::load(path)?.single(path)?.to_f32()),
+        Some(path) => Some(single(&TrajectoryFile::load(path)?, path, args.home)?),
         None => None,
     };
     let experiment = Experiment { settings, trajectory, rest: args.seconds };
@@ -87,6 +88,30 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     ui.say(&format!("{}: {losses}", args.out.display()));
     Ok(())
 }
+
+/// The motion of the rig's one joint, if it starts where the link stands.
+fn single(file: &TrajectoryFile, path: &Path, home: Option<f32>) -> Result<Trajectory<f32>, CommandError> {
+    let [joint] = file.joints.as_slice() else {
+        return Err(CommandError::Sentence(format!(
+            "{} moves {} joints, but the rig has one; design it with `rig excite` from the rig's description.",
+            path.display(),
+            file.joints.len()
+        )));
+    };
+    let stands = f64::from(home.unwrap_or(0.0));
+    if (joint.start - stands).abs() > START_TOLERANCE {
+        return Err(CommandError::Sentence(format!(
+            "{} starts at {:.4} rad, but the link stands at {stands:.4} rad (--home); bring the link there, or design the motion with `rig excite --start {stands:.4}`.",
+            path.display(),
+            joint.start
+        )));
+    }
+    Ok(joint.trajectory.to_f32())
+}
+
+/// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
+/// limits from where the link really stands.
+const START_TOLERANCE: f64 = 0.02;
 
 /// What a description asks the rig to be told.
 pub fn upload(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {

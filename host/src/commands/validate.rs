@@ -8,7 +8,7 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
-use crate::pages;
+use crate::pages::{self, Context};
 use crate::report;
 use crate::validate::{Options, validate};
 
@@ -38,11 +38,17 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     folder(&args.out)?;
-    let validation = validate(&robot, inputs.sources(), &Options::default())?;
+    let mut progress = ui.progress("validating", 1000);
+    let validation = validate(&robot, &inputs.recordings(), &Options::default(), &mut |share| {
+        progress.at((1000.0 * share) as u64);
+    })?;
+    drop(progress);
+    let context =
+        Context { command: command_line(), warnings: inputs.warnings().collect(), ..Context::default() };
     let json = serde_json::to_string_pretty(&validation)
         .map_err(|error| CommandError::Sentence(format!("The result cannot be written as JSON: {error}.")))?;
     write_whole(&args.out.join("validation.json"), (json + "\n").as_bytes())?;
-    report::write(&args.out.join("report.html"), &pages::validation(&robot, &validation, &command_line()))?;
+    report::write(&args.out.join("report.html"), &pages::validation(&robot, &validation, &context))?;
     for line in validation.summary() {
         ui.say(&line);
     }

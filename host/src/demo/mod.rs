@@ -1,6 +1,7 @@
 //! The main job without hardware: a rig that differs from its description is excited, recorded over the
 //! real wire, identified off-line and on-line, and compensated; everything lands in one report.
 
+mod figures;
 mod run;
 
 use std::path::Path;
@@ -20,7 +21,7 @@ use crate::identify::{
 };
 use crate::link::{EmulatedPort, LinkError, LossReport, Session, SessionSettings};
 use crate::plant::{Equivalent, PlantConfig};
-use crate::report::ReportError;
+use crate::simulate::SimulateError;
 use crate::robot::{ONE_LINK_TEMPLATE, Robot, RobotError};
 
 pub use run::Run;
@@ -54,12 +55,12 @@ pub enum DemoError {
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// The model behind a figure.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
     /// Files.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The report.
-    #[error(transparent)]
-    Report(#[from] ReportError),
     /// A fault of the rig.
     #[error("{0}")]
     Sentence(String),
@@ -117,9 +118,9 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     let design = excite::design(&robot, &design_options(seed, home), |_, _| ())?;
     let other = excite::design(&robot, &design_options(seed + 1, home), |_, _| ())?;
     progress(0.2);
-    let training = record(&mut session, "train.csv", at_home, &design.trajectories[0], 0.5)?;
+    let training = record(&mut session, "train.csv", at_home, &design.file.joints[0].trajectory, 0.5)?;
     progress(0.4);
-    let holdout = record(&mut session, "holdout.csv", vec![], &other.trajectories[0], 0.5)?;
+    let holdout = record(&mut session, "holdout.csv", vec![], &other.file.joints[0].trajectory, 0.5)?;
     progress(0.5);
     let sweep = sweep()?;
     record(&mut session, "sweep.csv", vec![], &sweep, 0.5)?;
@@ -152,7 +153,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         without,
         with,
         losses,
-        condition: design.value,
+        condition: design.values.si_condition_number,
     })
 }
 
