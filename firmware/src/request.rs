@@ -66,7 +66,9 @@ fn with(now: &Settings, body: &RequestBody) -> Settings {
         RequestBody::SetControl(kind) => settings.control = *kind,
         RequestBody::SetModel(model) => settings.model = *model,
         RequestBody::SetFriction(friction) => settings.friction = *friction,
-        RequestBody::SetPrecompensation(precompensation) => settings.precompensation = *precompensation,
+        RequestBody::SetPrecompensation(precompensation) => {
+            settings.precompensation = *precompensation
+        }
         RequestBody::SetLimits(limits) => settings.limits = *limits,
         RequestBody::SetEstimator(estimator) => settings.estimator = *estimator,
         _ => {}
@@ -75,13 +77,20 @@ fn with(now: &Settings, body: &RequestBody) -> Settings {
 }
 
 fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
-    if matches!(state.mode, Mode::Running | Mode::Stopping) { Err(Refusal::WrongMode) } else { Ok(()) }
+    if matches!(state.mode, Mode::Running | Mode::Stopping) {
+        Err(Refusal::WrongMode)
+    } else {
+        Ok(())
+    }
 }
 
 fn arm(state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
-            state.run = Run { base: state.position, ..Run::default() };
+            state.run = Run {
+                base: state.position,
+                ..Run::default()
+            };
             state.current_loop = current::State::default();
             state.law.adaptive = adaptive::State::new(state.settings.model);
             state.mode = Mode::Holding;
@@ -135,11 +144,17 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
         return Err(Refusal::CauseActing);
     }
     // An implausible offset is measured again: it may have been a motor turned by hand.
-    let offset = state.latch.first().is_some_and(|record| record.fault == Fault::CurrentOffset);
+    let offset = state
+        .latch
+        .first()
+        .is_some_and(|record| record.fault == Fault::CurrentOffset);
     state.latch.clear();
     state.snapshot.release();
     if offset {
-        state.calibration = Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() };
+        state.calibration = Calibration {
+            zero_code: config.scaling.current_zero,
+            ..Calibration::default()
+        };
         state.mode = Mode::Calibrating;
     } else {
         state.mode = Mode::Disarmed;
@@ -175,8 +190,16 @@ fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
 
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run.
-fn fits(trajectory: &Trajectory<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
-    let anywhere = Limits { position_low: -f32::MAX, position_high: f32::MAX, ..*limits };
+fn fits(
+    trajectory: &Trajectory<f32>,
+    limits: &Limits<f32>,
+    base: Option<f32>,
+) -> Result<(), Refusal> {
+    let anywhere = Limits {
+        position_low: -f32::MAX,
+        position_high: f32::MAX,
+        ..*limits
+    };
     let checked = match base {
         Some(base) => trajectory.check(limits, base),
         None => trajectory.check(&anywhere, 0.0),

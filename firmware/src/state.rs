@@ -106,7 +106,10 @@ impl State {
             estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?,
             settings,
             derived,
-            calibration: Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() },
+            calibration: Calibration {
+                zero_code: config.scaling.current_zero,
+                ..Calibration::default()
+            },
             encoder: encoder::State::default(),
             origin: None,
             counts: 0,
@@ -133,9 +136,14 @@ impl State {
     }
 
     /// Replaces settings and everything that follows from them; nothing where they cannot be used.
-    pub(crate) fn apply(&mut self, config: &Config, settings: Settings) -> Result<(), SettingsFault> {
+    pub(crate) fn apply(
+        &mut self,
+        config: &Config,
+        settings: Settings,
+    ) -> Result<(), SettingsFault> {
         if settings.estimator != self.settings.estimator {
-            self.estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
+            self.estimator =
+                OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
             self.previous = None;
         }
         self.derived = Derived::new(config, &settings);

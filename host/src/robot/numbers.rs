@@ -31,7 +31,8 @@ impl Robot {
                 row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
             }
             if let Some(drive) = &joint.drive {
-                row[column::DRIVE_INERTIA] = drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
+                row[column::DRIVE_INERTIA] =
+                    drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
             }
             if let Some(friction) = &joint.friction {
                 row[column::VISCOUS] = friction.viscous;

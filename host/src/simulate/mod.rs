@@ -4,9 +4,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-use rig_shared::multibody::{
-    COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix,
-};
+use rig_shared::multibody::{COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix};
 use thiserror::Error;
 
 use crate::robot::{Controller, Robot};
