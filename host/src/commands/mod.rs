@@ -1,3 +1,5 @@
 //! commands
 
+pub mod excite;
+pub mod simulate;
 pub mod ui;

@@ -54,9 +54,7 @@ fn derivative_bound(order: usize, omega: f64, coefficients: &[f64], ramp: Option
     match ramp {
         None => series(order),
         Some(length) => (0..=order)
-            .map(|j| {
-                BINOMIAL[order][j] * ENVELOPE[j] / length.powi(j as i32) * series(order - j)
-            })
+            .map(|j| BINOMIAL[order][j] * ENVELOPE[j] / length.powi(j as i32) * series(order - j))
             .sum(),
     }
 }

@@ -109,7 +109,11 @@ impl Interval {
         };
         let ends = Self::hull(at_ends[0], at_ends[1]).outwards().outwards();
         Self {
-            low: if holds(peak + PI) { -1.0 } else { ends.low.max(-1.0) },
+            low: if holds(peak + PI) {
+                -1.0
+            } else {
+                ends.low.max(-1.0)
+            },
             high: if holds(peak) { 1.0 } else { ends.high.min(1.0) },
         }
     }

@@ -45,7 +45,9 @@ pub use certificate::Reach;
 pub use error::ExciteError;
 pub use replay::{Noise, Replay, replay};
 pub use stages::{StagedKind, staged};
-pub use trajectory_file::{DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference};
+pub use trajectory_file::{
+    DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
+};
 
 use certificate::reach;
 use interval::Interval;
@@ -206,12 +208,9 @@ fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
     let mut notes = Vec::new();
     let mut list = Vec::new();
     for joint in &robot.joints {
-        let limits = joint
-            .limits
-            .as_ref()
-            .ok_or_else(|| ExciteError::NoLimits {
-                joint: joint.name.clone(),
-            })?;
+        let limits = joint.limits.as_ref().ok_or_else(|| ExciteError::NoLimits {
+            joint: joint.name.clone(),
+        })?;
         let [mut low, mut high] = limits.position;
         if !low.is_finite() || !high.is_finite() {
             (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
@@ -297,7 +296,11 @@ fn column_sizes(
 }
 
 /// Singular values of a motion's regressor over one period at `samples` instants.
-fn values_of(frame: &Frame, motions: &[JointMotion], samples: usize) -> Result<Values, ExciteError> {
+fn values_of(
+    frame: &Frame,
+    motions: &[JointMotion],
+    samples: usize,
+) -> Result<Values, ExciteError> {
     let n = motions.len();
     let (p, width) = (frame.columns.len(), n * COLUMNS);
     let trajectories: Vec<_> = motions
@@ -348,7 +351,13 @@ fn worst(
     let mut worst: Option<(f64, usize, &'static str)> = None;
     for (j, (reach, b)) in reaches.iter().zip(bounds).enumerate() {
         let base = motions[j].base;
-        let share = |value: f64, limit: f64| if value > 0.0 { limit / value } else { f64::INFINITY };
+        let share = |value: f64, limit: f64| {
+            if value > 0.0 {
+                limit / value
+            } else {
+                f64::INFINITY
+            }
+        };
         let room = [
             (share(reach.position[1] - base, b.high - base), "position"),
             (share(base - reach.position[0], base - b.low), "position"),
@@ -452,9 +461,10 @@ fn run_start(
     let start = random_start(&mut problem, frame, seed, index);
     let x = minimise(&mut problem, start, ITERATIONS, done);
     let motions = problem.decode(&x);
-    if motions.iter().any(|m| {
-        !m.base.is_finite() || m.coefficients.iter().any(|c| !c.is_finite())
-    }) {
+    if motions
+        .iter()
+        .any(|m| !m.base.is_finite() || m.coefficients.iter().any(|c| !c.is_finite()))
+    {
         return Ok(Err((0, "position")));
     }
     match fit_within(frame, enclosing, motions)? {

@@ -145,8 +145,7 @@ mod tests {
         }
         fn update(&mut self, x: &DVector<f64>, next_weight: f64) {
             if self.weight > 0.0 {
-                self.multiplier =
-                    (self.weight * Self::constraint(x) + self.multiplier).max(0.0);
+                self.multiplier = (self.weight * Self::constraint(x) + self.multiplier).max(0.0);
             }
             self.weight = next_weight;
         }
@@ -168,6 +167,9 @@ mod tests {
                 f(*a, *b).total_cmp(&f(*c, *d))
             })
             .unwrap_or_default();
-        assert!((x[0] - best.0).abs() < 1e-4 && (x[1] - best.1).abs() < 1e-4, "{x} {best:?}");
+        assert!(
+            (x[0] - best.0).abs() < 1e-4 && (x[1] - best.1).abs() < 1e-4,
+            "{x} {best:?}"
+        );
     }
 }

@@ -277,7 +277,10 @@ impl<'a> Problem<'a> {
             let (bounds, base) = (&self.frame.bounds[i % n], bases[i % n]);
             let (up, down) = (bounds.high - base, bounds.low - base);
             let away = q - base;
-            room = room.min(if away > 0.0 { up / away } else { down / away });
+            // Where it starts and ends it is not away at all.
+            if away != 0.0 {
+                room = room.min(if away > 0.0 { up / away } else { down / away });
+            }
             room = room.min(bounds.velocity / self.motion[1][i].abs());
             if let Some(limit) = bounds.acceleration {
                 room = room.min(limit / self.motion[2][i].abs());
@@ -356,16 +359,15 @@ impl<'a> Problem<'a> {
         let n = self.joints();
         let samples = self.motion[0].len() / n;
         let keep = 1.0 - MARGIN;
-        let dual_rows: Option<Vec<[D3; COLUMNS]>> =
-            self.frame.parameters.as_ref().map(|rows| {
-                rows.iter()
-                    .map(|row| {
-                        let mut row = row.map(D3::constant);
-                        row[column::COULOMB] = D3::default();
-                        row
-                    })
-                    .collect()
-            });
+        let dual_rows: Option<Vec<[D3; COLUMNS]>> = self.frame.parameters.as_ref().map(|rows| {
+            rows.iter()
+                .map(|row| {
+                    let mut row = row.map(D3::constant);
+                    row[column::COULOMB] = D3::default();
+                    row
+                })
+                .collect()
+        });
         let torque_limited = self.frame.bounds.iter().any(|b| b.torque.is_some());
         let mut slope = vec![[0.0; 3]; n];
         let mut tau = vec![D3::default(); n];
@@ -409,8 +411,7 @@ impl<'a> Problem<'a> {
                         .as_ref()
                         .map_or(0.0, |p| p[j][column::COULOMB]);
                     let total = tau[j]
-                        + D3::constant(coulomb)
-                            * soft_sign(qd[j], self.frame.bounds[j].velocity);
+                        + D3::constant(coulomb) * soft_sign(qd[j], self.frame.bounds[j].velocity);
                     torque[j] = total.value;
                     torque_slope[j * n + by] = total.derivative;
                 }
@@ -475,8 +476,7 @@ impl Objective for Problem<'_> {
         for j in 0..n {
             let mut sums = DVector::zeros(block - 1);
             for (order, table) in self.basis.tables.iter().enumerate() {
-                let pull =
-                    DVector::from_fn(samples, |s, _| self.adjoint[order][s * n + j]);
+                let pull = DVector::from_fn(samples, |s, _| self.adjoint[order][s * n + j]);
                 sums += table.tr_mul(&pull);
             }
             let base: f64 = (0..samples).map(|s| self.adjoint[0][s * n + j]).sum();
@@ -508,6 +508,9 @@ impl Objective for Problem<'_> {
 }
 
 #[cfg(test)]
-pub(super) fn probe_multiplier(problem: &mut Problem<'_>, value: f64) {
-    problem.multipliers.fill(value);
+impl Problem<'_> {
+    /// Makes every constraint count, so that a test of the gradient sees all of them.
+    pub(super) fn press(&mut self, multiplier: f64) {
+        self.multipliers.fill(multiplier);
+    }
 }

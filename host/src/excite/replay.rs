@@ -147,7 +147,12 @@ impl Replay {
                 JointKind::Prismatic => ("m", "N"),
             };
             let speed = format!("{length}/s");
-            for (name, unit) in [("q", length), ("qd", &speed), ("tau", force), ("ref", length)] {
+            for (name, unit) in [
+                ("q", length),
+                ("qd", &speed),
+                ("tau", force),
+                ("ref", length),
+            ] {
                 columns.push(Column::new(&format!("{name}{}", k + 1), unit));
             }
         }

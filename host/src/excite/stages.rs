@@ -247,7 +247,8 @@ pub fn staged(
             continue;
         };
         // In single precision, as the rig runs it.
-        let checked: Result<Extremes<f64>, _> = trajectory.to_f32().to_f64().check(&limits, start[moving]);
+        let checked: Result<Extremes<f64>, _> =
+            trajectory.to_f32().to_f64().check(&limits, start[moving]);
         if let Err(error) = checked {
             why = error.to_string();
             continue;

@@ -305,11 +305,31 @@ fn write_motion(out: &mut String, trajectory: &Trajectory<f64>, unit: &str) {
             put("duration", number(seconds(*duration)), "s");
         }
         Trajectory::Fourier(m) => {
-            put("kind", quoted("fourier"), "E(t) * sum of a_k sin(k w t) + b_k cos(k w t)");
-            put("period", number(seconds(m.period_us)), "s, of the fundamental: w = 2 pi / period");
-            put("periods", m.periods.to_string(), "whole periods at full amplitude");
-            put("ramp", number(seconds(m.ramp_us)), "s, rise and fall of the envelope E before and after them");
-            put("sine", list(&m.sine), &each("a_k from the fundamental upwards"));
+            put(
+                "kind",
+                quoted("fourier"),
+                "E(t) * sum of a_k sin(k w t) + b_k cos(k w t)",
+            );
+            put(
+                "period",
+                number(seconds(m.period_us)),
+                "s, of the fundamental: w = 2 pi / period",
+            );
+            put(
+                "periods",
+                m.periods.to_string(),
+                "whole periods at full amplitude",
+            );
+            put(
+                "ramp",
+                number(seconds(m.ramp_us)),
+                "s, rise and fall of the envelope E before and after them",
+            );
+            put(
+                "sine",
+                list(&m.sine),
+                &each("a_k from the fundamental upwards"),
+            );
             put("cosine", list(&m.cosine), &each("b_k"));
         }
         Trajectory::Chirp(m) => {
@@ -321,32 +341,96 @@ fn write_motion(out: &mut String, trajectory: &Trajectory<f64>, unit: &str) {
             put("start_hz", number(m.start_hz), "Hz");
             put("end_hz", number(m.end_hz), "Hz");
             put("sweep", quoted(sweep), "linear or logarithmic in time");
-            put("duration", number(seconds(m.duration_us)), "s, with both ramps");
-            put("ramp", number(seconds(m.ramp_us)), "s, rise and fall of the amplitude");
+            put(
+                "duration",
+                number(seconds(m.duration_us)),
+                "s, with both ramps",
+            );
+            put(
+                "ramp",
+                number(seconds(m.ramp_us)),
+                "s, rise and fall of the amplitude",
+            );
             put("amplitude", number(m.amplitude), &each("largest amplitude"));
-            put("velocity", number(m.velocity), &format!("{unit}/s, bounds the amplitude at higher frequencies"));
-            put("acceleration", number(m.acceleration), &format!("{unit}/s^2, likewise"));
+            put(
+                "velocity",
+                number(m.velocity),
+                &format!("{unit}/s, bounds the amplitude at higher frequencies"),
+            );
+            put(
+                "acceleration",
+                number(m.acceleration),
+                &format!("{unit}/s^2, likewise"),
+            );
         }
         Trajectory::Staircase(m) => {
-            put("kind", quoted("staircase"), "moves to each level, back to the start at the end");
+            put(
+                "kind",
+                quoted("staircase"),
+                "moves to each level, back to the start at the end",
+            );
             put("levels", list(&m.levels), &each("from the start"));
             put("move", number(seconds(m.move_us)), "s, length of a move");
-            put("dwell", number(seconds(m.dwell_us)), "s, rest after each move");
+            put(
+                "dwell",
+                number(seconds(m.dwell_us)),
+                "s, rest after each move",
+            );
         }
         Trajectory::SlowReversals(m) => {
-            put("kind", quoted("reversals"), "slow triangles with rounded turns");
-            put("speed", number(m.speed), &format!("{unit}/s between the turns"));
-            put("half_turn", number(seconds(m.half_turn_us)), "s, half the length of a turn");
-            put("quarter", all(&m.quarter_us), "s from the centre to where the turn begins, one per amplitude");
+            put(
+                "kind",
+                quoted("reversals"),
+                "slow triangles with rounded turns",
+            );
+            put(
+                "speed",
+                number(m.speed),
+                &format!("{unit}/s between the turns"),
+            );
+            put(
+                "half_turn",
+                number(seconds(m.half_turn_us)),
+                "s, half the length of a turn",
+            );
+            put(
+                "quarter",
+                all(&m.quarter_us),
+                "s from the centre to where the turn begins, one per amplitude",
+            );
             put("cycles", m.cycles.to_string(), "triangles per amplitude");
         }
         Trajectory::FrictionSweep(m) => {
-            put("kind", quoted("sweep"), "forth and back at each of several constant speeds");
-            put("half_span", number(m.half_span), &each("half the distance between the ends"));
-            put("cruise", all(&m.cruise_us), "s at constant speed, one per speed");
-            put("ramp", number(seconds(m.ramp_us)), "s to reach the speed, and to stop");
-            put("dwell", number(seconds(m.dwell_us)), "s at rest after each pass");
-            put("lead", number(seconds(m.lead_us)), "s from the start to the first end, and back");
+            put(
+                "kind",
+                quoted("sweep"),
+                "forth and back at each of several constant speeds",
+            );
+            put(
+                "half_span",
+                number(m.half_span),
+                &each("half the distance between the ends"),
+            );
+            put(
+                "cruise",
+                all(&m.cruise_us),
+                "s at constant speed, one per speed",
+            );
+            put(
+                "ramp",
+                number(seconds(m.ramp_us)),
+                "s to reach the speed, and to stop",
+            );
+            put(
+                "dwell",
+                number(seconds(m.dwell_us)),
+                "s at rest after each pass",
+            );
+            put(
+                "lead",
+                number(seconds(m.lead_us)),
+                "s from the start to the first end, and back",
+            );
         }
     }
 }
@@ -432,16 +516,12 @@ impl TrajectoryFile {
                     format!("start is {start}, but it must be a finite number, in rad or m"),
                 ));
             }
-            let trajectory = joint
-                .trajectory
-                .get_ref()
-                .trajectory()
-                .map_err(|message| {
-                    wrong(
-                        joint.trajectory.span().start,
-                        format!("in the trajectory of joint \"{}\", {message}", joint.name),
-                    )
-                })?;
+            let trajectory = joint.trajectory.get_ref().trajectory().map_err(|message| {
+                wrong(
+                    joint.trajectory.span().start,
+                    format!("in the trajectory of joint \"{}\", {message}", joint.name),
+                )
+            })?;
             joints.push(JointTrajectory {
                 name: joint.name.clone(),
                 start,
@@ -458,10 +538,20 @@ impl TrajectoryFile {
     /// As TOML with units in comments; [`TrajectoryFile::from_toml`] reads it back equal.
     pub fn to_toml(&self, robot: &Robot) -> String {
         let mut out = String::new();
-        line(&mut out, "robot", &quoted(&self.robot), "for which it was made");
+        line(
+            &mut out,
+            "robot",
+            &quoted(&self.robot),
+            "for which it was made",
+        );
         if let Some(d) = &self.design {
             out.push_str("\n[design]\n");
-            line(&mut out, "criterion", &quoted(d.criterion.name()), "what was optimised");
+            line(
+                &mut out,
+                "criterion",
+                &quoted(d.criterion.name()),
+                "what was optimised",
+            );
             line(&mut out, "value", &number(d.value), "of that criterion");
             line(
                 &mut out,
@@ -469,7 +559,12 @@ impl TrajectoryFile {
                 &number(d.condition_number),
                 "of the regressor, columns divided by their sizes",
             );
-            line(&mut out, "seed", &d.seed.to_string(), "of the optimiser's starts");
+            line(
+                &mut out,
+                "seed",
+                &d.seed.to_string(),
+                "of the optimiser's starts",
+            );
         }
         for (k, joint) in self.joints.iter().enumerate() {
             let unit = match robot.joints.get(k).map(|j| j.kind) {
@@ -477,7 +572,12 @@ impl TrajectoryFile {
                 _ => "rad",
             };
             out.push_str("\n[[joint]]\n");
-            line(&mut out, "name", &quoted(&joint.name), "as in the robot description");
+            line(
+                &mut out,
+                "name",
+                &quoted(&joint.name),
+                "as in the robot description",
+            );
             line(
                 &mut out,
                 "start",
@@ -535,9 +635,7 @@ impl TrajectoryFile {
             .and_then(|e| e.to_str())
             .map(str::to_ascii_lowercase);
         match extension.as_deref() {
-            Some("toml") => {
-                Ok(write_whole(path, self.to_toml(robot).as_bytes())?)
-            }
+            Some("toml") => Ok(write_whole(path, self.to_toml(robot).as_bytes())?),
             Some("csv") => self.save_samples(path, robot, rate),
             _ => Err(ExciteError::UnknownFormat { path: path.into() }),
         }
