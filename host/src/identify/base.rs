@@ -54,7 +54,7 @@ pub struct Independent {
 
 /// Visits the columns of `matrix` in `order` and keeps those that are not, to within `tolerance` of their
 /// length, combinations of the ones kept before: a QR factorisation pivoted by preference (Gautier 1991).
-/// Columns shorter than `tolerance_zero` times the longest count as zero.
+/// Columns shorter than 1e-12 of the longest count as zero.
 pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f64) -> Independent {
     let all = matrix.ncols();
     let longest = (0..all)
@@ -68,7 +68,7 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     let mut remainder = vec![0.0; all];
     for &c in order {
         let length = matrix.column(c).norm();
-        if !(length > 1e-12 * longest) {
+        if length <= 1e-12 * longest || length.is_nan() {
             continue;
         }
         let mut rest = matrix.column(c).into_owned() / length;

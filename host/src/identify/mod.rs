@@ -11,10 +11,14 @@
 mod base;
 mod covariance;
 mod describe;
+mod evaluate;
+mod excitation;
 mod factor;
 mod friction_map;
+mod linear;
 mod model;
 mod residual;
+mod robust;
 mod solve;
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ const BINS: usize = 20;
 /// Lags of the whiteness test.
 const TEST_LAGS: usize = 20;
 /// Most points of a time series that is kept for plots.
-pub const SERIES_POINTS: usize = 4000;
+pub(super) const SERIES_POINTS: usize = 4000;
 
 /// Mean residual over one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -165,9 +165,18 @@ impl Binned {
     }
 }
 
+/// A small p-value in words; below the smallest number it is not zero.
+fn p_text(p: f64) -> String {
+    if p < 1e-300 {
+        "p < 1e-300".to_owned()
+    } else {
+        format!("p = {p:.1e}")
+    }
+}
+
 /// Ranges that the bins span.
 #[derive(Clone, Copy, Debug)]
-pub struct Ranges {
+pub(super) struct Ranges {
     /// Lowest and highest position.
     pub position: [f64; 2],
     /// Highest speed.
@@ -177,7 +186,7 @@ pub struct Ranges {
 }
 
 /// Collects the residuals of one joint.
-pub struct ResidualStream {
+pub(super) struct ResidualStream {
     total: u64,
     every: u64,
     moments: [f64; 5],
@@ -189,7 +198,7 @@ pub struct ResidualStream {
 
 impl ResidualStream {
     /// For `total` instants.
-    pub fn new(total: u64, ranges: Ranges) -> Self {
+    pub(super) fn new(total: u64, ranges: Ranges) -> Self {
         Self {
             total: total.max(1),
             every: total.div_ceil(SERIES_POINTS as u64).max(1),
@@ -208,7 +217,7 @@ impl ResidualStream {
 
     /// Takes instant `index`: time, position, velocity, measured and predicted torque; `used` is false for
     /// rows that are masked, which are only drawn.
-    pub fn push(
+    pub(super) fn push(
         &mut self,
         index: u64,
         t: f64,
@@ -244,13 +253,8 @@ impl ResidualStream {
         }
     }
 
-    /// Sum of squares of the residuals and of the torque so far.
-    pub fn squares(&self) -> (f64, f64) {
-        (self.moments[2], self.torque_squares)
-    }
-
     /// Sums up.
-    pub fn report(self) -> ResidualReport {
+    pub(super) fn report(self) -> ResidualReport {
         let n = self.moments[0].max(1.0);
         let rms = (self.moments[2] / n).sqrt();
         let torque_rms = (self.torque_squares / n).sqrt();
@@ -283,14 +287,16 @@ impl ResidualStream {
         ResidualReport {
             whiteness: if whiteness_p < 0.01 {
                 format!(
-                    "The residual is correlated in time (memory {length:.1} rows, p = {whiteness_p:.1e}): standard deviations that take it as white are too small."
+                    "The residual is correlated in time (memory {length:.1} rows, {}): standard deviations that take it as white are too small.",
+                    p_text(whiteness_p)
                 )
             } else {
                 format!("The residual cannot be told from white noise (p = {whiteness_p:.2}).")
             },
             normality: if normality_p < 0.01 {
                 format!(
-                    "The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, p = {normality_p:.1e})."
+                    "The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, {}).",
+                    p_text(normality_p)
                 )
             } else {
                 format!(

@@ -87,7 +87,7 @@ impl LowPass {
                 });
             }
         }
-        if !(radius < 1.0) {
+        if radius >= 1.0 || radius.is_nan() {
             return None;
         }
         // 1e-13 and one quarter more: what a wrong initial state leaves is then below rounding, and the

@@ -108,10 +108,11 @@ fn drop_front(block: &mut Block, rows: usize) {
             &mut joint.reference,
             &mut joint.voltage,
             &mut joint.temperature,
-        ] {
-            if let Some(column) = column {
-                column.drain(..rows);
-            }
+        ]
+        .into_iter()
+        .flatten()
+        {
+            column.drain(..rows);
         }
     }
     for (_, column) in &mut block.extra {
@@ -198,10 +199,11 @@ fn truncate(block: &mut Block, rows: usize) {
             &mut joint.reference,
             &mut joint.voltage,
             &mut joint.temperature,
-        ] {
-            if let Some(column) = column {
-                column.truncate(rows);
-            }
+        ]
+        .into_iter()
+        .flatten()
+        {
+            column.truncate(rows);
         }
     }
     for (_, column) in &mut block.extra {

@@ -1,266 +1,6 @@
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! Recordings made by a simulation of their own.
 
 use super::*;
-use crate::data::{Block, JointColumns};
-use crate::prepare::{Choice, InMemory, Recording};
-use crate::robot::{Joint, JointKind, Robot};
-use rand::{RngExt, SeedableRng};
-
-fn joint(kind: JointKind, alpha: f64) -> Joint {
-    Joint {
-        name: "axis".into(),
-        kind,
-        alpha,
-        a: 0.0,
-        theta: 0.0,
-        d: 0.0,
-        inertial: None,
-        limits: None,
-        friction: None,
-        drive: None,
-        controller: None,
-    }
-}
-
-fn robot(name: &str, joints: Vec<Joint>) -> Robot {
-    Robot {
-        name: name.into(),
-        gravity: [0.0, 0.0, -9.81],
-        joints,
-        effects: Vec::new(),
-    }
-}
-
-/// A slide along the horizontal.
-fn slide() -> Robot {
-    robot(
-        "slide",
-        vec![joint(JointKind::Prismatic, std::f64::consts::FRAC_PI_2)],
-    )
-}
-
-/// A pendulum: axis horizontal, angle zero along the horizontal.
-fn pendulum() -> Robot {
-    robot(
-        "pendulum",
-        vec![joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2)],
-    )
-}
-
-/// The robot and a recording, or None with a plain word where the recordings are not at hand.
-fn emps(file: &str) -> Option<(Robot, crate::data::Source)> {
-    let Some(folder) = crate::data::data_dir() else {
-        println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
-        return None;
-    };
-    let robot =
-        Robot::load(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/emps.toml"))
-            .unwrap();
-    let source = crate::data::Source::open(&folder.join("emps").join(file), &robot).unwrap();
-    Some((robot, source))
-}
-
-fn published() -> Options {
-    Options {
-        prepare: PrepareOptions {
-            cutoff: Choice::Fixed(100.0),
-            decimation: Choice::Fixed(10),
-            speed_threshold: Choice::Fixed(0.0),
-            ..Default::default()
-        },
-        ..Default::default()
-    }
-}
-
-fn show(title: &str, found: &Identification) {
-    let d = &found.details;
-    println!(
-        "== {title}: cut-off {:.2} Hz, decimation {}, rows {}, memory {:.1}, dof {}, cond {:.1} scaled {:.2}, motion {:.2} Hz, threshold {:?}, window {:?}",
-        d.treatment.cutoff,
-        d.treatment.decimation,
-        d.estimate.rows,
-        d.estimate.memory_rows,
-        d.estimate.degrees_of_freedom,
-        d.estimate.condition,
-        d.estimate.scaled_condition,
-        d.treatment.motion_frequency,
-        d.treatment.speed_threshold,
-        d.window.as_ref().map(|w| w.0)
-    );
-    println!("   {} | {:?}", d.treatment.cutoff_reason, d.masked);
-    for b in &found.base_parameters {
-        println!(
-            "   {:10} {:10.4} ± {:.3} % (classical {:.3} %) [{:.4}, {:.4}] {}",
-            b.expression,
-            b.value,
-            b.relative_std_percent,
-            b.classical_relative_std_percent,
-            b.interval[0],
-            b.interval[1],
-            b.unit
-        );
-    }
-    for j in &found.joints {
-        println!(
-            "   train {:.4} ({:.3} %) hold-out {:?} ({:?})",
-            j.train_residual_rms,
-            100.0 * j.train_relative_error,
-            j.holdout_residual_rms,
-            j.holdout_relative_error
-        );
-    }
-}
-
-/// Janot, Gautier & Brunot 2019: kg, N·s/m, N, N.
-const PUBLISHED: [f64; 4] = [95.1089, 203.5034, 20.3935, -3.1648];
-
-fn assert_near(found: &Identification, expected: &[f64], percent: f64) {
-    assert_eq!(found.base_parameters.len(), expected.len());
-    for (b, e) in found.base_parameters.iter().zip(expected) {
-        let off = 100.0 * (b.value / e - 1.0).abs();
-        assert!(
-            off < percent,
-            "{}: {} is {off:.2} % off {e}",
-            b.expression,
-            b.value
-        );
-    }
-}
-
-#[test]
-fn emps_with_the_published_processing_gives_the_published_values() {
-    let (Some((robot, train)), Some((_, test))) = (emps("train.csv"), emps("test_pulses.csv"))
-    else {
-        return;
-    };
-    let found = identify(&robot, &[&train], &[&test], &published()).unwrap();
-    show("published processing", &found);
-    let names: Vec<_> = found
-        .base_parameters
-        .iter()
-        .map(|b| b.expression.as_str())
-        .collect();
-    assert_eq!(names, ["m1 + Ia1", "fv1", "fc1", "off1"]);
-    assert_near(&found, &PUBLISHED, 0.5);
-    // An independent repetition printed these relative standard deviations and this condition number.
-    for (b, percent) in found.base_parameters.iter().zip([0.11, 0.56, 0.49, 1.39]) {
-        assert!(
-            (b.classical_relative_std_percent - percent).abs() < 0.02,
-            "{b:?}"
-        );
-        assert!(
-            b.relative_std_percent > percent,
-            "residuals are correlated: {b:?}"
-        );
-    }
-    assert!((found.condition_number - 26.0).abs() < 0.5);
-    assert!((found.joints[0].train_relative_error - 0.0404).abs() < 5e-4);
-    assert!(found.not_excited.is_empty());
-    let refit = identify(&robot, &[&test], &[], &published()).unwrap();
-    show("published processing, pulse recording", &refit);
-    assert_near(&refit, &[94.06, 210.3, 20.87, -3.21], 0.5);
-}
-
-/// Whether the pulses are a force beside `tau1`: then adding them, in the unit of the force or of the
-/// controller's output, would leave less. It leaves more.
-#[test]
-fn emps_pulses_are_no_force_beside_the_measured_one() {
-    let Some((robot, test)) = emps("test_pulses.csv") else {
-        return;
-    };
-    let (blocks, _) = test.read_all().unwrap();
-    let rms = |gain: f64| {
-        let mut blocks = blocks.clone();
-        for block in &mut blocks {
-            let pulses = block
-                .extra
-                .iter()
-                .find(|(name, _)| name == "pulses")
-                .unwrap()
-                .1
-                .clone();
-            for (tau, pulse) in block.joints[0].tau.iter_mut().zip(pulses) {
-                *tau += gain * pulse;
-            }
-        }
-        let recording = InMemory {
-            label: "pulses".into(),
-            blocks,
-        };
-        identify(&robot, &[&recording], &[], &published())
-            .unwrap()
-            .joints[0]
-            .train_residual_rms
-    };
-    let alone = rms(0.0);
-    for gain in [1.0, -1.0, 35.1507, -35.1507] {
-        println!("gain {gain}: {:.4} against {alone:.4}", rms(gain));
-        assert!(rms(gain) > 1.1 * alone);
-    }
-}
-
-#[test]
-fn emps_with_the_defaults_both_models_agree() {
-    let (Some((robot, train)), Some((_, test))) = (emps("train.csv"), emps("test_pulses.csv"))
-    else {
-        return;
-    };
-    let run = |model, estimator| {
-        let options = Options {
-            model,
-            estimator,
-            ..Default::default()
-        };
-        let found = identify(&robot, &[&train], &[&test], &options).unwrap();
-        show(&format!("defaults {model:?} {estimator:?}"), &found);
-        for d in &found.details.train[0].dependence {
-            println!("   {}", d.text);
-        }
-        println!(
-            "   {} {}",
-            found.details.train[0].whiteness, found.details.train[0].normality
-        );
-        found
-    };
-    let differential = run(ModelKind::Differential, Estimator::Weighted);
-    let integral = run(ModelKind::Integral, Estimator::Weighted);
-    assert_near(&differential, &PUBLISHED, 2.0);
-    assert_near(&integral, &PUBLISHED, 2.0);
-    for k in 0..4 {
-        let (a, b) = (
-            &differential.base_parameters[k],
-            &integral.base_parameters[k],
-        );
-        assert!(
-            differential.details.estimate.covers(k, b.value),
-            "{a:?} {b:?}"
-        );
-        assert!(integral.details.estimate.covers(k, a.value), "{a:?} {b:?}");
-    }
-    for found in [&differential, &integral] {
-        let j = &found.joints[0];
-        assert!(j.holdout_relative_error.unwrap() < 0.08, "{j:?}");
-    }
-    run(ModelKind::Differential, Estimator::Robust);
-    run(ModelKind::Integral, Estimator::Robust);
-    let json = serde_json::to_value(&differential).unwrap();
-    for key in [
-        "schema",
-        "robot",
-        "model",
-        "estimator",
-        "rank",
-        "condition_number",
-        "base_parameters",
-        "joints",
-        "not_excited",
-        "warnings",
-    ] {
-        assert!(json.get(key).is_some(), "{key}");
-    }
-    assert_eq!(json["schema"], "rig-identification/1");
-    assert_eq!(json["model"], "differential");
-}
 
 #[test]
 fn base_parameters_group_as_papers_group_them() {
@@ -307,6 +47,11 @@ const TRUTH: [f64; 6] = [0.30, 0.04, 0.35, 0.30, 0.40, 0.10];
 /// dry friction does; torque noise coloured, position noisy and rounded to encoder steps. It shares nothing
 /// with the regressor that is fitted.
 fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
+    swing_along(seed, seconds, held, |t| t)
+}
+
+/// The same along a reference whose time runs as told (its second argument to the sines).
+fn swing_along(seed: u64, seconds: f64, held: bool, clock: impl Fn(f64) -> f64) -> InMemory {
     let mut g = rand_pcg::Pcg64::seed_from_u64(seed);
     let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
     let (rate, fine) = (500.0, 20);
@@ -330,7 +75,8 @@ fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
     for k in 0..(seconds * rate) as usize {
         let t = k as f64 / rate;
         let measured = ((q + 5e-6 * normal()) / step).round() * step;
-        let (r, rv) = reference(t);
+        let (r, rv) = reference(clock(t));
+        let rv = rv * (clock(t + 1e-6) - clock(t)) / 1e-6;
         let torque = 60.0 * (r - measured) + 6.0 * (rv - v);
         // First order, 8 ms: correlated over several samples.
         coloured = 0.78 * coloured + 0.03 * normal();
@@ -360,8 +106,8 @@ fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
     }
 }
 
-/// How often 95 % intervals hold the truth: 92 to 98 % over all parameters of each model, and no parameter is
-/// left out (200 draws scatter by 1.5 %, so a single one may lie a little further out).
+/// How often 95 % intervals hold the truth: between 92 and 98 % for every parameter of both models (200 draws
+/// scatter by 1.5 %).
 #[test]
 fn intervals_cover_the_truth_as_often_as_they_say() {
     let draws = 200;
@@ -401,10 +147,7 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
         );
         let mean = share.iter().sum::<f64>() / 6.0;
         assert!((0.92..=0.98).contains(&mean), "{mean}");
-        assert!(
-            share.iter().all(|s| (0.90..=0.995).contains(s)),
-            "{share:?}"
-        );
+        assert!(share.iter().all(|s| (0.92..=0.98).contains(s)), "{share:?}");
     }
 }
 
@@ -731,4 +474,130 @@ fn streaming_gives_the_same_parameters() {
             assert!((a.std / b.std - 1.0).abs() < 1e-6, "{a:?} {b:?}");
         }
     }
+}
+
+/// Two links in a vertical plane, torques by the multibody kernels of the other side (inverse dynamics), the
+/// second joint's sensor ten times as noisy: both models find every base parameter.
+#[test]
+fn two_links_are_identified_by_both_models() {
+    use rig_shared::multibody::{COLUMNS, inverse_dynamics};
+    let mut second = joint(JointKind::Revolute, 0.0);
+    second.a = 0.5;
+    second.name = "second".into();
+    let arm = robot(
+        "arm",
+        vec![
+            joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2),
+            second,
+        ],
+    );
+    let mut pi = [[0.0; COLUMNS]; 2];
+    for (row, values) in pi.iter_mut().zip([
+        [3.0, 0.7, 0.1, 0.05, 0.02, 0.2, 0.4, 0.3, 0.15, 0.1],
+        [1.5, 0.3, -0.05, 0.02, 0.01, 0.08, 0.05, 0.2, 0.1, -0.05],
+    ]) {
+        // m mx my Ixx Iyy Izz Ia fv fc off
+        for (c, v) in [0, 1, 2, 4, 7, 9, 10, 11, 12, 13].into_iter().zip(values) {
+            row[c] = v;
+        }
+    }
+    let chain = chain_of(&arm).unwrap();
+    let mut g = rand_pcg::Pcg64::seed_from_u64(9);
+    let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
+    let mut block = Block {
+        joints: vec![JointColumns::default(); 2],
+        first_line: 2,
+        ..Default::default()
+    };
+    for k in 0..30_000 {
+        let t = k as f64 * 1e-3;
+        let mut state = [[0.0; 2]; 3];
+        for (j, terms) in [
+            [(0.9, 1.7, 0.3), (0.3, 4.1, 1.1), (0.1, 7.3, 0.2)],
+            [(1.1, 2.3, 2.0), (0.4, 3.3, 0.5), (0.1, 8.9, 1.7)],
+        ]
+        .iter()
+        .enumerate()
+        {
+            for (a, w, p) in terms {
+                let (s, c) = (w * t + p).sin_cos();
+                state[0][j] += a * s;
+                state[1][j] += a * w * c;
+                state[2][j] -= a * w * w * s;
+            }
+        }
+        let mut tau = [0.0; 2];
+        inverse_dynamics(&chain, &pi, &state[0], &state[1], &state[2], &mut tau).unwrap();
+        block.t.push(t);
+        for j in 0..2 {
+            block.joints[j].q.push(state[0][j] + 1e-6 * normal());
+            block.joints[j].tau.push(tau[j] + [0.02, 0.2][j] * normal());
+        }
+    }
+    let recording = InMemory {
+        label: "arm".into(),
+        blocks: vec![block],
+    };
+    let flat: Vec<f64> = pi.iter().flatten().copied().collect();
+    for model in [ModelKind::Differential, ModelKind::Integral] {
+        let options = Options {
+            model,
+            ..Default::default()
+        };
+        let found = identify(&arm, &[&recording], &[], &options).unwrap();
+        show(&format!("two links {model:?}"), &found);
+        assert_eq!(found.rank, 13);
+        assert!(found.not_excited.is_empty());
+        for (k, b) in found.base_parameters.iter().enumerate() {
+            let row = found.details.combination.row(k);
+            let truth: f64 = row.iter().zip(&flat).map(|(k, p)| k * p).sum();
+            assert!(
+                (b.value - truth).abs() < 4.0 * b.std,
+                "{b:?}, truth {truth}"
+            );
+            assert!(b.std < 0.05, "{b:?}");
+        }
+    }
+}
+
+/// Half of the time the link rests, held by dry friction anywhere inside its band: torque that Coulomb's law
+/// says nothing about. Masked, it does not touch the estimate; left in, it does.
+#[test]
+fn standing_still_does_not_bias_friction() {
+    let clock = |t: f64| (t / 4.0).floor() * 2.0 + (t % 4.0).min(2.0);
+    let recording = swing_along(6, 60.0, false, clock);
+    for model in [ModelKind::Differential, ModelKind::Integral] {
+        let run = |threshold| {
+            let options = Options {
+                model,
+                prepare: PrepareOptions {
+                    speed_threshold: threshold,
+                    ..Default::default()
+                },
+                ..Default::default()
+            };
+            identify(&pendulum(), &[&recording], &[], &options).unwrap()
+        };
+        let found = run(Choice::Auto);
+        show(&format!("half at rest {model:?}"), &found);
+        for (b, truth) in found.base_parameters.iter().zip(TRUTH) {
+            assert!(
+                (b.value - truth).abs() < 4.0 * b.std,
+                "{b:?}, truth {truth}"
+            );
+        }
+        assert!(found.details.masked.iter().any(|m| m.why.contains("speed")));
+    }
+    let careless = {
+        let options = Options {
+            prepare: PrepareOptions {
+                speed_threshold: Choice::Fixed(0.0),
+                ..Default::default()
+            },
+            ..Default::default()
+        };
+        identify(&pendulum(), &[&recording], &[], &options).unwrap()
+    };
+    show("half at rest, unmasked", &careless);
+    assert!((careless.base_parameters[4].value / TRUTH[4] - 1.0).abs() > 0.1);
 }
