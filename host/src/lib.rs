@@ -16,3 +16,4 @@ pub mod prepare;
 pub mod report;
 pub mod robot;
 pub mod simulate;
+pub mod validate;
