@@ -11,6 +11,7 @@ pub mod excite;
 pub mod files;
 pub mod identify;
 pub mod link;
+pub mod pages;
 pub mod plant;
 pub mod prepare;
 pub mod report;
