@@ -42,7 +42,7 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             _ => Err(Refusal::WrongMode),
         },
         RequestBody::ClearFault => clear_fault(config, state),
-        RequestBody::SetPosition(position) => set_position(state, *position),
+        RequestBody::SetPosition(position) => set_position(config, state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
             fits(trajectory, &state.settings.limits, None)?;
@@ -53,7 +53,15 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             refuse_in_motion(state)?;
             let settings = with(&state.settings, body);
             usable(&settings)?;
-            state.apply(config, settings).map_err(|_| Refusal::BadValue)
+            state
+                .apply(config, settings)
+                .map_err(|_| Refusal::BadValue)?;
+            if matches!(body, RequestBody::SetEstimator(_)) {
+                state
+                    .restart_estimator(config)
+                    .map_err(|_| Refusal::BadValue)?;
+            }
+            Ok(())
         }
     }
 }
@@ -115,7 +123,7 @@ fn start(state: &mut State) -> Result<(), Refusal> {
 }
 
 /// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
-fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
+fn set_position(config: &Config, state: &mut State, position: f32) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
         return Err(Refusal::WrongMode);
     }
@@ -133,6 +141,12 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);
     state.previous = None;
+    if shift != 0 {
+        // gc and gs belong to the angle that they were learnt for.
+        state
+            .restart_estimator(config)
+            .map_err(|_| Refusal::BadValue)?;
+    }
     Ok(())
 }
 
@@ -148,6 +162,8 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
         .latch
         .first()
         .is_some_and(|record| record.fault == Fault::CurrentOffset);
+    // A fault that came in the middle of the measurement leaves it to be done.
+    let offset = offset || state.calibration.ticks < config.calibration_ticks;
     state.latch.clear();
     state.snapshot.release();
     if offset {
@@ -179,11 +195,13 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
         && model.coulomb >= 0.0
 }
 
+/// Also while switched off: what is kept may be switched on.
 fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
     let share = |x: f32| (0.0..=1.0).contains(&x);
     share(settings.gain)
         && share(settings.gain_at_rest)
         && settings.gain_at_rest <= settings.gain
+        && settings.gain_at_rest < 1.0
         && settings.velocity_threshold > 0.0
         && settings.velocity_threshold.is_finite()
 }

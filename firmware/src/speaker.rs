@@ -141,7 +141,12 @@ impl Speaker {
     /// One part of the snapshot per telemetry sample, so that it never crowds out the stream.
     fn send_snapshot_part(&mut self, state: &State, transmit: &mut impl Transmit) {
         let Some(first) = self.snapshot else { return };
-        let total = state.snapshot.len();
+        // A ring that still turns would put parts of different times together. Without a fault there is nothing.
+        let faulty = state.latch.first().is_some();
+        if faulty && !state.snapshot.is_frozen() {
+            return;
+        }
+        let total = if faulty { state.snapshot.len() } else { 0 };
         let samples = (first..total.min(first + SNAPSHOT_PART))
             .filter_map(|k| state.snapshot.get(k).copied())
             .collect();

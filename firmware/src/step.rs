@@ -13,7 +13,10 @@ use crate::config::Config;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
-use crate::window::Tick;
+use crate::window::{Tick, Window};
+
+/// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
+const OFFSET: usize = PARAMETER_COUNT - 1;
 
 /// What a control tick gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -117,8 +120,10 @@ fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Faul
     if state.mode != Mode::Calibrating {
         return None;
     }
+    let code = u64::from(sample.current.0);
     state.calibration.ticks += 1;
-    state.calibration.sum += u64::from(sample.current.0);
+    state.calibration.sum += code;
+    state.calibration.squares += code * code;
     if state.calibration.ticks < config.calibration_ticks {
         return None;
     }
@@ -128,6 +133,7 @@ fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Faul
         return Some((Fault::CurrentOffset, offset));
     }
     state.calibration.zero_code = zero_code;
+    state.calibration.std = state.calibration.std_of_mean() * config.scaling.current_per_code.abs();
     state.mode = Mode::Disarmed;
     None
 }
@@ -298,10 +304,27 @@ fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate>
     let window = state
         .estimation
         .push(tick, config.rates.estimator_decimation)?;
-    let before = state.previous.replace(window)?;
+    // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
+    // doubt: neither says anything about the rig's parameters.
+    if !state.mode.drives() {
+        state.previous = None;
+        state.estimator.interrupt();
+    } else if let Some(before) = state.previous.replace(window) {
+        learn(config, state, &before, &window);
+    }
     if state.mode == Mode::Calibrating {
         return None;
     }
+    state.updates_since_report += 1;
+    if state.updates_since_report < config.rates.estimate_report_decimation {
+        return None;
+    }
+    state.updates_since_report = 0;
+    Some(estimate_report(state))
+}
+
+/// One update from two consecutive windows.
+fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
     let ticks = f32::from(config.rates.estimator_decimation);
     let per_count = state.derived.radians_per_count / ticks;
     // The difference is taken in integers: exact at any position.
@@ -312,12 +335,6 @@ fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate>
     state
         .estimator
         .step(q, qd, current * state.derived.torque_per_ampere);
-    state.updates_since_report += 1;
-    if state.updates_since_report < config.rates.estimate_report_decimation {
-        return None;
-    }
-    state.updates_since_report = 0;
-    Some(estimate_report(state))
 }
 
 /// The estimate as it goes over the wire.
@@ -332,6 +349,10 @@ fn estimate_report(state: &State) -> Estimate {
     };
     estimate.value = report.value;
     estimate.std = report.std;
+    // The current offset was measured from finitely many samples; its error is a constant torque that no motion
+    // shows, and goes into `off` alone.
+    let measured = state.calibration.std * state.derived.torque_per_ampere;
+    estimate.std[OFFSET] = libm::hypotf(estimate.std[OFFSET], measured);
     estimate.trusted = report.trusted;
     estimate
 }

@@ -24,15 +24,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     let found = identify(&robot, &[&train], &[&test], &Options::default())?;
     let (identified, remarks) = identified_robot(&robot, &found);
     let mut context = Context {
-        command: "rig identify --robot emps.toml --data train.csv --holdout test_pulses.csv --out result".into(),
+        command:
+            "rig identify --robot emps.toml --data train.csv --holdout test_pulses.csv --out result"
+                .into(),
         identified: Some(("identified.toml".into(), identified.to_toml()?)),
         remarks,
         warnings: Vec::new(),
     };
-    write(&out.join("identification.html"), &pages::identification(&robot, &found, &context))?;
-    let checked = validate::validate(&identified, &[&test], &validate::Options::default(), &mut |_| ())?;
-    context.command = "rig validate --robot identified.toml --data test_pulses.csv --out result".into();
+    write(
+        &out.join("identification.html"),
+        &pages::identification(&robot, &found, &context),
+    )?;
+    let checked = validate::validate(
+        &identified,
+        &[&test],
+        &validate::Options::default(),
+        &mut |_| (),
+    )?;
+    context.command =
+        "rig validate --robot identified.toml --data test_pulses.csv --out result".into();
     context.identified = None;
-    write(&out.join("validation.html"), &pages::validation(&identified, &checked, &context))?;
+    write(
+        &out.join("validation.html"),
+        &pages::validation(&identified, &checked, &context),
+    )?;
     Ok(())
 }

@@ -26,6 +26,12 @@ const OBSERVER_BANDWIDTH: f32 = 200.0;
 /// Speed below which the measured velocity says nothing about the direction, rad/s.
 const DIRECTION_THRESHOLD: f32 = 0.01;
 
+/// Speed above which the on-line estimator takes friction to be Coulomb and viscous alone, rad/s. Geared
+/// servo drives weaken with speed up to some 0.05 to 0.1 rad/s at the joint, with tails beyond that the parameters
+/// fc and fv would absorb (with half of the excess gone at 0.025 rad/s, 1.5 % of it is left at 0.2 rad/s,
+/// a fifth at 0.05 rad/s). An excitation at 1 to 3 rad/s loses a tenth of its samples to it.
+const SLIP_VELOCITY: f32 = 0.2;
+
 /// Why a description does not make a one-link rig.
 #[derive(Debug, Error)]
 pub enum NameplateError {
@@ -268,5 +274,8 @@ fn estimator(model: &LinkParameters<f32>, limits: &Limits<f32>) -> EstimatorSett
         0.5 * torque,
         0.5 * torque,
     ];
-    EstimatorSettings::for_band(lower, upper)
+    EstimatorSettings {
+        slip_velocity: SLIP_VELOCITY,
+        ..EstimatorSettings::for_band(lower, upper)
+    }
 }

@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rig_shared::multibody::{
-    COLUMN_NAMES, COLUMNS, Chain, column, differential_regressor,
-    energy_regressor,
+    COLUMN_NAMES, COLUMNS, Chain, column, differential_regressor, energy_regressor,
 };
 
 use super::{IdentifyError, ModelKind};

@@ -3,8 +3,8 @@
 use super::parts;
 use crate::identify::{FrictionMap, ResidualReport};
 use crate::report::{
-    Axis, Block, Column, Document, Fact, Marker, NoteKind, Plot, Role, Section, Series, Style, Table,
-    Tone, format_significant, format_value,
+    Axis, Block, Column, Document, Fact, Marker, NoteKind, Plot, Role, Section, Series, Style,
+    Table, Tone, format_significant, format_value,
 };
 use crate::robot::{JointKind, Robot};
 
@@ -133,12 +133,17 @@ pub fn demo(figures: &DemoFigures) -> Document {
     sections.push(friction(figures));
     sections.push(wire(figures));
     sections.push(beyond(figures));
-    let mut repeat = Section::new("repeat", "How to repeat this", "").with(Block::Code(figures.command.clone()));
+    let mut repeat =
+        Section::new("repeat", "How to repeat this", "").with(Block::Code(figures.command.clone()));
     if !figures.files.is_empty() {
         repeat = repeat.with(Block::Table(Table {
             caption: "Files beside this page".into(),
             columns: vec![Column::text("File"), Column::text("Holds")],
-            rows: figures.files.iter().map(|(name, what)| vec![name.clone(), what.clone()]).collect(),
+            rows: figures
+                .files
+                .iter()
+                .map(|(name, what)| vec![name.clone(), what.clone()])
+                .collect(),
             note: String::new(),
         }));
     }
@@ -167,38 +172,66 @@ fn estimates(p: &DemoParameter) -> [(&'static str, Role, Interval); 3] {
 
 fn summary(figures: &DemoFigures) -> Vec<Fact> {
     let total = figures.parameters.len();
-    let covered = figures.parameters.iter().filter(|p| p.differential.covers(p.truth)).count();
+    let covered = figures
+        .parameters
+        .iter()
+        .filter(|p| p.differential.covers(p.truth))
+        .count();
     let mut facts = vec![
-        Fact::new("True values within their 95 % intervals", format!("{covered} of {total}"))
-            .note("off-line, differential model")
-            // One of twenty intervals is expected to miss; more than one of six is not chance.
-            .tone(if covered + 1 >= total { Tone::Good } else { Tone::Warning }),
+        Fact::new(
+            "True values within their 95 % intervals",
+            format!("{covered} of {total}"),
+        )
+        .note("off-line, differential model")
+        // One of twenty intervals is expected to miss; more than one of six is not chance.
+        .tone(if covered + 1 >= total {
+            Tone::Good
+        } else {
+            Tone::Warning
+        }),
     ];
     for t in &figures.tracking {
         if let Some(factor) = gain(t) {
             facts.push(
-                Fact::new(format!("Tracking error, {}", t.motion), format!("{} times smaller", format_significant(factor, 2)))
-                    .note(format!(
-                        "RMS {} → {} {} with precompensation",
-                        format_significant(t.rms_without, 2),
-                        format_significant(t.rms_with, 2),
-                        parts::unit(&t.unit)
-                    ))
-                    .tone(if factor > 1.0 { Tone::Good } else { Tone::Warning }),
+                Fact::new(
+                    format!("Tracking error, {}", t.motion),
+                    format!("{} times smaller", format_significant(factor, 2)),
+                )
+                .note(format!(
+                    "RMS {} → {} {} with precompensation",
+                    format_significant(t.rms_without, 2),
+                    format_significant(t.rms_with, 2),
+                    parts::unit(&t.unit)
+                ))
+                .tone(if factor > 1.0 {
+                    Tone::Good
+                } else {
+                    Tone::Warning
+                }),
             );
         }
     }
     for report in &figures.holdout {
         facts.push(
-            Fact::new("Torque left on data held back", parts::percent(report.relative_error))
-                .unit("%")
-                .note("residual RMS over torque RMS"),
+            Fact::new(
+                "Torque left on data held back",
+                parts::percent(report.relative_error),
+            )
+            .unit("%")
+            .note("residual RMS over torque RMS"),
         );
     }
     facts.push(
         Fact::new("Samples lost on the wire", parts::count(figures.wire.lost))
-            .note(format!("of {}", parts::count(figures.wire.received + figures.wire.lost)))
-            .tone(if figures.wire.lost == 0 { Tone::Good } else { Tone::Warning }),
+            .note(format!(
+                "of {}",
+                parts::count(figures.wire.received + figures.wire.lost)
+            ))
+            .tone(if figures.wire.lost == 0 {
+                Tone::Good
+            } else {
+                Tone::Warning
+            }),
     );
     facts
 }
@@ -229,7 +262,10 @@ fn parameters(figures: &DemoFigures) -> Section {
     let places: Vec<f64> = (0..figures.parameters.len()).map(|k| k as f64).collect();
     let mut plot = Plot::new(
         "Estimate less truth, in standard deviations",
-        Axis::categories("", figures.parameters.iter().map(|p| p.name.clone()).collect()),
+        Axis::categories(
+            "",
+            figures.parameters.iter().map(|p| p.name.clone()).collect(),
+        ),
         Axis::new("(estimate − truth) / standard deviation", ""),
     );
     for m in 0..3 {
@@ -242,7 +278,13 @@ fn parameters(figures: &DemoFigures) -> Section {
             y.push((i.value - p.truth) / i.std);
             half_width.push(half(&i) / i.std);
         }
-        plot = plot.with(Series::new(name, role, Style::ErrorBars { half_width }, x, y));
+        plot = plot.with(Series::new(
+            name,
+            role,
+            Style::ErrorBars { half_width },
+            x,
+            y,
+        ));
     }
     plot = plot
         .mark(Marker::horizontal(0.0, "truth"))
@@ -276,14 +318,21 @@ fn tracking(figures: &DemoFigures) -> Section {
     );
     for t in &figures.tracking {
         let unit = parts::unit(&t.unit);
-        let (scale, shown) = if t.rms_without.abs() < 0.1 { (1e3, format!("m{unit}")) } else { (1.0, unit.clone()) };
+        let (scale, shown) = if t.rms_without.abs() < 0.1 {
+            (1e3, format!("m{unit}"))
+        } else {
+            (1.0, unit.clone())
+        };
         let scaled = |v: &[f64]| v.iter().map(|e| scale * e).collect::<Vec<_>>();
         let note = format!(
             "n = {}, RMS {} {shown} without and {} {shown} with{}. {}",
             t.t.len(),
             format_significant(scale * t.rms_without, 3),
             format_significant(scale * t.rms_with, 3),
-            gain(t).map_or(String::new(), |g| format!(": {} times smaller", format_significant(g, 2))),
+            gain(t).map_or(String::new(), |g| format!(
+                ": {} times smaller",
+                format_significant(g, 2)
+            )),
             t.note
         );
         let mut error = Plot::new(
@@ -291,8 +340,18 @@ fn tracking(figures: &DemoFigures) -> Section {
             Axis::new("time", "s"),
             Axis::new("reference less position", &shown),
         )
-        .with(Series::line("feedback alone", Role::Before, t.t.clone(), scaled(&t.error_without)))
-        .with(Series::line("with precompensation", Role::After, t.t.clone(), scaled(&t.error_with)))
+        .with(Series::line(
+            "feedback alone",
+            Role::Before,
+            t.t.clone(),
+            scaled(&t.error_without),
+        ))
+        .with(Series::line(
+            "with precompensation",
+            Role::After,
+            t.t.clone(),
+            scaled(&t.error_with),
+        ))
         .mark(Marker::horizontal(0.0, ""))
         .note(note.trim_end());
         error.height = 280;
@@ -301,13 +360,22 @@ fn tracking(figures: &DemoFigures) -> Section {
             Axis::new("time", "s"),
             Axis::new("position", &unit),
         )
-        .with(Series::line("reference", Role::Reference, t.t.clone(), t.reference.clone()))
+        .with(Series::line(
+            "reference",
+            Role::Reference,
+            t.t.clone(),
+            t.reference.clone(),
+        ))
         .note(format!("n = {}.", t.t.len()));
         reference.height = 160;
-        section = section.with(Block::Plot(error)).with(Block::Plot(reference));
+        section = section
+            .with(Block::Plot(error))
+            .with(Block::Plot(reference));
     }
     if figures.tracking.is_empty() {
-        section = section.with(parts::warning("No motion was run with and without precompensation."));
+        section = section.with(parts::warning(
+            "No motion was run with and without precompensation.",
+        ));
     }
     section
 }
@@ -321,15 +389,34 @@ fn online(figures: &DemoFigures) -> Section {
     let o = &figures.online;
     for (k, p) in figures.parameters.iter().enumerate() {
         let (Some(values), Some(std)) = (o.values.get(k), o.std.get(k)) else {
-            section = section.with(parts::warning(format!("There is no on-line estimate of {}.", p.name)));
+            section = section.with(parts::warning(format!(
+                "There is no on-line estimate of {}.",
+                p.name
+            )));
             continue;
         };
         let unit = parts::unit(&p.unit);
-        let shifted = |f: f64| values.iter().zip(std).map(|(v, s)| v + f * s).collect::<Vec<_>>();
+        let shifted = |f: f64| {
+            values
+                .iter()
+                .zip(std)
+                .map(|(v, s)| v + f * s)
+                .collect::<Vec<_>>()
+        };
         // Before anything is learnt the band spans all there is: it would flatten the rest of the figure.
-        let wide = 5.0 * std.last().copied().unwrap_or(0.0).max(0.1 * p.truth.abs()).max(p.online.std);
+        let wide = 5.0
+            * std
+                .last()
+                .copied()
+                .unwrap_or(0.0)
+                .max(0.1 * p.truth.abs())
+                .max(p.online.std);
         let first = std.iter().position(|s| *s <= wide).unwrap_or(0);
-        let ends: Vec<f64> = [o.t.get(first), o.t.last()].into_iter().flatten().copied().collect();
+        let ends: Vec<f64> = [o.t.get(first), o.t.last()]
+            .into_iter()
+            .flatten()
+            .copied()
+            .collect();
         let level = |v: f64| vec![v; ends.len()];
         let cut = |v: Vec<f64>| v.into_iter().skip(first).collect::<Vec<_>>();
         let t: Vec<f64> = cut(o.t.clone());
@@ -338,16 +425,43 @@ fn online(figures: &DemoFigures) -> Section {
             Axis::new("time", "s"),
             Axis::new(&p.name, &unit),
         )
-        .with(Series::band("on-line, 95 %", Role::Model, t.clone(), cut(shifted(-1.96)), cut(shifted(1.96))))
-        .with(Series::line("on-line", Role::Model, t.clone(), cut(values.clone())))
-        .with(Series::line("off-line", Role::Measured, ends.clone(), level(p.differential.value)).dashed())
-        .with(Series::line("truth", Role::Reference, ends.clone(), level(p.truth)))
+        .with(Series::band(
+            "on-line, 95 %",
+            Role::Model,
+            t.clone(),
+            cut(shifted(-1.96)),
+            cut(shifted(1.96)),
+        ))
+        .with(Series::line(
+            "on-line",
+            Role::Model,
+            t.clone(),
+            cut(values.clone()),
+        ))
+        .with(
+            Series::line(
+                "off-line",
+                Role::Measured,
+                ends.clone(),
+                level(p.differential.value),
+            )
+            .dashed(),
+        )
+        .with(Series::line(
+            "truth",
+            Role::Reference,
+            ends.clone(),
+            level(p.truth),
+        ))
         .note(format!(
             "n = {}; at the end {} {unit}.{}",
             values.len(),
             format_value(p.online.value, p.online.std),
             if first > 0 {
-                format!(" Drawn from {} s on, when something was known.", format_significant(t.first().copied().unwrap_or(0.0), 2))
+                format!(
+                    " Drawn from {} s on, when something was known.",
+                    format_significant(t.first().copied().unwrap_or(0.0), 2)
+                )
             } else {
                 String::new()
             }
@@ -365,7 +479,9 @@ fn holdout(figures: &DemoFigures) -> Section {
         "Torque of a motion that took no part in the fit, predicted with the identified parameters.",
     );
     for (joint, report) in figures.robot.joints.iter().zip(&figures.holdout) {
-        section.blocks.extend(parts::torque_plots(joint, report, "data held back"));
+        section
+            .blocks
+            .extend(parts::torque_plots(joint, report, "data held back"));
     }
     if figures.holdout.is_empty() {
         section = section.with(parts::warning("No data were held back."));
@@ -374,19 +490,37 @@ fn holdout(figures: &DemoFigures) -> Section {
 }
 
 fn friction(figures: &DemoFigures) -> Section {
-    let section = Section::new("friction", "Friction over velocity", "Stretches of constant speed, gravity and inertia taken off.");
+    let section = Section::new(
+        "friction",
+        "Friction over velocity",
+        "Stretches of constant speed, gravity and inertia taken off.",
+    );
     match &figures.friction {
         Some(map) => {
-            let kind = figures.robot.joints.first().map_or(JointKind::Revolute, |j| j.kind);
-            Section { blocks: parts::friction(kind, map), ..section }
+            let kind = figures
+                .robot
+                .joints
+                .first()
+                .map_or(JointKind::Revolute, |j| j.kind);
+            Section {
+                blocks: parts::friction(kind, map),
+                ..section
+            }
         }
         None => section.with(parts::warning(figures.friction_text.clone())),
     }
 }
 
 fn wire(figures: &DemoFigures) -> Section {
-    let kind = if figures.wire.lost == 0 { NoteKind::Good } else { NoteKind::Warning };
-    Section::new("wire", "Between firmware and host", "").with(Block::Note { kind, text: figures.wire.text.clone() })
+    let kind = if figures.wire.lost == 0 {
+        NoteKind::Good
+    } else {
+        NoteKind::Warning
+    };
+    Section::new("wire", "Between firmware and host", "").with(Block::Note {
+        kind,
+        text: figures.wire.text.clone(),
+    })
 }
 
 fn beyond(figures: &DemoFigures) -> Section {
@@ -396,7 +530,9 @@ fn beyond(figures: &DemoFigures) -> Section {
         "These effects make the test honest: the rig shares no equation with the model that is fitted to it.",
     );
     if figures.beyond_model.is_empty() {
-        return section.with(parts::info("Nothing beyond the model was switched on for this run."));
+        return section.with(parts::info(
+            "Nothing beyond the model was switched on for this run.",
+        ));
     }
     section.with(Block::List(figures.beyond_model.clone()))
 }

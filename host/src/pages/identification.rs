@@ -50,31 +50,53 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
     let worst = |of: &dyn Fn(&crate::identify::JointFigures) -> Option<f64>| {
         found.joints.iter().filter_map(of).reduce(f64::max)
     };
-    let several = if found.joints.len() > 1 { ", worst joint" } else { "" };
+    let several = if found.joints.len() > 1 {
+        ", worst joint"
+    } else {
+        ""
+    };
     let train = worst(&|j| Some(j.train_relative_error));
     let mut facts = Vec::new();
     match worst(&|j| j.holdout_relative_error) {
         Some(held) => facts.push(
             Fact::new("Left on data held back", parts::percent(held))
                 .unit("%")
-                .note(format!("residual RMS over torque RMS{several}; on the training data {} %", train.map_or("–".into(), parts::percent)))
-                .tone(if held > 0.3 { Tone::Warning } else { Tone::Plain }),
+                .note(format!(
+                    "residual RMS over torque RMS{several}; on the training data {} %",
+                    train.map_or("–".into(), parts::percent)
+                ))
+                .tone(if held > 0.3 {
+                    Tone::Warning
+                } else {
+                    Tone::Plain
+                }),
         ),
         None => facts.push(
-            Fact::new("Left on the training data", train.map_or("–".into(), parts::percent))
-                .unit("%")
-                .note(format!("residual RMS over torque RMS{several}; no data were held back"))
-                .tone(Tone::Warning),
+            Fact::new(
+                "Left on the training data",
+                train.map_or("–".into(), parts::percent),
+            )
+            .unit("%")
+            .note(format!(
+                "residual RMS over torque RMS{several}; no data were held back"
+            ))
+            .tone(Tone::Warning),
         ),
     }
     let warnings = found.warnings.len() + context.warnings.len();
     facts.push(if warnings == 0 {
         Fact::new("Warnings", "none").tone(Tone::Good)
     } else {
-        Fact::new("Warnings", warnings.to_string()).note("on top of the page").tone(Tone::Warning)
+        Fact::new("Warnings", warnings.to_string())
+            .note("on top of the page")
+            .tone(Tone::Warning)
     });
     facts.push(
-        Fact::new("Condition number", format_significant(found.condition_number, 2)).note(format!(
+        Fact::new(
+            "Condition number",
+            format_significant(found.condition_number, 2),
+        )
+        .note(format!(
             "{} with columns scaled to one length",
             format_significant(found.details.estimate.scaled_condition, 2)
         )),
@@ -88,12 +110,21 @@ fn summary(found: &Identification, context: &Context) -> Vec<Fact> {
             );
         }
     } else {
-        let mut relative: Vec<f64> = found.base_parameters.iter().map(|b| b.relative_std_percent).collect();
+        let mut relative: Vec<f64> = found
+            .base_parameters
+            .iter()
+            .map(|b| b.relative_std_percent)
+            .collect();
         relative.sort_by(f64::total_cmp);
-        let median = relative.get(relative.len() / 2).copied().unwrap_or(f64::NAN);
+        let median = relative
+            .get(relative.len() / 2)
+            .copied()
+            .unwrap_or(f64::NAN);
         facts.push(
-            Fact::new("Base parameters", found.base_parameters.len().to_string())
-                .note(format!("median relative standard deviation {} %", format_significant(median, 2))),
+            Fact::new("Base parameters", found.base_parameters.len().to_string()).note(format!(
+                "median relative standard deviation {} %",
+                format_significant(median, 2)
+            )),
         );
     }
     if !found.not_excited.is_empty() {
@@ -117,10 +148,21 @@ fn parameters(found: &Identification) -> Section {
         .map(|b| {
             let decimals = |v: f64| {
                 // Ends of the interval with the digits of the value beside them.
-                format_value(v, b.std).split(" ± ").next().unwrap_or_default().trim_start_matches('(').to_owned()
+                format_value(v, b.std)
+                    .split(" ± ")
+                    .next()
+                    .unwrap_or_default()
+                    .trim_start_matches('(')
+                    .to_owned()
             };
             let plain = !format_value(b.value, b.std).starts_with('(');
-            let end = |v: f64| if plain { decimals(v) } else { format_significant(v, 4) };
+            let end = |v: f64| {
+                if plain {
+                    decimals(v)
+                } else {
+                    format_significant(v, 4)
+                }
+            };
             vec![
                 b.expression.clone(),
                 format_value(b.value, b.std),
@@ -223,22 +265,41 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
         }));
     }
     for (j, joint) in robot.joints.iter().enumerate() {
-        if let Some(report) = found.details.holdout_residuals.as_ref().and_then(|h| h.get(j)) {
-            section.blocks.extend(parts::torque_plots(joint, report, "data held back"));
+        if let Some(report) = found
+            .details
+            .holdout_residuals
+            .as_ref()
+            .and_then(|h| h.get(j))
+        {
+            section
+                .blocks
+                .extend(parts::torque_plots(joint, report, "data held back"));
         }
         if let Some(report) = found.details.train.get(j) {
-            section.blocks.extend(parts::torque_plots(joint, report, "training data"));
+            section
+                .blocks
+                .extend(parts::torque_plots(joint, report, "training data"));
         }
     }
-    section.with(parts::info("Drag over a plot to zoom, double-click to see all of it again."))
+    section.with(parts::info(
+        "Drag over a plot to zoom, double-click to see all of it again.",
+    ))
 }
 
 fn confidence(found: &Identification) -> Section {
     let e = &found.details.estimate;
-    let names: Vec<String> = found.base_parameters.iter().map(|b| b.expression.clone()).collect();
+    let names: Vec<String> = found
+        .base_parameters
+        .iter()
+        .map(|b| b.expression.clone())
+        .collect();
     let n = names.len();
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (0..a).map(move |b| (b, a))).collect();
-    pairs.sort_by(|x, y| e.correlation[y.0][y.1].abs().total_cmp(&e.correlation[x.0][x.1].abs()));
+    pairs.sort_by(|x, y| {
+        e.correlation[y.0][y.1]
+            .abs()
+            .total_cmp(&e.correlation[x.0][x.1].abs())
+    });
     let mut section = Section::new(
         "confidence",
         "Which parameters are confused with which",
@@ -250,10 +311,14 @@ fn confidence(found: &Identification) -> Section {
         .take(ELLIPSES)
         .collect();
     if strong.is_empty() && n > 1 {
-        section = section.with(parts::info(format!("No two parameters are correlated by more than {CORRELATED}.")));
+        section = section.with(parts::info(format!(
+            "No two parameters are correlated by more than {CORRELATED}."
+        )));
     }
     for &&(a, b) in &strong {
-        let Some(ellipse) = e.ellipse(a, b) else { continue };
+        let Some(ellipse) = e.ellipse(a, b) else {
+            continue;
+        };
         let (x, y): (Vec<f64>, Vec<f64>) = (0..=180)
             .map(|k| (f64::from(k) * TAU / 180.0).sin_cos())
             .map(|(s, c)| {
@@ -265,7 +330,12 @@ fn confidence(found: &Identification) -> Section {
             .unzip();
         let unit = |k: usize| parts::unit(&found.base_parameters[k].unit);
         let mut plot = Plot::new(
-            format!("{} and {}: correlation {}", names[a], names[b], signed(e.correlation[a][b])),
+            format!(
+                "{} and {}: correlation {}",
+                names[a],
+                names[b],
+                signed(e.correlation[a][b])
+            ),
             Axis::new(&names[a], &unit(a)),
             Axis::new(&names[b], &unit(b)),
         )
@@ -273,7 +343,9 @@ fn confidence(found: &Identification) -> Section {
         .with(Series::new(
             "estimate, 95 % interval of one",
             Role::Measured,
-            Style::ErrorBars { half_width: vec![half(e.interval[b])] },
+            Style::ErrorBars {
+                half_width: vec![half(e.interval[b])],
+            },
             vec![e.values[a]],
             vec![e.values[b]],
         ))
@@ -289,11 +361,21 @@ fn confidence(found: &Identification) -> Section {
         // A wide matrix reads badly; the pairs that matter do not.
         section = section.with(Block::Table(Table {
             caption: "The twenty strongest correlations".into(),
-            columns: vec![Column::text("Parameter"), Column::text("Parameter"), Column::number("Correlation", "")],
+            columns: vec![
+                Column::text("Parameter"),
+                Column::text("Parameter"),
+                Column::number("Correlation", ""),
+            ],
             rows: pairs
                 .iter()
                 .take(20)
-                .map(|&(a, b)| vec![names[a].clone(), names[b].clone(), signed(e.correlation[a][b])])
+                .map(|&(a, b)| {
+                    vec![
+                        names[a].clone(),
+                        names[b].clone(),
+                        signed(e.correlation[a][b]),
+                    ]
+                })
                 .collect(),
             note: String::new(),
         }));
@@ -306,7 +388,13 @@ fn confidence(found: &Identification) -> Section {
             rows: (0..n)
                 .map(|a| {
                     std::iter::once(names[a].clone())
-                        .chain((0..n).map(|b| if a == b { "1".into() } else { signed(e.correlation[a][b]) }))
+                        .chain((0..n).map(|b| {
+                            if a == b {
+                                "1".into()
+                            } else {
+                                signed(e.correlation[a][b])
+                            }
+                        }))
                         .collect()
                 })
                 .collect(),
@@ -337,19 +425,22 @@ fn data(robot: &Robot, found: &Identification) -> Section {
     };
     let mut rows = surveys(&d.training, "training");
     rows.extend(surveys(&d.holdout, "held back"));
-    let mut section = Section::new("data", "What was done to the data", "").with(Block::Table(Table {
-        caption: "Recordings".into(),
-        columns: vec![
-            Column::text("Recording"),
-            Column::text("Used for"),
-            Column::number("Rows", ""),
-            Column::number("Rate", "Hz"),
-            Column::number("Duration", "s"),
-        ],
-        rows,
-        note: String::new(),
-    }));
-    section.blocks.extend(parts::treatment(&robot.joints, &d.treatment));
+    let mut section =
+        Section::new("data", "What was done to the data", "").with(Block::Table(Table {
+            caption: "Recordings".into(),
+            columns: vec![
+                Column::text("Recording"),
+                Column::text("Used for"),
+                Column::number("Rows", ""),
+                Column::number("Rate", "Hz"),
+                Column::number("Duration", "s"),
+            ],
+            rows,
+            note: String::new(),
+        }));
+    section
+        .blocks
+        .extend(parts::treatment(&robot.joints, &d.treatment));
     if let Some((_, why)) = &d.window {
         section = section.with(Block::Text(format!("Windows of the integral model: {why}")));
     }
@@ -358,13 +449,21 @@ fn data(robot: &Robot, found: &Identification) -> Section {
     }
     section.with(Block::Table(Table {
         caption: "Rows left out of the fit (after decimation)".into(),
-        columns: vec![Column::text("Joint"), Column::number("Rows", ""), Column::text("Why")],
+        columns: vec![
+            Column::text("Joint"),
+            Column::number("Rows", ""),
+            Column::text("Why"),
+        ],
         rows: d
             .masked
             .iter()
             .map(|m| {
                 let joint = m.joint.checked_sub(1).and_then(|j| robot.joints.get(j));
-                vec![joint.map_or("all".into(), |j| j.name.clone()), parts::count(m.rows), m.why.clone()]
+                vec![
+                    joint.map_or("all".into(), |j| j.name.clone()),
+                    parts::count(m.rows),
+                    m.why.clone(),
+                ]
             })
             .collect(),
         note: format!("{} rows were used.", parts::count(d.estimate.rows)),
@@ -384,7 +483,10 @@ fn residuals(robot: &Robot, found: &Identification) -> Section {
         if robot.joints.len() == 1 {
             section.blocks.extend(blocks);
         } else {
-            section.blocks.push(Block::Details { summary: format!("Joint {}", joint.name), blocks });
+            section.blocks.push(Block::Details {
+                summary: format!("Joint {}", joint.name),
+                blocks,
+            });
         }
     }
     section

@@ -75,8 +75,8 @@ pub(super) fn warnings(groups: &[&[String]]) -> Option<Section> {
 
 /// How to repeat it, and the description that came of it.
 pub(super) fn repeat(context: &super::Context) -> Section {
-    let mut section = Section::new("repeat", "How to repeat this", "")
-        .with(Block::Code(context.command.clone()));
+    let mut section =
+        Section::new("repeat", "How to repeat this", "").with(Block::Code(context.command.clone()));
     if let Some((name, text)) = &context.identified {
         if !context.remarks.is_empty() {
             section = section.with(Block::List(context.remarks.clone()));
@@ -114,7 +114,11 @@ fn with_gaps(curves: &Curves) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
 pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> Vec<Block> {
     let (what, torque) = (effort(joint.kind), units(joint.kind)[2]);
     let (t, measured, predicted) = with_gaps(&report.series);
-    let residual: Vec<f64> = measured.iter().zip(&predicted).map(|(a, b)| a - b).collect();
+    let residual: Vec<f64> = measured
+        .iter()
+        .zip(&predicted)
+        .map(|(a, b)| a - b)
+        .collect();
     let note = format!(
         "{} rows, residual RMS {} {torque}, {what} RMS {} {torque}: {} % are left.",
         count(report.rows),
@@ -127,12 +131,20 @@ pub(super) fn torque_plots(joint: &Joint, report: &ResidualReport, of: &str) -> 
         Axis::new("time", "s"),
         Axis::new(what, torque),
     )
-    .with(Series::line("measured", Role::Measured, t.clone(), measured))
+    .with(Series::line(
+        "measured",
+        Role::Measured,
+        t.clone(),
+        measured,
+    ))
     .with(Series::line("predicted", Role::Model, t.clone(), predicted))
     .note(note);
     first.height = 280;
     let mut second = Plot::new(
-        format!("Joint {}: residual (measured less predicted), {of}", joint.name),
+        format!(
+            "Joint {}: residual (measured less predicted), {of}",
+            joint.name
+        ),
         Axis::new("time", "s"),
         Axis::new("residual", torque),
     )
@@ -171,7 +183,11 @@ pub(super) fn residual_tests(joint: &Joint, report: &ResidualReport, period: f64
         lags,
         report.autocorrelation.clone(),
     ))
-    .note(format!("n = {}, residual RMS {} {torque}.", count(report.rows), format_significant(report.rms, 3)));
+    .note(format!(
+        "n = {}, residual RMS {} {torque}.",
+        count(report.rows),
+        format_significant(report.rms, 3)
+    ));
     correlation.height = 220;
     let mut blocks = vec![
         Block::List(
@@ -265,7 +281,13 @@ pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
             s.density.clone(),
         ))
         .with(
-            Series::line("noise floor", Role::Noise, ends.clone(), vec![s.floor; ends.len()]).dashed(),
+            Series::line(
+                "noise floor",
+                Role::Noise,
+                ends.clone(),
+                vec![s.floor; ends.len()],
+            )
+            .dashed(),
         )
         .mark(Marker::vertical(
             treatment.cutoff,
@@ -273,7 +295,10 @@ pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
         ))
         .mark(Marker::vertical(
             treatment.motion_frequency,
-            format!("motion up to {} Hz", format_significant(treatment.motion_frequency, 3)),
+            format!(
+                "motion up to {} Hz",
+                format_significant(treatment.motion_frequency, 3)
+            ),
         ))
         .note(format!(
             "Sampled at {} Hz. RMS of the noise over the whole band {} {position}.",
@@ -347,18 +372,36 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
                 .as_ref()
                 .map_or("–".into(), |f| format_significant(f.leave_one_out_rms, 2)),
         ));
-    let kind_of_note = if map.warranted { NoteKind::Good } else { NoteKind::Info };
+    let kind_of_note = if map.warranted {
+        NoteKind::Good
+    } else {
+        NoteKind::Info
+    };
     let mut rows = vec![fit_row("Coulomb and viscous", &map.simple)];
-    rows.extend(map.stribeck.iter().map(|f| fit_row("with Stribeck term", f)));
+    rows.extend(
+        map.stribeck
+            .iter()
+            .map(|f| fit_row("with Stribeck term", f)),
+    );
     let mut blocks = vec![
-        Block::Note { kind: kind_of_note, text: map.text.clone() },
+        Block::Note {
+            kind: kind_of_note,
+            text: map.text.clone(),
+        },
         Block::Plot(plot),
         Block::Table(Table {
             caption: "Both laws, ± half the 95 % interval".into(),
             columns: vec![
                 Column::text("Law"),
                 Column::number("Coulomb", torque),
-                Column::number("Viscous", if kind == JointKind::Revolute { "N·m·s/rad" } else { "N·s/m" }),
+                Column::number(
+                    "Viscous",
+                    if kind == JointKind::Revolute {
+                        "N·m·s/rad"
+                    } else {
+                        "N·s/m"
+                    },
+                ),
                 Column::number("Breakaway above Coulomb", torque),
                 Column::number("Stribeck velocity", velocity),
             ],
@@ -379,7 +422,10 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
             map.profile.iter().map(|p| p[1]).collect(),
         ))
         .mark(Marker::horizontal(map.simple.squares, "without"))
-        .note(format!("n = {}; residuals in standard deviations of the points.", map.points.len()));
+        .note(format!(
+            "n = {}; residuals in standard deviations of the points.",
+            map.points.len()
+        ));
         profile.height = 220;
         blocks.push(Block::Details {
             summary: "How the Stribeck velocity was chosen".into(),

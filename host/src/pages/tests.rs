@@ -10,8 +10,11 @@ use crate::simulate::{Inputs, Model, closed_loop};
 
 /// The one-link description with a controller.
 fn robot() -> Robot {
-    let mut robot =
-        Robot::from_toml(crate::robot::ONE_LINK_TEMPLATE, std::path::Path::new("r.toml")).unwrap();
+    let mut robot = Robot::from_toml(
+        crate::robot::ONE_LINK_TEMPLATE,
+        std::path::Path::new("r.toml"),
+    )
+    .unwrap();
     robot.joints[0].controller = Some(Controller {
         position_gain: 16.0,
         velocity_gain: 60.0,
@@ -98,7 +101,10 @@ fn an_identification_shows_every_parameter_warning_and_reason() {
     found.warnings.push("The <third> warning.".into());
     let context = Context {
         command: "rig identify --robot r.toml".into(),
-        identified: Some(("identified.toml".into(), "name = \"identified text\"".into())),
+        identified: Some((
+            "identified.toml".into(),
+            "name = \"identified text\"".into(),
+        )),
         remarks: vec!["The remark.".into()],
         warnings: vec!["The data warning.".into()],
     };
@@ -146,7 +152,12 @@ fn a_validation_says_what_was_not_simulated() {
 #[test]
 fn a_friction_map_shows_its_decision_and_both_laws() {
     let page = render(&friction_map(&robot(), &map(), &Context::default())).unwrap();
-    for text in ["A Stribeck term is warranted by four points.", "0.412", "0.399", "0.110"] {
+    for text in [
+        "A Stribeck term is warranted by four points.",
+        "0.412",
+        "0.399",
+        "0.110",
+    ] {
         assert!(page.contains(text), "{text}");
     }
 }
@@ -179,8 +190,12 @@ fn figures() -> DemoFigures {
             })
             .collect(),
         online: OnlineEstimates {
-            values: (0..6).map(|k| t.iter().map(|t| 1.0 + f64::from(k) - (-t).exp()).collect()).collect(),
-            std: (0..6).map(|_| t.iter().map(|t| 0.02 + 10.0 * (-t).exp()).collect()).collect(),
+            values: (0..6)
+                .map(|k| t.iter().map(|t| 1.0 + f64::from(k) - (-t).exp()).collect())
+                .collect(),
+            std: (0..6)
+                .map(|_| t.iter().map(|t| 0.02 + 10.0 * (-t).exp()).collect())
+                .collect(),
             t: t.clone(),
         },
         tracking: vec![Tracking {
@@ -196,7 +211,11 @@ fn figures() -> DemoFigures {
         }],
         friction: Some(map()),
         friction_text: String::new(),
-        wire: Wire { received: 20_000, lost: 3, text: "Three samples were lost.".into() },
+        wire: Wire {
+            received: 20_000,
+            lost: 3,
+            text: "Three samples were lost.".into(),
+        },
         holdout: Vec::new(),
         beyond_model: vec!["Cogging of the motor".into()],
         warnings: vec!["The demonstration's warning.".into()],
@@ -230,6 +249,10 @@ fn the_demonstration_shows_what_it_was_given() {
     }
     assert!(render(&demo(&figures)).unwrap().contains("0 of 6"));
     if let Some(folder) = std::env::var_os("RIG_PAGES_OUT") {
-        crate::report::write(&std::path::Path::new(&folder).join("demo.html"), &demo(&figures)).unwrap();
+        crate::report::write(
+            &std::path::Path::new(&folder).join("demo.html"),
+            &demo(&figures),
+        )
+        .unwrap();
     }
 }
