@@ -2,7 +2,6 @@
 
 use rig_shared::control::{adaptive, current};
 use rig_shared::link::LinkParameters;
-use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::{Fault, Limits, Mode};
 use rig_shared::trajectory::{Trajectory, TrajectoryError};
 use rig_shared::wire::message::{Refusal, RequestBody};
@@ -129,7 +128,7 @@ fn set_position(config: &Config, state: &mut State, position: f32) -> Result<(),
     }
     let counts = position / state.derived.radians_per_count;
     // Above 2²⁴ counts an f32 no longer names single counts.
-    if !(counts.abs() < 16_777_216.0) {
+    if counts.is_nan() || counts.abs() >= 16_777_216.0 {
         return Err(Refusal::BadValue);
     }
     let shift = libm::roundf(counts) as i64 - state.counts;
@@ -184,7 +183,7 @@ fn usable(settings: &Settings) -> Result<(), Refusal> {
         && settings.gains.usable()
         && settings.friction.check().is_ok()
         && model_is_usable(&settings.model)
-        && precompensation_is_usable(&settings.precompensation);
+        && settings.precompensation.check().is_ok();
     if good { Ok(()) } else { Err(Refusal::BadValue) }
 }
 
@@ -196,16 +195,6 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
 }
 
 /// Also while switched off: what is kept may be switched on.
-fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
-    let share = |x: f32| (0.0..=1.0).contains(&x);
-    share(settings.gain)
-        && share(settings.gain_at_rest)
-        && settings.gain_at_rest <= settings.gain
-        && settings.gain_at_rest < 1.0
-        && settings.velocity_threshold > 0.0
-        && settings.velocity_threshold.is_finite()
-}
-
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run.
 fn fits(

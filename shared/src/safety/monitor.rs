@@ -99,7 +99,6 @@ fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
 }
 
 // A comparison with NaN is false: written as `!(value <= limit)`, a NaN is a fault.
-#[allow(clippy::neg_cmp_op_on_partial_ord)]
 /// One tick of all checks: the first fault found, with the value that was out of range.
 pub fn step(
     config: &MonitorConfig,
