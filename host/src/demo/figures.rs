@@ -144,10 +144,7 @@ impl Demo {
         Ok(DemoFigures {
             robot: self.robot.clone(),
             command: command.into(),
-            seconds: self
-                .runs()
-                .map(|run| run.rows.last().map_or(0.0, |r| r.t) - run.rows[0].t)
-                .sum(),
+            seconds: self.losses.iter().map(|l| l.taken as f64).sum::<f64>() / self.sample_rate,
             parameters: self.parameters()?,
             online: OnlineEstimates {
                 t: estimates.iter().map(|(t, _)| *t).collect(),
@@ -178,10 +175,6 @@ impl Demo {
                 .map(|(name, holds)| (name.into(), holds.into()))
                 .into(),
         })
-    }
-
-    fn runs(&self) -> impl Iterator<Item = &Run> {
-        [&self.training, &self.holdout, &self.without, &self.with].into_iter()
     }
 
     /// The result at a glance, for the terminal.
