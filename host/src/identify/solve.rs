@@ -17,7 +17,7 @@ use crate::robot::Robot;
 
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
-/// … or after this many passes (Huber's iteration converges linearly; twenty have always sufficed).
+/// … or after this many passes; then a warning says so.
 const MOST_PASSES: usize = 30;
 
 /// Identifies `robot` from `training` and checks the result on `holdout`.
@@ -303,7 +303,7 @@ fn add(total: &mut Tally, part: &Tally) {
 
 /// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
 /// short enough that speeding up and slowing down fall into different windows. On EMPS, where friction is not
-/// quite Coulomb and viscous, longer windows move the offset by up to 13 %, this one by about one.
+/// quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
 fn choose_window(
     options: &Options,
     treatment: &Treatment,

@@ -107,7 +107,7 @@ pub struct Treatment {
 }
 
 /// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
-/// motion itself (customary: five to ten times; Gautier, Janot & Vandanjon 2013).
+/// motion itself.
 const LEAST_HEADROOM: f64 = 5.0;
 
 /// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion: reversals of

@@ -601,3 +601,76 @@ fn standing_still_does_not_bias_friction() {
     show("half at rest, unmasked", &careless);
     assert!((careless.base_parameters[4].value / TRUTH[4] - 1.0).abs() > 0.1);
 }
+
+/// A pendulum's recording that exists nowhere: every pass makes it anew, and notes the largest block asked for.
+struct Endless {
+    rows: usize,
+    largest: std::cell::Cell<usize>,
+}
+
+impl crate::prepare::Recording for Endless {
+    fn label(&self) -> String {
+        "endless".into()
+    }
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), crate::prepare::PrepareError>,
+    ) -> Result<(), crate::prepare::PrepareError> {
+        let mut g = rand_pcg::Pcg64::seed_from_u64(21);
+        let [mx, my, inertia, fv, fc, off] = TRUTH;
+        self.largest.set(self.largest.get().max(rows));
+        for start in (0..self.rows).step_by(rows) {
+            let mut block = Block {
+                joints: vec![JointColumns::default()],
+                first_line: start as u64 + 2,
+                continues: start > 0,
+                ..Default::default()
+            };
+            for k in start..(start + rows).min(self.rows) {
+                let t = k as f64 * 1e-3;
+                let (mut q, mut qd, mut qdd) = (0.2, 0.0, 0.0);
+                for (a, w, p) in [(1.1, 1.3, 0.4), (0.6, 2.9, 1.0), (0.25, 5.3, 2.0)] {
+                    let (s, c): (f64, f64) = f64::sin_cos(w * t + p);
+                    (q, qd, qdd) = (q + a * s, qd + a * w * c, qdd - a * w * w * s);
+                }
+                let tau = inertia * qdd
+                    + 9.81 * (mx * q.cos() - my * q.sin())
+                    + fv * qd
+                    + fc * qd.signum()
+                    + off;
+                block.t.push(t);
+                block.joints[0].q.push(q + 1e-5 * (g.random::<f64>() - 0.5));
+                block.joints[0]
+                    .tau
+                    .push(tau + 0.2 * (g.random::<f64>() - 0.5));
+            }
+            take(block)?;
+        }
+        Ok(())
+    }
+}
+
+/// A million rows in blocks: what is held at once does not depend on their number.
+#[test]
+fn a_recording_larger_than_what_is_held_at_once() {
+    let recording = Endless {
+        rows: 1_000_000,
+        largest: std::cell::Cell::new(0),
+    };
+    let mut held = 0;
+    crate::prepare::each_piece(&recording, 1 << 15, 1000, &mut |piece| {
+        held = held.max(piece.rows.len());
+        Ok(())
+    })
+    .unwrap();
+    assert!(held <= (1 << 15) + 2 * 1000, "{held}");
+    let begin = std::time::Instant::now();
+    let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
+    println!("a million rows: {:?}", begin.elapsed());
+    show("a million rows", &found);
+    assert!(recording.largest.get() <= 1 << 16);
+    for (b, truth) in found.base_parameters.iter().zip(TRUTH) {
+        assert!((b.value / truth - 1.0).abs() < 0.01, "{b:?}");
+    }
+}
