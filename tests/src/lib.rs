@@ -55,7 +55,10 @@ pub fn calibrated(line: &mut Line) {
     for _ in 0..100 {
         match line.request(RequestBody::SetPosition(0.0)) {
             Ok(()) => return,
-            Err(LinkError::Refused { refusal: Refusal::WrongMode, .. }) => wait(line, 0.05),
+            Err(LinkError::Refused {
+                refusal: Refusal::WrongMode,
+                ..
+            }) => wait(line, 0.05),
             Err(other) => panic!("{other}"),
         }
     }
@@ -64,7 +67,8 @@ pub fn calibrated(line: &mut Line) {
 
 /// Lets emulated time pass; what comes meanwhile is dropped.
 pub fn wait(line: &mut Line, seconds: f64) {
-    let until = rig_host::link::Port::now(line.port()) + std::time::Duration::from_secs_f64(seconds);
+    let until =
+        rig_host::link::Port::now(line.port()) + std::time::Duration::from_secs_f64(seconds);
     loop {
         let left = until.saturating_sub(rig_host::link::Port::now(line.port()));
         if left.is_zero() {
@@ -119,7 +123,12 @@ impl Recording {
         let start = self.rows[0].t;
         let of = |row: &&Row| (from..to).contains(&(row.t - start));
         let count = self.rows.iter().filter(of).count();
-        let sum: f64 = self.rows.iter().filter(of).map(|row| (row.q1 - row.ref1).powi(2)).sum();
+        let sum: f64 = self
+            .rows
+            .iter()
+            .filter(of)
+            .map(|row| (row.q1 - row.ref1).powi(2))
+            .sum();
         (sum / count as f64).sqrt()
     }
 }
@@ -130,8 +139,14 @@ pub fn recorded(line: &mut Line, experiment: &Experiment) -> Recording {
     let mut out = Recording::default();
     out.losses = run(line, experiment, |event| {
         match event {
-            Event::Samples { first_tick, samples } => out.rows.extend(
-                samples.iter().enumerate().map(|(k, sample)| converter.row(first_tick, k, sample)),
+            Event::Samples {
+                first_tick,
+                samples,
+            } => out.rows.extend(
+                samples
+                    .iter()
+                    .enumerate()
+                    .map(|(k, sample)| converter.row(first_tick, k, sample)),
             ),
             Event::Estimate(estimate) => out.estimates.push(*estimate),
             Event::Fault(fault) => out.faults.push(*fault),
@@ -150,7 +165,14 @@ pub fn driven(
     trajectory: Trajectory<f32>,
     rest: f64,
 ) -> Recording {
-    recorded(line, &Experiment { settings, trajectory: Some(trajectory), rest })
+    recorded(
+        line,
+        &Experiment {
+            settings,
+            trajectory: Some(trajectory),
+            rest,
+        },
+    )
 }
 
 /// Works through `jobs` numbers on two threads and gives the results in order.
@@ -160,11 +182,17 @@ pub fn in_parallel<T: Send>(jobs: u64, job: impl Fn(u64) -> T + Sync) -> Vec<T> 
         let threads: Vec<_> = (0..2)
             .map(|part| {
                 scope.spawn(move || {
-                    (0..jobs).filter(|k| k % 2 == part).map(|k| (k, job(k))).collect::<Vec<_>>()
+                    (0..jobs)
+                        .filter(|k| k % 2 == part)
+                        .map(|k| (k, job(k)))
+                        .collect::<Vec<_>>()
                 })
             })
             .collect();
-        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        threads
+            .into_iter()
+            .map(|thread| thread.join().unwrap())
+            .collect()
     });
     let mut all: Vec<(u64, T)> = parts.drain(..).flatten().collect();
     all.sort_by_key(|(k, _)| *k);

@@ -13,7 +13,11 @@ fn intervals_cover_the_truth_as_often_as_they_claim() {
         let (mut line, plant) = bench(seed);
         let first = driven(&mut line, vec![], excitation(2 * seed, 5, 5), 0.5);
         let second = driven(&mut line, vec![], excitation(2 * seed + 1, 5, 5), 0.5);
-        assert_eq!((&first.faults[..], &second.faults[..]), (&[][..], &[][..]), "seed {seed}");
+        assert_eq!(
+            (&first.faults[..], &second.faults[..]),
+            (&[][..], &[][..]),
+            "seed {seed}"
+        );
         let estimate = second.estimate();
         let truth = plant.equivalent().to_array();
         let z: [f64; 6] = std::array::from_fn(|k| {
@@ -29,7 +33,11 @@ fn intervals_cover_the_truth_as_often_as_they_claim() {
         let covered = trusted.iter().filter(|(z, _)| z[k].abs() <= 1.96).count() as f64 / n;
         let mean = trusted.iter().map(|(z, _)| z[k]).sum::<f64>() / n;
         let rms = (trusted.iter().map(|(z, _)| z[k] * z[k]).sum::<f64>() / n).sqrt();
-        let std = trusted.iter().map(|(_, e)| f64::from(e.std[k])).sum::<f64>() / n;
+        let std = trusted
+            .iter()
+            .map(|(_, e)| f64::from(e.std[k]))
+            .sum::<f64>()
+            / n;
         text += &format!(
             "{:<10} {:>7.1} % {:>6.1} % {mean:>7.2} {rms:>6.2} {std:>10.6}\n",
             PARAMETER_NAMES[k],

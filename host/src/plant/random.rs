@@ -94,8 +94,10 @@ impl PlantConfig {
     /// stands anywhere in its range at power on.
     pub fn laboratory(seed: u64) -> Self {
         let mut config = Self::random(seed);
-        config.mechanism.disturbance =
-            Some(Disturbance { std: DISTURBANCE, correlation_time: CORRELATION });
+        config.mechanism.disturbance = Some(Disturbance {
+            std: DISTURBANCE,
+            correlation_time: CORRELATION,
+        });
         config.sensors.current.noise = Some(CURRENT_NOISE);
         // A stream of its own, so that the rig is otherwise the one that `random` draws.
         let mut rng = super::sensors::stream(seed, 4);

@@ -109,10 +109,21 @@ pub fn step(
 ) -> Option<(Fault, f32)> {
     let magnitude = now.current.abs();
     let n = config.persistence;
-    state.heat += (now.current * now.current - state.heat) * (config.period / config.thermal_time);
+    // With the bridge off the winding is open: what a broken converter then reads heats nothing.
+    let heating = if now.driving {
+        now.current * now.current
+    } else {
+        0.0
+    };
+    state.heat += (heating - state.heat) * (config.period / config.thermal_time);
     let rating = limits.continuous_current * limits.continuous_current;
     // The cause acts until the motor has cooled: an instant after the bridge is off it is just below its limit.
-    state.overloaded = !(state.heat <= if state.overloaded { COOLED * rating } else { rating });
+    state.overloaded = !(state.heat
+        <= if state.overloaded {
+            COOLED * rating
+        } else {
+            rating
+        });
 
     // Every counter is brought up to date before any is judged: an early return must not stop the others.
     let over_current = persists(
@@ -166,11 +177,7 @@ pub fn step(
         (outside, Fault::Position, now.position),
         (bad_supply, Fault::Supply, now.supply),
         (hot, Fault::Temperature, now.temperature),
-        (
-            state.overloaded,
-            Fault::Overload,
-            libm::sqrtf(state.heat),
-        ),
+        (state.overloaded, Fault::Overload, libm::sqrtf(state.heat)),
         (now.overrun && now.driving, Fault::Deadline, 0.0),
     ];
     faults
