@@ -6,6 +6,7 @@ extern crate std;
 
 pub mod control;
 pub mod drive;
+pub mod dual;
 pub mod encoder;
 pub mod estimation;
 pub mod friction;

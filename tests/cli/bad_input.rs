@@ -12,7 +12,11 @@ fn recording(folder: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf
     for k in 0..4000 {
         let t = k as f64 * 1e-3;
         let q = 1.5 * (3.0 * t).sin() + 0.3 * (11.0 * t).cos();
-        let mut row = vec![format!("{t:.3}"), format!("{q:.9}"), format!("{:.6}", 2.9 * q.cos() + 0.4)];
+        let mut row = vec![
+            format!("{t:.3}"),
+            format!("{q:.9}"),
+            format!("{:.6}", 2.9 * q.cos() + 0.4),
+        ];
         change(k, &mut row);
         text += &row.join(",");
         text.push('\n');
@@ -24,7 +28,14 @@ fn recording(folder: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf
 
 fn identify(robot: &Path, data: &Path, out: &Path) -> std::process::Command {
     let mut command = rig();
-    command.arg("identify").arg("--robot").arg(robot).arg("--data").arg(data).arg("--out").arg(out);
+    command
+        .arg("identify")
+        .arg("--robot")
+        .arg(robot)
+        .arg("--data")
+        .arg(data)
+        .arg("--out")
+        .arg(out);
     command
 }
 
@@ -32,7 +43,11 @@ fn identify(robot: &Path, data: &Path, out: &Path) -> std::process::Command {
 fn sentence(data: &Path) -> String {
     let out = tempfile::tempdir().unwrap();
     let text = refuse(&mut identify(&robot("one-link.toml"), data, out.path()));
-    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0, "something was written");
+    assert_eq!(
+        fs::read_dir(out.path()).unwrap().count(),
+        0,
+        "something was written"
+    );
     text
 }
 
@@ -92,7 +107,10 @@ fn units_off_by_a_thousand_and_degrees_are_recognised() {
     names(&sentence(&scaled(1, 1000.0)), &["q1"]);
     names(&sentence(&scaled(2, 1000.0)), &["tau1", "1000"]);
     names(&sentence(&scaled(2, 0.001)), &["tau1", "1000"]);
-    names(&sentence(&scaled(1, 180.0 / core::f64::consts::PI)), &["q1", "degrees"]);
+    names(
+        &sentence(&scaled(1, 180.0 / core::f64::consts::PI)),
+        &["q1", "degrees"],
+    );
     names(&sentence(&scaled(0, 1000.0)), &["t", "millisecond"]);
 }
 
@@ -118,7 +136,10 @@ fn empty_file_directory_and_missing_file_are_told_apart() {
     fs::write(&empty, "").unwrap();
     names(&sentence(&empty), &["empty.csv", "empty"]);
     names(&sentence(folder.path()), &["directory"]);
-    names(&sentence(&folder.path().join("absent.csv")), &["absent.csv"]);
+    names(
+        &sentence(&folder.path().join("absent.csv")),
+        &["absent.csv"],
+    );
 }
 
 #[test]
@@ -151,11 +172,23 @@ fn a_description_with_a_fault_is_named_by_line() {
     };
     let line = |part: &str| good.lines().position(|l| l.starts_with(part)).unwrap() + 1;
     let at = format!("robot.toml:{}", line("mass"));
-    names(&said(good.replace("mass = 1.0", "mass = -1.0")), &[&at, "mass"]);
-    names(&said(good.replace("mass = 1.0", "mass = \"heavy\"")), &[&at]);
-    names(&said(good.replace("gear_ratio = 50.0", "gear_ration = 50.0")), &["robot.toml:", "gear_ration"]);
+    names(
+        &said(good.replace("mass = 1.0", "mass = -1.0")),
+        &[&at, "mass"],
+    );
+    names(
+        &said(good.replace("mass = 1.0", "mass = \"heavy\"")),
+        &[&at],
+    );
+    names(
+        &said(good.replace("gear_ratio = 50.0", "gear_ration = 50.0")),
+        &["robot.toml:", "gear_ration"],
+    );
     let effect = "\n[[effect]]\nkind = \"stribeck\"\njoint = \"lnik\"\n";
-    names(&said(format!("{good}{effect}")), &["robot.toml:", "lnik", "link"]);
+    names(
+        &said(format!("{good}{effect}")),
+        &["robot.toml:", "lnik", "link"],
+    );
     names(&said(String::new()), &["robot.toml"]);
 }
 
@@ -181,7 +214,11 @@ fn a_place_that_cannot_be_written_is_named() {
     let data = recording(folder.path(), |_, _| ());
     let blocked = folder.path().join("file");
     fs::write(&blocked, "").unwrap();
-    let text = refuse(&mut identify(&robot("one-link.toml"), &data, &blocked.join("out")));
+    let text = refuse(&mut identify(
+        &robot("one-link.toml"),
+        &data,
+        &blocked.join("out"),
+    ));
     names(&text, &["file"]);
 }
 

@@ -16,7 +16,11 @@ fn write(path: &Path, rows: usize) {
     for k in 0..rows {
         let t = k as f64 * 1e-3;
         let (s, c) = (3.0 * t).sin_cos();
-        let (q, qd, qdd) = (1.2 * s + 0.5 * (7.1 * t).sin(), 3.6 * c + 3.55 * (7.1 * t).cos(), -10.8 * s - 25.205 * (7.1 * t).sin());
+        let (q, qd, qdd) = (
+            1.2 * s + 0.5 * (7.1 * t).sin(),
+            3.6 * c + 3.55 * (7.1 * t).cos(),
+            -10.8 * s - 25.205 * (7.1 * t).sin(),
+        );
         let tau = 0.17 * qdd + 2.943 * q.cos() + 0.3 * qd + 0.4 * qd.signum();
         writeln!(file, "{t:.3},{q:.7},{tau:.5}").unwrap();
     }
@@ -40,7 +44,10 @@ fn peak(data: &Path) -> u64 {
     while child.try_wait().unwrap().is_none() {
         let text = fs::read_to_string(&status).unwrap_or_default();
         let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        peak = line.and_then(|l| l.split_whitespace().next()).and_then(|n| n.parse().ok()).unwrap_or(peak);
+        peak = line
+            .and_then(|l| l.split_whitespace().next())
+            .and_then(|n| n.parse().ok())
+            .unwrap_or(peak);
         std::thread::sleep(Duration::from_millis(2));
     }
     assert!(child.wait().unwrap().success());
@@ -50,7 +57,10 @@ fn peak(data: &Path) -> u64 {
 #[test]
 fn a_recording_eight_times_as_long_needs_no_more_memory() {
     let folder = tempfile::tempdir().unwrap();
-    let (short, long) = (folder.path().join("short.csv"), folder.path().join("long.csv"));
+    let (short, long) = (
+        folder.path().join("short.csv"),
+        folder.path().join("long.csv"),
+    );
     write(&short, 400_000);
     write(&long, 3_200_000);
     let (small, large) = (peak(&short), peak(&long));

@@ -10,14 +10,20 @@ pub(crate) fn rig() -> Command {
 
 /// A description that ships with the project.
 pub(crate) fn robot(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("robots").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("robots")
+        .join(name)
 }
 
 /// The real recordings, or nothing after having said so.
 pub(crate) fn real_data(folder: &str) -> Option<PathBuf> {
-    let found = rig_host::data::data_dir().map(|dir| dir.join(folder)).filter(|dir| dir.is_dir());
+    let found = rig_host::data::data_dir()
+        .map(|dir| dir.join(folder))
+        .filter(|dir| dir.is_dir());
     if found.is_none() {
-        println!("skipped: no recordings {folder} here; set RIG_DATA to the folder that holds them");
+        println!(
+            "skipped: no recordings {folder} here; set RIG_DATA to the folder that holds them"
+        );
     }
     found
 }
@@ -25,7 +31,11 @@ pub(crate) fn real_data(folder: &str) -> Option<PathBuf> {
 /// Standard output of a run that must succeed.
 pub(crate) fn succeed(command: &mut Command) -> String {
     let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{command:?}\n{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -36,7 +46,12 @@ pub(crate) fn refuse(command: &mut Command) -> String {
     assert!(!output.status.success(), "{command:?} succeeded");
     assert!(output.status.code().is_some(), "{command:?} was killed");
     let lines: Vec<&str> = text.lines().collect();
-    let [sentence] = lines.as_slice() else { panic!("{command:?} said more than one line:\n{text}") };
-    assert!(sentence.starts_with("rig: ") && !sentence.contains("panicked"), "{sentence}");
+    let [sentence] = lines.as_slice() else {
+        panic!("{command:?} said more than one line:\n{text}")
+    };
+    assert!(
+        sentence.starts_with("rig: ") && !sentence.contains("panicked"),
+        "{sentence}"
+    );
     (*sentence).to_string()
 }

@@ -18,7 +18,10 @@ fn boots_calibrates_and_waits_disarmed() {
     let mut rig = EmulatedRig::new(&nameplate, PlantConfig::default(), 1).unwrap();
     for _ in 0..20_000 {
         let output = rig.tick();
-        assert!(!output.command.bridge, "nothing moves without an arm command");
+        assert!(
+            !output.command.bridge,
+            "nothing moves without an arm command"
+        );
         assert_eq!(output.fault, None);
     }
     assert_eq!(rig.state().mode, Mode::Disarmed);

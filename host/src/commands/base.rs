@@ -10,7 +10,7 @@ use crate::identify::Base;
 
 /// Lists the canonical (base) parameters: the combinations that motion and torque can tell apart.
 #[derive(Debug, ClapArgs)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
     /// Which equations they are for
@@ -28,10 +28,12 @@ pub struct Args {
 ///
 /// # Errors
 /// The description, or a model whose base parameters cannot be decided.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load()?;
     let base = Base::structural(&robot, args.model.into(), args.seed)?;
-    let list: Vec<(String, &str)> = (0..base.len()).map(|k| (base.expression(k), base.unit(k))).collect();
+    let list: Vec<(String, &str)> = (0..base.len())
+        .map(|k| (base.expression(k), base.unit(k)))
+        .collect();
     if args.json {
         let parameters: Vec<_> = list
             .iter()

@@ -13,7 +13,7 @@ use crate::report;
 
 /// Shows the whole way without hardware: excite, record, identify, compensate, report.
 #[derive(Clone, Debug, ClapArgs)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder for recordings, results and the report
     #[arg(long, default_value = "rig-demo")]
     out: PathBuf,
@@ -24,7 +24,10 @@ pub struct Args {
 
 impl Default for Args {
     fn default() -> Self {
-        Self { out: PathBuf::from("rig-demo"), seed: 1 }
+        Self {
+            out: PathBuf::from("rig-demo"),
+            seed: 1,
+        }
     }
 }
 
@@ -32,14 +35,16 @@ impl Default for Args {
 ///
 /// # Errors
 /// A sentence naming what went wrong.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let begin = Instant::now();
     let mut progress = ui.progress("emulated rig", 1000);
-    let demo = demo::run(&args.out, args.seed, |share| progress.at((1000.0 * share) as u64))?;
+    let demo = demo::run(&args.out, args.seed, |share| {
+        progress.at((1000.0 * share) as u64)
+    })?;
     drop(progress);
     let path = args.out.join("report.html");
-    report::write(&path, &demo.page(&command_line()))?;
-    for line in demo.summary() {
+    report::write(&path, &demo.page(&command_line())?)?;
+    for line in demo.summary()? {
         ui.say(&line);
     }
     ui.remark(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));

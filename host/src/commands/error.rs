@@ -49,6 +49,15 @@ pub enum CommandError {
     /// Data that contradict the description.
     #[error("{0}")]
     Implausible(String),
+    /// Trajectory design.
+    #[error(transparent)]
+    Excite(#[from] crate::excite::ExciteError),
+    /// The demonstration.
+    #[error(transparent)]
+    Demo(#[from] crate::demo::DemoError),
+    /// Validation.
+    #[error(transparent)]
+    Validate(#[from] crate::validate::ValidateError),
     /// Anything else that has its whole sentence.
     #[error("{0}")]
     Sentence(String),

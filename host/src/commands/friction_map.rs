@@ -9,7 +9,7 @@ use super::input::{Inputs, RobotArg, command_line};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{FrictionMapOptions, Options, friction_map, identify};
-use crate::pages;
+use crate::pages::{self, Context};
 use crate::report;
 
 /// Draws friction over speed from a recording of a friction sweep.
@@ -17,7 +17,7 @@ use crate::report;
 /// Gravity and inertia are taken from an identification on the recordings given with --data; the sweep's
 /// stretches of constant speed give one point each.
 #[derive(Debug, ClapArgs)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
     /// Recording of an excitation, from which gravity and inertia are identified
@@ -38,14 +38,18 @@ pub struct Args {
 ///
 /// # Errors
 /// A sentence naming the file, line or value at fault.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load()?;
     let training = Inputs::open(&robot, &args.data)?;
     let sweep = Inputs::open(&robot, std::slice::from_ref(&args.sweep))?;
     for warning in training.warnings().chain(sweep.warnings()) {
         ui.remark(&warning);
     }
-    let Some(joint) = args.joint.checked_sub(1).filter(|joint| *joint < robot.joints.len()) else {
+    let Some(joint) = args
+        .joint
+        .checked_sub(1)
+        .filter(|joint| *joint < robot.joints.len())
+    else {
         return Err(CommandError::Sentence(format!(
             "--joint {} does not exist: {} has {} joints, counted from 1.",
             args.joint,
@@ -54,15 +58,36 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         )));
     };
     folder(&args.out)?;
+    let context = Context {
+        command: command_line(),
+        warnings: training.warnings().chain(sweep.warnings()).collect(),
+        ..Context::default()
+    };
     let identification = identify(&robot, &training.recordings(), &[], &Options::default())?;
     for source in sweep.recordings() {
-        let map = friction_map(&robot, &identification, source, joint, FrictionMapOptions::default())?;
-        let json = serde_json::to_string_pretty(&map)
-            .map_err(|error| CommandError::Sentence(format!("The map cannot be written as JSON: {error}.")))?;
-        write_whole(&args.out.join("friction-map.json"), (json + "\n").as_bytes())?;
-        report::write(&args.out.join("report.html"), &pages::friction_map(&robot, &map, &command_line()))?;
+        let map = friction_map(
+            &robot,
+            &identification,
+            source,
+            joint,
+            FrictionMapOptions::default(),
+        )?;
+        let json = serde_json::to_string_pretty(&map).map_err(|error| {
+            CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
+        })?;
+        write_whole(
+            &args.out.join("friction-map.json"),
+            (json + "\n").as_bytes(),
+        )?;
+        report::write(
+            &args.out.join("report.html"),
+            &pages::friction_map(&robot, &map, &context),
+        )?;
         ui.say(&map.text);
     }
-    ui.say(&format!("report: {}", args.out.join("report.html").display()));
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
     Ok(())
 }

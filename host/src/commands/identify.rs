@@ -9,15 +9,17 @@ use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
-use crate::identify::{Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify};
-use crate::pages;
+use crate::identify::{
+    Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify,
+};
+use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
 use crate::report::format_value;
 
 /// Which equations are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Model {
+pub(crate) enum Model {
     /// Torque against acceleration, velocity and position
     Differential,
     /// Work against change of energy over windows; needs no acceleration
@@ -35,7 +37,7 @@ impl From<Model> for ModelKind {
 
 /// How they are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Fit {
+pub(crate) enum Fit {
     /// Ordinary least squares
     Ols,
     /// Each joint's rows weighted by its noise
@@ -49,7 +51,9 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
     if text == "auto" {
         return Ok(Choice::Auto);
     }
-    text.parse().map(Choice::Fixed).map_err(|_| format!("\"{text}\" is neither a number nor \"auto\""))
+    text.parse()
+        .map(Choice::Fixed)
+        .map_err(|_| format!("\"{text}\" is neither a number nor \"auto\""))
 }
 
 /// Identifies the parameters of a robot from recordings.
@@ -57,7 +61,7 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
 /// Writes identified.toml (the description with the identified values), identification.json and report.html
 /// into the folder given with --out.
 #[derive(Debug, ClapArgs)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
     /// Recording to learn from, CSV or MCAP; may be given several times
@@ -122,7 +126,7 @@ impl Args {
 ///
 /// # Errors
 /// A sentence naming the file, line or value at fault.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load()?;
     let training = Inputs::open(&robot, &args.data)?;
     let holdout = Inputs::open(&robot, &args.holdout)?;
@@ -131,7 +135,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     folder(&args.out)?;
     // Three passes over the training data, two over the hold-out: see `identify`.
-    let progress = RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
+    let progress =
+        RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
     let identification = identify(
         &robot,
         &recordings(&training.watched(&progress)),
@@ -140,12 +145,23 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     drop(progress);
     let (identified, remarks) = identified_robot(&robot, &identification);
-    let page = pages::identification(&robot, &identification, &remarks, &command_line());
+    let text = identified.to_toml()?;
+    let context = Context {
+        command: command_line(),
+        identified: Some(("identified.toml".into(), text.clone())),
+        remarks,
+        warnings: training.warnings().chain(holdout.warnings()).collect(),
+    };
+    let page = pages::identification(&robot, &identification, &context);
 
-    let json = serde_json::to_string_pretty(&identification)
-        .map_err(|error| CommandError::Sentence(format!("The result cannot be written as JSON: {error}.")))?;
-    write_whole(&args.out.join("identified.toml"), identified.to_toml()?.as_bytes())?;
-    write_whole(&args.out.join("identification.json"), (json + "\n").as_bytes())?;
+    let json = serde_json::to_string_pretty(&identification).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
+    write_whole(
+        &args.out.join("identification.json"),
+        (json + "\n").as_bytes(),
+    )?;
     report::write(&args.out.join("report.html"), &page)?;
     print(ui, &identification, &args.out);
     Ok(())
@@ -153,7 +169,12 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 
 /// The result at a glance.
 fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
-    let width = result.base_parameters.iter().map(|p| p.expression.chars().count()).max().unwrap_or(0);
+    let width = result
+        .base_parameters
+        .iter()
+        .map(|p| p.expression.chars().count())
+        .max()
+        .unwrap_or(0);
     for parameter in &result.base_parameters {
         ui.say(&format!(
             "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
@@ -165,9 +186,9 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
         ));
     }
     for joint in &result.joints {
-        let holdout = joint
-            .holdout_relative_error
-            .map_or(String::new(), |error| format!(", {:.2} % on the hold-out", 100.0 * error));
+        let holdout = joint.holdout_relative_error.map_or(String::new(), |error| {
+            format!(", {:.2} % on the hold-out", 100.0 * error)
+        });
         ui.say(&format!(
             "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
             joint.name,
@@ -176,7 +197,10 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
         ));
     }
     for missing in &result.not_excited {
-        ui.say(&format!("not excited: {} ({}); {}", missing.combination, missing.why, missing.motion));
+        ui.say(&format!(
+            "not excited: {} ({}); {}",
+            missing.combination, missing.why, missing.motion
+        ));
     }
     for warning in &result.warnings {
         ui.remark(warning);

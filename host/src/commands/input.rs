@@ -16,7 +16,7 @@ const UNIT_CHECK_ROWS: usize = 100_000;
 
 /// The robot description.
 #[derive(Debug, ClapArgs)]
-pub struct RobotArg {
+pub(crate) struct RobotArg {
     /// Robot description, TOML or URDF (`rig init` writes one to start from)
     #[arg(long = "robot", value_name = "FILE")]
     path: PathBuf,
@@ -27,13 +27,13 @@ impl RobotArg {
     ///
     /// # Errors
     /// What is wrong with the file, by line.
-    pub fn load(&self) -> Result<Robot, CommandError> {
+    pub(crate) fn load(&self) -> Result<Robot, CommandError> {
         Ok(Robot::load(&self.path)?)
     }
 }
 
 /// Recordings that fit the robot.
-pub struct Inputs {
+pub(crate) struct Inputs {
     sources: Vec<Source>,
 }
 
@@ -42,14 +42,21 @@ impl Inputs {
     ///
     /// # Errors
     /// What is wrong, by file and line; all units that look wrong in one sentence.
-    pub fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
+    pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
         let mut sources = Vec::with_capacity(paths.len());
         for path in paths {
             let source = Source::open(path, robot)?;
             if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
-                let found: Vec<String> = plausibility(&block?, robot).iter().map(ToString::to_string).collect();
+                let found: Vec<String> = plausibility(&block?, robot)
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect();
                 if !found.is_empty() {
-                    return Err(CommandError::Implausible(format!("{}: {}", path.display(), found.join("; "))));
+                    return Err(CommandError::Implausible(format!(
+                        "{}: {}",
+                        path.display(),
+                        found.join("; ")
+                    )));
                 }
             }
             sources.push(source);
@@ -58,30 +65,31 @@ impl Inputs {
     }
 
     /// What the reader should know of them.
-    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.sources.iter().flat_map(|source| {
-            source.warnings().iter().map(move |warning| format!("{}: {warning}", source.path().display()))
+            source
+                .warnings()
+                .iter()
+                .map(move |warning| format!("{}: {warning}", source.path().display()))
         })
     }
 
     /// Bytes in all files.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.sources.iter().map(Source::bytes).sum()
     }
 
     /// The recordings as the library takes them.
-    pub fn recordings(&self) -> Vec<&dyn Recording> {
-        self.sources.iter().map(|source| source as &dyn Recording).collect()
-    }
-
-    /// The files.
-    pub fn sources(&self) -> &[Source] {
-        &self.sources
+    pub(crate) fn recordings(&self) -> Vec<&dyn Recording> {
+        self.sources
+            .iter()
+            .map(|source| source as &dyn Recording)
+            .collect()
     }
 }
 
 /// A recording whose reading moves a progress bar.
-pub struct Watched<'a> {
+pub(crate) struct Watched<'a> {
     source: &'a Source,
     progress: &'a RefCell<Progress>,
 }
@@ -110,21 +118,31 @@ impl Recording for Watched<'_> {
 
 impl Inputs {
     /// The recordings, each reporting to `progress` what was read.
-    pub fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
-        self.sources.iter().map(|source| Watched { source, progress }).collect()
+    pub(crate) fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
+        self.sources
+            .iter()
+            .map(|source| Watched { source, progress })
+            .collect()
     }
 }
 
 /// The list that the library takes.
-pub fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
-    watched.iter().map(|recording| recording as &dyn Recording).collect()
+pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
+    watched
+        .iter()
+        .map(|recording| recording as &dyn Recording)
+        .collect()
 }
 
 /// The command line as typed, for the report's "how to repeat this".
-pub fn command_line() -> String {
+pub(crate) fn command_line() -> String {
     let mut words = vec!["rig".to_string()];
     words.extend(std::env::args().skip(1).map(|word| {
-        if word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=:,".contains(c)) && !word.is_empty() {
+        if word
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "-_./=:,".contains(c))
+            && !word.is_empty()
+        {
             word
         } else {
             format!("'{}'", word.replace('\'', "'\\''"))

@@ -16,7 +16,7 @@ mod validate;
 use clap::{Parser, Subcommand};
 
 pub use error::CommandError;
-pub use ui::{Progress, Ui};
+use ui::Ui;
 
 /// Identifies a robot's dynamics and friction: record, identify, validate, compensate.
 ///

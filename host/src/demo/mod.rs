@@ -1,6 +1,7 @@
 //! The main job without hardware: a rig that differs from its description is excited, recorded over the
 //! real wire, identified off-line and on-line, and compensated; everything lands in one report.
 
+mod figures;
 mod run;
 
 use std::path::Path;
@@ -15,13 +16,13 @@ use crate::emulated::{EmulatedRig, Nameplate, NameplateError, link_parameters};
 use crate::excite::{self, ExciteError};
 use crate::files::{WriteError, folder, write_whole};
 use crate::identify::{
-    FrictionMap, FrictionMapOptions, Identification, IdentifyError, ModelKind, Options, friction_map, identified_robot,
-    identify,
+    FrictionMap, FrictionMapOptions, Identification, IdentifyError, ModelKind, Options,
+    friction_map, identified_robot, identify,
 };
 use crate::link::{EmulatedPort, LinkError, LossReport, Session, SessionSettings};
 use crate::plant::{Equivalent, PlantConfig};
-use crate::report::ReportError;
 use crate::robot::{ONE_LINK_TEMPLATE, Robot, RobotError};
+use crate::simulate::SimulateError;
 
 pub use run::Run;
 
@@ -31,7 +32,9 @@ const SLOW: f64 = 0.05;
 const REST: f64 = 5.0;
 /// Speeds of the friction sweep, rad/s: below, at and well above the Stribeck velocity of a servo gear
 /// (0.01 to 0.3 rad/s; Armstrong-Hélouvry, Dupont & Canudas de Wit 1994).
-const SPEEDS: [f64; 12] = [0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6, 1.0, 1.5, 2.0];
+const SPEEDS: [f64; 12] = [
+    0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6, 1.0, 1.5, 2.0,
+];
 
 /// Why the demonstration could not be run.
 #[derive(Debug, Error)]
@@ -54,12 +57,12 @@ pub enum DemoError {
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// The model behind a figure.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
     /// Files.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The report.
-    #[error(transparent)]
-    Report(#[from] ReportError),
     /// A fault of the rig.
     #[error("{0}")]
     Sentence(String),
@@ -87,8 +90,8 @@ pub struct Demo {
     pub with: Run,
     /// What the wire lost in all runs.
     pub losses: Vec<LossReport>,
-    /// Criterion of the excitation: condition number of the base regressor.
-    pub condition: f64,
+    /// Telemetry samples a second.
+    pub sample_rate: f64,
 }
 
 /// Runs the demonstration; recordings and the identified description are written into `out`. `progress` is
@@ -103,12 +106,19 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     let nameplate = Nameplate::from_robot(&robot)?;
     let home = plant.initial_position;
     let truth = plant.equivalent();
-    let rig = EmulatedRig::new(&nameplate, plant, seed)
-        .map_err(|fault| DemoError::Sentence(format!("The estimator's settings cannot be used: {fault:?}.")))?;
+    let rig = EmulatedRig::new(&nameplate, plant, seed).map_err(|fault| {
+        DemoError::Sentence(format!(
+            "The estimator's settings cannot be used: {fault:?}."
+        ))
+    })?;
     let mut session = Session::open(EmulatedPort::new(rig), SessionSettings::default())?;
     let at_home = vec![RequestBody::SetPosition(home as f32)];
     let mut losses = Vec::new();
-    let mut record = |session: &mut Session<_>, name: &str, settings: Vec<RequestBody>, motion: &Trajectory<f64>, rest| {
+    let mut record = |session: &mut Session<_>,
+                      name: &str,
+                      settings: Vec<RequestBody>,
+                      motion: &Trajectory<f64>,
+                      rest| {
         let run = Run::record(session, settings, motion, rest, &out.join(name))?;
         losses.push(run.losses);
         Ok::<_, DemoError>(run)
@@ -117,9 +127,21 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     let design = excite::design(&robot, &design_options(seed, home), |_, _| ())?;
     let other = excite::design(&robot, &design_options(seed + 1, home), |_, _| ())?;
     progress(0.2);
-    let training = record(&mut session, "train.csv", at_home, &design.trajectories[0], 0.5)?;
+    let training = record(
+        &mut session,
+        "train.csv",
+        at_home,
+        &design.file.joints[0].trajectory,
+        0.5,
+    )?;
     progress(0.4);
-    let holdout = record(&mut session, "holdout.csv", vec![], &other.trajectories[0], 0.5)?;
+    let holdout = record(
+        &mut session,
+        "holdout.csv",
+        vec![],
+        &other.file.joints[0].trajectory,
+        0.5,
+    )?;
     progress(0.5);
     let sweep = sweep()?;
     record(&mut session, "sweep.csv", vec![], &sweep, 0.5)?;
@@ -127,13 +149,32 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
 
     let open = |name: &str| Source::open(&out.join(name), &robot);
     let (train, hold) = (open("train.csv")?, open("holdout.csv")?);
-    let fit = |model| identify(&robot, &[&train], &[&hold], &Options { model, ..Options::default() });
+    let fit = |model| {
+        identify(
+            &robot,
+            &[&train],
+            &[&hold],
+            &Options {
+                model,
+                ..Options::default()
+            },
+        )
+    };
     let differential = fit(ModelKind::Differential)?;
     let integral = fit(ModelKind::Integral)?;
     let sweep = open("sweep.csv")?;
-    let friction_map = friction_map(&robot, &differential, &sweep, 0, FrictionMapOptions::default())?;
+    let friction_map = friction_map(
+        &robot,
+        &differential,
+        &sweep,
+        0,
+        FrictionMapOptions::default(),
+    )?;
     let (identified, _) = identified_robot(&robot, &differential);
-    write_whole(&out.join("identified.toml"), identified.to_toml()?.as_bytes())?;
+    write_whole(
+        &out.join("identified.toml"),
+        identified.to_toml()?.as_bytes(),
+    )?;
     progress(0.8);
 
     let reversals = reversals()?;
@@ -152,7 +193,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         without,
         with,
         losses,
-        condition: design.value,
+        sample_rate: f64::from(nameplate.config.rates.telemetry_hz()),
     })
 }
 
@@ -163,7 +204,11 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
 /// demonstration does not pretend to find it.
 fn nameplate_of(plant: &PlantConfig) -> Result<Robot, DemoError> {
     let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?;
-    for drive in robot.joints.iter_mut().filter_map(|joint| joint.drive.as_mut()) {
+    for drive in robot
+        .joints
+        .iter_mut()
+        .filter_map(|joint| joint.drive.as_mut())
+    {
         drive.torque_constant = plant.motor.torque_constant;
         drive.resistance = Some(plant.motor.resistance);
         drive.inductance = Some(plant.motor.inductance);
@@ -172,20 +217,28 @@ fn nameplate_of(plant: &PlantConfig) -> Result<Robot, DemoError> {
 }
 
 fn design_options(seed: u64, home: f64) -> excite::Options {
-    excite::Options { start: Some(vec![home]), seed, ..excite::Options::default() }
+    excite::Options {
+        start: Some(vec![home]),
+        seed,
+        ..excite::Options::default()
+    }
 }
 
 /// The friction sweep: a tenth of a turn at each speed, both ways.
 fn sweep() -> Result<Trajectory<f64>, DemoError> {
     FrictionSweep::new(&SPEEDS, 0.4, 0.1, 0.3, 1.0)
         .map(Trajectory::FrictionSweep)
-        .ok_or_else(|| DemoError::Sentence("The friction sweep cannot be built from its speeds.".into()))
+        .ok_or_else(|| {
+            DemoError::Sentence("The friction sweep cannot be built from its speeds.".into())
+        })
 }
 
 fn reversals() -> Result<Trajectory<f64>, DemoError> {
     SlowReversals::new(SLOW, 0.1, &[0.1, 0.05], 3)
         .map(Trajectory::SlowReversals)
-        .ok_or_else(|| DemoError::Sentence("The slow reversals cannot be built from their speed.".into()))
+        .ok_or_else(|| {
+            DemoError::Sentence("The slow reversals cannot be built from their speed.".into())
+        })
 }
 
 /// The identified model and friction law as requests to the rig, precompensation switched on.
@@ -198,7 +251,9 @@ fn compensation(identified: &Robot, map: &FrictionMap) -> Result<Vec<RequestBody
         coulomb: model.coulomb,
         viscous: model.viscous,
         breakaway_excess: weakening.map_or(0.0, |fit| fit.breakaway_excess as f32),
-        stribeck_velocity: weakening.and_then(|fit| fit.stribeck_velocity).unwrap_or(0.0) as f32,
+        stribeck_velocity: weakening
+            .and_then(|fit| fit.stribeck_velocity)
+            .unwrap_or(0.0) as f32,
         ..Friction::default()
     };
     Ok(vec![

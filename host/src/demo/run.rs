@@ -42,15 +42,25 @@ impl Run {
         let greeting = session.greeting().clone();
         let converter = Converter::new(&greeting);
         let rate = f64::from(greeting.control_rate_hz);
-        let columns: Vec<Column> =
-            COLUMNS.iter().zip(UNITS).map(|(name, unit)| Column::new(name, unit)).collect();
+        let columns: Vec<Column> = COLUMNS
+            .iter()
+            .zip(UNITS)
+            .map(|(name, unit)| Column::new(name, unit))
+            .collect();
         let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
-        let experiment = Experiment { settings, trajectory: Some(motion.to_f32()), rest };
+        let experiment = Experiment {
+            settings,
+            trajectory: Some(motion.to_f32()),
+            rest,
+        };
         let (mut rows, mut estimates) = (Vec::new(), Vec::new());
         let mut trouble = None;
         let losses = run(session, &experiment, |event| {
             match event {
-                Event::Samples { first_tick, samples } => {
+                Event::Samples {
+                    first_tick,
+                    samples,
+                } => {
                     for (k, sample) in samples.iter().enumerate() {
                         let row = converter.row(first_tick, k, sample);
                         if let Err(error) = writer.push_row(&row.values()) {
@@ -60,7 +70,9 @@ impl Run {
                         rows.push(row);
                     }
                 }
-                Event::Estimate(estimate) => estimates.push((estimate.tick as f64 / rate, *estimate)),
+                Event::Estimate(estimate) => {
+                    estimates.push((estimate.tick as f64 / rate, *estimate))
+                }
                 Event::Fault(record) => {
                     trouble = Some(DemoError::Sentence(format!(
                         "The emulated rig has stopped with the fault {:?} ({}).",
@@ -77,22 +89,33 @@ impl Run {
         }
         writer.finish()?;
         let motion_end = rows.last().map_or(0.0, |row: &Row| row.t) - rest;
-        Ok(Self { rows, estimates, losses, motion_end })
+        Ok(Self {
+            rows,
+            estimates,
+            losses,
+            motion_end,
+        })
     }
 
     /// RMS tracking error while the trajectory ran, rad.
     pub fn tracking_rms(&self) -> f64 {
         let moving = self.rows.iter().filter(|row| row.t < self.motion_end);
-        let (sum, count) = moving.fold((0.0, 0u32), |(sum, n), row| (sum + (row.q1 - row.ref1).powi(2), n + 1));
+        let (sum, count) = moving.fold((0.0, 0u32), |(sum, n), row| {
+            (sum + (row.q1 - row.ref1).powi(2), n + 1)
+        });
         (sum / f64::from(count.max(1))).sqrt()
     }
 
     /// Distance between the furthest positions during the last half of the rest, rad: a limit cycle shows here.
     pub fn rest_span(&self) -> f64 {
         let end = self.rows.last().map_or(0.0, |row| row.t);
-        let late = self.rows.iter().filter(|row| row.t > 0.5 * (self.motion_end + end));
-        let (low, high) =
-            late.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| (low.min(row.q1), high.max(row.q1)));
+        let late = self
+            .rows
+            .iter()
+            .filter(|row| row.t > 0.5 * (self.motion_end + end));
+        let (low, high) = late.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| {
+            (low.min(row.q1), high.max(row.q1))
+        });
         (high - low).max(0.0)
     }
 }

@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rig_shared::multibody::{
-    COLUMN_NAMES, COLUMNS, Chain, JointGeometry, JointKind, column, differential_regressor,
-    energy_regressor,
+    COLUMN_NAMES, COLUMNS, Chain, column, differential_regressor, energy_regressor,
 };
 
 use super::{IdentifyError, ModelKind};
@@ -22,21 +21,7 @@ const INDEPENDENT: f64 = 1e-7;
 /// # Errors
 /// [`IdentifyError::Model`] where the geometry is not one.
 pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
-    let joints: Vec<JointGeometry> = robot
-        .joints
-        .iter()
-        .map(|j| JointGeometry {
-            kind: match j.kind {
-                robot::JointKind::Revolute => JointKind::Revolute,
-                robot::JointKind::Prismatic => JointKind::Prismatic,
-            },
-            alpha: j.alpha,
-            a: j.a,
-            theta: j.theta,
-            d: j.d,
-        })
-        .collect();
-    Chain::new(&joints, robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
+    Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
 /// Independent columns of a matrix and how the others follow from them.

@@ -6,31 +6,6 @@ use rig_shared::multibody::{COLUMNS, column};
 use super::Identification;
 use crate::robot::{Inertial, JointFriction, JointKind, Robot};
 
-/// Standard parameters of a description, 14 a joint.
-fn standard(robot: &Robot) -> Vec<f64> {
-    robot
-        .joints
-        .iter()
-        .flat_map(|joint| {
-            let mut row = [0.0; COLUMNS];
-            if let Some(i) = &joint.inertial {
-                row[column::MASS] = i.mass;
-                row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&i.first_moment);
-                row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&i.inertia);
-            }
-            if let Some(d) = &joint.drive {
-                row[column::DRIVE_INERTIA] = d.rotor_inertia * d.gear_ratio * d.gear_ratio;
-            }
-            if let Some(f) = &joint.friction {
-                row[column::VISCOUS] = f.viscous;
-                row[column::COULOMB] = f.coulomb;
-                row[column::OFFSET] = f.offset;
-            }
-            row
-        })
-        .collect()
-}
-
 /// `robot` with the identified values, its dynamics those of the base parameters.
 ///
 /// Only combinations are identified, so their split is a choice: the prior description is moved by the smallest
@@ -40,7 +15,7 @@ fn standard(robot: &Robot) -> Vec<f64> {
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let k = &identification.details.combination;
     let values = DVector::from_column_slice(&identification.details.estimate.values);
-    let mut pi = DVector::from_vec(standard(robot));
+    let mut pi = DVector::from_vec(robot.standard_parameters().concat());
     let mut remarks = Vec::new();
     let mut result = robot.clone();
     if robot.joints.len() == 1 {

@@ -110,7 +110,7 @@ pub(super) fn covariance(
 
 /// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
 /// can be compared.
-pub(super) fn torque_residuals(
+pub(crate) fn torque_residuals(
     recordings: &[&dyn Recording],
     surveys: &[Survey],
     plan: &Plan,

@@ -32,6 +32,7 @@ pub use base::{
 };
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
+pub(crate) use evaluate::torque_residuals;
 pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};

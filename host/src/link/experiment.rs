@@ -30,7 +30,10 @@ pub struct Experiment {
 impl Experiment {
     /// Telemetry samples that the experiment takes.
     pub fn samples(&self, sample_rate: f64) -> u64 {
-        let motion = self.trajectory.as_ref().map_or(0.0, |t| t.duration_micros() as f64 * 1e-6);
+        let motion = self
+            .trajectory
+            .as_ref()
+            .map_or(0.0, |t| t.duration_micros() as f64 * 1e-6);
         ((motion + self.rest) * sample_rate).ceil() as u64
     }
 }
@@ -46,8 +49,12 @@ pub fn run<P: Port>(
     on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
 ) -> Result<LossReport, LinkError> {
     let greeting = session.greeting();
-    let rate = f64::from(greeting.control_rate_hz) / f64::from(greeting.telemetry_decimation.max(1));
-    let mut settings = RecordSettings { samples: Some(experiment.samples(rate)), ..RecordSettings::default() };
+    let rate =
+        f64::from(greeting.control_rate_hz) / f64::from(greeting.telemetry_decimation.max(1));
+    let mut settings = RecordSettings {
+        samples: Some(experiment.samples(rate)),
+        ..RecordSettings::default()
+    };
     when_calibrated(session, RequestBody::Disarm)?;
     for body in &experiment.settings {
         when_calibrated(session, body.clone())?;
@@ -70,9 +77,10 @@ fn when_calibrated<P: Port>(session: &mut Session<P>, body: RequestBody) -> Resu
     let begin = session.port().now();
     loop {
         match session.request(body.clone()) {
-            Err(LinkError::Refused { refusal: Refusal::WrongMode, .. })
-                if session.port().now().saturating_sub(begin) < CALIBRATION_PATIENCE =>
-            {
+            Err(LinkError::Refused {
+                refusal: Refusal::WrongMode,
+                ..
+            }) if session.port().now().saturating_sub(begin) < CALIBRATION_PATIENCE => {
                 session.next_report(CALIBRATION_PAUSE)?;
             }
             other => return other,

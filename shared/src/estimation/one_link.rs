@@ -137,6 +137,10 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         step(&self.config, &mut self.state, q, qd, tau)
     }
 
+    /// Samples have been left out: the filter starts anew with the next one, what has been learnt stays.
+    pub fn interrupt(&mut self) {
+        self.state.filter = filtered::State::default();
+    }
     /// See [`report`].
     pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
         report(&self.config, &self.state)

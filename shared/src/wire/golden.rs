@@ -122,7 +122,11 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             RequestBody::GetSnapshot,
             "08820211b6f25c6100"
         ),
-        ("SetPosition", RequestBody::SetPosition(-1.5), "048202120107c0bf5151085200"),
+        (
+            "SetPosition",
+            RequestBody::SetPosition(-1.5),
+            "048202120107c0bf5151085200"
+        ),
     ]
 }
 

@@ -1,0 +1,170 @@
+//! `rig excite`: a motion that tells the robot's parameters apart, within its limits.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+use super::error::CommandError;
+use super::ui::Ui;
+use crate::excite::{Criterion, Design, Options, StagedKind, design, staged};
+use crate::robot::Robot;
+
+/// What is optimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CriterionArg {
+    /// Condition number: errors spread evenly over the parameters
+    Cond,
+    /// Smallest singular value: the worst combination known as well as possible
+    MinSingular,
+    /// Determinant of the information: the smallest confidence ellipsoid
+    DOptimal,
+}
+
+/// Kind of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum KindArg {
+    /// Optimal periodic motion, for identification
+    Fourier,
+    /// Swept sine, for resonances and frequency response
+    Chirp,
+    /// Steps with rests, for gravity and holding torque
+    Staircase,
+    /// Slow triangles, for breakaway, presliding and backlash
+    Reversals,
+    /// Pairs of constant speeds, for the friction map
+    Sweep,
+}
+
+/// Designs a motion within the robot's limits that tells its parameters apart.
+///
+/// The limits stand in the robot description under [joint.limits]. The torque limit is kept by the inertia and
+/// friction written there, where they are. The same seed gives the same file.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Robot description (.toml or .urdf)
+    #[arg(long)]
+    pub(crate) robot: PathBuf,
+    /// File to write: .toml holds the motion's parameters (for the rig), .csv its samples
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Kind of motion; all but fourier move one joint
+    #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
+    pub(crate) kind: KindArg,
+    /// What is optimised (fourier)
+    #[arg(long, value_enum, default_value_t = CriterionArg::Cond)]
+    pub(crate) criterion: CriterionArg,
+    /// Harmonics per joint, 1 to 8 (fourier)
+    #[arg(long, default_value_t = 5)]
+    pub(crate) harmonics: usize,
+    /// Period of the slowest harmonic, s [default: from the limits] (fourier)
+    #[arg(long)]
+    pub(crate) period: Option<f64>,
+    /// Whole periods at full amplitude (fourier)
+    #[arg(long, default_value_t = 5)]
+    pub(crate) periods: u16,
+    /// Joint positions at the beginning, comma between them, rad or m [default: free for fourier, else mid-range]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) start: Option<Vec<f64>>,
+    /// The joint that moves [default: the first] (all but fourier)
+    #[arg(long)]
+    pub(crate) joint: Option<String>,
+    /// Random starts of the optimiser: more find better motions and take longer (fourier)
+    #[arg(long, default_value_t = 24)]
+    pub(crate) starts: u32,
+    /// Seed of the random starts (fourier)
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples a second in a .csv, Hz
+    #[arg(long, default_value_t = 1000.0)]
+    pub(crate) rate: f64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A description or options that do not serve, no motion within the limits, a file that cannot be written.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let robot = Robot::load(&args.robot)?;
+    let kind = match args.kind {
+        KindArg::Fourier => return optimal(args, &robot, ui),
+        KindArg::Chirp => StagedKind::Chirp,
+        KindArg::Staircase => StagedKind::Staircase,
+        KindArg::Reversals => StagedKind::Reversals,
+        KindArg::Sweep => StagedKind::Sweep,
+    };
+    let (file, notes) = staged(&robot, kind, args.joint.as_deref(), args.start.as_deref())?;
+    file.save(&args.out, &robot, args.rate)?;
+    for note in notes {
+        ui.remark(&note);
+    }
+    ui.say(&format!(
+        "{}: {} of {:.1} s.",
+        args.out.display(),
+        kind.name(),
+        file.duration()
+    ));
+    Ok(())
+}
+
+fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
+    let options = Options {
+        criterion: match args.criterion {
+            CriterionArg::Cond => Criterion::ConditionNumber,
+            CriterionArg::MinSingular => Criterion::SmallestSingularValue,
+            CriterionArg::DOptimal => Criterion::Determinant,
+        },
+        harmonics: args.harmonics,
+        period: args.period,
+        periods: args.periods,
+        ramp: None,
+        start: args.start.clone(),
+        starts: args.starts,
+        seed: args.seed,
+        threads: None,
+    };
+    let mut progress = ui.progress("designing the motion", 1);
+    let found = design(robot, &options, |done, total| progress.at_of(done, total))?;
+    drop(progress);
+    found.file.save(&args.out, robot, args.rate)?;
+    for note in &found.notes {
+        ui.remark(note);
+    }
+    for line in summary(&found, robot) {
+        ui.say(&line);
+    }
+    ui.say(&format!(
+        "{}: {:.1} s.",
+        args.out.display(),
+        found.file.duration()
+    ));
+    Ok(())
+}
+
+/// What the design achieves, line by line.
+fn summary(found: &Design, robot: &Robot) -> Vec<String> {
+    let values = &found.values;
+    let mut lines = vec![
+        format!(
+            "For the {} base parameters {}:",
+            found.base_parameters.len(),
+            found.base_parameters.join(", ")
+        ),
+        format!(
+            "condition number {:.3} with columns scaled by their sizes ({:.3} in SI units), smallest singular value {:.3}, mean {:.3}.",
+            values.condition_number,
+            values.si_condition_number,
+            values.smallest_singular_value,
+            values.mean_singular_value
+        ),
+    ];
+    for (joint, reach) in robot.joints.iter().zip(&found.reach) {
+        let torque = reach
+            .torque
+            .map_or(String::new(), |t| format!(", torque {t:.3}"));
+        lines.push(format!(
+            "Joint \"{}\" stays within position {:.3} to {:.3}, velocity {:.3}, acceleration {:.3}{torque} (SI units).",
+            joint.name, reach.position[0], reach.position[1], reach.velocity, reach.acceleration
+        ));
+    }
+    lines
+}

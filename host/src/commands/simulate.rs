@@ -1,0 +1,70 @@
+//! `rig simulate`: what the model would do on a trajectory, as a recording.
+
+use std::path::PathBuf;
+
+use super::error::CommandError;
+use super::ui::Ui;
+use crate::excite::{Noise, load_reference, replay};
+use crate::robot::Robot;
+
+/// Simulates the robot following a trajectory, with its own friction, drives and controller.
+///
+/// Writes a recording with the columns t, q, qd, tau and ref per joint, which the other commands read like one of the
+/// real robot. The same seed gives the same file.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Robot description (.toml or .urdf) with inertia and friction
+    #[arg(long)]
+    pub(crate) robot: PathBuf,
+    /// Trajectory that `rig excite` wrote (.toml or .csv), or a recording whose reference is run again
+    #[arg(long)]
+    pub(crate) trajectory: PathBuf,
+    /// Recording to write (.csv or .mcap)
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Samples a second for a .toml trajectory, Hz; a .csv has its own
+    #[arg(long, default_value_t = 1000.0)]
+    pub(crate) rate: f64,
+    /// Standard deviation of the noise on positions, rad or m
+    #[arg(long, default_value_t = 0.0)]
+    pub(crate) noise_position: f64,
+    /// Standard deviation of the noise on velocities, rad/s or m/s
+    #[arg(long, default_value_t = 0.0)]
+    pub(crate) noise_velocity: f64,
+    /// Standard deviation of the noise on torques, N·m or N
+    #[arg(long, default_value_t = 0.0)]
+    pub(crate) noise_torque: f64,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Files that cannot be read or written, a model that cannot be simulated.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let robot = Robot::load(&args.robot)?;
+    let reference = load_reference(&args.trajectory, &robot, args.rate)?;
+    let noise = Noise {
+        position: args.noise_position,
+        velocity: args.noise_velocity,
+        torque: args.noise_torque,
+    };
+    let mut progress = ui.progress("simulating", 1);
+    let done = replay(&robot, &reference, noise, args.seed, |done, total| {
+        progress.at_of(done, total);
+    })?;
+    drop(progress);
+    done.save(&args.out, &robot)?;
+    for note in &done.notes {
+        ui.remark(note);
+    }
+    let rows = done.motion.q.first().map_or(0, Vec::len);
+    ui.say(&format!(
+        "{}: {rows} samples, {:.1} s.",
+        args.out.display(),
+        rows as f64 * done.period
+    ));
+    Ok(())
+}

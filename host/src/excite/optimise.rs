@@ -1,0 +1,175 @@
+//! Minimisation with exact gradients: BFGS inside an augmented Lagrangian.
+//!
+//! The constraints c ≤ 0 enter as μ/2·max(0, c + λ/μ)² with multipliers λ that are updated between the rounds
+//! (Rockafellar 1973; Nocedal & Wright 2006, ch. 17). The line search asks for the weak Wolfe conditions by
+//! bisection, with which BFGS also descends where the criterion has kinks, as the smallest singular value has
+//! where it is double (Lewis & Overton 2013).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Sufficient decrease and sufficient rise of the slope (Nocedal & Wright 2006, sec. 3.1).
+const ARMIJO: f64 = 1e-4;
+const WOLFE: f64 = 0.9;
+/// Halvings and doublings of a step before the direction is given up.
+const BISECTIONS: usize = 30;
+
+/// What is minimised.
+pub(super) trait Objective {
+    /// The value at `x` of the criterion plus the penalties; fills the gradient. Not finite where undefined.
+    fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64;
+    /// Renews the multipliers at `x` for the penalty weight that follows.
+    fn update(&mut self, x: &DVector<f64>, next_weight: f64);
+}
+
+/// Weights of the penalty, round by round: constraints are relative to their limits and the criterion is a
+/// logarithm, so that multipliers are of the order of one.
+pub(super) const WEIGHTS: [f64; 6] = [1e1, 1e2, 1e3, 1e3, 3e3, 3e3];
+
+/// Minimises from `x`, calling `round` after each round of the multipliers.
+pub(super) fn minimise(
+    objective: &mut impl Objective,
+    mut x: DVector<f64>,
+    iterations: usize,
+    mut round: impl FnMut(),
+) -> DVector<f64> {
+    for weight in WEIGHTS {
+        objective.update(&x, weight);
+        x = bfgs(objective, x, iterations);
+        round();
+    }
+    x
+}
+
+fn bfgs(objective: &mut impl Objective, mut x: DVector<f64>, iterations: usize) -> DVector<f64> {
+    let size = x.len();
+    let mut gradient = DVector::zeros(size);
+    let mut value = objective.value(&x, &mut gradient);
+    let mut inverse = DMatrix::identity(size, size);
+    let mut fresh = true;
+    let mut trial_gradient = DVector::zeros(size);
+    for _ in 0..iterations {
+        if !value.is_finite() || gradient.amax() < 1e-7 {
+            break;
+        }
+        let mut direction = -(&inverse * &gradient);
+        let mut slope = direction.dot(&gradient);
+        if slope >= 0.0 || !slope.is_finite() {
+            inverse.fill_with_identity();
+            fresh = true;
+            direction = -&gradient;
+            slope = direction.dot(&gradient);
+        }
+        // Without knowledge of the curvature, a step of a tenth of a variable's range is a guess that fits.
+        let mut step = if fresh {
+            (0.1 / direction.amax()).min(1.0)
+        } else {
+            1.0
+        };
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut found = None;
+        for _ in 0..BISECTIONS {
+            let trial = &x + step * &direction;
+            let trial_value = objective.value(&trial, &mut trial_gradient);
+            if !(trial_value <= value + ARMIJO * step * slope) {
+                high = step;
+            } else if trial_gradient.dot(&direction) < WOLFE * slope {
+                low = step;
+                found = Some((trial, trial_value, trial_gradient.clone()));
+            } else {
+                found = Some((trial, trial_value, trial_gradient.clone()));
+                break;
+            }
+            step = if high.is_finite() {
+                0.5 * (low + high)
+            } else {
+                2.0 * low
+            };
+        }
+        let Some((next, next_value, next_gradient)) = found else {
+            if fresh {
+                break;
+            }
+            // A kink spoils the curvature: once more along the steepest descent.
+            inverse.fill_with_identity();
+            fresh = true;
+            continue;
+        };
+        let s = &next - &x;
+        let y = &next_gradient - &gradient;
+        let curvature = s.dot(&y);
+        if curvature > 1e-12 * s.norm() * y.norm() {
+            if fresh {
+                inverse.fill_with_identity();
+                inverse *= curvature / y.norm_squared();
+                fresh = false;
+            }
+            let hy = &inverse * &y;
+            let factor = (1.0 + y.dot(&hy) / curvature) / curvature;
+            inverse.ger(factor, &s, &s, 1.0);
+            inverse.ger(-1.0 / curvature, &hy, &s, 1.0);
+            inverse.ger(-1.0 / curvature, &s, &hy, 1.0);
+        }
+        let still = (value - next_value).abs() < 1e-10 * (1.0 + value.abs());
+        (x, value, gradient) = (next, next_value, next_gradient);
+        if still {
+            break;
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley on the disc of radius 1 about the origin.
+    struct Valley {
+        weight: f64,
+        multiplier: f64,
+    }
+
+    impl Valley {
+        fn constraint(x: &DVector<f64>) -> f64 {
+            x.norm_squared() - 1.0
+        }
+    }
+
+    impl Objective for Valley {
+        fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64 {
+            let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
+            let active = (Self::constraint(x) + self.multiplier / self.weight).max(0.0);
+            gradient[0] = -2.0 * a - 400.0 * x[0] * b;
+            gradient[1] = 200.0 * b;
+            *gradient += 2.0 * self.weight * active * x;
+            a * a + 100.0 * b * b + 0.5 * self.weight * active * active
+        }
+        fn update(&mut self, x: &DVector<f64>, next_weight: f64) {
+            if self.weight > 0.0 {
+                self.multiplier = (self.weight * Self::constraint(x) + self.multiplier).max(0.0);
+            }
+            self.weight = next_weight;
+        }
+    }
+
+    #[test]
+    fn finds_the_constrained_minimum() {
+        let mut valley = Valley {
+            weight: 0.0,
+            multiplier: 0.0,
+        };
+        let x = minimise(&mut valley, DVector::from_vec(vec![-0.5, 0.8]), 200, || ());
+        // On the circle with the angle as the only unknown, by a dense search.
+        let best = (0..2_000_000)
+            .map(|k| f64::from(k) * 1e-6)
+            .map(|angle| (angle.cos(), angle.sin()))
+            .min_by(|(a, b), (c, d)| {
+                let f = |x: f64, y: f64| (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
+                f(*a, *b).total_cmp(&f(*c, *d))
+            })
+            .unwrap_or_default();
+        assert!(
+            (x[0] - best.0).abs() < 1e-4 && (x[1] - best.1).abs() < 1e-4,
+            "{x} {best:?}"
+        );
+    }
+}
