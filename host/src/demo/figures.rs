@@ -239,6 +239,10 @@ const FILES: [(&str, &str); 7] = [
     ("slow-without.csv", "slow reversals without precompensation"),
     ("slow-with.csv", "the same with it"),
     (
+        "tracking.svg",
+        "the tracking error with and without precompensation",
+    ),
+    (
         "identified.toml",
         "the description with the identified values",
     ),
