@@ -8,7 +8,7 @@ use rig_shared::multibody::{COLUMNS, column, gravity_vector};
 use super::{Demo, DemoError, Run};
 use crate::identify::Identification;
 use crate::pages::{self, DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire};
-use crate::report::{Document, format_significant, format_value};
+use crate::report::{Document, Plot, format_significant, format_value};
 use crate::simulate::Model;
 
 /// Meanings and units, in the order of [`PARAMETER_NAMES`].
@@ -91,6 +91,11 @@ impl Demo {
     /// Where a parameter was not identified.
     pub fn page(&self, command: &str) -> Result<Document, DemoError> {
         Ok(pages::demo(&self.figures(command)?))
+    }
+
+    /// The tracking error with and without precompensation, as a picture of its own.
+    pub fn picture(&self) -> Plot {
+        pages::tracking_plot(&tracking(&self.without, &self.with))
     }
 
     fn parameters(&self) -> Result<Vec<DemoParameter>, DemoError> {
@@ -224,7 +229,7 @@ const BEYOND_MODEL: [&str; 6] = [
     "masses and centres of mass that differ from the description by up to 30 %",
 ];
 
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     (
         "train.csv",
         "the excitation that the parameters were identified from",
@@ -233,6 +238,10 @@ const FILES: [(&str, &str); 6] = [
     ("sweep.csv", "constant speeds, for the friction map"),
     ("slow-without.csv", "slow reversals without precompensation"),
     ("slow-with.csv", "the same with it"),
+    (
+        "tracking.svg",
+        "the tracking error with and without precompensation",
+    ),
     (
         "identified.toml",
         "the description with the identified values",
@@ -245,7 +254,7 @@ fn tracking(without: &Run, with: &Run) -> Tracking {
     let error = |run: &Run| {
         run.rows
             .iter()
-            .map(|row| row.q1 - row.ref1)
+            .map(|row| row.ref1 - row.q1)
             .collect::<Vec<_>>()
     };
     let (mut error_without, mut error_with) = (error(without), error(with));
