@@ -22,12 +22,20 @@ const GRAVITY: f64 = 9.81;
 /// frame: gc = g·mx, gs = −g·my.
 fn truth(plant: &PlantConfig) -> [f64; 6] {
     let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
-    [cos / GRAVITY, -sin / GRAVITY, inertia, viscous, coulomb, offset]
+    [
+        cos / GRAVITY,
+        -sin / GRAVITY,
+        inertia,
+        viscous,
+        coulomb,
+        offset,
+    ]
 }
 
 /// The recording as the identification takes it.
 fn as_recording(label: &str, recording: &Recording, torque_per_ampere: f64) -> InMemory {
-    let of = |f: &dyn Fn(&rig_host::link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
+    let of =
+        |f: &dyn Fn(&rig_host::link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
     InMemory {
         label: label.into(),
         blocks: vec![Block {
@@ -65,8 +73,20 @@ struct Outcome {
 
 /// The on-line estimate J, gc, gs, fv, fc, off as base parameters: value and standard deviation.
 fn online(estimate: &Estimate) -> [(f64, f64); 6] {
-    let of = |k: usize, scale: f64| (f64::from(estimate.value[k]) * scale, f64::from(estimate.std[k]) * scale.abs());
-    [of(1, 1.0 / GRAVITY), of(2, -1.0 / GRAVITY), of(0, 1.0), of(3, 1.0), of(4, 1.0), of(5, 1.0)]
+    let of = |k: usize, scale: f64| {
+        (
+            f64::from(estimate.value[k]) * scale,
+            f64::from(estimate.std[k]) * scale.abs(),
+        )
+    };
+    [
+        of(1, 1.0 / GRAVITY),
+        of(2, -1.0 / GRAVITY),
+        of(0, 1.0),
+        of(3, 1.0),
+        of(4, 1.0),
+        of(5, 1.0),
+    ]
 }
 
 fn study(seed: u64) -> Outcome {
@@ -74,15 +94,27 @@ fn study(seed: u64) -> Outcome {
     let torque_per_ampere = plant.mechanism.ratio * plant.motor.torque_constant;
     let runs = [0, 1].map(|run| {
         let recording = driven(&mut line, vec![], excitation(2 * seed + run, 5, 4), 0.5);
-        assert!(recording.faults.is_empty(), "rig {seed}: {:?}", recording.faults);
+        assert!(
+            recording.faults.is_empty(),
+            "rig {seed}: {:?}",
+            recording.faults
+        );
         recording
     });
-    let [first, second] = [0, 1].map(|k| as_recording(&format!("rig {seed}, run {k}"), &runs[k], torque_per_ampere));
+    let [first, second] =
+        [0, 1].map(|k| as_recording(&format!("rig {seed}, run {k}"), &runs[k], torque_per_ampere));
     let truth = truth(&plant);
     let results = [ModelKind::Differential, ModelKind::Integral].map(|model| {
-        let options = Options { model, ..Options::default() };
+        let options = Options {
+            model,
+            ..Options::default()
+        };
         let found = identify(&robot(), &[&first, &second], &[], &options).unwrap();
-        let names: Vec<_> = found.base_parameters.iter().map(|b| b.expression.as_str()).collect();
+        let names: Vec<_> = found
+            .base_parameters
+            .iter()
+            .map(|b| b.expression.as_str())
+            .collect();
         assert_eq!(names, NAMES);
         found.base_parameters
     });
@@ -108,7 +140,8 @@ fn study(seed: u64) -> Outcome {
 fn intervals_cover_the_truth_as_often_as_they_claim() {
     let outcomes = in_parallel(RIGS, study);
     let n = RIGS as f64;
-    let mut text = String::from("model         parameter    covered  mean z  rms z   mean std  mean error\n");
+    let mut text =
+        String::from("model         parameter    covered  mean z  rms z   mean std  mean error\n");
     let mut fair = true;
     for (m, model) in ["differential", "integral"].iter().enumerate() {
         for (k, name) in NAMES.iter().enumerate() {

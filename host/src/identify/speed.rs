@@ -25,7 +25,9 @@ const INDEPENDENT: f64 = 1e-3;
 
 /// Upper bounds of the bins below the believed speeds, fastest first; the last bin ends at `least`.
 fn bounds(top: f64, least: f64) -> Vec<f64> {
-    std::iter::successors(Some(top), |v| Some(v / STEP)).take_while(|v| *v > least).collect()
+    std::iter::successors(Some(top), |v| Some(v / STEP))
+        .take_while(|v| *v > least)
+        .collect()
 }
 
 /// Adds what is behind `bin` to `to`, with the column of the bin's own Coulomb friction or without.
@@ -62,8 +64,10 @@ pub(super) fn speed_thresholds(
         .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
         .collect();
     let bin_of = |j: usize, speed: f64| bins[j].iter().take_while(|bound| speed < **bound).count();
-    let mut factors: Vec<Vec<TriangularFactor>> =
-        bins.iter().map(|b| vec![TriangularFactor::new(p + OWN); b.len() + 1]).collect();
+    let mut factors: Vec<Vec<TriangularFactor>> = bins
+        .iter()
+        .map(|b| vec![TriangularFactor::new(p + OWN); b.len() + 1])
+        .collect();
     let mut row = vec![0.0; p + OWN];
     for recording in training {
         each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
@@ -75,7 +79,11 @@ pub(super) fn speed_thresholds(
                     let ahead = rows.qd[j].get(i + 1).copied().unwrap_or(qd);
                     let behind = rows.qd[j][i.saturating_sub(1)];
                     let brakes = (ahead - behind) * qd < 0.0;
-                    row[p..].copy_from_slice(&if brakes { [qd.signum(), 0.0] } else { [0.0, qd.signum()] });
+                    row[p..].copy_from_slice(&if brakes {
+                        [qd.signum(), 0.0]
+                    } else {
+                        [0.0, qd.signum()]
+                    });
                     factors[j][bin_of(j, qd.abs())].push(&row, equation.y[i], 1.0);
                 }
             }
@@ -91,7 +99,8 @@ pub(super) fn speed_thresholds(
             let (r, z) = believed.system();
             let svd = r.svd(true, true);
             let smallest = 1e-10 * svd.singular_values.max();
-            svd.solve(&z, smallest).map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
+            svd.solve(&z, smallest)
+                .map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
         })
         .collect();
     let mut memories = vec![Memory::default(); joints];
@@ -101,7 +110,9 @@ pub(super) fn speed_thresholds(
                 let equation = &rows.equations[j];
                 for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
                     if bin_of(j, rows.qd[j][i].abs()) == 0 {
-                        memories[j].push(equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta[j]));
+                        memories[j].push(
+                            equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta[j]),
+                        );
                     }
                 }
             }
