@@ -9,6 +9,7 @@
 //! errors in the regressor (kept small by the choice of the cut-off, [`crate::prepare::NOISE_SHARE`]).
 
 mod base;
+mod cache;
 mod covariance;
 mod describe;
 mod evaluate;
@@ -30,6 +31,7 @@ use serde::{Deserialize, Serialize};
 pub use base::{
     Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
 };
+pub use cache::RowCache;
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
 pub(crate) use evaluate::torque_residuals;

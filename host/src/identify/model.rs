@@ -2,6 +2,7 @@
 
 use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor, energy_regressor};
 
+use super::cache::RowCache;
 use super::{IdentifyError, ModelKind};
 use crate::prepare::{Masked, Motion, PrepareError, Recording, Treatment, each_motion};
 
@@ -19,6 +20,8 @@ pub struct Plan<'a> {
     pub stride: usize,
     /// Per joint, how loud its torque is taken to be in the energy balance (its RMS), N·m or N.
     pub loudness: Vec<f64>,
+    /// Rows made so far.
+    pub cache: RowCache,
 }
 
 /// One equation at many instants: x·β = y.
@@ -105,6 +108,23 @@ impl Tally {
 /// # Errors
 /// What reading or `take` gives.
 pub fn each_rows(
+    recording: &dyn Recording,
+    plan: &Plan,
+    model: ModelKind,
+    take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
+) -> Result<Tally, IdentifyError> {
+    if let Some(tally) = plan.cache.replay(recording, model, take)? {
+        return Ok(tally);
+    }
+    plan.cache.keep(
+        recording,
+        model,
+        |keep| make_rows(recording, plan, model, keep),
+        take,
+    )
+}
+
+fn make_rows(
     recording: &dyn Recording,
     plan: &Plan,
     model: ModelKind,

@@ -1,6 +1,7 @@
 //! The way from recordings to an [`Identification`].
 
 use super::base::{Base, chain_of, expression};
+use super::cache::RowCache;
 use super::evaluate::{covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
@@ -72,13 +73,22 @@ pub fn identify(
         window,
         stride: (window / 4).max(1),
         loudness: loudness.clone(),
+        cache: RowCache::default(),
     };
     let mut treatment = decided.clone();
+    let mut made = RowCache::default();
     if options.prepare.speed_threshold == Choice::Auto {
-        let (speeds, reason) = speed_thresholds(training, &plan_with(&decided))?;
+        let by_noise = plan_with(&decided);
+        let (speeds, reason) = speed_thresholds(training, &by_noise)?;
+        if speeds == decided.speed_threshold {
+            made = by_noise.cache;
+        }
         (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
     }
-    let plan = plan_with(&treatment);
+    let plan = Plan {
+        cache: made,
+        ..plan_with(&treatment)
+    };
     let p = base.len();
 
     // First fit: everything into one factor an equation.

@@ -256,6 +256,7 @@ pub fn validate(
         window: 0,
         stride: 1,
         loudness: vec![1.0; joints],
+        cache: crate::identify::RowCache::default(),
     };
     let mut warnings = prior_warnings(robot, &columns);
     let mut checked = Vec::with_capacity(recordings.len());
