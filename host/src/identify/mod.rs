@@ -20,6 +20,7 @@ mod model;
 mod residual;
 mod robust;
 mod solve;
+mod speed;
 
 #[cfg(test)]
 mod tests;

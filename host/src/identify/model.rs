@@ -85,7 +85,7 @@ impl Tally {
         };
         let mut all = entries(
             &self.slow,
-            "speed below the threshold: the sign of friction is not known",
+            "speed below the threshold: friction there is not Coulomb and viscous, or its sign is not known",
         );
         all.extend(entries(&self.saturated, "torque at its limit"));
         if self.short > 0 {

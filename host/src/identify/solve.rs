@@ -8,11 +8,12 @@ use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
 use super::residual::ResidualReport;
 use super::robust::{reweighted, spread_of};
+use super::speed::speed_thresholds;
 use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
-use crate::prepare::{Recording, Survey, Treatment};
+use crate::prepare::{Choice, Recording, Survey, Treatment};
 use crate::robot::Robot;
 
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
@@ -51,26 +52,33 @@ pub fn identify(
         .iter()
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
-    let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let decided = Treatment::decide(&surveys, &options.prepare, &limits)?;
     for s in &holdout_surveys {
-        treatment.admits(s)?;
+        decided.admits(s)?;
     }
-    let (window, window_reason) = choose_window(options, &treatment, &surveys)?;
-    let plan = Plan {
+    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
+    let loudness: Vec<f64> = (0..joints)
+        .map(|j| {
+            surveys
+                .iter()
+                .map(|s| s.joints[j].torque_rms)
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    let plan_with = |treatment| Plan {
         chain: &chain,
         columns: &base.columns,
-        treatment: &treatment,
+        treatment,
         window,
         stride: (window / 4).max(1),
-        loudness: (0..joints)
-            .map(|j| {
-                surveys
-                    .iter()
-                    .map(|s| s.joints[j].torque_rms)
-                    .fold(0.0, f64::max)
-            })
-            .collect(),
+        loudness: loudness.clone(),
     };
+    let mut treatment = decided.clone();
+    if options.prepare.speed_threshold == Choice::Auto {
+        let (speeds, reason) = speed_thresholds(training, &plan_with(&decided))?;
+        (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
+    }
+    let plan = plan_with(&treatment);
     let p = base.len();
 
     // First fit: everything into one factor an equation.

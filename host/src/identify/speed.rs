@@ -1,0 +1,164 @@
+//! From which speed on friction is Coulomb and viscous, read from the recordings themselves.
+
+use super::covariance::Memory;
+use super::factor::TriangularFactor;
+use super::linear::product;
+use super::model::{Plan, each_rows};
+use super::{IdentifyError, ModelKind};
+use crate::prepare::Recording;
+
+/// Rows faster than this share of the RMS speed are believed from the start; no threshold lies higher.
+const BELIEVED: f64 = 0.5;
+/// Ratio of neighbouring bounds between bins of speed: half an octave.
+const STEP: f64 = std::f64::consts::SQRT_2;
+/// Columns of a bin's own friction: braking and gathering speed.
+const OWN: usize = 2;
+/// A bin is refused where its own friction explains this many variances: the 99 % quantile of χ² with [`OWN`]
+/// degrees of freedom. Under a true model one bin in 100 is refused by chance, which costs rows but moves no value.
+const REFUSED: f64 = 9.21;
+/// The threshold lies this many times above the fastest bin that was refused. What weakens with speed does not
+/// end where it sinks into the noise of one bin; after doubling the speed a quarter is left of a tail that
+/// falls with its square (Hess & Soom 1990), and less of an exponential one.
+const MARGIN: f64 = 2.0;
+/// A bin whose own Coulomb friction is independent of the other columns by less than this share tells nothing.
+const INDEPENDENT: f64 = 1e-3;
+
+/// Upper bounds of the bins below the believed speeds, fastest first; the last bin ends at `least`.
+fn bounds(top: f64, least: f64) -> Vec<f64> {
+    std::iter::successors(Some(top), |v| Some(v / STEP))
+        .take_while(|v| *v > least)
+        .collect()
+}
+
+/// Adds what is behind `bin` to `to`, with the column of the bin's own Coulomb friction or without.
+fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
+    let r = bin.triangle();
+    let width = bin.columns() + 1;
+    for i in 0..width {
+        let mut row: Vec<f64> = (0..width).map(|j| r[j * width + i]).collect();
+        if !own {
+            row[width - 1 - OWN..width - 1].fill(0.0);
+        }
+        to.push(&row[..width - 1], row[width - 1], 1.0);
+    }
+}
+
+/// Per joint, the speed from which on one Coulomb and one viscous coefficient describe its friction, rad/s or
+/// m/s, and a sentence of how it was found. `plan` brings the lowest thresholds that make sense, those of noise.
+///
+/// From the believed speeds downwards each bin of speed in turn is given a Coulomb friction of its own beside the
+/// full model (the test of Chow 1960 for a changed parameter); the first bin where it differs significantly,
+/// memory of the residuals allowed for, ends the range. Braking and gathering speed have one each: friction that
+/// lags behind a reversal is too high before and too low after it, and would cancel in a common one. No friction
+/// law is assumed for what lies below.
+pub(super) fn speed_thresholds(
+    training: &[&dyn Recording],
+    plan: &Plan,
+) -> Result<(Vec<f64>, String), IdentifyError> {
+    let spectra = &plan.treatment.spectra;
+    let joints = spectra.len();
+    let p = plan.columns.len();
+    let bins: Vec<Vec<f64>> = spectra
+        .iter()
+        .zip(&plan.treatment.speed_threshold)
+        .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
+        .collect();
+    let bin_of = |j: usize, speed: f64| bins[j].iter().take_while(|bound| speed < **bound).count();
+    let mut factors: Vec<Vec<TriangularFactor>> = bins
+        .iter()
+        .map(|b| vec![TriangularFactor::new(p + OWN); b.len() + 1])
+        .collect();
+    let mut row = vec![0.0; p + OWN];
+    for recording in training {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for j in 0..joints {
+                let equation = &rows.equations[j];
+                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                    let qd = rows.qd[j][i];
+                    row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
+                    let ahead = rows.qd[j].get(i + 1).copied().unwrap_or(qd);
+                    let behind = rows.qd[j][i.saturating_sub(1)];
+                    let brakes = (ahead - behind) * qd < 0.0;
+                    row[p..].copy_from_slice(&if brakes {
+                        [qd.signum(), 0.0]
+                    } else {
+                        [0.0, qd.signum()]
+                    });
+                    factors[j][bin_of(j, qd.abs())].push(&row, equation.y[i], 1.0);
+                }
+            }
+            Ok(())
+        })?;
+    }
+    // The believed rows alone, each joint for itself: a pseudo-inverse, as one joint need not show every parameter.
+    let beta: Vec<Vec<f64>> = factors
+        .iter()
+        .map(|list| {
+            let mut believed = TriangularFactor::new(p + OWN);
+            add(&mut believed, &list[0], false);
+            let (r, z) = believed.system();
+            let svd = r.svd(true, true);
+            let smallest = 1e-10 * svd.singular_values.max();
+            svd.solve(&z, smallest)
+                .map_or(vec![0.0; p], |x| x.as_slice()[..p].to_vec())
+        })
+        .collect();
+    let mut memories = vec![Memory::default(); joints];
+    for recording in training {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for j in 0..joints {
+                let equation = &rows.equations[j];
+                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                    if bin_of(j, rows.qd[j][i].abs()) == 0 {
+                        memories[j].push(
+                            equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta[j]),
+                        );
+                    }
+                }
+            }
+            Ok(())
+        })?;
+    }
+    let thresholds = (0..joints)
+        .map(|j| {
+            let refused = first_refused(&factors[j], memories[j].length());
+            let least = plan.treatment.speed_threshold[j];
+            match (refused, bins[j].first()) {
+                (Some(bin), Some(top)) => (MARGIN * bins[j][bin - 1]).min(*top).max(least),
+                _ => least,
+            }
+        })
+        .collect();
+    Ok((
+        thresholds,
+        "Read from the data: below it, within a factor of two, the joint's friction differs from the Coulomb and viscous friction of faster rows by more than chance; never below five standard deviations of the velocity's noise or 1 % of its RMS.".into(),
+    ))
+}
+
+/// Number of the fastest bin whose own Coulomb friction differs.
+fn first_refused(bins: &[TriangularFactor], memory: f64) -> Option<usize> {
+    let columns = bins.first()?.columns();
+    let width = columns + 1;
+    let mut faster = TriangularFactor::new(columns);
+    add(&mut faster, &bins[0], false);
+    let mut rows = bins[0].rows();
+    for (k, bin) in bins.iter().enumerate().skip(1) {
+        let mut tried = faster.clone();
+        add(&mut tried, bin, true);
+        // The bin's own columns come last, so their entries of R and Qᵀy belong to what the others leave of them.
+        let r = tried.triangle();
+        let residual = r[columns * width + columns];
+        rows += bin.rows();
+        let freedom = rows.saturating_sub(columns as u64).max(1) as f64;
+        let variance = residual * residual * memory / freedom;
+        let explained: f64 = (columns - OWN..columns)
+            .filter(|&c| r[c * width + c].powi(2) > INDEPENDENT * bin.rows() as f64)
+            .map(|c| r[columns * width + c].powi(2))
+            .sum();
+        if explained > REFUSED * variance {
+            return Some(k);
+        }
+        add(&mut faster, bin, false);
+    }
+    None
+}
