@@ -42,7 +42,7 @@ pub struct Replay {
 
 /// Simulates the robot of a description following `reference`, which is at rest where it begins.
 ///
-/// The recording begins when the model has stood at the first reference for [one second](self). Torque `tau[k]` is
+/// The recording begins when the model has stood at the first reference for one second. Torque `tau[k]` is
 /// the one held from sample k to the next. `progress` is told how many samples are done, and of how many.
 ///
 /// # Errors
