@@ -330,7 +330,7 @@ mod tests {
 
     #[test]
     fn narrow_intervals_stay_narrow() {
-        for x in [0.3, 1.5707, 3.2, -8.0] {
+        for x in [0.3, 1.57, 3.2, -8.0] {
             let (s, c) = Interval::hull(x, x + 1e-6).sin_cos();
             assert!(s.high - s.low < 1.1e-6 && c.high - c.low < 1.1e-6);
         }
