@@ -35,7 +35,8 @@ impl Derived {
     pub fn new(config: &Config, settings: &Settings) -> Self {
         let rate = config.rates.control_hz as f32;
         let period = 1.0 / rate;
-        let counts_per_joint_turn = config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
+        let counts_per_joint_turn =
+            config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
         let limits = &settings.limits;
         Self {
             period,

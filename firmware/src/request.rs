@@ -2,7 +2,6 @@
 
 use rig_shared::control::{adaptive, current};
 use rig_shared::link::LinkParameters;
-use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::{Fault, Limits, Mode};
 use rig_shared::trajectory::{Trajectory, TrajectoryError};
 use rig_shared::wire::message::{Refusal, RequestBody};
@@ -42,6 +41,7 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             _ => Err(Refusal::WrongMode),
         },
         RequestBody::ClearFault => clear_fault(config, state),
+        RequestBody::SetPosition(position) => set_position(config, state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
             fits(trajectory, &state.settings.limits, None)?;
@@ -52,7 +52,15 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
             refuse_in_motion(state)?;
             let settings = with(&state.settings, body);
             usable(&settings)?;
-            state.apply(config, settings).map_err(|_| Refusal::BadValue)
+            state
+                .apply(config, settings)
+                .map_err(|_| Refusal::BadValue)?;
+            if matches!(body, RequestBody::SetEstimator(_)) {
+                state
+                    .restart_estimator(config)
+                    .map_err(|_| Refusal::BadValue)?;
+            }
+            Ok(())
         }
     }
 }
@@ -65,7 +73,9 @@ fn with(now: &Settings, body: &RequestBody) -> Settings {
         RequestBody::SetControl(kind) => settings.control = *kind,
         RequestBody::SetModel(model) => settings.model = *model,
         RequestBody::SetFriction(friction) => settings.friction = *friction,
-        RequestBody::SetPrecompensation(precompensation) => settings.precompensation = *precompensation,
+        RequestBody::SetPrecompensation(precompensation) => {
+            settings.precompensation = *precompensation
+        }
         RequestBody::SetLimits(limits) => settings.limits = *limits,
         RequestBody::SetEstimator(estimator) => settings.estimator = *estimator,
         _ => {}
@@ -74,13 +84,20 @@ fn with(now: &Settings, body: &RequestBody) -> Settings {
 }
 
 fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
-    if matches!(state.mode, Mode::Running | Mode::Stopping) { Err(Refusal::WrongMode) } else { Ok(()) }
+    if matches!(state.mode, Mode::Running | Mode::Stopping) {
+        Err(Refusal::WrongMode)
+    } else {
+        Ok(())
+    }
 }
 
 fn arm(state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
-            state.run = Run { base: state.position, ..Run::default() };
+            state.run = Run {
+                base: state.position,
+                ..Run::default()
+            };
             state.current_loop = current::State::default();
             state.law.adaptive = adaptive::State::new(state.settings.model);
             state.mode = Mode::Holding;
@@ -104,6 +121,34 @@ fn start(state: &mut State) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
+fn set_position(config: &Config, state: &mut State, position: f32) -> Result<(), Refusal> {
+    if state.mode != Mode::Disarmed {
+        return Err(Refusal::WrongMode);
+    }
+    let counts = position / state.derived.radians_per_count;
+    // Above 2²⁴ counts an f32 no longer names single counts.
+    if counts.is_nan() || counts.abs() >= 16_777_216.0 {
+        return Err(Refusal::BadValue);
+    }
+    let shift = libm::roundf(counts) as i64 - state.counts;
+    state.origin = state.origin.map(|origin| origin - shift);
+    state.counts += shift;
+    state.position = state.counts as f32 * state.derived.radians_per_count;
+    state.reference.position = state.position;
+    // Windows that are open hold counts from the old origin.
+    state.telemetry.position += shift * i64::from(state.telemetry.ticks);
+    state.estimation.position += shift * i64::from(state.estimation.ticks);
+    state.previous = None;
+    if shift != 0 {
+        // gc and gs belong to the angle that they were learnt for.
+        state
+            .restart_estimator(config)
+            .map_err(|_| Refusal::BadValue)?;
+    }
+    Ok(())
+}
+
 fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Fault {
         return Ok(());
@@ -112,11 +157,19 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
         return Err(Refusal::CauseActing);
     }
     // An implausible offset is measured again: it may have been a motor turned by hand.
-    let offset = state.latch.first().is_some_and(|record| record.fault == Fault::CurrentOffset);
+    let offset = state
+        .latch
+        .first()
+        .is_some_and(|record| record.fault == Fault::CurrentOffset);
+    // A fault that came in the middle of the measurement leaves it to be done.
+    let offset = offset || state.calibration.ticks < config.calibration_ticks;
     state.latch.clear();
     state.snapshot.release();
     if offset {
-        state.calibration = Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() };
+        state.calibration = Calibration {
+            zero_code: config.scaling.current_zero,
+            ..Calibration::default()
+        };
         state.mode = Mode::Calibrating;
     } else {
         state.mode = Mode::Disarmed;
@@ -130,7 +183,7 @@ fn usable(settings: &Settings) -> Result<(), Refusal> {
         && settings.gains.usable()
         && settings.friction.check().is_ok()
         && model_is_usable(&settings.model)
-        && precompensation_is_usable(&settings.precompensation);
+        && settings.precompensation.check().is_ok();
     if good { Ok(()) } else { Err(Refusal::BadValue) }
 }
 
@@ -141,19 +194,19 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
         && model.coulomb >= 0.0
 }
 
-fn precompensation_is_usable(settings: &PrecompensationSettings<f32>) -> bool {
-    let share = |x: f32| (0.0..=1.0).contains(&x);
-    share(settings.gain)
-        && share(settings.gain_at_rest)
-        && settings.gain_at_rest <= settings.gain
-        && settings.velocity_threshold > 0.0
-        && settings.velocity_threshold.is_finite()
-}
-
+/// Also while switched off: what is kept may be switched on.
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run.
-fn fits(trajectory: &Trajectory<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
-    let anywhere = Limits { position_low: -f32::MAX, position_high: f32::MAX, ..*limits };
+fn fits(
+    trajectory: &Trajectory<f32>,
+    limits: &Limits<f32>,
+    base: Option<f32>,
+) -> Result<(), Refusal> {
+    let anywhere = Limits {
+        position_low: -f32::MAX,
+        position_high: f32::MAX,
+        ..*limits
+    };
     let checked = match base {
         Some(base) => trajectory.check(limits, base),
         None => trajectory.check(&anywhere, 0.0),

@@ -1,8 +1,12 @@
 //! The rig's end of the conversation: bytes in, requests carried out, reports out.
 
 use heapless::String;
-use rig_shared::wire::message::{Batch, Greeting, Report, Request, RequestBody, SNAPSHOT_PART, SnapshotPart};
-use rig_shared::wire::{Batcher, Ledger, MAX_FRAME, MessageDecoder, PROTOCOL_VERSION, encode, schema};
+use rig_shared::wire::message::{
+    Batch, Greeting, Report, Request, RequestBody, SNAPSHOT_PART, SnapshotPart,
+};
+use rig_shared::wire::{
+    Batcher, Ledger, MAX_FRAME, MessageDecoder, PROTOCOL_VERSION, encode, schema,
+};
 
 use crate::config::Config;
 use crate::request::carry_out;
@@ -38,7 +42,13 @@ impl Speaker {
     }
 
     /// Takes in bytes from the host: carries out what they ask for and answers.
-    pub fn receive(&mut self, config: &Config, state: &mut State, bytes: &[u8], transmit: &mut impl Transmit) {
+    pub fn receive(
+        &mut self,
+        config: &Config,
+        state: &mut State,
+        bytes: &[u8],
+        transmit: &mut impl Transmit,
+    ) {
         for &byte in bytes {
             // A damaged frame was counted by the decoder; the host, unanswered, will repeat its request.
             if let Some(Ok(request)) = self.decoder.push(byte) {
@@ -48,18 +58,22 @@ impl Speaker {
         }
     }
 
-    fn answer(&mut self, config: &Config, state: &mut State, request: &Request, transmit: &mut impl Transmit) {
+    fn answer(
+        &mut self,
+        config: &Config,
+        state: &mut State,
+        request: &Request,
+        transmit: &mut impl Transmit,
+    ) {
         if request.body == RequestBody::Hello {
             self.ledger.clear();
-            send(&Report::Greeting(greeting(config)), transmit);
         }
-        let acknowledge = match self.ledger.answered(request.id) {
-            Some(earlier) => earlier,
-            None => {
-                let result = carry_out(config, state, &request.body);
-                self.ledger.answer(request.id, result)
-            }
-        };
+        if let Some(earlier) = self.ledger.answered(request.id) {
+            send(&Report::Acknowledge(earlier), transmit);
+            return;
+        }
+        let result = carry_out(config, state, &request.body);
+        let acknowledge = self.ledger.answer(request.id, result);
         let accepted = acknowledge.result.is_ok();
         send(&Report::Acknowledge(acknowledge), transmit);
         if accepted {
@@ -67,8 +81,7 @@ impl Speaker {
         }
     }
 
-    /// The requests about the conversation itself. Each may be repeated without harm: a stream that is
-    /// started again begins anew, its end and the snapshot are sent again.
+    /// The requests about the conversation itself, carried out after their acknowledgement.
     fn converse(
         &mut self,
         config: &Config,
@@ -77,8 +90,12 @@ impl Speaker {
         transmit: &mut impl Transmit,
     ) {
         match body {
+            RequestBody::Hello => {
+                send(&Report::Greeting(greeting(config)), transmit);
+            }
             RequestBody::StartStream => {
-                self.batcher.start(state.window_start(), config.rates.telemetry_decimation);
+                self.batcher
+                    .start(state.window_start(), config.rates.telemetry_decimation);
             }
             RequestBody::StopStream => {
                 if let Some(batch) = self.batcher.close() {
@@ -124,10 +141,20 @@ impl Speaker {
     /// One part of the snapshot per telemetry sample, so that it never crowds out the stream.
     fn send_snapshot_part(&mut self, state: &State, transmit: &mut impl Transmit) {
         let Some(first) = self.snapshot else { return };
-        let total = state.snapshot.len();
-        let samples =
-            (first..total.min(first + SNAPSHOT_PART)).filter_map(|k| state.snapshot.get(k).copied()).collect();
-        let part = SnapshotPart { first: first as u16, total: total as u16, samples };
+        // A ring that still turns would put parts of different times together. Without a fault there is nothing.
+        let faulty = state.latch.first().is_some();
+        if faulty && !state.snapshot.is_frozen() {
+            return;
+        }
+        let total = if faulty { state.snapshot.len() } else { 0 };
+        let samples = (first..total.min(first + SNAPSHOT_PART))
+            .filter_map(|k| state.snapshot.get(k).copied())
+            .collect();
+        let part = SnapshotPart {
+            first: first as u16,
+            total: total as u16,
+            samples,
+        };
         if send(&Report::Snapshot(part), transmit) {
             let next = first + SNAPSHOT_PART;
             self.snapshot = (next < total).then_some(next);
@@ -139,7 +166,9 @@ impl Speaker {
 fn send(report: &Report, transmit: &mut impl Transmit) -> bool {
     let mut frame = [0; MAX_FRAME];
     match encode(report, &mut frame) {
-        Ok(length) => frame.get(..length).is_some_and(|bytes| transmit.frame(bytes)),
+        Ok(length) => frame
+            .get(..length)
+            .is_some_and(|bytes| transmit.frame(bytes)),
         // The longest report fits (tested with the wire format); an unsendable one counts as refused.
         Err(_) => false,
     }

@@ -80,8 +80,25 @@ pub(crate) struct Calibration {
     pub(crate) ticks: u32,
     /// Sum of the codes: exact in an integer.
     pub(crate) sum: u64,
+    /// Sum of their squares.
+    pub(crate) squares: u64,
+    /// Standard deviation of the measured offset, A.
+    pub(crate) std: f32,
     /// Measured code at no current.
     pub(crate) zero_code: f32,
+}
+
+impl Calibration {
+    /// Standard deviation of the mean code, from the codes' own spread: n·Σc² − (Σc)² in integers, as the
+    /// difference is small against its terms. Noise is taken as white from tick to tick; the converter's
+    /// rounding counts as it is dithered by the noise.
+    pub(crate) fn std_of_mean(&self) -> f32 {
+        let n = u128::from(self.ticks.max(1));
+        let spread = (n * u128::from(self.squares))
+            .saturating_sub(u128::from(self.sum) * u128::from(self.sum));
+        // n²·variance over n³ is the variance of the mean.
+        libm::sqrtf(spread as f32) / (n as f32 * libm::sqrtf(n as f32))
+    }
 }
 
 impl State {
@@ -106,7 +123,10 @@ impl State {
             estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?,
             settings,
             derived,
-            calibration: Calibration { zero_code: config.scaling.current_zero, ..Calibration::default() },
+            calibration: Calibration {
+                zero_code: config.scaling.current_zero,
+                ..Calibration::default()
+            },
             encoder: encoder::State::default(),
             origin: None,
             counts: 0,
@@ -133,13 +153,22 @@ impl State {
     }
 
     /// Replaces settings and everything that follows from them; nothing where they cannot be used.
-    pub(crate) fn apply(&mut self, config: &Config, settings: Settings) -> Result<(), SettingsFault> {
-        if settings.estimator != self.settings.estimator {
-            self.estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
-            self.previous = None;
-        }
+    pub(crate) fn apply(
+        &mut self,
+        config: &Config,
+        settings: Settings,
+    ) -> Result<(), SettingsFault> {
+        settings.estimator.check(config.rates.estimator_hz())?;
         self.derived = Derived::new(config, &settings);
         self.settings = settings;
+        Ok(())
+    }
+
+    /// Has the estimator forget everything.
+    pub(crate) fn restart_estimator(&mut self, config: &Config) -> Result<(), SettingsFault> {
+        self.estimator =
+            OneLinkEstimator::new(&self.settings.estimator, config.rates.estimator_hz())?;
+        self.previous = None;
         Ok(())
     }
 }

@@ -13,7 +13,10 @@ use crate::config::Config;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
-use crate::window::Tick;
+use crate::window::{Tick, Window};
+
+/// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
+const OFFSET: usize = PARAMETER_COUNT - 1;
 
 /// What a control tick gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,16 +35,27 @@ pub struct Output {
 pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     let readings = read(config, state, sample);
     let mut output = Output::default();
-    let found = monitor::step(&config.monitor, &state.settings.limits, &mut state.monitor, &readings);
+    let found = monitor::step(
+        &config.monitor,
+        &state.settings.limits,
+        &mut state.monitor,
+        &readings,
+    );
     state.cause_acting = found.is_some();
-    let found = found.or_else(|| calibrate(config, state, sample)).or_else(|| listen(config, state));
+    let found = found
+        .or_else(|| calibrate(config, state, sample))
+        .or_else(|| listen(config, state));
     if let Some((fault, value)) = found {
         output.fault = fall(state, fault, value);
     }
 
     let mut limits = LimitSet::default();
     state.reference = reference(config, state, &mut limits);
-    let (duty, torque) = if state.mode.drives() { drive(config, state, &readings, &mut limits) } else { (0.0, 0.0) };
+    let (duty, torque) = if state.mode.drives() {
+        drive(config, state, &readings, &mut limits)
+    } else {
+        (0.0, 0.0)
+    };
     state.limits = limits;
 
     let tick = Tick {
@@ -62,7 +76,10 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     });
     output.state = telemetry(config, state, &tick);
     output.estimate = estimate(config, state, &tick);
-    output.command = Command { duty: Duty(duty), bridge: state.mode.drives() };
+    output.command = Command {
+        duty: Duty(duty),
+        bridge: state.mode.drives(),
+    };
     state.duty = duty;
     state.tick += 1;
     output
@@ -85,7 +102,8 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         overrun: sample.overrun,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
-        current: (f32::from(sample.current.0) - state.calibration.zero_code) * scaling.current_per_code,
+        current: (f32::from(sample.current.0) - state.calibration.zero_code)
+            * scaling.current_per_code,
         supply: f32::from(sample.supply.0) * scaling.supply_per_code,
         temperature: scaling.temperature_at_zero
             + f32::from(sample.temperature.0) * scaling.temperature_per_code,
@@ -102,8 +120,10 @@ fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Faul
     if state.mode != Mode::Calibrating {
         return None;
     }
+    let code = u64::from(sample.current.0);
     state.calibration.ticks += 1;
-    state.calibration.sum += u64::from(sample.current.0);
+    state.calibration.sum += code;
+    state.calibration.squares += code * code;
     if state.calibration.ticks < config.calibration_ticks {
         return None;
     }
@@ -113,6 +133,7 @@ fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Faul
         return Some((Fault::CurrentOffset, offset));
     }
     state.calibration.zero_code = zero_code;
+    state.calibration.std = state.calibration.std_of_mean() * config.scaling.current_per_code.abs();
     state.mode = Mode::Disarmed;
     None
 }
@@ -133,7 +154,11 @@ fn listen(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
 
 /// Bridge off, fault latched, snapshot kept.
 fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
-    let record = FaultRecord { fault, tick: state.tick, value };
+    let record = FaultRecord {
+        fault,
+        tick: state.tick,
+        value,
+    };
     state.mode = Mode::Fault;
     let first = state.latch.latch(record);
     if first {
@@ -151,7 +176,10 @@ pub(crate) fn brake(state: &mut State) {
 /// The reference of this tick, by mode; modes that end by themselves end here.
 fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Reference<f32> {
     let Run { start, base, .. } = state.run;
-    let standing = |position| Reference { position, ..Reference::default() };
+    let standing = |position| Reference {
+        position,
+        ..Reference::default()
+    };
     let wish = match state.mode {
         Mode::Calibrating | Mode::Disarmed | Mode::Fault => return standing(state.position),
         Mode::Holding => standing(base),
@@ -160,7 +188,10 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
             match &state.trajectory {
                 Some(trajectory) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
-                    Reference { position: base + offset.position, ..offset }
+                    Reference {
+                        position: base + offset.position,
+                        ..offset
+                    }
                 }
                 _ => {
                     state.run.base = state.reference.position;
@@ -170,7 +201,10 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
             }
         }
         Mode::Stopping => {
-            let next = state.run.braking.step(state.settings.limits.acceleration, state.derived.period);
+            let next = state
+                .run
+                .braking
+                .step(state.settings.limits.acceleration, state.derived.period);
             if state.run.braking.at_rest() {
                 state.run.base = next.position;
                 state.mode = Mode::Holding;
@@ -184,7 +218,10 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
 }
 
 fn is_over(trajectory: &Trajectory<f32>, elapsed: u64, rate_hz: u32) -> bool {
-    elapsed.saturating_mul(1_000_000) >= trajectory.duration_micros().saturating_mul(u64::from(rate_hz))
+    elapsed.saturating_mul(1_000_000)
+        >= trajectory
+            .duration_micros()
+            .saturating_mul(u64::from(rate_hz))
 }
 
 /// Holds a reference at the edge of the position range.
@@ -193,16 +230,34 @@ fn within_range(
     wish: Reference<f32>,
     limits: &mut LimitSet,
 ) -> Reference<f32> {
-    let position = wish.position.max(range.position_low).min(range.position_high);
+    let position = wish
+        .position
+        .max(range.position_low)
+        .min(range.position_high);
     let outside = position != wish.position;
     limits.set(Limit::Position, outside);
-    if outside { Reference { position, ..Reference::default() } } else { wish }
+    if outside {
+        Reference {
+            position,
+            ..Reference::default()
+        }
+    } else {
+        wish
+    }
 }
 
 /// Position law, then current loop: duty cycle and commanded joint torque.
 fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> (f32, f32) {
-    let measured = Measured { position: state.position, velocity: state.velocity };
-    let torque = law::step(&state.derived.law, &mut state.law, measured, state.reference);
+    let measured = Measured {
+        position: state.position,
+        velocity: state.velocity,
+    };
+    let torque = law::step(
+        &state.derived.law,
+        &mut state.law,
+        measured,
+        state.reference,
+    );
     limits.set(Limit::Torque, torque.limited);
     let wish = config.drive.current(torque.value);
     let peak = state.settings.limits.peak_current;
@@ -225,7 +280,9 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
 /// Closes a telemetry window when it is full.
 fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, StateSample)> {
     let first_tick = state.window_start();
-    let window = state.telemetry.push(tick, config.rates.telemetry_decimation)?;
+    let window = state
+        .telemetry
+        .push(tick, config.rates.telemetry_decimation)?;
     let sample = StateSample {
         position_sum: window.position,
         velocity: state.velocity,
@@ -244,24 +301,40 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
 /// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
 /// same two windows: all belong to the instant between them, and no column lags another.
 fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
-    let window = state.estimation.push(tick, config.rates.estimator_decimation)?;
-    let before = state.previous.replace(window)?;
+    let window = state
+        .estimation
+        .push(tick, config.rates.estimator_decimation)?;
+    // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
+    // doubt: neither says anything about the rig's parameters.
+    if !state.mode.drives() {
+        state.previous = None;
+        state.estimator.interrupt();
+    } else if let Some(before) = state.previous.replace(window) {
+        learn(config, state, &before, &window);
+    }
     if state.mode == Mode::Calibrating {
         return None;
     }
-    let ticks = f32::from(config.rates.estimator_decimation);
-    let per_count = state.derived.radians_per_count / ticks;
-    // The difference is taken in integers: exact at any position.
-    let qd = (window.position - before.position) as f32 * per_count / state.derived.estimator_period;
-    let q = 0.5 * (window.position + before.position) as f32 * per_count;
-    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
-    state.estimator.step(q, qd, current * state.derived.torque_per_ampere);
     state.updates_since_report += 1;
     if state.updates_since_report < config.rates.estimate_report_decimation {
         return None;
     }
     state.updates_since_report = 0;
     Some(estimate_report(state))
+}
+
+/// One update from two consecutive windows.
+fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
+    let ticks = f32::from(config.rates.estimator_decimation);
+    let per_count = state.derived.radians_per_count / ticks;
+    // The difference is taken in integers: exact at any position.
+    let qd =
+        (window.position - before.position) as f32 * per_count / state.derived.estimator_period;
+    let q = 0.5 * (window.position + before.position) as f32 * per_count;
+    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
+    state
+        .estimator
+        .step(q, qd, current * state.derived.torque_per_ampere);
 }
 
 /// The estimate as it goes over the wire.
@@ -276,6 +349,10 @@ fn estimate_report(state: &State) -> Estimate {
     };
     estimate.value = report.value;
     estimate.std = report.std;
+    // The current offset was measured from finitely many samples; its error is a constant torque that no motion
+    // shows, and goes into `off` alone.
+    let measured = state.calibration.std * state.derived.torque_per_ampere;
+    estimate.std[OFFSET] = libm::hypotf(estimate.std[OFFSET], measured);
     estimate.trusted = report.trusted;
     estimate
 }

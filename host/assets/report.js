@@ -68,17 +68,21 @@
     var home = data.range, view = home.slice(), shown = data.series.map(function () { return true; });
     var plot = null, dots = [], values = [];
 
-    function line(cls, text) {
-      if (!text) return;
-      var p = document.createElement("p");
-      p.className = cls; p.textContent = text; live.appendChild(p);
+    function element(tag, cls, text, parent) {
+      var e = document.createElement(tag);
+      e.className = cls; e.textContent = text; parent.appendChild(e);
+      return e;
     }
-    line("y-title", data.y.title); live.appendChild(box); line("x-title", data.x.title);
-
-    var reset = document.createElement("button");
-    reset.type = "button"; reset.className = "reset"; reset.textContent = "Reset zoom";
+    // Title of the ordinate, place of the cursor and the button share a line, so that nothing moves when they appear.
+    var bar = element("div", "bar", "", root);
+    root.insertBefore(bar, live);
+    element("span", "y-title", data.y.title, bar);
+    var place = element("span", "place", "", bar);
+    var reset = element("button", "reset", "Reset zoom", bar);
+    reset.type = "button";
     reset.addEventListener("click", function () { show(home); });
-    root.querySelector(".figure-head").appendChild(reset);
+    live.appendChild(box);
+    element("p", "x-title", data.x.title, live);
 
     Array.prototype.forEach.call(root.querySelectorAll(".legend li"), function (li, i) {
       var button = document.createElement("button");
@@ -86,6 +90,7 @@
       while (li.firstChild) button.appendChild(li.firstChild);
       li.appendChild(button);
       values.push(button.querySelector(".v"));
+      if (data.series[i].shape === "band" || data.series[i].shape === "errors") values[i].className = "v wide";
       button.addEventListener("click", function () {
         shown[i] = !shown[i];
         button.setAttribute("aria-pressed", String(shown[i]));
@@ -126,6 +131,10 @@
         plot.setScale("x", { min: s[0], max: s[1] });
         plot.setScale("y", { min: s[2], max: s[3] });
       });
+    }
+    // Equal scales need the plot area's size, which is known only after the axes have been laid out.
+    function again() {
+      if (data.equal) requestAnimationFrame(function () { show(root.classList.contains("is-zoomed") ? view : home); });
     }
     function current() { return [plot.scales.x.min, plot.scales.x.max, plot.scales.y.min, plot.scales.y.max]; }
     // Zooms by factors about a place given as shares of the plot area, then shifts by shares of it.
@@ -253,6 +262,9 @@
     }
     function cursor(u) {
       var left = u.cursor.left, top = u.cursor.top;
+      var at = left >= 0 ? u.posToVal(left, "x") : null, unit = /\(([^()]*)\)$/.exec(data.x.title);
+      place.textContent = at == null ? "" : data.x.names.length ? data.x.names[Math.round(at)] || ""
+        : "at " + reading(at, u.scales.x.max - u.scales.x.min, data.x.log) + (unit ? " " + unit[1] : "");
       data.series.forEach(function (s, i) {
         var dot = dots[i], j = left >= 0 && shown[i] ? nearest(u, i, left, top) : -1;
         if (j < 0) { dot.style.display = "none"; values[i].textContent = ""; return; }
@@ -260,8 +272,7 @@
         var text = s.shape === "band" ? reading(s.low[j], span, data.y.log) + " … " + reading(s.high[j], span, data.y.log)
           : reading(v, span, data.y.log);
         if (s.shape === "errors") text += " ± " + reading((s.high[j] - s.low[j]) / 2, span, data.y.log);
-        var at = data.x.names.length ? data.x.names[Math.round(s.x[j])] || "" : reading(s.x[j], u.scales.x.max - u.scales.x.min, data.x.log);
-        values[i].textContent = text + " at " + at;
+        values[i].textContent = text;
         if (v == null) { dot.style.display = "none"; return; }
         var x = u.valToPos(s.x[j] + s.offset, "x"), y = u.valToPos(v, "y");
         var inside = x >= 0 && y >= 0 && x <= u.over.clientWidth && y <= u.over.clientHeight;
@@ -271,18 +282,21 @@
     }
 
     function axis(which, room) {
+      // From the whole figure's size: that of the plot area is not known before the ticks are.
+      function count(u) {
+        var length = which === "x" ? u.width - 70 : u.height - 36;
+        return Math.max(2, Math.min(12, Math.floor(length / room)));
+      }
       return {
         scale: which, stroke: function () { return variable("quiet"); }, font: FONT, gap: 6,
         grid: { stroke: function () { return variable("grid"); }, width: 1 },
         ticks: { show: false }, border: { show: true, stroke: function () { return variable("axis"); }, width: 1 },
         splits: function (u, i, lo, hi) {
-          var length = which === "x" ? u.over.clientWidth || u.width - 60 : u.over.clientHeight || u.height - 30;
-          return ticks(data[which], lo, hi, Math.max(2, Math.min(12, Math.floor(length / room)))).map(function (t) { return t[0]; });
+          return ticks(data[which], lo, hi, count(u)).map(function (t) { return t[0]; });
         },
         filter: function (u, s) { return s; },
         values: function (u, splits) {
-          var sc = u.scales[which], length = which === "x" ? u.over.clientWidth || u.width - 60 : u.over.clientHeight || u.height - 30;
-          var all = ticks(data[which], sc.min, sc.max, Math.max(2, Math.min(12, Math.floor(length / room))));
+          var sc = u.scales[which], all = ticks(data[which], sc.min, sc.max, count(u));
           return splits.map(function (v, i) { return all[i] ? all[i][1] : ""; });
         },
         size: which === "x" ? 28 : function (u, texts) {
@@ -296,14 +310,15 @@
     }
 
     function make() {
-      var s = size();
+      // Before its size is asked for: what is not displayed has none.
       root.classList.add("is-live");
+      var s = size();
       function scale(which) {
         return { time: false, auto: false, distr: data[which].log ? 3 : 1, log: 10, range: function (u, lo, hi) { return [lo, hi]; } };
       }
       plot = new uPlot({
         width: s.width, height: s.height, padding: [8, 14, 0, 0],
-        scales: { x: scale("x"), y: scale("y") }, axes: [axis("x", 80), axis("y", 44)],
+        scales: { x: scale("x"), y: scale("y") }, axes: [axis("x", 62), axis("y", 36)],
         series: [{}, { scale: "y", show: true, paths: function () { return null; }, points: { show: false } }],
         legend: { show: false },
         cursor: {
@@ -326,8 +341,7 @@
         var d = document.createElement("div"); d.className = "dot"; plot.over.appendChild(d); dots.push(d);
       });
       show(home);
-      // Only now are the axes' widths known, on which equal scales depend.
-      requestAnimationFrame(function () { if (!root.classList.contains("is-zoomed")) show(home); });
+      again();
       hands(plot.over);
     }
 
@@ -382,7 +396,7 @@
       if (!live.parentNode.clientWidth) return;
       if (!plot) { make(); return; }
       var s = size();
-      if (s.width !== plot.width || s.height !== plot.height) { plot.setSize(s); show(root.classList.contains("is-zoomed") ? view : home); }
+      if (s.width !== plot.width || s.height !== plot.height) { plot.setSize(s); again(); }
     };
     this.redraw = function () { if (plot) plot.redraw(false, true); };
   }
@@ -393,7 +407,7 @@
     var figure = new Figure(root);
     figures.push(figure);
     // Figures in closed folds have no width yet: they are made when unfolded.
-    if (window.ResizeObserver) new ResizeObserver(function () { figure.fit(); }).observe(root);
+    if (window.ResizeObserver) new ResizeObserver(function () { requestAnimationFrame(figure.fit); }).observe(root);
     figure.fit();
   });
   if (window.matchMedia) {

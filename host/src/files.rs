@@ -22,7 +22,10 @@ pub struct WriteError {
 /// # Errors
 /// [`WriteError`] naming the file.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let at = |cause| WriteError { path: path.into(), cause };
+    let at = |cause| WriteError {
+        path: path.into(),
+        cause,
+    };
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -38,7 +41,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 #[cfg(unix)]
 fn make_readable(file: &tempfile::NamedTempFile) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
-    file.as_file().set_permissions(fs::Permissions::from_mode(0o644))
+    file.as_file()
+        .set_permissions(fs::Permissions::from_mode(0o644))
 }
 
 #[cfg(not(unix))]
@@ -51,5 +55,8 @@ fn make_readable(_file: &tempfile::NamedTempFile) -> io::Result<()> {
 /// # Errors
 /// [`WriteError`] naming the folder.
 pub fn folder(path: &Path) -> Result<(), WriteError> {
-    fs::create_dir_all(path).map_err(|cause| WriteError { path: path.into(), cause })
+    fs::create_dir_all(path).map_err(|cause| WriteError {
+        path: path.into(),
+        cause,
+    })
 }

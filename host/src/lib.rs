@@ -6,13 +6,16 @@
 
 pub mod commands;
 pub mod data;
+pub mod demo;
 pub mod emulated;
 pub mod excite;
 pub mod files;
 pub mod identify;
 pub mod link;
+pub mod pages;
 pub mod plant;
 pub mod prepare;
 pub mod report;
 pub mod robot;
 pub mod simulate;
+pub mod validate;

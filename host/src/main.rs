@@ -1,2 +1,16 @@
 //! The `rig` program.
-fn main() {}
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use rig_host::commands::Cli;
+
+fn main() -> ExitCode {
+    match Cli::parse().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("rig: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

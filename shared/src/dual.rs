@@ -78,6 +78,8 @@ impl<T: Real, const N: usize> Sub for Dual<T, N> {
     }
 }
 
+// The product and quotient rules mix operators by nature.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<T: Real, const N: usize> Mul for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
@@ -89,6 +91,7 @@ impl<T: Real, const N: usize> Mul for Dual<T, N> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl<T: Real, const N: usize> Div for Dual<T, N> {
     type Output = Self;
     #[inline(always)]
@@ -191,6 +194,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::multibody::{Chain, JointGeometry, JointKind, inverse_dynamics};
 

@@ -19,6 +19,10 @@
 //! â/a = ω³/(s+ω)³ (group delay 3/ω). Below one edge in some 0.7/ω the edges themselves limit
 //! the bandwidth.
 //!
+//! Measured ripple of the velocity (rms, 100 Hz of bandwidth at 10 kHz; test `ripple_at_low_speed`), counts/s, and that of a
+//! linear observer of the same bandwidth: at 1 count/s 0.0005 (17), at 10 0.007 (54), at 100 0.19 (112), at 1000 8.9 (21),
+//! at 5000 43 (52), at 20 000 91 (95), at 400 000 24 (26).
+//!
 //! Position is an integer of counts plus a fraction, velocity and acceleration are per sample inside, so `f32`
 //! resolves the same after any number of turns.
 //!

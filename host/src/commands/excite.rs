@@ -4,24 +4,14 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
+use super::error::CommandError;
 use super::ui::Ui;
-use crate::excite::{Criterion, Design, ExciteError, Options, StagedKind, design, staged};
-use crate::robot::{Robot, RobotError};
-
-/// Why the command could not do its work.
-#[derive(Debug, thiserror::Error)]
-pub enum ExciteCommandError {
-    /// The robot description.
-    #[error(transparent)]
-    Robot(#[from] RobotError),
-    /// The motion or its file.
-    #[error(transparent)]
-    Excite(#[from] ExciteError),
-}
+use crate::excite::{Criterion, Design, Options, StagedKind, design, staged};
+use crate::robot::Robot;
 
 /// What is optimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum CriterionArg {
+pub(crate) enum CriterionArg {
     /// Condition number: errors spread evenly over the parameters
     Cond,
     /// Smallest singular value: the worst combination known as well as possible
@@ -32,7 +22,7 @@ pub enum CriterionArg {
 
 /// Kind of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum KindArg {
+pub(crate) enum KindArg {
     /// Optimal periodic motion, for identification
     Fourier,
     /// Swept sine, for resonances and frequency response
@@ -50,50 +40,50 @@ pub enum KindArg {
 /// The limits stand in the robot description under [joint.limits]. The torque limit is kept by the inertia and
 /// friction written there, where they are. The same seed gives the same file.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Robot description (.toml or .urdf)
     #[arg(long)]
-    pub robot: PathBuf,
+    pub(crate) robot: PathBuf,
     /// File to write: .toml holds the motion's parameters (for the rig), .csv its samples
     #[arg(long)]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Kind of motion; all but fourier move one joint
     #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
-    pub kind: KindArg,
+    pub(crate) kind: KindArg,
     /// What is optimised (fourier)
     #[arg(long, value_enum, default_value_t = CriterionArg::Cond)]
-    pub criterion: CriterionArg,
+    pub(crate) criterion: CriterionArg,
     /// Harmonics per joint, 1 to 8 (fourier)
     #[arg(long, default_value_t = 5)]
-    pub harmonics: usize,
+    pub(crate) harmonics: usize,
     /// Period of the slowest harmonic, s [default: from the limits] (fourier)
     #[arg(long)]
-    pub period: Option<f64>,
+    pub(crate) period: Option<f64>,
     /// Whole periods at full amplitude (fourier)
     #[arg(long, default_value_t = 5)]
-    pub periods: u16,
+    pub(crate) periods: u16,
     /// Joint positions at the beginning, comma between them, rad or m [default: free for fourier, else mid-range]
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
-    pub start: Option<Vec<f64>>,
+    pub(crate) start: Option<Vec<f64>>,
     /// The joint that moves [default: the first] (all but fourier)
     #[arg(long)]
-    pub joint: Option<String>,
+    pub(crate) joint: Option<String>,
     /// Random starts of the optimiser: more find better motions and take longer (fourier)
     #[arg(long, default_value_t = 24)]
-    pub starts: u32,
+    pub(crate) starts: u32,
     /// Seed of the random starts (fourier)
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Samples a second in a .csv, Hz
     #[arg(long, default_value_t = 1000.0)]
-    pub rate: f64,
+    pub(crate) rate: f64,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// A description or options that do not serve, no motion within the limits, a file that cannot be written.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), ExciteCommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = Robot::load(&args.robot)?;
     let kind = match args.kind {
         KindArg::Fourier => return optimal(args, &robot, ui),
@@ -116,7 +106,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), ExciteCommandError> {
     Ok(())
 }
 
-fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), ExciteCommandError> {
+fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let options = Options {
         criterion: match args.criterion {
             CriterionArg::Cond => Criterion::ConditionNumber,

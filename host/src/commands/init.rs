@@ -10,7 +10,7 @@ use crate::files::write_whole;
 
 /// Robots that there is a description of.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The one-link geared rig.
     OneLink,
     /// The EMPS ball-screw axis whose public recordings the project reproduces.
@@ -19,23 +19,23 @@ pub enum Kind {
 
 /// Writes a commented robot description to start from.
 #[derive(Debug, ClapArgs)]
-pub struct Args {
+pub(crate) struct Args {
     /// Which robot
     #[arg(value_enum)]
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// File to write [default: the robot's name with .toml]
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Replace the file if it exists
     #[arg(long)]
-    pub force: bool,
+    pub(crate) force: bool,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// Where the file exists already or cannot be written.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (name, text) = match args.kind {
         Kind::OneLink => ("one-link.toml", include_str!("../../robots/one-link.toml")),
         Kind::Emps => ("emps.toml", include_str!("../../robots/emps.toml")),
@@ -45,6 +45,9 @@ pub fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         return Err(CommandError::Exists { path });
     }
     write_whole(&path, text.as_bytes())?;
-    ui.say(&format!("{}: change what is not true of your rig, then give it to the other commands as --robot.", path.display()));
+    ui.say(&format!(
+        "{}: change what is not true of your rig, then give it to the other commands as --robot.",
+        path.display()
+    ));
     Ok(())
 }

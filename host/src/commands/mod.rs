@@ -1,5 +1,64 @@
-//! commands
+//! The program's verbs, one file each: arguments in, library called, results named.
 
-pub mod excite;
-pub mod simulate;
-pub mod ui;
+mod base;
+mod demo;
+mod error;
+mod excite;
+mod friction_map;
+mod identify;
+mod init;
+mod input;
+mod record;
+mod simulate;
+mod ui;
+mod validate;
+
+use clap::{Parser, Subcommand};
+
+pub use error::CommandError;
+use ui::Ui;
+
+/// Identifies a robot's dynamics and friction: record, identify, validate, compensate.
+///
+/// Without a command: the demonstration, which needs no hardware.
+#[derive(Debug, Parser)]
+#[command(name = "rig", version)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Init(init::Args),
+    Record(record::Args),
+    Excite(excite::Args),
+    Simulate(simulate::Args),
+    Base(base::Args),
+    Identify(identify::Args),
+    FrictionMap(friction_map::Args),
+    Validate(validate::Args),
+}
+
+impl Cli {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// The sentence for the person at the terminal.
+    pub fn run(self) -> Result<(), CommandError> {
+        let ui = Ui::new();
+        match self.command {
+            None => demo::run(&demo::Args::default(), &ui),
+            Some(Command::Demo(args)) => demo::run(&args, &ui),
+            Some(Command::Init(args)) => init::run(&args, &ui),
+            Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Excite(args)) => excite::run(&args, &ui),
+            Some(Command::Simulate(args)) => simulate::run(&args, &ui),
+            Some(Command::Base(args)) => base::run(&args, &ui),
+            Some(Command::Identify(args)) => identify::run(&args, &ui),
+            Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
+            Some(Command::Validate(args)) => validate::run(&args, &ui),
+        }
+    }
+}

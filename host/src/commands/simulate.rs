@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::excite::ExciteCommandError;
+use super::error::CommandError;
 use super::ui::Ui;
 use crate::excite::{Noise, load_reference, replay};
 use crate::robot::Robot;
@@ -12,38 +12,38 @@ use crate::robot::Robot;
 /// Writes a recording with the columns t, q, qd, tau and ref per joint, which the other commands read like one of the
 /// real robot. The same seed gives the same file.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Robot description (.toml or .urdf) with inertia and friction
     #[arg(long)]
-    pub robot: PathBuf,
+    pub(crate) robot: PathBuf,
     /// Trajectory that `rig excite` wrote (.toml or .csv), or a recording whose reference is run again
     #[arg(long)]
-    pub trajectory: PathBuf,
+    pub(crate) trajectory: PathBuf,
     /// Recording to write (.csv or .mcap)
     #[arg(long)]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Samples a second for a .toml trajectory, Hz; a .csv has its own
     #[arg(long, default_value_t = 1000.0)]
-    pub rate: f64,
+    pub(crate) rate: f64,
     /// Standard deviation of the noise on positions, rad or m
     #[arg(long, default_value_t = 0.0)]
-    pub noise_position: f64,
+    pub(crate) noise_position: f64,
     /// Standard deviation of the noise on velocities, rad/s or m/s
     #[arg(long, default_value_t = 0.0)]
-    pub noise_velocity: f64,
+    pub(crate) noise_velocity: f64,
     /// Standard deviation of the noise on torques, N·m or N
     #[arg(long, default_value_t = 0.0)]
-    pub noise_torque: f64,
+    pub(crate) noise_torque: f64,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// Files that cannot be read or written, a model that cannot be simulated.
-pub fn run(args: &Args, ui: &Ui) -> Result<(), ExciteCommandError> {
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = Robot::load(&args.robot)?;
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {

@@ -13,7 +13,7 @@ use rig_shared::estimation::SettingsFault;
 use crate::link::Device;
 use crate::plant::{Plant, PlantConfig};
 
-pub use nameplate::{Nameplate, NameplateError};
+pub use nameplate::{Nameplate, NameplateError, link_parameters};
 
 /// The control application, run tick by tick against the plant, with the real wire protocol at its end.
 pub struct EmulatedRig {
@@ -29,7 +29,11 @@ impl EmulatedRig {
     ///
     /// # Errors
     /// What is wrong with the nameplate's estimator settings.
-    pub fn new(nameplate: &Nameplate, plant: PlantConfig, seed: u64) -> Result<Self, SettingsFault> {
+    pub fn new(
+        nameplate: &Nameplate,
+        plant: PlantConfig,
+        seed: u64,
+    ) -> Result<Self, SettingsFault> {
         let (config, settings) = (nameplate.config, nameplate.settings);
         Ok(Self {
             config,
@@ -75,7 +79,8 @@ impl Device for EmulatedRig {
             to_host.extend_from_slice(frame);
             true
         };
-        self.speaker.receive(&self.config, &mut self.state, from_host, &mut transmit);
+        self.speaker
+            .receive(&self.config, &mut self.state, from_host, &mut transmit);
         for _ in 0..self.ticks_per_slice() {
             let output = self.tick();
             self.speaker.publish(&self.state, &output, &mut transmit);

@@ -26,11 +26,19 @@ const OBSERVER_BANDWIDTH: f32 = 200.0;
 /// Speed below which the measured velocity says nothing about the direction, rad/s.
 const DIRECTION_THRESHOLD: f32 = 0.01;
 
+/// Speed above which the on-line estimator takes friction to be Coulomb and viscous alone, rad/s. Geared
+/// servo drives weaken with speed up to some 0.05 to 0.1 rad/s at the joint, with tails beyond that the parameters
+/// fc and fv would absorb (with half of the excess gone at 0.025 rad/s, 1.5 % of it is left at 0.2 rad/s,
+/// a fifth at 0.05 rad/s). An excitation at 1 to 3 rad/s loses a tenth of its samples to it.
+const SLIP_VELOCITY: f32 = 0.2;
+
 /// Why a description does not make a one-link rig.
 #[derive(Debug, Error)]
 pub enum NameplateError {
     /// Not one joint.
-    #[error("the one-link rig has one joint, but \"{robot}\" has {joints}: give the description of a one-link rig (`rig init one-link` writes one).")]
+    #[error(
+        "the one-link rig has one joint, but \"{robot}\" has {joints}: give the description of a one-link rig (`rig init one-link` writes one)."
+    )]
     JointCount {
         /// Name of the robot.
         robot: String,
@@ -69,15 +77,26 @@ impl Nameplate {
     /// [`NameplateError`] naming what is missing.
     pub fn from_robot(robot: &Robot) -> Result<Self, NameplateError> {
         let [joint] = robot.joints.as_slice() else {
-            return Err(NameplateError::JointCount { robot: robot.name.clone(), joints: robot.joints.len() });
+            return Err(NameplateError::JointCount {
+                robot: robot.name.clone(),
+                joints: robot.joints.len(),
+            });
         };
         if joint.kind == JointKind::Prismatic {
             return Err(NameplateError::Prismatic(joint.name.clone()));
         }
-        let missing = |what| NameplateError::Missing { joint: joint.name.clone(), what };
-        let drive = joint.drive.as_ref().ok_or_else(|| missing("[joint.drive]"))?;
+        let missing = |what| NameplateError::Missing {
+            joint: joint.name.clone(),
+            what,
+        };
+        let drive = joint
+            .drive
+            .as_ref()
+            .ok_or_else(|| missing("[joint.drive]"))?;
         let rates = Rates::default();
-        let counts = drive.encoder_counts_per_rev.ok_or_else(|| missing("drive.encoder_counts_per_rev"))?;
+        let counts = drive
+            .encoder_counts_per_rev
+            .ok_or_else(|| missing("drive.encoder_counts_per_rev"))?;
         let limits = limits(joint, drive)?;
         let model = link_parameters(robot)?;
         let config = Config {
@@ -87,8 +106,12 @@ impl Nameplate {
                 gear_ratio: drive.gear_ratio as f32,
                 rotor_inertia: drive.rotor_inertia as f32,
                 torque_constant: drive.torque_constant as f32,
-                resistance: drive.resistance.ok_or_else(|| missing("drive.resistance"))? as f32,
-                inductance: drive.inductance.ok_or_else(|| missing("drive.inductance"))? as f32,
+                resistance: drive
+                    .resistance
+                    .ok_or_else(|| missing("drive.resistance"))? as f32,
+                inductance: drive
+                    .inductance
+                    .ok_or_else(|| missing("drive.inductance"))? as f32,
             },
             encoder: Encoder {
                 counts_per_motor_turn: counts as u32,
@@ -136,12 +159,34 @@ pub fn link_parameters(robot: &Robot) -> Result<LinkParameters<f32>, NameplateEr
     let numbers = |result: Result<(), rig_shared::multibody::MultibodyError>| {
         result.map_err(|error| NameplateError::Model(SimulateError::Multibody(error)))
     };
-    numbers(inertia_matrix(&model.chain, &model.parameters, &[0.0], &mut inertia))?;
-    numbers(gravity_vector(&model.chain, &model.parameters, &[0.0], &mut at_zero))?;
-    numbers(gravity_vector(&model.chain, &model.parameters, &[FRAC_PI_2], &mut at_quarter))?;
+    numbers(inertia_matrix(
+        &model.chain,
+        &model.parameters,
+        &[0.0],
+        &mut inertia,
+    ))?;
+    numbers(gravity_vector(
+        &model.chain,
+        &model.parameters,
+        &[0.0],
+        &mut at_zero,
+    ))?;
+    numbers(gravity_vector(
+        &model.chain,
+        &model.parameters,
+        &[FRAC_PI_2],
+        &mut at_quarter,
+    ))?;
     if inertia[0].is_nan() || inertia[0] <= 0.0 {
-        let joint = robot.joints.first().map(|joint| joint.name.clone()).unwrap_or_default();
-        return Err(NameplateError::Missing { joint, what: "[joint.inertial] or drive.rotor_inertia" });
+        let joint = robot
+            .joints
+            .first()
+            .map(|joint| joint.name.clone())
+            .unwrap_or_default();
+        return Err(NameplateError::Missing {
+            joint,
+            what: "[joint.inertial] or drive.rotor_inertia",
+        });
     }
     let [.., viscous, coulomb, offset] = model.parameters[0];
     Ok(LinkParameters {
@@ -155,15 +200,23 @@ pub fn link_parameters(robot: &Robot) -> Result<LinkParameters<f32>, NameplateEr
 }
 
 fn limits(joint: &Joint, drive: &crate::robot::Drive) -> Result<Limits<f32>, NameplateError> {
-    let missing = |what| NameplateError::Missing { joint: joint.name.clone(), what };
-    let limits = joint.limits.as_ref().ok_or_else(|| missing("[joint.limits]"))?;
+    let missing = |what| NameplateError::Missing {
+        joint: joint.name.clone(),
+        what,
+    };
+    let limits = joint
+        .limits
+        .as_ref()
+        .ok_or_else(|| missing("[joint.limits]"))?;
     let torque = limits.torque.ok_or_else(|| missing("limits.torque"))?;
     let peak = torque / (drive.torque_constant * drive.gear_ratio).abs();
     Ok(Limits {
         position_low: limits.position[0] as f32,
         position_high: limits.position[1] as f32,
         velocity: limits.velocity as f32,
-        acceleration: limits.acceleration.ok_or_else(|| missing("limits.acceleration"))? as f32,
+        acceleration: limits
+            .acceleration
+            .ok_or_else(|| missing("limits.acceleration"))? as f32,
         torque: torque as f32,
         // The description has one torque; a small motor stands about half of its peak current for good.
         continuous_current: (0.5 * peak) as f32,
@@ -173,7 +226,11 @@ fn limits(joint: &Joint, drive: &crate::robot::Drive) -> Result<Limits<f32>, Nam
 
 fn friction(joint: &Joint) -> Friction<f32> {
     let prior = joint.friction.clone().unwrap_or_default();
-    Friction { coulomb: prior.coulomb as f32, viscous: prior.viscous as f32, ..Friction::default() }
+    Friction {
+        coulomb: prior.coulomb as f32,
+        viscous: prior.viscous as f32,
+        ..Friction::default()
+    }
 }
 
 /// Thresholds of the checks, from what the limits allow.
@@ -201,8 +258,24 @@ fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, gear_ratio: f64) ->
 /// Bands wide enough for any rig that the description could be wrong about, narrow enough to catch a run-away.
 fn estimator(model: &LinkParameters<f32>, limits: &Limits<f32>) -> EstimatorSettings<f32> {
     let torque = limits.torque;
-    let lower = [0.1 * model.inertia, -torque, -torque, 0.0, 0.0, -0.5 * torque];
-    let upper =
-        [10.0 * model.inertia, torque, torque, torque / limits.velocity * 4.0, 0.5 * torque, 0.5 * torque];
-    EstimatorSettings::for_band(lower, upper)
+    let lower = [
+        0.1 * model.inertia,
+        -torque,
+        -torque,
+        0.0,
+        0.0,
+        -0.5 * torque,
+    ];
+    let upper = [
+        10.0 * model.inertia,
+        torque,
+        torque,
+        torque / limits.velocity * 4.0,
+        0.5 * torque,
+        0.5 * torque,
+    ];
+    EstimatorSettings {
+        slip_velocity: SLIP_VELOCITY,
+        ..EstimatorSettings::for_band(lower, upper)
+    }
 }

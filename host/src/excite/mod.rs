@@ -34,11 +34,11 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rig_shared::dual::Dual;
-use rig_shared::multibody::{COLUMNS, Chain, JointGeometry, JointKind, differential_regressor};
+use rig_shared::multibody::{COLUMNS, Chain, differential_regressor};
 use rig_shared::trajectory::HARMONICS;
 
 use crate::identify::{Base, ModelKind};
-use crate::robot::{self, Robot};
+use crate::robot::Robot;
 use crate::simulate::Model;
 
 pub use certificate::Reach;
@@ -242,21 +242,6 @@ fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
         Some(joint) => Err(joint.name.clone()),
         None => Ok(model.parameters.clone()),
     }
-}
-
-fn geometry(robot: &Robot) -> Vec<JointGeometry> {
-    let kind = |kind| match kind {
-        robot::JointKind::Revolute => JointKind::Revolute,
-        robot::JointKind::Prismatic => JointKind::Prismatic,
-    };
-    let joint = |j: &robot::Joint| JointGeometry {
-        kind: kind(j.kind),
-        alpha: j.alpha,
-        a: j.a,
-        theta: j.theta,
-        d: j.d,
-    };
-    robot.joints.iter().map(joint).collect()
 }
 
 /// Root mean square of each base column over states within the limits.
@@ -597,7 +582,7 @@ fn frame_of(robot: &Robot, options: &Options) -> Result<(Frame, Base, Vec<String
     let fastest = schedule.omega() * options.harmonics as f64;
     let sizes = column_sizes(&model.chain, &base.columns, &bounds, &weights, fastest)?;
     let frame = Frame {
-        dual: Chain::<Dual<f64, 3>>::new(&geometry(robot), robot.gravity)
+        dual: Chain::<Dual<f64, 3>>::new(&robot.geometry(), robot.gravity)
             .map_err(crate::simulate::SimulateError::from)?,
         plain: model.chain,
         columns: base.columns.clone(),
@@ -627,7 +612,7 @@ pub fn design(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Design, ExciteError> {
     let (frame, base, notes) = frame_of(robot, options)?;
-    let enclosing = Chain::<Interval>::new(&geometry(robot), robot.gravity)
+    let enclosing = Chain::<Interval>::new(&robot.geometry(), robot.gravity)
         .map_err(crate::simulate::SimulateError::from)?;
     let starts = options.starts as usize;
     let threads = options

@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rig_shared::multibody::{
-    COLUMN_NAMES, COLUMNS, Chain, JointGeometry, JointKind, column, differential_regressor,
-    energy_regressor,
+    COLUMN_NAMES, COLUMNS, Chain, column, differential_regressor, energy_regressor,
 };
 
 use super::{IdentifyError, ModelKind};
@@ -22,21 +21,7 @@ const INDEPENDENT: f64 = 1e-7;
 /// # Errors
 /// [`IdentifyError::Model`] where the geometry is not one.
 pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
-    let joints: Vec<JointGeometry> = robot
-        .joints
-        .iter()
-        .map(|j| JointGeometry {
-            kind: match j.kind {
-                robot::JointKind::Revolute => JointKind::Revolute,
-                robot::JointKind::Prismatic => JointKind::Prismatic,
-            },
-            alpha: j.alpha,
-            a: j.a,
-            theta: j.theta,
-            d: j.d,
-        })
-        .collect();
-    Chain::new(&joints, robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
+    Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
 /// Independent columns of a matrix and how the others follow from them.
@@ -54,10 +39,12 @@ pub struct Independent {
 
 /// Visits the columns of `matrix` in `order` and keeps those that are not, to within `tolerance` of their
 /// length, combinations of the ones kept before: a QR factorisation pivoted by preference (Gautier 1991).
-/// Columns shorter than `tolerance_zero` times the longest count as zero.
+/// Columns shorter than 1e-12 of the longest count as zero.
 pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f64) -> Independent {
     let all = matrix.ncols();
-    let longest = (0..all).map(|c| matrix.column(c).norm()).fold(0.0, f64::max);
+    let longest = (0..all)
+        .map(|c| matrix.column(c).norm())
+        .fold(0.0, f64::max);
     let mut basis: Vec<nalgebra::DVector<f64>> = Vec::new();
     let mut visited: Vec<usize> = Vec::new();
     // Coordinates of every column in the orthonormal basis, filled as the basis grows.
@@ -66,7 +53,7 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     let mut remainder = vec![0.0; all];
     for &c in order {
         let length = matrix.column(c).norm();
-        if !(length > 1e-12 * longest) {
+        if length <= 1e-12 * longest || length.is_nan() {
             continue;
         }
         let mut rest = matrix.column(c).into_owned() / length;
@@ -92,7 +79,11 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     }
     let rank = visited.len();
     let triangle = DMatrix::from_fn(rank, rank, |i, j| {
-        if i <= j { coordinates[visited[j]][i] } else { 0.0 }
+        if i <= j {
+            coordinates[visited[j]][i]
+        } else {
+            0.0
+        }
     });
     let mut order_of: Vec<usize> = (0..rank).collect();
     order_of.sort_by_key(|&k| visited[k]);
@@ -137,7 +128,11 @@ pub struct Base {
 pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
     let revolute: &[usize] = &[4, 5, 6, 8, 9, 1, 2];
     let prismatic: &[usize] = &[0, 1, 2, 3];
-    let of = |joint: usize, list: &[usize]| list.iter().map(move |c| joint * COLUMNS + c).collect::<Vec<_>>();
+    let of = |joint: usize, list: &[usize]| {
+        list.iter()
+            .map(move |c| joint * COLUMNS + c)
+            .collect::<Vec<_>>()
+    };
     let own = |j: usize| match kinds[j] {
         robot::JointKind::Revolute => revolute,
         robot::JointKind::Prismatic => prismatic,
@@ -177,7 +172,8 @@ impl Base {
                 let mut matrix = DMatrix::zeros(states * n, width);
                 let mut out = vec![0.0; n * width];
                 for s in 0..states {
-                    let [q, qd, qdd] = [3.0, 2.0, 5.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                    let [q, qd, qdd] = [3.0, 2.0, 5.0]
+                        .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
                     differential_regressor(&chain, &q, &qd, &qdd, &mut out)
                         .map_err(|e| IdentifyError::Model(e.to_string()))?;
                     for j in 0..n {
@@ -193,7 +189,8 @@ impl Base {
                 let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
                 for row in 0..3 * width {
                     for out in [&mut before, &mut after] {
-                        let [q, qd] = [3.0, 2.0].map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
+                        let [q, qd] = [3.0, 2.0]
+                            .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
                         energy_regressor(&chain, &q, &qd, out)
                             .map_err(|e| IdentifyError::Model(e.to_string()))?;
                     }

@@ -5,17 +5,17 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 /// Groups that are collected; neighbouring ones are joined afterwards where residuals remember for longer.
-pub const FINEST_GROUPS: usize = 64;
+pub(super) const FINEST_GROUPS: usize = 64;
 /// Fewest groups from which an interval is still formed.
 const FEWEST_GROUPS: usize = 8;
 /// A group must be this many times as long as the residual's memory, so that groups are nearly independent.
 const MEMORIES_PER_GROUP: f64 = 10.0;
 /// Lags, in rows, over which the memory of residuals is followed.
-pub const LAGS: usize = 200;
+pub(super) const LAGS: usize = 200;
 
 /// Autocovariance of a stream of residuals.
 #[derive(Clone, Debug)]
-pub struct Memory {
+pub(super) struct Memory {
     ring: Vec<f64>,
     next: usize,
     seen: u64,
@@ -35,7 +35,7 @@ impl Default for Memory {
 
 impl Memory {
     /// Takes the next residual.
-    pub fn push(&mut self, e: f64) {
+    pub(super) fn push(&mut self, e: f64) {
         let size = self.ring.len();
         self.ring[self.next] = e;
         for lag in 0..size.min(self.seen as usize + 1) {
@@ -46,14 +46,14 @@ impl Memory {
     }
 
     /// Autocorrelation at lags 0 … [`LAGS`].
-    pub fn correlation(&self) -> Vec<f64> {
+    pub(super) fn correlation(&self) -> Vec<f64> {
         let zero = self.sums[0].max(f64::MIN_POSITIVE);
         self.sums.iter().map(|s| s / zero).collect()
     }
 
     /// Integrated memory 1 + 2·Σρ in rows, summed while ρ stays above twice its standard error (the truncation
     /// of Geyer's initial sequence, 1992, with the noise of the estimate in mind); never below one.
-    pub fn length(&self) -> f64 {
+    pub(super) fn length(&self) -> f64 {
         let threshold = 2.0 / (self.seen.max(1) as f64).sqrt();
         let sum: f64 = self
             .correlation()
@@ -65,14 +65,14 @@ impl Memory {
     }
 
     /// Residuals seen.
-    pub fn seen(&self) -> u64 {
+    pub(super) fn seen(&self) -> u64 {
         self.seen
     }
 }
 
 /// Sums over stretches of time, in coordinates z in which Σ z·zᵀ over all rows is the identity.
 #[derive(Clone, Debug)]
-pub struct Groups {
+pub(super) struct Groups {
     information: Vec<DMatrix<f64>>,
     score: Vec<DVector<f64>>,
     total: u64,
@@ -80,7 +80,7 @@ pub struct Groups {
 
 impl Groups {
     /// For `total` instants and `size` parameters.
-    pub fn new(size: usize, total: u64) -> Self {
+    pub(super) fn new(size: usize, total: u64) -> Self {
         Self {
             information: vec![DMatrix::zeros(size, size); FINEST_GROUPS],
             score: vec![DVector::zeros(size); FINEST_GROUPS],
@@ -89,7 +89,7 @@ impl Groups {
     }
 
     /// Takes one row: whitened regressor `z` and residual `e` of instant `index`.
-    pub fn push(&mut self, index: u64, z: &DVector<f64>, e: f64) {
+    pub(super) fn push(&mut self, index: u64, z: &DVector<f64>, e: f64) {
         let g = group_of(index, self.total);
         self.information[g].ger(1.0, z, z, 1.0);
         self.score[g].axpy(e, z, 1.0);
@@ -102,7 +102,7 @@ impl Groups {
     /// groups the estimate divided by its standard deviation follows Student's t with G − 1 degrees of freedom
     /// (Bester, Conley & Hansen 2011). `None` where the recording is too short for independent groups, or where all
     /// information on some parameter lies in a single group.
-    pub fn jackknife(&self, memory_rows: f64) -> Option<(DMatrix<f64>, usize)> {
+    pub(super) fn jackknife(&self, memory_rows: f64) -> Option<(DMatrix<f64>, usize)> {
         let most = (self.total as f64 / (MEMORIES_PER_GROUP * memory_rows)).floor() as usize;
         let groups = most.clamp(FEWEST_GROUPS, FINEST_GROUPS);
         let size = self.score[0].len();
@@ -124,15 +124,12 @@ impl Groups {
             let d = shift - &mean;
             covariance.ger(1.0, &d, &d, 1.0);
         }
-        Some((
-            covariance * ((groups - 1) as f64 / groups as f64),
-            groups,
-        ))
+        Some((covariance * ((groups - 1) as f64 / groups as f64), groups))
     }
 }
 
 /// Group of instant `index` among `total`.
-pub fn group_of(index: u64, total: u64) -> usize {
+pub(super) fn group_of(index: u64, total: u64) -> usize {
     ((index as u128 * FINEST_GROUPS as u128 / total.max(1) as u128) as usize).min(FINEST_GROUPS - 1)
 }
 

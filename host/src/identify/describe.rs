@@ -6,31 +6,6 @@ use rig_shared::multibody::{COLUMNS, column};
 use super::Identification;
 use crate::robot::{Inertial, JointFriction, JointKind, Robot};
 
-/// Standard parameters of a description, 14 a joint.
-fn standard(robot: &Robot) -> Vec<f64> {
-    robot
-        .joints
-        .iter()
-        .flat_map(|joint| {
-            let mut row = [0.0; COLUMNS];
-            if let Some(i) = &joint.inertial {
-                row[column::MASS] = i.mass;
-                row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&i.first_moment);
-                row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&i.inertia);
-            }
-            if let Some(d) = &joint.drive {
-                row[column::DRIVE_INERTIA] = d.rotor_inertia * d.gear_ratio * d.gear_ratio;
-            }
-            if let Some(f) = &joint.friction {
-                row[column::VISCOUS] = f.viscous;
-                row[column::COULOMB] = f.coulomb;
-                row[column::OFFSET] = f.offset;
-            }
-            row
-        })
-        .collect()
-}
-
 /// `robot` with the identified values, its dynamics those of the base parameters.
 ///
 /// Only combinations are identified, so their split is a choice: the prior description is moved by the smallest
@@ -40,7 +15,7 @@ fn standard(robot: &Robot) -> Vec<f64> {
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let k = &identification.details.combination;
     let values = DVector::from_column_slice(&identification.details.estimate.values);
-    let mut pi = DVector::from_vec(standard(robot));
+    let mut pi = DVector::from_vec(robot.standard_parameters().concat());
     let mut remarks = Vec::new();
     let mut result = robot.clone();
     if robot.joints.len() == 1 {
@@ -57,7 +32,8 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         let mut inertia = [0.0; 6];
         inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
         if let Some(drive) = &mut joint.drive {
-            drive.rotor_inertia = row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
+            drive.rotor_inertia =
+                row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
         } else {
             // Without a drive there is no place for its inertia but the link's own.
             inertia[5] += row[column::DRIVE_INERTIA];
@@ -81,7 +57,12 @@ fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {
 }
 
 /// Distributes the base parameters of one link.
-fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64>, remarks: &mut Vec<String>) {
+fn one_link(
+    robot: &Robot,
+    identification: &Identification,
+    pi: &mut DVector<f64>,
+    remarks: &mut Vec<String>,
+) {
     let details = &identification.details;
     let identified = |c: usize| {
         details
@@ -104,14 +85,20 @@ fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64
             let Some(total) = identified(column::MASS) else {
                 return;
             };
-            let drive = if prior_drive < total { prior_drive } else { 0.0 };
+            let drive = if prior_drive < total {
+                prior_drive
+            } else {
+                0.0
+            };
             if drive != prior_drive {
                 remarks.push(format!("The drive's inertia of {prior_drive} kg in the description exceeds the identified {total} kg and was set to zero."));
             }
             pi[column::DRIVE_INERTIA] = drive;
             pi[column::MASS] = total - drive;
             if total <= 0.0 {
-                remarks.push(format!("The identified mass of {total} kg is not positive: no simulation can use it."));
+                remarks.push(format!(
+                    "The identified mass of {total} kg is not positive: no simulation can use it."
+                ));
             }
         }
         JointKind::Revolute => {
@@ -122,16 +109,30 @@ fn one_link(robot: &Robot, identification: &Identification, pi: &mut DVector<f64
             let mut drive = prior_drive;
             let prior_mass = pi[column::MASS];
             // Izz about the joint is at least (m·c)²/m: with the mass given that bounds the drive's share.
-            let least = |mass: f64| if mass > 0.0 { moment * moment / mass } else { 0.0 };
+            let least = |mass: f64| {
+                if mass > 0.0 {
+                    moment * moment / mass
+                } else {
+                    0.0
+                }
+            };
             if total - drive < least(prior_mass) || total - drive <= 0.0 {
-                drive = if total - least(prior_mass) > 0.0 { (total - least(prior_mass)).min(drive) * 0.5 } else { 0.0 };
+                drive = if total - least(prior_mass) > 0.0 {
+                    (total - least(prior_mass)).min(drive) * 0.5
+                } else {
+                    0.0
+                };
                 remarks.push(format!("The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {total} kg*m^2; {drive} kg*m^2 were left to it."));
             }
             let link = total - drive;
             let mass = if prior_mass > 0.0 && least(prior_mass) <= link {
                 prior_mass
             } else {
-                let mass = if moment > 0.0 && link > 0.0 { 2.0 * moment * moment / link } else { 1.0 };
+                let mass = if moment > 0.0 && link > 0.0 {
+                    2.0 * moment * moment / link
+                } else {
+                    1.0
+                };
                 remarks.push(format!("The mass does not follow from this motion; {mass} kg was chosen, twice the smallest that the inertia allows."));
                 mass
             };

@@ -152,7 +152,9 @@ impl TriangularFactor {
         let (width, columns) = (self.width, self.columns());
         (0..width)
             .map(|i| {
-                let model: f64 = (0..columns.min(x.len())).map(|j| r[j * width + i] * x[j]).sum();
+                let model: f64 = (0..columns.min(x.len()))
+                    .map(|j| r[j * width + i] * x[j])
+                    .sum();
                 (r[columns * width + i] - model).powi(2)
             })
             .sum()
@@ -175,7 +177,9 @@ mod tests {
     fn accumulated_factor_solves_as_the_whole_matrix_does() {
         let mut g = rand_pcg::Pcg64::seed_from_u64(3);
         for rows in [5usize, 127, 128, 129, 1000] {
-            let a = DMatrix::from_fn(rows, 5, |_, j| (g.random::<f64>() - 0.5) * 10f64.powi(j as i32 - 2));
+            let a = DMatrix::from_fn(rows, 5, |_, j| {
+                (g.random::<f64>() - 0.5) * 10f64.powi(j as i32 - 2)
+            });
             let y = DVector::from_fn(rows, |_, _| g.random::<f64>());
             let mut factor = TriangularFactor::new(5);
             let (mut upper, mut lower) = (TriangularFactor::new(5), TriangularFactor::new(5));
@@ -192,8 +196,12 @@ mod tests {
                 let x = r.clone().solve_upper_triangular(&z).unwrap();
                 assert!((&x - &expected).norm() < 1e-9 * expected.norm());
                 let residual = (&a * &expected - &y).norm_squared();
-                assert!((f.residual_squares(x.as_slice()) - residual).abs() < 1e-10 * y.norm_squared());
-                assert!((r.transpose() * &r - a.transpose() * &a).norm() < 1e-10 * (a.norm().powi(2)));
+                assert!(
+                    (f.residual_squares(x.as_slice()) - residual).abs() < 1e-10 * y.norm_squared()
+                );
+                assert!(
+                    (r.transpose() * &r - a.transpose() * &a).norm() < 1e-10 * (a.norm().powi(2))
+                );
             }
         }
     }
@@ -203,7 +211,12 @@ mod tests {
         // Läuchli's matrix: with ε = 1e-9, 1 + ε² rounds to one and AᵀA is singular.
         let e = 1e-9;
         let mut factor = TriangularFactor::new(3);
-        for (row, y) in [([1.0, 1.0, 1.0], 6.0), ([e, 0.0, 0.0], e), ([0.0, e, 0.0], 2.0 * e), ([0.0, 0.0, e], 3.0 * e)] {
+        for (row, y) in [
+            ([1.0, 1.0, 1.0], 6.0),
+            ([e, 0.0, 0.0], e),
+            ([0.0, e, 0.0], 2.0 * e),
+            ([0.0, 0.0, e], 3.0 * e),
+        ] {
             factor.push(&row, y, 1.0);
         }
         let (r, z) = factor.system();

@@ -11,9 +11,14 @@
 mod base;
 mod covariance;
 mod describe;
+mod evaluate;
+mod excitation;
 mod factor;
+mod friction_map;
+mod linear;
 mod model;
 mod residual;
+mod robust;
 mod solve;
 
 #[cfg(test)]
@@ -21,10 +26,14 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 
-pub use base::{Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit};
+pub use base::{
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
+};
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
+pub(crate) use evaluate::torque_residuals;
 pub use factor::TriangularFactor;
+pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
 pub use residual::{Dependence, ResidualReport, Series};
 pub use solve::identify;
@@ -146,13 +155,17 @@ pub enum IdentifyError {
         saturated: u64,
     },
     /// The torque is zero throughout.
-    #[error("The torque of joint {joint} is zero throughout; record the torque or the motor current.")]
+    #[error(
+        "The torque of joint {joint} is zero throughout; record the torque or the motor current."
+    )]
     NoTorque {
         /// Number of the joint, from 1.
         joint: usize,
     },
     /// The fit is singular.
-    #[error("The least-squares problem is singular although its columns looked independent; the smallest of them is {column}.")]
+    #[error(
+        "The least-squares problem is singular although its columns looked independent; the smallest of them is {column}."
+    )]
     Singular {
         /// Its name.
         column: String,
@@ -170,7 +183,9 @@ pub enum IdentifyError {
         needed: u64,
     },
     /// A window that no integral model can have.
-    #[error("A window of {window} s is not possible for the integral model; it must last between {least} s and {most} s here.")]
+    #[error(
+        "A window of {window} s is not possible for the integral model; it must last between {least} s and {most} s here."
+    )]
     Window {
         /// Asked for, s.
         window: f64,

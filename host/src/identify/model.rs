@@ -1,8 +1,6 @@
 //! Rows of the two models, streamed from a recording.
 
-use rig_shared::multibody::{
-    COLUMNS, Chain, column, differential_regressor, energy_regressor,
-};
+use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor, energy_regressor};
 
 use super::{IdentifyError, ModelKind};
 use crate::prepare::{Masked, Motion, PrepareError, Recording, Treatment, each_motion};
@@ -56,6 +54,8 @@ pub struct Tally {
     pub slow: Vec<u64>,
     /// Per joint (or window), saturated.
     pub saturated: Vec<u64>,
+    /// Rows, before decimation, of stretches between gaps that are shorter than the filters need.
+    pub short: u64,
 }
 
 impl Tally {
@@ -83,8 +83,19 @@ impl Tally {
                 })
                 .collect::<Vec<_>>()
         };
-        let mut all = entries(&self.slow, "speed below the threshold: the sign of friction is not known");
+        let mut all = entries(
+            &self.slow,
+            "speed below the threshold: the sign of friction is not known",
+        );
         all.extend(entries(&self.saturated, "torque at its limit"));
+        if self.short > 0 {
+            all.push(Masked {
+                joint: 0,
+                rows: self.short,
+                why: "rows of stretches between gaps in time that are too short for the filters"
+                    .into(),
+            });
+        }
         all
     }
 }
@@ -105,6 +116,9 @@ pub fn each_rows(
         ModelKind::Integral => plan.window,
     };
     each_motion(recording, plan.treatment, reach, &mut |motion| {
+        if motion.usable.0 >= motion.usable.1 {
+            tally.short += motion.t.len() as u64;
+        }
         let rows = match model {
             ModelKind::Differential => differential_rows(motion, plan, &mut tally)?,
             ModelKind::Integral => integral_rows(motion, plan, &mut tally)?,
@@ -119,7 +133,11 @@ fn failed(e: impl std::fmt::Display) -> PrepareError {
 }
 
 /// Torque and regressor at the full rate, all passed through the parallel low-pass, one row in so many kept.
-fn differential_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows, PrepareError> {
+fn differential_rows(
+    motion: &Motion,
+    plan: &Plan,
+    tally: &mut Tally,
+) -> Result<Rows, PrepareError> {
     let n = motion.joints.len();
     let (rows, p) = (motion.t.len(), plan.columns.len());
     let width = n * COLUMNS;
@@ -148,8 +166,16 @@ fn differential_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<
         .collect();
     let mut result = Rows {
         t: picked.iter().map(|&k| motion.t[k]).collect(),
-        q: motion.joints.iter().map(|j| picked.iter().map(|&k| j.q[k]).collect()).collect(),
-        qd: motion.joints.iter().map(|j| picked.iter().map(|&k| j.qd[k]).collect()).collect(),
+        q: motion
+            .joints
+            .iter()
+            .map(|j| picked.iter().map(|&k| j.q[k]).collect())
+            .collect(),
+        qd: motion
+            .joints
+            .iter()
+            .map(|j| picked.iter().map(|&k| j.qd[k]).collect())
+            .collect(),
         ..Default::default()
     };
     for (j, joint) in motion.joints.iter().enumerate() {
@@ -231,7 +257,10 @@ fn integral_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows
     for (j, joint) in motion.joints.iter().enumerate() {
         let qd = &joint.qd;
         let torque = low_pass.zero_phase(&joint.tau);
-        let sign: Vec<f64> = qd.iter().map(|v| rig_shared::scalar::Real::sgn(*v)).collect();
+        let sign: Vec<f64> = qd
+            .iter()
+            .map(|v| rig_shared::scalar::Real::sgn(*v))
+            .collect();
         let sign = low_pass.zero_phase(&sign);
         let squares = cumulative(&|k| qd[k] * qd[k]);
         for (sum, part) in work.iter_mut().zip(cumulative(&|k| torque[k] * qd[k])) {
@@ -241,8 +270,13 @@ fn integral_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows
         for (sum, part) in activity.iter_mut().zip(&squares) {
             *sum += share * part;
         }
-        least_activity += share * plan.treatment.speed_threshold[j].powi(2) * plan.window as f64 * dt;
-        friction.push([squares, cumulative(&|k| sign[k] * qd[k]), cumulative(&|k| qd[k])]);
+        least_activity +=
+            share * plan.treatment.speed_threshold[j].powi(2) * plan.window as f64 * dt;
+        friction.push([
+            squares,
+            cumulative(&|k| sign[k] * qd[k]),
+            cumulative(&|k| qd[k]),
+        ]);
     }
     let duration = plan.window as f64 * dt;
     let mut result = Rows {
@@ -254,7 +288,9 @@ fn integral_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows
     let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
     for start in motion.usable.0..motion.usable.1 {
         let end = start + plan.window;
-        if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64) || end >= motion.sound_end {
+        if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64)
+            || end >= motion.sound_end
+        {
             continue;
         }
         for (k, out) in [(start, &mut before), (end, &mut after)] {
@@ -263,7 +299,10 @@ fn integral_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows
             energy_regressor(plan.chain, &q, &qd, out).map_err(failed)?;
         }
         let moved = activity[end] - activity[start];
-        let scale = 1.0 / (duration * (moved + least_activity)).sqrt().max(f64::MIN_POSITIVE);
+        let scale = 1.0
+            / (duration * (moved + least_activity))
+                .sqrt()
+                .max(f64::MIN_POSITIVE);
         let equation = &mut result.equations[0];
         for &c in plan.columns.iter().take(p) {
             let joint = &friction[c / COLUMNS];
@@ -280,7 +319,10 @@ fn integral_rows(motion: &Motion, plan: &Plan, tally: &mut Tally) -> Result<Rows
         }
         equation.y.push(scale * (work[end] - work[start]));
         let still = moved <= least_activity;
-        let saturated = motion.joints.iter().any(|j| j.saturated[start..=end].iter().any(|s| *s));
+        let saturated = motion
+            .joints
+            .iter()
+            .any(|j| j.saturated[start..=end].iter().any(|s| *s));
         if saturated {
             Tally::count(&mut tally.saturated, 0);
         } else if still {

@@ -10,7 +10,7 @@ const BINS: usize = 20;
 /// Lags of the whiteness test.
 const TEST_LAGS: usize = 20;
 /// Most points of a time series that is kept for plots.
-pub const SERIES_POINTS: usize = 4000;
+pub(super) const SERIES_POINTS: usize = 4000;
 
 /// Mean residual over one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -104,7 +104,11 @@ impl Binned {
         let (mut middle, mut mean, mut std) = (Vec::new(), Vec::new(), Vec::new());
         let mut best = (1.0f64, 0.0, 0.0);
         for b in 0..self.bins {
-            let of = |list: &[f64]| (0..FINEST_GROUPS).map(|g| list[g * self.bins + b]).collect::<Vec<_>>();
+            let of = |list: &[f64]| {
+                (0..FINEST_GROUPS)
+                    .map(|g| list[g * self.bins + b])
+                    .collect::<Vec<_>>()
+            };
             let (sums, counts) = (of(&self.sums), of(&self.counts));
             let total: f64 = counts.iter().sum();
             let groups = counts.iter().filter(|c| **c > 0.0).count();
@@ -112,28 +116,43 @@ impl Binned {
                 continue;
             }
             let m = sums.iter().sum::<f64>() / total;
-            let squares: f64 = sums.iter().zip(&counts).map(|(s, c)| (s - m * c).powi(2)).sum();
+            let squares: f64 = sums
+                .iter()
+                .zip(&counts)
+                .map(|(s, c)| (s - m * c).powi(2))
+                .sum();
             let g = groups as f64;
             let s = (squares * g / (g - 1.0)).sqrt() / total;
             let at = low + (b as f64 + 0.5) * step;
             middle.push(at);
             mean.push(m);
             std.push(s);
-            let p = StudentsT::new(0.0, 1.0, g - 1.0).map_or(1.0, |t| 2.0 * t.sf((m / s.max(f64::MIN_POSITIVE)).abs()));
+            let p = StudentsT::new(0.0, 1.0, g - 1.0)
+                .map_or(1.0, |t| 2.0 * t.sf((m / s.max(f64::MIN_POSITIVE)).abs()));
             if p < best.0 {
                 best = (p, at, m);
             }
         }
         let p_value = (best.0 * middle.len().max(1) as f64).min(1.0);
         let text = if middle.len() < 2 {
-            format!("Too little of the range of {} was visited to judge.", self.name)
+            format!(
+                "Too little of the range of {} was visited to judge.",
+                self.name
+            )
         } else if p_value < 0.01 {
             format!(
                 "The mean residual depends on {}: near {:.4} it is {:.4}, {:.0} % of the residual's RMS (p = {:.1e}).",
-                self.name, best.1, best.2, 100.0 * best.2.abs() / rms.max(f64::MIN_POSITIVE), p_value
+                self.name,
+                best.1,
+                best.2,
+                100.0 * best.2.abs() / rms.max(f64::MIN_POSITIVE),
+                p_value
             )
         } else {
-            format!("No dependence of the mean residual on {} is seen (p = {p_value:.2}).", self.name)
+            format!(
+                "No dependence of the mean residual on {} is seen (p = {p_value:.2}).",
+                self.name
+            )
         };
         Dependence {
             coordinate: self.name.to_owned(),
@@ -146,9 +165,18 @@ impl Binned {
     }
 }
 
+/// A small p-value in words; below the smallest number it is not zero.
+fn p_text(p: f64) -> String {
+    if p < 1e-300 {
+        "p < 1e-300".to_owned()
+    } else {
+        format!("p = {p:.1e}")
+    }
+}
+
 /// Ranges that the bins span.
 #[derive(Clone, Copy, Debug)]
-pub struct Ranges {
+pub(super) struct Ranges {
     /// Lowest and highest position.
     pub position: [f64; 2],
     /// Highest speed.
@@ -158,7 +186,7 @@ pub struct Ranges {
 }
 
 /// Collects the residuals of one joint.
-pub struct ResidualStream {
+pub(super) struct ResidualStream {
     total: u64,
     every: u64,
     moments: [f64; 5],
@@ -170,7 +198,7 @@ pub struct ResidualStream {
 
 impl ResidualStream {
     /// For `total` instants.
-    pub fn new(total: u64, ranges: Ranges) -> Self {
+    pub(super) fn new(total: u64, ranges: Ranges) -> Self {
         Self {
             total: total.max(1),
             every: total.div_ceil(SERIES_POINTS as u64).max(1),
@@ -189,7 +217,16 @@ impl ResidualStream {
 
     /// Takes instant `index`: time, position, velocity, measured and predicted torque; `used` is false for
     /// rows that are masked, which are only drawn.
-    pub fn push(&mut self, index: u64, t: f64, q: f64, qd: f64, measured: f64, predicted: f64, used: bool) {
+    pub(super) fn push(
+        &mut self,
+        index: u64,
+        t: f64,
+        q: f64,
+        qd: f64,
+        measured: f64,
+        predicted: f64,
+        used: bool,
+    ) {
         if index.is_multiple_of(self.every) && self.series.t.len() < SERIES_POINTS {
             self.series.t.push(t);
             self.series.measured.push(measured);
@@ -207,18 +244,17 @@ impl ResidualStream {
         self.torque_squares += measured * measured;
         self.memory.push(e);
         let group = group_of(index, self.total);
-        for (binned, at) in self.binned.iter_mut().zip([q, qd, measured, 0.5 * qd.signum()]) {
+        for (binned, at) in self
+            .binned
+            .iter_mut()
+            .zip([q, qd, measured, 0.5 * qd.signum()])
+        {
             binned.push(group, at, e);
         }
     }
 
-    /// Sum of squares of the residuals and of the torque so far.
-    pub fn squares(&self) -> (f64, f64) {
-        (self.moments[2], self.torque_squares)
-    }
-
     /// Sums up.
-    pub fn report(self) -> ResidualReport {
+    pub(super) fn report(self) -> ResidualReport {
         let n = self.moments[0].max(1.0);
         let rms = (self.moments[2] / n).sqrt();
         let torque_rms = (self.torque_squares / n).sqrt();
@@ -226,27 +262,46 @@ impl ResidualStream {
         let [m2, m3, m4] = [
             self.moments[2] / n - mean.powi(2),
             self.moments[3] / n - 3.0 * mean * self.moments[2] / n + 2.0 * mean.powi(3),
-            self.moments[4] / n - 4.0 * mean * self.moments[3] / n + 6.0 * mean.powi(2) * self.moments[2] / n - 3.0 * mean.powi(4),
+            self.moments[4] / n - 4.0 * mean * self.moments[3] / n
+                + 6.0 * mean.powi(2) * self.moments[2] / n
+                - 3.0 * mean.powi(4),
         ];
         let m2 = m2.max(f64::MIN_POSITIVE);
         let (skewness, kurtosis) = (m3 / m2.powf(1.5), m4 / (m2 * m2) - 3.0);
         let correlation = self.memory.correlation();
-        let chi = |statistic: f64, freedom: f64| ChiSquared::new(freedom).map_or(1.0, |c| c.sf(statistic));
-        let ljung: f64 = n * (n + 2.0) * (1..=TEST_LAGS).map(|k| correlation[k].powi(2) / (n - k as f64).max(1.0)).sum::<f64>();
+        let chi = |statistic: f64, freedom: f64| {
+            ChiSquared::new(freedom).map_or(1.0, |c| c.sf(statistic))
+        };
+        let ljung: f64 = n
+            * (n + 2.0)
+            * (1..=TEST_LAGS)
+                .map(|k| correlation[k].powi(2) / (n - k as f64).max(1.0))
+                .sum::<f64>();
         let whiteness_p = chi(ljung, TEST_LAGS as f64);
         let length = self.memory.length();
         let effective = n / length;
-        let normality_p = chi(effective / 6.0 * (skewness.powi(2) + kurtosis.powi(2) / 4.0), 2.0);
+        let normality_p = chi(
+            effective / 6.0 * (skewness.powi(2) + kurtosis.powi(2) / 4.0),
+            2.0,
+        );
         ResidualReport {
             whiteness: if whiteness_p < 0.01 {
-                format!("The residual is correlated in time (memory {length:.1} rows, p = {whiteness_p:.1e}): standard deviations that take it as white are too small.")
+                format!(
+                    "The residual is correlated in time (memory {length:.1} rows, {}): standard deviations that take it as white are too small.",
+                    p_text(whiteness_p)
+                )
             } else {
                 format!("The residual cannot be told from white noise (p = {whiteness_p:.2}).")
             },
             normality: if normality_p < 0.01 {
-                format!("The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, p = {normality_p:.1e}).")
+                format!(
+                    "The residual is not normally distributed (skewness {skewness:.2}, excess kurtosis {kurtosis:.2}, {}).",
+                    p_text(normality_p)
+                )
             } else {
-                format!("The residual cannot be told from a normal distribution (p = {normality_p:.2}).")
+                format!(
+                    "The residual cannot be told from a normal distribution (p = {normality_p:.2})."
+                )
             },
             dependence: self.binned.iter().map(|b| b.report(rms)).collect(),
             relative_error: rms / torque_rms.max(f64::MIN_POSITIVE),

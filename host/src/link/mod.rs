@@ -7,6 +7,7 @@
 pub mod convert;
 pub mod emulated;
 pub mod error;
+pub mod experiment;
 pub mod lossy;
 pub mod port;
 pub mod recorder;

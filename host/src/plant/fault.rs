@@ -19,6 +19,8 @@ pub struct Faults {
     pub supply: Option<f64>,
     /// The driver reports a fault and its outputs are off.
     pub driver: bool,
+    /// The control tick before did not finish in its period.
+    pub overrun: bool,
     /// A body hangs on the link beside its own. It arrives with the link's own speed.
     pub payload: Option<Body>,
     /// Torque from outside on the link, N·m.

@@ -240,7 +240,7 @@ impl Plant {
             supply: faults.supply_stuck.map_or(supply, AdcCode),
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
             driver_fault: faults.driver,
-            overrun: false,
+            overrun: faults.overrun,
         }
     }
 

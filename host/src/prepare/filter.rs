@@ -87,12 +87,13 @@ impl LowPass {
                 });
             }
         }
-        if !(radius < 1.0) {
+        if radius >= 1.0 || radius.is_nan() {
             return None;
         }
         // 1e-13 and one quarter more: what a wrong initial state leaves is then below rounding, and the
         // polynomial factors of nearly equal poles are covered (checked in the tests by streaming).
-        let settle = (1.25 * 1e-13f64.ln() / radius.max(1e-6).ln()).ceil() as usize + 2 * sections.len() + 1;
+        let settle =
+            (1.25 * 1e-13f64.ln() / radius.max(1e-6).ln()).ceil() as usize + 2 * sections.len() + 1;
         Some(Self { sections, settle })
     }
 
@@ -108,7 +109,8 @@ impl LowPass {
             .iter()
             .map(|s| {
                 let at = |c0: f64, c1: f64, c2: f64| {
-                    (c0 + c1 * w.cos() + c2 * (2.0 * w).cos()).hypot(c1 * w.sin() + c2 * (2.0 * w).sin())
+                    (c0 + c1 * w.cos() + c2 * (2.0 * w).cos())
+                        .hypot(c1 * w.sin() + c2 * (2.0 * w).sin())
                 };
                 at(s.b[0], s.b[1], s.b[2]) / at(1.0, s.a[0], s.a[1])
             })
@@ -198,7 +200,10 @@ mod tests {
                 // The bilinear transform maps the analogue magnitude exactly, at warped frequencies.
                 let ratio = (PI * f / 1000.0).tan() / (PI * 0.1f64).tan();
                 let expected = 1.0 / (1.0 + ratio.powi(2 * order as i32)).sqrt();
-                assert!((filter.gain(f, 1000.0) - expected).abs() < 1e-11, "order {order}, {f} Hz");
+                assert!(
+                    (filter.gain(f, 1000.0) - expected).abs() < 1e-11,
+                    "order {order}, {f} Hz"
+                );
             }
         }
         assert!(LowPass::butterworth(4, 500.0, 1000.0).is_none());
@@ -218,9 +223,17 @@ mod tests {
     #[test]
     fn zero_phase_keeps_a_slow_sine_in_place_and_lines_whole() {
         let filter = LowPass::butterworth(4, 50.0, 1000.0).unwrap();
-        let sine: Vec<f64> = (0..4000).map(|k| (2.0 * PI * 2.0 * k as f64 * 1e-3).sin()).collect();
+        let sine: Vec<f64> = (0..4000)
+            .map(|k| (2.0 * PI * 2.0 * k as f64 * 1e-3).sin())
+            .collect();
         let gain = filter.gain(2.0, 1000.0).powi(2);
-        for (k, (a, b)) in sine.iter().zip(filter.zero_phase(&sine)).enumerate().take(3600).skip(400) {
+        for (k, (a, b)) in sine
+            .iter()
+            .zip(filter.zero_phase(&sine))
+            .enumerate()
+            .take(3600)
+            .skip(400)
+        {
             assert!((gain * a - b).abs() < 1e-10, "{k}");
         }
         let line: Vec<f64> = (0..500).map(|k| 5.0 + 0.3 * k as f64).collect();

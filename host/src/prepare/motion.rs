@@ -86,6 +86,7 @@ pub fn each_motion(
                 } else {
                     (central_difference(&q, dt), second_difference(&q, dt))
                 };
+                let (q, qd, qdd) = later(q, qd, qdd, treatment.torque_lead, dt);
                 let threshold = treatment.speed_threshold[j];
                 let [low, high] = treatment.saturation[j];
                 Ok(JointMotion {
@@ -93,7 +94,9 @@ pub fn each_motion(
                     saturated: column
                         .tau
                         .iter()
-                        .map(|tau| low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h))
+                        .map(|tau| {
+                            low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h)
+                        })
                         .collect(),
                     tau: column.tau.clone(),
                     q,
@@ -121,6 +124,33 @@ pub fn each_motion(
     })
 }
 
+/// The motion `lead` seconds later, by Taylor's series: the filtered position is smooth over a few samples.
+fn later(
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    qdd: Vec<f64>,
+    lead: f64,
+    dt: f64,
+) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    if lead == 0.0 {
+        return (q, qd, qdd);
+    }
+    let jerk = central_difference(&qdd, dt);
+    let moved = |x: &[f64], v: &[f64], a: &[f64]| -> Vec<f64> {
+        x.iter()
+            .zip(v)
+            .zip(a)
+            .map(|((x, v), a)| x + lead * (v + 0.5 * lead * a))
+            .collect()
+    };
+    let flat = vec![0.0; q.len()];
+    (
+        moved(&q, &qd, &qdd),
+        moved(&qd, &qdd, &jerk),
+        moved(&qdd, &jerk, &flat),
+    )
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
@@ -131,19 +161,34 @@ mod tests {
     fn recording(rows: usize, cut: usize) -> InMemory {
         let mut blocks = Vec::new();
         for start in (0..rows).step_by(cut) {
-            let t: Vec<f64> = (start..(start + cut).min(rows)).map(|k| k as f64 * 1e-3).collect();
+            let t: Vec<f64> = (start..(start + cut).min(rows))
+                .map(|k| k as f64 * 1e-3)
+                .collect();
             // Not smooth on purpose: the noise is what the margins must carry.
-            let q = t.iter().map(|t| 0.3 + (3.0 * t).sin() + 1e-4 * (1e5 * t * t).sin()).collect();
-            let tau = t.iter().map(|t| 2.0 * (3.0 * t).cos() + 0.1 * (7e4 * t * t).cos()).collect();
+            let q = t
+                .iter()
+                .map(|t| 0.3 + (3.0 * t).sin() + 1e-4 * (1e5 * t * t).sin())
+                .collect();
+            let tau = t
+                .iter()
+                .map(|t| 2.0 * (3.0 * t).cos() + 0.1 * (7e4 * t * t).cos())
+                .collect();
             blocks.push(Block {
-                joints: vec![JointColumns { q, tau, ..Default::default() }],
+                joints: vec![JointColumns {
+                    q,
+                    tau,
+                    ..Default::default()
+                }],
                 first_line: start as u64 + 2,
                 continues: start > 0,
                 t,
                 ..Default::default()
             });
         }
-        InMemory { label: "made".into(), blocks }
+        InMemory {
+            label: "made".into(),
+            blocks,
+        }
     }
 
     fn collect(recording: &InMemory, treatment: &Treatment) -> (Vec<f64>, Vec<f64>, usize) {
@@ -165,6 +210,7 @@ mod tests {
         let survey = Survey::take(&whole, 1).unwrap();
         let options = PrepareOptions {
             cutoff: Choice::Fixed(20.0),
+            decimation: Choice::Fixed(4),
             ..Default::default()
         };
         let mut treatment = Treatment::decide(&[survey], &options, &[None]).unwrap();
@@ -175,7 +221,10 @@ mod tests {
         assert!(pieces > 8, "{pieces}");
         assert_eq!(t_whole, t_cut);
         let scale = expected.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let worst = expected.iter().zip(&found).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        let worst = expected
+            .iter()
+            .zip(&found)
+            .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(worst < 1e-9 * scale, "{worst} of {scale}");
     }
 

@@ -1,7 +1,7 @@
 //! A recording in pieces with margins: whole-recording filters in constant memory.
 
 use super::PrepareError;
-use crate::data::Block;
+use crate::data::{Block, JointColumns};
 
 /// Something that gives its rows in blocks, as often as asked.
 pub trait Recording {
@@ -30,10 +30,32 @@ impl Recording for InMemory {
     }
     fn each_block(
         &self,
-        _rows: usize,
+        rows: usize,
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError> {
-        self.blocks.iter().cloned().try_for_each(take)
+        for block in &self.blocks {
+            for start in (0..block.len()).step_by(rows.max(1)) {
+                let end = start.saturating_add(rows.max(1)).min(block.len());
+                take(stretch(block, start, end))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Recording for crate::data::Source {
+    fn label(&self) -> String {
+        self.path().display().to_string()
+    }
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        for block in self.blocks(rows) {
+            take(block.map_err(|e| PrepareError::Read(e.to_string()))?)?;
+        }
+        Ok(())
     }
 }
 
@@ -52,6 +74,34 @@ pub struct Piece {
     pub segment: usize,
     /// Whether `rows` starts and ends where the segment does.
     pub at_ends: [bool; 2],
+}
+
+/// Rows `start .. end` of a block.
+fn stretch(block: &Block, start: usize, end: usize) -> Block {
+    let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
+    Block {
+        t: of(&block.t),
+        joints: block
+            .joints
+            .iter()
+            .map(|j| JointColumns {
+                q: of(&j.q),
+                tau: of(&j.tau),
+                qd: j.qd.as_ref().map(of),
+                qdd: j.qdd.as_ref().map(of),
+                reference: j.reference.as_ref().map(of),
+                voltage: j.voltage.as_ref().map(of),
+                temperature: j.temperature.as_ref().map(of),
+            })
+            .collect(),
+        extra: block
+            .extra
+            .iter()
+            .map(|(name, column)| (name.clone(), of(column)))
+            .collect(),
+        first_line: block.first_line + start as u64,
+        continues: start > 0 || block.continues,
+    }
 }
 
 fn append(block: &mut Block, mut more: Block) {
@@ -92,10 +142,11 @@ fn drop_front(block: &mut Block, rows: usize) {
             &mut joint.reference,
             &mut joint.voltage,
             &mut joint.temperature,
-        ] {
-            if let Some(column) = column {
-                column.drain(..rows);
-            }
+        ]
+        .into_iter()
+        .flatten()
+        {
+            column.drain(..rows);
         }
     }
     for (_, column) in &mut block.extra {
@@ -116,7 +167,11 @@ pub fn each_piece(
     let mut done = 0usize;
     let mut segment = 0usize;
     let mut started = false;
-    let flush = |buffer: &mut Block, offset: &mut u64, done: &mut usize, segment: usize, take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
+    let flush = |buffer: &mut Block,
+                 offset: &mut u64,
+                 done: &mut usize,
+                 segment: usize,
+                 take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
         if !buffer.is_empty() {
             let piece = Piece {
                 core_start: *done,
@@ -145,46 +200,21 @@ pub fn each_piece(
         // Twice the margin: what is left for the last piece is then never only a margin.
         while buffer.len() >= done + core + 2 * margin {
             let piece_len = done + core + margin;
-            let mut rest = buffer.clone();
-            truncate(&mut buffer, piece_len);
             let piece = Piece {
                 core_start: done,
                 core_end: done + core,
-                rows: std::mem::take(&mut buffer),
+                rows: stretch(&buffer, 0, piece_len),
                 offset,
                 segment,
                 at_ends: [offset == 0, false],
             };
             take(&piece)?;
             let drop = (done + core).saturating_sub(margin);
-            drop_front(&mut rest, drop);
+            drop_front(&mut buffer, drop);
             done = done + core - drop;
             offset += drop as u64;
-            buffer = rest;
         }
         Ok(())
     })?;
     flush(&mut buffer, &mut offset, &mut done, segment, take)
-}
-
-fn truncate(block: &mut Block, rows: usize) {
-    block.t.truncate(rows);
-    for joint in &mut block.joints {
-        joint.q.truncate(rows);
-        joint.tau.truncate(rows);
-        for column in [
-            &mut joint.qd,
-            &mut joint.qdd,
-            &mut joint.reference,
-            &mut joint.voltage,
-            &mut joint.temperature,
-        ] {
-            if let Some(column) = column {
-                column.truncate(rows);
-            }
-        }
-    }
-    for (_, column) in &mut block.extra {
-        column.truncate(rows);
-    }
 }

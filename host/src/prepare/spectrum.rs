@@ -53,7 +53,12 @@ impl Welch {
         self.last = [x, self.last[0]];
         self.seen += 1;
         if self.buffer.len() == self.segment {
-            let mut input: Vec<f64> = self.buffer.iter().zip(&self.window).map(|(x, w)| x * w).collect();
+            let mut input: Vec<f64> = self
+                .buffer
+                .iter()
+                .zip(&self.window)
+                .map(|(x, w)| x * w)
+                .collect();
             let mut output = self.fft.make_output_vec();
             // The lengths are those of the plan; the only error of this call is another length.
             if self.fft.process(&mut input, &mut output).is_ok() {
@@ -130,13 +135,21 @@ impl PositionSpectrum {
         let sunk = (0..n).find(|&k| {
             // Sunk for good means: over the next half octave too.
             let end = ((k as f64 + 1.0) * 1.4) as usize;
-            smooth[k..end.clamp(k + 1, n)].iter().all(|d| *d < SUNK * floor)
+            smooth[k..end.clamp(k + 1, n)]
+                .iter()
+                .all(|d| *d < SUNK * floor)
         });
         let crossing = sunk.map_or(frequency[n - 1], |k| frequency[k]);
         let velocity: Vec<f64> = frequency
             .iter()
             .zip(&density)
-            .map(|(f, d)| if *f <= crossing { (d - floor).max(0.0) * f * f } else { 0.0 })
+            .map(|(f, d)| {
+                if *f <= crossing {
+                    (d - floor).max(0.0) * f * f
+                } else {
+                    0.0
+                }
+            })
             .collect();
         let total: f64 = velocity.iter().sum();
         let mut sum = 0.0;
@@ -201,15 +214,29 @@ mod tests {
         // A signal that ends at 20 Hz for sure: a sum of sines below it.
         for k in 0..60_000 {
             let t = k as f64 / rate;
-            let signal: f64 = (1..=40).map(|m| (2.0 * PI * 0.5 * m as f64 * t + (m * m) as f64).sin() / m as f64).sum();
+            let signal: f64 = (1..=40)
+                .map(|m| (2.0 * PI * 0.5 * m as f64 * t + (m * m) as f64).sin() / m as f64)
+                .sum();
             let noise: f64 = (0..12).map(|_| generator.random::<f64>()).sum::<f64>() - 6.0;
             welch.push(0.1 * signal + sigma * noise);
         }
         let (f, d) = welch.density(rate).unwrap();
         let spectrum = PositionSpectrum::judge(f, d);
         // White noise of variance σ² spread over 0 … fs/2.
-        assert!((spectrum.floor / (sigma * sigma / 500.0) - 1.0).abs() < 0.1, "{}", spectrum.floor);
-        assert!((19.0..28.0).contains(&spectrum.crossing), "{}", spectrum.crossing);
-        assert!((15.0..=21.0).contains(&spectrum.motion), "{}", spectrum.motion);
+        assert!(
+            (spectrum.floor / (sigma * sigma / 500.0) - 1.0).abs() < 0.1,
+            "{}",
+            spectrum.floor
+        );
+        assert!(
+            (19.0..28.0).contains(&spectrum.crossing),
+            "{}",
+            spectrum.crossing
+        );
+        assert!(
+            (15.0..=21.0).contains(&spectrum.motion),
+            "{}",
+            spectrum.motion
+        );
     }
 }

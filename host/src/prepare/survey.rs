@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
-use super::PrepareError;
 
 /// Steps may differ from the mean by this share: time stamps written with single precision or by a jittery
 /// clock pass, a lost or doubled row does not.
@@ -32,7 +32,7 @@ pub struct JointSurvey {
 
 /// Rows in a row at the extreme torque that count as clipping; noise never repeats a value that often, but a
 /// command held at a limit does.
-pub const CLIPPED_RUN: usize = 5;
+pub(super) const CLIPPED_RUN: usize = 5;
 
 /// A recording as a whole.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -171,7 +171,8 @@ impl Survey {
         })?;
         let mean = span / steps.max(1) as f64;
         for (step, line) in [shortest, widest] {
-            if !((step / mean - 1.0).abs() <= STEP_TOLERANCE) {
+            let deviation = (step / mean - 1.0).abs();
+            if deviation > STEP_TOLERANCE || deviation.is_nan() {
                 return Err(PrepareError::Irregular {
                     label: recording.label(),
                     line,
@@ -185,7 +186,7 @@ impl Survey {
             .into_iter()
             .enumerate()
             .map(|(j, r)| {
-                if !(r.position[1] > r.position[0]) {
+                if r.position[0] == r.position[1] {
                     return Err(PrepareError::NotMoving {
                         label: recording.label(),
                         joint: j + 1,

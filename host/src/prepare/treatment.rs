@@ -31,6 +31,10 @@ pub struct PrepareOptions {
     pub speed_threshold: Choice<f64>,
     /// Velocity and acceleration from the recording's own columns where the position would be differentiated.
     pub measured_derivatives: bool,
+    /// How much later the torque recorded at an instant acts, s: half a sample for a command that is held until
+    /// the next one, plus dead time. The motion is taken that much later. Left at zero, such a lead L shifts
+    /// viscous friction by about −J·L·ω² for a motion of angular frequency ω.
+    pub torque_lead: f64,
     /// Rows that are processed together; memory grows with it, results do not depend on it.
     pub piece_rows: usize,
 }
@@ -43,6 +47,7 @@ impl Default for PrepareOptions {
             decimation: Choice::Auto,
             speed_threshold: Choice::Auto,
             measured_derivatives: false,
+            torque_lead: 0.0,
             piece_rows: 1 << 17,
         }
     }
@@ -82,6 +87,8 @@ pub struct Treatment {
     pub derivatives: String,
     /// Whether the recording's own velocity and acceleration are used.
     pub measured_derivatives: bool,
+    /// How much later the torque recorded at an instant is taken to act, s.
+    pub torque_lead: f64,
     /// Per joint, speed below which rows are masked, rad/s or m/s.
     pub speed_threshold: Vec<f64>,
     /// Why these thresholds, a sentence.
@@ -100,7 +107,7 @@ pub struct Treatment {
 }
 
 /// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
-/// motion itself (customary: five to ten times; Gautier, Janot & Vandanjon 2013).
+/// motion itself.
 const LEAST_HEADROOM: f64 = 5.0;
 
 /// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion: reversals of
@@ -153,7 +160,11 @@ impl Treatment {
                     n,
                     format!(
                         "One row in {n}: the low-pass before it passes up to {:.3} Hz, at least ten times the highest frequency of the motion ({motion:.3} Hz) or all that the position filter leaves.",
-                        if n > 1 { decimator_edge(n, rate) } else { cutoff }
+                        if n > 1 {
+                            decimator_edge(n, rate)
+                        } else {
+                            cutoff
+                        }
                     ),
                 )
             }
@@ -166,10 +177,7 @@ impl Treatment {
             });
         }
         let (speed_threshold, speed_reason) = match options.speed_threshold {
-            Choice::Fixed(speed) => (
-                vec![speed; spectra.len()],
-                format!("{speed}, as given."),
-            ),
+            Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{speed}, as given.")),
             Choice::Auto => {
                 let thresholds = spectra
                     .iter()
@@ -188,12 +196,17 @@ impl Treatment {
             let edge = decimator_edge(decimation, rate);
             (
                 edge,
-                format!("Chebyshev I, order 8, 0.05 dB ripple up to {edge:.3} Hz, forward and backward, over torque and every regressor column alike"),
+                format!(
+                    "Chebyshev I, order 8, 0.05 dB ripple up to {edge:.3} Hz, forward and backward, over torque and every regressor column alike"
+                ),
             )
         } else {
             (
                 cutoff,
-                format!("Butterworth, order {}, {cutoff:.3} Hz, forward and backward, over torque and every regressor column alike", options.order),
+                format!(
+                    "Butterworth, order {}, {cutoff:.3} Hz, forward and backward, over torque and every regressor column alike",
+                    options.order
+                ),
             )
         };
         let saturation = speaker
@@ -204,7 +217,11 @@ impl Treatment {
                 let limit = torque_limits.get(j).copied().flatten();
                 let seen = |side: usize| surveys.iter().find_map(|s| s.joints[j].clipped[side]);
                 [
-                    limit.map(|l| -l).into_iter().chain(seen(0)).reduce(f64::max),
+                    limit
+                        .map(|l| -l)
+                        .into_iter()
+                        .chain(seen(0))
+                        .reduce(f64::max),
                     limit.into_iter().chain(seen(1)).reduce(f64::min),
                 ]
             })
@@ -232,9 +249,11 @@ impl Treatment {
             derivatives: if options.measured_derivatives {
                 "Velocity and, where recorded, acceleration from the recording, through the position's filter.".into()
             } else {
-                "Central differences of the filtered position: (q₊ − q₋)/2Δ and (q₊ − 2q + q₋)/Δ².".into()
+                "Central differences of the filtered position: (q₊ − q₋)/2Δ and (q₊ − 2q + q₋)/Δ²."
+                    .into()
             },
             measured_derivatives: options.measured_derivatives,
+            torque_lead: options.torque_lead,
             speed_threshold,
             speed_reason,
             saturation,
@@ -312,7 +331,9 @@ fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f6
             "{cutoff:.3} Hz, five times the highest frequency of the motion ({motion:.3} Hz), although noise outweighs the signal from {crossing:.3} Hz on: a lower cut-off would bend the motion itself."
         )
     } else if wish > most {
-        format!("{cutoff:.3} Hz, 80 % of the Nyquist frequency: the position stands above its noise over the whole band.")
+        format!(
+            "{cutoff:.3} Hz, 80 % of the Nyquist frequency: the position stands above its noise over the whole band."
+        )
     } else if clean < crossing {
         format!(
             "{cutoff:.3} Hz: above it noise would be more than {:.1} % of the power of the acceleration; the position itself sinks into its noise at {crossing:.3} Hz.",

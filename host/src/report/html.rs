@@ -28,19 +28,19 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
     }
     let mut out = String::with_capacity(page.body.len() + 120_000);
     // Writing into a String cannot fail: the results of `write!` in this file are dropped on purpose.
-    let _ = write!(
+    let _ = writeln!(
         out,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
-         <title>{}</title>\n<style>\n{}{STYLE}</style>\n",
+         <title>{}</title>\n<style>\n{}{STYLE}</style>",
         text(&document.title),
         palette()
     );
     if page.plots > 0 {
-        let _ = write!(out, "<style>{PLOT_STYLE}</style>\n");
+        let _ = writeln!(out, "<style>{PLOT_STYLE}</style>");
     }
     out.push_str("</head>\n<body>\n");
     out.push_str("<a class=\"skip\" href=\"#contents\">Skip to the contents</a>\n");
@@ -51,16 +51,16 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
     out.push_str(&page.body);
     out.push_str("</main>\n</div>\n");
     if !document.footer.is_empty() {
-        let _ = write!(out, "<footer><p>{}</p></footer>\n", text(&document.footer));
+        let _ = writeln!(out, "<footer><p>{}</p></footer>", text(&document.footer));
     }
     if page.plots > 0 {
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<script>\n/*\n{}\n*/\n{PLOT_SCRIPT}</script>\n",
+            "<script>\n/*\n{}\n*/\n{PLOT_SCRIPT}</script>",
             PLOT_LICENCE.trim()
         );
     }
-    let _ = write!(out, "<script>\n{SCRIPT}</script>\n</body>\n</html>\n");
+    let _ = writeln!(out, "<script>\n{SCRIPT}</script>\n</body>\n</html>");
     Ok(out)
 }
 
@@ -94,15 +94,15 @@ fn check_ids(sections: &[Section]) -> Result<(), ReportError> {
 }
 
 fn header(out: &mut String, document: &Document) {
-    let _ = write!(
+    let _ = writeln!(
         out,
-        "<header class=\"top\"><div class=\"wrap\">\n<h1>{}</h1>\n",
+        "<header class=\"top\"><div class=\"wrap\">\n<h1>{}</h1>",
         text(&document.title)
     );
     if !document.subtitle.is_empty() {
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<p class=\"subtitle\">{}</p>\n",
+            "<p class=\"subtitle\">{}</p>",
             text(&document.subtitle)
         );
     }
@@ -148,9 +148,9 @@ fn contents(out: &mut String, sections: &[Section]) {
     if sections.len() > 1 {
         out.push_str("<p>Contents</p>\n<ol>\n");
         for section in sections {
-            let _ = write!(
+            let _ = writeln!(
                 out,
-                "<li><a href=\"#{}\">{}</a></li>\n",
+                "<li><a href=\"#{}\">{}</a></li>",
                 section.id,
                 text(&section.title)
             );
@@ -172,14 +172,14 @@ struct Page {
 
 impl Page {
     fn section(&mut self, section: &Section) -> Result<(), ReportError> {
-        let _ = write!(
+        let _ = writeln!(
             self.body,
-            "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 id=\"{0}-title\">{1}</h2>\n",
+            "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n<h2 id=\"{0}-title\">{1}</h2>",
             section.id,
             text(&section.title)
         );
         if !section.lead.is_empty() {
-            let _ = write!(self.body, "<p class=\"lead\">{}</p>\n", text(&section.lead));
+            let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", text(&section.lead));
         }
         for block in &section.blocks {
             self.block(block)?;
@@ -194,16 +194,16 @@ impl Page {
             Block::List(items) => {
                 self.body.push_str("<ul>\n");
                 for item in items {
-                    let _ = write!(self.body, "<li>{}</li>\n", text(item));
+                    let _ = writeln!(self.body, "<li>{}</li>", text(item));
                 }
                 self.body.push_str("</ul>\n");
             }
             Block::Table(table) => self.table(table)?,
             Block::Plot(plot) => self.plot(plot)?,
             Block::Details { summary, blocks } => {
-                let _ = write!(
+                let _ = writeln!(
                     self.body,
-                    "<details><summary>{}</summary>\n<div class=\"inside\">\n",
+                    "<details><summary>{}</summary>\n<div class=\"inside\">",
                     text(summary)
                 );
                 for block in blocks {
@@ -217,17 +217,17 @@ impl Page {
                     NoteKind::Warning => ("warning", "Attention"),
                     NoteKind::Good => ("good", "Confirmed"),
                 };
-                let _ = write!(
+                let _ = writeln!(
                     self.body,
-                    "<aside class=\"note {class}\"><strong>{word}</strong>\n"
+                    "<aside class=\"note {class}\"><strong>{word}</strong>"
                 );
                 self.paragraphs(words);
                 self.body.push_str("</aside>\n");
             }
             Block::Code(source) => {
-                let _ = write!(
+                let _ = writeln!(
                     self.body,
-                    "<pre tabindex=\"0\"><code>{}</code></pre>\n",
+                    "<pre tabindex=\"0\"><code>{}</code></pre>",
                     text(source)
                 );
             }
@@ -238,7 +238,7 @@ impl Page {
     fn paragraphs(&mut self, source: &str) {
         let clean = source.replace("\r\n", "\n");
         for paragraph in clean.split("\n\n").map(str::trim).filter(|p| !p.is_empty()) {
-            let _ = write!(self.body, "<p>{}</p>\n", text(paragraph));
+            let _ = writeln!(self.body, "<p>{}</p>", text(paragraph));
         }
     }
 
@@ -304,9 +304,9 @@ impl Page {
             self.body.push_str("<p class=\"table-note\">No rows.</p>\n");
         }
         if !table.note.is_empty() {
-            let _ = write!(
+            let _ = writeln!(
                 self.body,
-                "<p class=\"table-note\">{}</p>\n",
+                "<p class=\"table-note\">{}</p>",
                 text(&table.note)
             );
         }
@@ -318,10 +318,10 @@ impl Page {
         self.figures += 1;
         let number = self.figures;
         let id = format!("figure-{number}");
-        let _ = write!(
+        let _ = writeln!(
             self.body,
             "<figure id=\"{id}\" aria-labelledby=\"{id}-title\">\n\
-             <div class=\"figure-head\"><p class=\"figure-title\" id=\"{id}-title\"><b>Figure {number}</b> {}</p></div>\n",
+             <div class=\"figure-head\"><p class=\"figure-title\" id=\"{id}-title\"><b>Figure {number}</b> {}</p></div>",
             text(&plot.title)
         );
         let mut notes = Vec::new();
@@ -332,15 +332,15 @@ impl Page {
                 } else {
                     "None of the samples can be drawn: all are not finite, or not positive on a logarithmic axis."
                 };
-                let _ = write!(self.body, "<p class=\"empty\">{why}</p>\n");
+                let _ = writeln!(self.body, "<p class=\"empty\">{why}</p>");
             }
             Some(scene) => {
                 self.plots += 1;
                 self.legend(scene);
-                let _ = write!(
+                let _ = writeln!(
                     self.body,
                     "<div class=\"static\">{}</div>\n<div class=\"live\" tabindex=\"0\" role=\"img\" aria-label=\"{}\"></div>\n\
-                     <script type=\"application/json\" class=\"data\">{}</script>\n",
+                     <script type=\"application/json\" class=\"data\">{}</script>",
                     svg::inline(scene, &id),
                     text(&scene.description()),
                     scene.json()

@@ -414,7 +414,7 @@ impl Digits {
 fn shortest(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$e}");
     match text.parse::<f64>() {
-        Ok(rounded) if rounded == 0.0 => "0".to_owned(),
+        Ok(0.0) => "0".to_owned(),
         Ok(rounded) if (1e-4..1e7).contains(&rounded.abs()) => format!("{rounded}"),
         Ok(rounded) => format!("{rounded:e}"),
         Err(_) => "null".to_owned(),

@@ -140,7 +140,7 @@ impl<'a> Canvas<'a> {
         let height = body + extra.max(0.0);
         let (top, bottom) = (head, height - bottom_margin);
         let (mut x_range, mut y_range) = (scene.x_range, scene.y_range);
-        let y_count = ((bottom - top) / 46.0).clamp(2.0, 12.0) as usize;
+        let y_count = ((bottom - top) / 38.0).clamp(2.0, 12.0) as usize;
         let right = WIDTH - 16.0;
         let margin = |ticks: &[Tick]| {
             let widest = ticks.iter().map(|t| width_of(&t.label)).fold(0.0, f64::max);

@@ -9,6 +9,7 @@
 mod check;
 mod dh;
 mod error;
+mod numbers;
 mod text;
 mod urdf;
 

@@ -4,12 +4,10 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-use rig_shared::multibody::{
-    COLUMNS, Chain, ChainError, JointGeometry, JointKind as Kind, MultibodyError, inertia_matrix,
-};
+use rig_shared::multibody::{COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix};
 use thiserror::Error;
 
-use crate::robot::{Controller, JointKind, Robot};
+use crate::robot::{Controller, Robot};
 
 pub use step::Stepper;
 
@@ -77,37 +75,8 @@ impl Model {
     /// # Errors
     /// [`SimulateError::Chain`] on geometry that is no chain.
     pub fn from_robot(robot: &Robot) -> Result<Self, SimulateError> {
-        let geometry: Vec<_> = robot
-            .joints
-            .iter()
-            .map(|joint| JointGeometry {
-                kind: match joint.kind {
-                    JointKind::Revolute => Kind::Revolute,
-                    JointKind::Prismatic => Kind::Prismatic,
-                },
-                alpha: joint.alpha,
-                a: joint.a,
-                theta: joint.theta,
-                d: joint.d,
-            })
-            .collect();
-        let chain = Chain::new(&geometry, robot.gravity)?;
-        let mut parameters = vec![[0.0; COLUMNS]; robot.joints.len()];
-        for (row, joint) in parameters.iter_mut().zip(&robot.joints) {
-            if let Some(inertial) = &joint.inertial {
-                row[0] = inertial.mass;
-                row[1..4].copy_from_slice(&inertial.first_moment);
-                row[4..10].copy_from_slice(&inertial.inertia);
-            }
-            if let Some(drive) = &joint.drive {
-                row[10] = drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
-            }
-            if let Some(friction) = &joint.friction {
-                row[11] = friction.viscous;
-                row[12] = friction.coulomb;
-                row[13] = friction.offset;
-            }
-        }
+        let chain = Chain::new(&robot.geometry(), robot.gravity)?;
+        let parameters = robot.standard_parameters();
         Ok(Self { chain, parameters })
     }
 }

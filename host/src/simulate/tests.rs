@@ -136,10 +136,19 @@ fn viscous_friction_decays_as_the_exponential() {
 fn the_stand_in_controller_tracks_a_slow_sine() {
     let robot = pendulum(0.0, 0.1);
     let model = Model::from_robot(&robot).unwrap();
-    let reference: Vec<f64> = (0..4000).map(|k| 0.5 * (0.001 * f64::from(k)).sin()).collect();
+    let reference: Vec<f64> = (0..4000)
+        .map(|k| 0.5 * (0.001 * f64::from(k)).sin())
+        .collect();
     let (controllers, stand_ins) = controllers(&robot, &model, &[0.0]).unwrap();
     assert_eq!(stand_ins, ["link"]);
-    let inputs = Inputs { period: 1e-3, reference: &[reference], added: &[], q: &[0.0], v: &[0.0], substeps: 4 };
+    let inputs = Inputs {
+        period: 1e-3,
+        reference: &[reference],
+        added: &[],
+        q: &[0.0],
+        v: &[0.0],
+        substeps: 4,
+    };
     let motion = closed_loop(&robot, &model, &controllers, &inputs, |_| ()).unwrap();
     // What a cascade without feed-forward leaves: gravity and viscous friction over the stiffness J·ω², and the
     // lag of the velocity over the position gain.

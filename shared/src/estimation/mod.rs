@@ -8,6 +8,8 @@ pub mod ud;
 pub mod uncertainty;
 
 #[cfg(test)]
+mod cost;
+#[cfg(test)]
 mod tests;
 
 pub use one_link::OneLinkEstimator;

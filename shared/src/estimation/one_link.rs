@@ -4,6 +4,9 @@
 //! [`filtered`]) and whether it is *informative* (leverage against noise). Memory and forgetting count
 //! valid, informative samples alone, so that standing still forgets nothing.
 //!
+//! Cost of a step, counted by the test `operations_are_as_stated`: at most 788 sums and products, 18 divisions, one sine and
+//! cosine (628 and 15 on the mean); the dearest step is the one that closes a residual block.
+//!
 //! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both
 //! show in `residual_rms`.
 
@@ -134,6 +137,10 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         step(&self.config, &mut self.state, q, qd, tau)
     }
 
+    /// Samples have been left out: the filter starts anew with the next one, what has been learnt stays.
+    pub fn interrupt(&mut self) {
+        self.state.filter = filtered::State::default();
+    }
     /// See [`report`].
     pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
         report(&self.config, &self.state)

@@ -8,13 +8,13 @@ use rand_pcg::Pcg64Mcg;
 use super::*;
 use crate::model::differential;
 
-const LOWER: [f64; 6] = [0.01, -5.0, -5.0, 0.0, 0.0, -1.0];
-const UPPER: [f64; 6] = [0.5, 5.0, 5.0, 1.0, 1.5, 1.0];
-const TRUTH: [f64; 6] = [0.12, 2.9, -0.7, 0.3, 0.4, 0.15];
-const RATE: f64 = 1000.0;
+pub(super) const LOWER: [f64; 6] = [0.01, -5.0, -5.0, 0.0, 0.0, -1.0];
+pub(super) const UPPER: [f64; 6] = [0.5, 5.0, 5.0, 1.0, 1.5, 1.0];
+pub(super) const TRUTH: [f64; 6] = [0.12, 2.9, -0.7, 0.3, 0.4, 0.15];
+pub(super) const RATE: f64 = 1000.0;
 
 /// Sum of three sines: (q, q̇, q̈).
-fn motion(t: f64, phase: f64) -> [f64; 3] {
+pub(super) fn motion(t: f64, phase: f64) -> [f64; 3] {
     let mut out = [0.0; 3];
     for (a, f) in [(1.1, 0.31), (0.5, 0.83), (0.12, 2.3)] {
         let w = core::f64::consts::TAU * f;
@@ -26,7 +26,7 @@ fn motion(t: f64, phase: f64) -> [f64; 3] {
     out
 }
 
-fn torque(theta: &[f64; 6], [q, qd, qdd]: [f64; 3]) -> f64 {
+pub(super) fn torque(theta: &[f64; 6], [q, qd, qdd]: [f64; 3]) -> f64 {
     let row = differential::row(q, qd, qdd);
     row.iter().zip(theta).map(|(a, b)| a * b).sum()
 }
@@ -435,106 +435,6 @@ fn gradient_converges() {
         );
         assert!(now < 4.0 * r.std[i], "{i}: {r:?}");
     }
-}
-
-/// A number that counts what is done with it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Counted(f64);
-
-std::thread_local! {
-    static OPERATIONS: core::cell::Cell<[u32; 3]> = const { core::cell::Cell::new([0; 3]) };
-}
-
-fn count(kind: usize) {
-    OPERATIONS.with(|c| {
-        let mut n = c.get();
-        n[kind] += 1;
-        c.set(n);
-    });
-}
-
-macro_rules! counted {
-    ($($op:ident $f:ident $assign:ident $g:ident $sign:tt $kind:expr;)*) => {$(
-        impl core::ops::$op for Counted {
-            type Output = Self;
-            fn $f(self, o: Self) -> Self { count($kind); Self(self.0 $sign o.0) }
-        }
-        impl core::ops::$assign for Counted {
-            fn $g(&mut self, o: Self) { count($kind); self.0 = self.0 $sign o.0; }
-        }
-    )*};
-}
-counted! {
-    Add add AddAssign add_assign + 0;
-    Sub sub SubAssign sub_assign - 0;
-    Mul mul MulAssign mul_assign * 0;
-    Div div DivAssign div_assign / 1;
-}
-impl core::ops::Neg for Counted {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self(-self.0)
-    }
-}
-impl crate::scalar::Real for Counted {
-    type Mask = bool;
-    const ZERO: Self = Self(0.0);
-    const ONE: Self = Self(1.0);
-    fn from_f64(value: f64) -> Self {
-        Self(value)
-    }
-    fn sin_cos(self) -> (Self, Self) {
-        count(2);
-        (Self(self.0.sin()), Self(self.0.cos()))
-    }
-    fn sqrt(self) -> Self {
-        Self(self.0.sqrt())
-    }
-    fn exp(self) -> Self {
-        Self(self.0.exp())
-    }
-    fn tanh(self) -> Self {
-        Self(self.0.tanh())
-    }
-    fn powf(self, e: Self) -> Self {
-        Self(self.0.powf(e.0))
-    }
-    fn abs(self) -> Self {
-        Self(self.0.abs())
-    }
-    fn lt(self, o: Self) -> bool {
-        self.0 < o.0
-    }
-    fn le(self, o: Self) -> bool {
-        self.0 <= o.0
-    }
-    fn select(mask: bool, yes: Self, no: Self) -> Self {
-        if mask { yes } else { no }
-    }
-}
-
-/// The cost stated in `one_link`: [sums and products, divisions, sine and cosine] of the dearest step.
-#[test]
-fn operations_are_as_stated() {
-    let settings = EstimatorSettings::for_band(LOWER.map(Counted), UPPER.map(Counted));
-    let mut e = OneLinkEstimator::new(&settings, Counted(RATE)).unwrap();
-    let (mut most, mut sum, mut used) = ([0; 3], [0_u64; 3], 0);
-    for k in 0..30_000 {
-        let m = motion(f64::from(k) / RATE, 0.0);
-        OPERATIONS.with(|c| c.set([0; 3]));
-        let update = e.step(Counted(m[0]), Counted(m[1]), Counted(torque(&TRUTH, m)));
-        let n = OPERATIONS.with(core::cell::Cell::get);
-        if update == Update::Used {
-            used += 1;
-            (0..3).for_each(|i| sum[i] += u64::from(n[i]));
-        }
-        (0..3).for_each(|i| most[i] = n[i].max(most[i]));
-    }
-    std::println!(
-        "operations at most {most:?}, mean {:?}",
-        sum.map(|s| s / used)
-    );
-    assert!(most[0] <= 1100 && most[1] <= 25 && most[2] == 1, "{most:?}");
 }
 
 #[test]

@@ -12,6 +12,11 @@
 //! A jump of a parameter (a payload) shows as blocks that Σ and r cannot explain; two in a row raise
 //! [`Block::Changed`] and the caller starts over from its prior (covariance resetting; Goodwin & Sin 1984, sec. 3.3; Hägglund 1985).
 //!
+//! Measured (`coverage_in_full`: 400 seeds, noise AR(1) with pole 0, 0.9 and 0.98 at 1 kHz behind the 30 Hz filter, random
+//! parameters): 95 % intervals of the six parameters cover in 92.0–97.3 % of the runs with a memory of 15 s and
+//! 92.8–98.0 % with 60 s. With the gradient update they cover always: its Σ keeps the prior of what it has not yet
+//! learnt, and its residuals count as noise while it converges.
+//!
 //! Leaves out: the lag behind parameters that drift too slowly to be noticed so, and model error in step with the motion.
 
 use crate::scalar::Real;

@@ -36,6 +36,10 @@ pub struct MonitorConfig {
     pub thermal_time: f32,
 }
 
+/// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without
+/// current.
+const COOLED: f32 = 0.5;
+
 /// What the checks look at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
@@ -80,6 +84,8 @@ pub struct MonitorState {
     duty_high: f32,
     /// Filtered square of the current, A².
     heat: f32,
+    /// The heat has passed its limit and is not yet well below it again.
+    overloaded: bool,
 }
 
 /// Counts up while `failing`; true once `persistence` ticks in a row failed.
@@ -93,7 +99,6 @@ fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
 }
 
 // A comparison with NaN is false: written as `!(value <= limit)`, a NaN is a fault.
-#[allow(clippy::neg_cmp_op_on_partial_ord)]
 /// One tick of all checks: the first fault found, with the value that was out of range.
 pub fn step(
     config: &MonitorConfig,
@@ -104,6 +109,14 @@ pub fn step(
     let magnitude = now.current.abs();
     let n = config.persistence;
     state.heat += (now.current * now.current - state.heat) * (config.period / config.thermal_time);
+    let rating = limits.continuous_current * limits.continuous_current;
+    // The cause acts until the motor has cooled: an instant after the bridge is off it is just below its limit.
+    state.overloaded = !(state.heat
+        <= if state.overloaded {
+            COOLED * rating
+        } else {
+            rating
+        });
 
     // Every counter is brought up to date before any is judged: an early return must not stop the others.
     let over_current = persists(
@@ -136,12 +149,13 @@ pub fn step(
 
     let faults = [
         (now.driver_fault, Fault::Driver, 0.0),
-        (over_current, Fault::OverCurrent, now.current),
+        // Before the over-current: a code at the rail is no measurement, though it reads as a large current.
         (
             at_rail || stuck,
             Fault::AdcStuck,
             f32::from(now.current_code),
         ),
+        (over_current, Fault::OverCurrent, now.current),
         (
             now.encoder_step.abs() > config.largest_step,
             Fault::EncoderJump,
@@ -156,11 +170,7 @@ pub fn step(
         (outside, Fault::Position, now.position),
         (bad_supply, Fault::Supply, now.supply),
         (hot, Fault::Temperature, now.temperature),
-        (
-            state.heat > limits.continuous_current * limits.continuous_current,
-            Fault::Overload,
-            libm::sqrtf(state.heat),
-        ),
+        (state.overloaded, Fault::Overload, libm::sqrtf(state.heat)),
         (now.overrun && now.driving, Fault::Deadline, 0.0),
     ];
     faults

@@ -33,8 +33,8 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
         ("ClearFault", RequestBody::ClearFault, "088202063251c8a500"),
         (
             "SetTrajectory",
-            RequestBody::SetTrajectory(Trajectory::Hold(1.5)),
-            "04820207010107c03ff5323a1600"
+            RequestBody::SetTrajectory(Trajectory::Hold(1_500_000)),
+            "0482020708e0c65b27831de500"
         ),
         (
             "SetGains",
@@ -105,10 +105,11 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
                 kind: EstimatorKind::Gradient,
                 memory: 20.0,
                 bandwidth: 15.0,
+                slip_velocity: 0.05,
                 lower: [0.0, -9.0, -9.0, 0.0, 0.0, -1.0],
                 upper: [1.0, 9.0, 9.0, 2.0, 2.0, 1.0]
             }),
-            "0582020e010103a0410103704101010101010310c1010310c10101010101010101010380bf0103803f010310410103104101010240010102400107803f3178087e00"
+            "0582020e010103a04101077041cdcc4c3d01010101010310c1010310c10101010101010101010380bf0103803f010310410103104101010240010102400107803f52677e3800"
         ),
         (
             "StartStream",
@@ -120,6 +121,11 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             "GetSnapshot",
             RequestBody::GetSnapshot,
             "08820211b6f25c6100"
+        ),
+        (
+            "SetPosition",
+            RequestBody::SetPosition(-1.5),
+            "048202120107c0bf5151085200"
         ),
     ]
 }
@@ -272,6 +278,7 @@ fn request_number(body: &RequestBody) -> usize {
         RequestBody::StartStream => 15,
         RequestBody::StopStream => 16,
         RequestBody::GetSnapshot => 17,
+        RequestBody::SetPosition(_) => 18,
     }
 }
 
@@ -290,12 +297,12 @@ fn report_number(report: &Report) -> usize {
 #[test]
 fn every_request_has_its_bytes() {
     let mut right = true;
-    let mut seen = [false; 18];
+    let mut seen = [false; 19];
     for (name, body, expected) in requests() {
         seen[request_number(&body)] = true;
         right &= check(name, &Request { id: 258, body }, expected);
     }
-    assert_eq!(seen, [true; 18]);
+    assert_eq!(seen, [true; 19]);
     assert!(right, "the format has changed: see the head of this file");
 }
 

@@ -71,6 +71,8 @@ pub enum RequestBody {
     StopStream,
     /// Send the snapshot of the first latched fault, part by part.
     GetSnapshot,
+    /// Say where the link stands now, rad; only while disarmed. An incremental encoder cannot know.
+    SetPosition(f32),
 }
 
 /// Rig to host.

@@ -3,7 +3,7 @@
 use postcard_schema::key::Key;
 
 use super::message::{BATCH, PARAMETERS, Report, Request, SNAPSHOT_PART};
-use crate::trajectory::{HARMONICS, SPEEDS};
+use crate::trajectory::{AMPLITUDES, HARMONICS, LEVELS, SPEEDS};
 
 /// Version of the conversation: framing, and what each message asks of the other end.
 ///
@@ -27,6 +27,8 @@ pub const fn schema() -> u64 {
         hash = fold(hash, SNAPSHOT_PART as u64);
         hash = fold(hash, PARAMETERS as u64);
         hash = fold(hash, HARMONICS as u64);
+        hash = fold(hash, AMPLITUDES as u64);
+        hash = fold(hash, LEVELS as u64);
         fold(hash, SPEEDS as u64)
     };
     FINGERPRINT

@@ -1,0 +1,53 @@
+//! `rig demo`: the main job with no hardware.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::input::command_line;
+use super::ui::Ui;
+use crate::demo;
+use crate::report;
+
+/// Shows the whole way without hardware: excite, record, identify, compensate, report.
+#[derive(Clone, Debug, ClapArgs)]
+pub(crate) struct Args {
+    /// Folder for recordings, results and the report
+    #[arg(long, default_value = "rig-demo")]
+    out: PathBuf,
+    /// Seed: which rig is emulated, and its noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Default for Args {
+    fn default() -> Self {
+        Self {
+            out: PathBuf::from("rig-demo"),
+            seed: 1,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming what went wrong.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let begin = Instant::now();
+    let mut progress = ui.progress("emulated rig", 1000);
+    let demo = demo::run(&args.out, args.seed, |share| {
+        progress.at((1000.0 * share) as u64)
+    })?;
+    drop(progress);
+    let path = args.out.join("report.html");
+    report::write(&path, &demo.page(&command_line())?)?;
+    for line in demo.summary()? {
+        ui.say(&line);
+    }
+    ui.remark(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
+    ui.say(&format!("report: {}", path.display()));
+    Ok(())
+}

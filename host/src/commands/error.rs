@@ -1,0 +1,64 @@
+//! What went wrong, as one sentence.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::data::DataError;
+use crate::emulated::NameplateError;
+use crate::files::WriteError;
+use crate::identify::IdentifyError;
+use crate::link::LinkError;
+use crate::report::ReportError;
+use crate::robot::RobotError;
+use crate::simulate::SimulateError;
+
+/// Why a command did not do its work. Every text is a sentence for the person at the terminal.
+#[derive(Debug, Error)]
+pub enum CommandError {
+    /// A file stands in the way.
+    #[error("{} exists already; choose another name with --out, or give --force to replace it.", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The robot description.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// A recording.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// Identification.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// Simulation.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The rig.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The rig's nameplate.
+    #[error(transparent)]
+    Nameplate(#[from] NameplateError),
+    /// A report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// An output file.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Data that contradict the description.
+    #[error("{0}")]
+    Implausible(String),
+    /// Trajectory design.
+    #[error(transparent)]
+    Excite(#[from] crate::excite::ExciteError),
+    /// The demonstration.
+    #[error(transparent)]
+    Demo(#[from] crate::demo::DemoError),
+    /// Validation.
+    #[error(transparent)]
+    Validate(#[from] crate::validate::ValidateError),
+    /// Anything else that has its whole sentence.
+    #[error("{0}")]
+    Sentence(String),
+}

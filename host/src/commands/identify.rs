@@ -1,0 +1,209 @@
+//! `rig identify`: recordings and a description in, parameters with their uncertainty out.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::ui::Ui;
+use crate::files::{folder, write_whole};
+use crate::identify::{
+    Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify,
+};
+use crate::pages::{self, Context};
+use crate::prepare::{Choice, PrepareOptions};
+use crate::report;
+use crate::report::format_value;
+
+/// Which equations are fitted.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Model {
+    /// Torque against acceleration, velocity and position
+    Differential,
+    /// Work against change of energy over windows; needs no acceleration
+    Integral,
+}
+
+impl From<Model> for ModelKind {
+    fn from(model: Model) -> Self {
+        match model {
+            Model::Differential => Self::Differential,
+            Model::Integral => Self::Integral,
+        }
+    }
+}
+
+/// How they are fitted.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Fit {
+    /// Ordinary least squares
+    Ols,
+    /// Each joint's rows weighted by its noise
+    Weighted,
+    /// Weighted, and outliers count less (Huber)
+    Robust,
+}
+
+/// A setting that is `auto` (chosen from the data) or a number.
+fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
+    if text == "auto" {
+        return Ok(Choice::Auto);
+    }
+    text.parse()
+        .map(Choice::Fixed)
+        .map_err(|_| format!("\"{text}\" is neither a number nor \"auto\""))
+}
+
+/// Identifies the parameters of a robot from recordings.
+///
+/// Writes identified.toml (the description with the identified values), identification.json and report.html
+/// into the folder given with --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording to learn from, CSV or MCAP; may be given several times
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
+    /// Recording to judge by, not used in the fit; may be given several times
+    #[arg(long)]
+    holdout: Vec<PathBuf>,
+    /// Which equations are fitted
+    #[arg(long, value_enum, default_value = "differential")]
+    model: Model,
+    /// How they are fitted
+    #[arg(long, value_enum, default_value = "weighted")]
+    estimator: Fit,
+    /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
+    #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
+    cutoff: Choice<f64>,
+    /// Keep every n-th row after the parallel low-pass, or "auto"
+    #[arg(long, default_value = "auto", value_parser = auto::<usize>)]
+    decimation: Choice<usize>,
+    /// Leave out rows slower than this, rad/s or m/s, where friction has no sign yet; 0 keeps all, or "auto"
+    #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
+    min_speed: Choice<f64>,
+    /// Length of the integral model's windows, s [default: chosen from the motion]
+    #[arg(long)]
+    window: Option<f64>,
+    /// How much later a recorded torque acts, s (half a sample for a command held until the next one)
+    #[arg(long, default_value_t = 0.0)]
+    torque_lead: f64,
+    /// Seed of the random states from which the base parameters are found
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl Args {
+    fn options(&self) -> Options {
+        Options {
+            model: self.model.into(),
+            estimator: match self.estimator {
+                Fit::Ols => Estimator::Ols,
+                Fit::Weighted => Estimator::Weighted,
+                Fit::Robust => Estimator::Robust,
+            },
+            loss: Loss::default(),
+            prepare: PrepareOptions {
+                cutoff: self.cutoff,
+                decimation: self.decimation,
+                speed_threshold: self.min_speed,
+                torque_lead: self.torque_lead,
+                ..PrepareOptions::default()
+            },
+            window: self.window,
+            seed: self.seed,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming the file, line or value at fault.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let robot = args.robot.load()?;
+    let training = Inputs::open(&robot, &args.data)?;
+    let holdout = Inputs::open(&robot, &args.holdout)?;
+    for warning in training.warnings().chain(holdout.warnings()) {
+        ui.remark(&warning);
+    }
+    folder(&args.out)?;
+    // Three passes over the training data, two over the hold-out: see `identify`.
+    let progress =
+        RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
+    let identification = identify(
+        &robot,
+        &recordings(&training.watched(&progress)),
+        &recordings(&holdout.watched(&progress)),
+        &args.options(),
+    )?;
+    drop(progress);
+    let (identified, remarks) = identified_robot(&robot, &identification);
+    let text = identified.to_toml()?;
+    let context = Context {
+        command: command_line(),
+        identified: Some(("identified.toml".into(), text.clone())),
+        remarks,
+        warnings: training.warnings().chain(holdout.warnings()).collect(),
+    };
+    let page = pages::identification(&robot, &identification, &context);
+
+    let json = serde_json::to_string_pretty(&identification).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
+    write_whole(
+        &args.out.join("identification.json"),
+        (json + "\n").as_bytes(),
+    )?;
+    report::write(&args.out.join("report.html"), &page)?;
+    print(ui, &identification, &args.out);
+    Ok(())
+}
+
+/// The result at a glance.
+fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
+    let width = result
+        .base_parameters
+        .iter()
+        .map(|p| p.expression.chars().count())
+        .max()
+        .unwrap_or(0);
+    for parameter in &result.base_parameters {
+        ui.say(&format!(
+            "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
+            parameter.expression,
+            format_value(parameter.value, parameter.std),
+            parameter.unit,
+            parameter.interval[0],
+            parameter.interval[1],
+        ));
+    }
+    for joint in &result.joints {
+        let holdout = joint.holdout_relative_error.map_or(String::new(), |error| {
+            format!(", {:.2} % on the hold-out", 100.0 * error)
+        });
+        ui.say(&format!(
+            "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
+            joint.name,
+            joint.train_residual_rms,
+            100.0 * joint.train_relative_error,
+        ));
+    }
+    for missing in &result.not_excited {
+        ui.say(&format!(
+            "not excited: {} ({}); {}",
+            missing.combination, missing.why, missing.motion
+        ));
+    }
+    for warning in &result.warnings {
+        ui.remark(warning);
+    }
+    ui.say(&format!("report: {}", out.join("report.html").display()));
+}

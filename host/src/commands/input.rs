@@ -1,0 +1,152 @@
+//! What several commands take: a robot description and recordings, checked before any work begins.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::ui::Progress;
+use crate::data::{Block, Source, plausibility};
+use crate::prepare::{PrepareError, Recording};
+use crate::robot::Robot;
+
+/// Rows that are looked at for units; a recording in the wrong unit shows it at once.
+const UNIT_CHECK_ROWS: usize = 100_000;
+
+/// The robot description.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct RobotArg {
+    /// Robot description, TOML or URDF (`rig init` writes one to start from)
+    #[arg(long = "robot", value_name = "FILE")]
+    path: PathBuf,
+}
+
+impl RobotArg {
+    /// Loads it.
+    ///
+    /// # Errors
+    /// What is wrong with the file, by line.
+    pub(crate) fn load(&self) -> Result<Robot, CommandError> {
+        Ok(Robot::load(&self.path)?)
+    }
+}
+
+/// Recordings that fit the robot.
+pub(crate) struct Inputs {
+    sources: Vec<Source>,
+}
+
+impl Inputs {
+    /// Opens recordings and checks their columns and units.
+    ///
+    /// # Errors
+    /// What is wrong, by file and line; all units that look wrong in one sentence.
+    pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
+        let mut sources = Vec::with_capacity(paths.len());
+        for path in paths {
+            let source = Source::open(path, robot)?;
+            if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
+                let found: Vec<String> = plausibility(&block?, robot)
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect();
+                if !found.is_empty() {
+                    return Err(CommandError::Implausible(format!(
+                        "{}: {}",
+                        path.display(),
+                        found.join("; ")
+                    )));
+                }
+            }
+            sources.push(source);
+        }
+        Ok(Self { sources })
+    }
+
+    /// What the reader should know of them.
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+        self.sources.iter().flat_map(|source| {
+            source
+                .warnings()
+                .iter()
+                .map(move |warning| format!("{}: {warning}", source.path().display()))
+        })
+    }
+
+    /// Bytes in all files.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.sources.iter().map(Source::bytes).sum()
+    }
+
+    /// The recordings as the library takes them.
+    pub(crate) fn recordings(&self) -> Vec<&dyn Recording> {
+        self.sources
+            .iter()
+            .map(|source| source as &dyn Recording)
+            .collect()
+    }
+}
+
+/// A recording whose reading moves a progress bar.
+pub(crate) struct Watched<'a> {
+    source: &'a Source,
+    progress: &'a RefCell<Progress>,
+}
+
+impl Recording for Watched<'_> {
+    fn label(&self) -> String {
+        self.source.label()
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        let mut blocks = self.source.blocks(rows);
+        let mut before = 0;
+        while let Some(block) = blocks.next() {
+            take(block.map_err(|error| PrepareError::Read(error.to_string()))?)?;
+            let read = blocks.bytes_read();
+            self.progress.borrow_mut().advance(read - before);
+            before = read;
+        }
+        Ok(())
+    }
+}
+
+impl Inputs {
+    /// The recordings, each reporting to `progress` what was read.
+    pub(crate) fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
+        self.sources
+            .iter()
+            .map(|source| Watched { source, progress })
+            .collect()
+    }
+}
+
+/// The list that the library takes.
+pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recording> {
+    watched
+        .iter()
+        .map(|recording| recording as &dyn Recording)
+        .collect()
+}
+
+/// The command line as typed, for the report's "how to repeat this".
+pub(crate) fn command_line() -> String {
+    let mut words = vec!["rig".to_string()];
+    words.extend(std::env::args().skip(1).map(|word| {
+        if word
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "-_./=:,".contains(c))
+            && !word.is_empty()
+        {
+            word
+        } else {
+            format!("'{}'", word.replace('\'', "'\\''"))
+        }
+    }));
+    words.join(" ")
+}

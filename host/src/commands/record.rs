@@ -1,0 +1,249 @@
+//! `rig record`: a trajectory run on the rig, or the rig at rest, recorded.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgGroup, Args as ClapArgs};
+use rig_shared::safety::{Limit, Mode};
+use rig_shared::trajectory::Trajectory;
+use rig_shared::wire::message::RequestBody;
+
+use super::error::CommandError;
+use super::ui::Ui;
+use crate::data::{Column, RecordingWriter};
+use crate::emulated::{EmulatedRig, Nameplate};
+use crate::excite::TrajectoryFile;
+use crate::link::experiment::{Experiment, run as run_experiment};
+use crate::link::serial::DEFAULT_BAUD;
+use crate::link::{
+    COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session, SessionSettings,
+};
+use crate::plant::PlantConfig;
+use crate::robot::{ONE_LINK_TEMPLATE, Robot};
+
+/// Records the rig's telemetry, at rest or while it runs a trajectory.
+#[derive(Debug, ClapArgs)]
+#[command(group = ArgGroup::new("where").required(true).args(["port", "emulated"]))]
+pub(crate) struct Args {
+    /// Serial port of the rig, such as /dev/ttyACM0 or COM3
+    #[arg(long)]
+    port: Option<String>,
+    /// The emulated rig instead of hardware
+    #[arg(long)]
+    emulated: bool,
+    /// Speed of the serial port, baud
+    #[arg(long, default_value_t = DEFAULT_BAUD)]
+    baud: u32,
+    /// Robot description whose model, friction and limits are sent to the rig first
+    #[arg(long)]
+    robot: Option<PathBuf>,
+    /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
+    #[arg(long)]
+    trajectory: Option<PathBuf>,
+    /// How long to record after the trajectory, or in all without one, s
+    #[arg(long, default_value_t = 1.0)]
+    seconds: f64,
+    /// Where the link stands at the start, rad: an incremental encoder cannot know
+    #[arg(long, allow_negative_numbers = true)]
+    home: Option<f32>,
+    /// Compensate friction by the description's parameters
+    #[arg(long, requires = "robot")]
+    precompensation: bool,
+    /// Seed of the emulated rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// File to write, .csv or .mcap
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence: the port, the rig's refusal, the file.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
+        return Err(CommandError::Sentence(format!(
+            "--seconds {} is no time; give 0 or more.",
+            args.seconds
+        )));
+    }
+    let robot = args.robot.as_deref().map(Robot::load).transpose()?;
+    let mut settings: Vec<RequestBody> = args
+        .home
+        .map(RequestBody::SetPosition)
+        .into_iter()
+        .collect();
+    if let Some(robot) = &robot {
+        settings.extend(upload(&Nameplate::from_robot(robot)?, args.precompensation));
+    }
+    let trajectory = match &args.trajectory {
+        Some(path) => Some(single(&TrajectoryFile::load(path)?, path, args.home)?),
+        None => None,
+    };
+    let experiment = Experiment {
+        settings,
+        trajectory,
+        rest: args.seconds,
+    };
+    let losses = if let Some(name) = &args.port {
+        record(
+            SerialLine::open(name, args.baud)?,
+            &experiment,
+            &args.out,
+            ui,
+        )?
+    } else {
+        let described = match robot {
+            Some(robot) => robot,
+            None => Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?,
+        };
+        let rig = EmulatedRig::new(
+            &Nameplate::from_robot(&described)?,
+            PlantConfig::laboratory(args.seed),
+            args.seed,
+        )
+        .map_err(|fault| {
+            CommandError::Sentence(format!(
+                "The estimator's settings cannot be used: {fault:?}."
+            ))
+        })?;
+        record(EmulatedPort::new(rig), &experiment, &args.out, ui)?
+    };
+    ui.say(&format!("{}: {losses}", args.out.display()));
+    Ok(())
+}
+
+/// The motion of the rig's one joint, if it starts where the link stands.
+fn single(
+    file: &TrajectoryFile,
+    path: &Path,
+    home: Option<f32>,
+) -> Result<Trajectory<f32>, CommandError> {
+    let [joint] = file.joints.as_slice() else {
+        return Err(CommandError::Sentence(format!(
+            "{} moves {} joints, but the rig has one; design it with `rig excite` from the rig's description.",
+            path.display(),
+            file.joints.len()
+        )));
+    };
+    let stands = f64::from(home.unwrap_or(0.0));
+    if (joint.start - stands).abs() > START_TOLERANCE {
+        return Err(CommandError::Sentence(format!(
+            "{} starts at {:.4} rad, but the link stands at {stands:.4} rad (--home); bring the link there, or design the motion with `rig excite --start {stands:.4}`.",
+            path.display(),
+            joint.start
+        )));
+    }
+    Ok(joint.trajectory.to_f32())
+}
+
+/// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
+/// limits from where the link really stands.
+const START_TOLERANCE: f64 = 0.02;
+
+/// What a description asks the rig to be told.
+pub(crate) fn upload(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {
+    let settings = &nameplate.settings;
+    let mut compensation = settings.precompensation;
+    compensation.enabled = precompensation;
+    vec![
+        RequestBody::SetLimits(settings.limits),
+        RequestBody::SetModel(settings.model),
+        RequestBody::SetFriction(settings.friction),
+        RequestBody::SetPrecompensation(compensation),
+        RequestBody::SetGains(settings.gains),
+        RequestBody::SetEstimator(settings.estimator),
+    ]
+}
+
+/// Units of [`COLUMNS`].
+const UNITS: [&str; COLUMNS.len()] = ["s", "rad", "A", "V", "rad", "rad/s", "N*m", "", ""];
+
+fn record<P: Port>(
+    port: P,
+    experiment: &Experiment,
+    out: &Path,
+    ui: &Ui,
+) -> Result<LossReport, CommandError> {
+    let mut session = Session::open(port, SessionSettings::default())?;
+    let greeting = session.greeting().clone();
+    let converter = Converter::new(&greeting);
+    let columns: Vec<Column> = COLUMNS
+        .iter()
+        .zip(UNITS)
+        .map(|(name, unit)| Column::new(name, unit))
+        .collect();
+    let metadata = BTreeMap::from([
+        ("firmware".to_string(), greeting.firmware.to_string()),
+        (
+            "modes".to_string(),
+            names(&[
+                Mode::Calibrating,
+                Mode::Disarmed,
+                Mode::Holding,
+                Mode::Running,
+                Mode::Stopping,
+                Mode::Fault,
+            ]),
+        ),
+        (
+            "limits".to_string(),
+            Limit::ALL
+                .map(|limit| format!("{} {}", limit as u8, limit.name()))
+                .join(", "),
+        ),
+    ]);
+    let mut writer = RecordingWriter::create(out, &columns, &metadata)?;
+    let total = experiment.samples(1.0 / converter.period());
+    let mut progress = ui.progress("recording", total);
+    let mut failed = None;
+    let mut fault = None;
+    let mut done = 0;
+    let losses = run_experiment(&mut session, experiment, |event| {
+        match event {
+            Event::Samples {
+                first_tick,
+                samples,
+            } => {
+                for (k, sample) in samples.iter().enumerate() {
+                    if let Err(error) =
+                        writer.push_row(&converter.row(first_tick, k, sample).values())
+                    {
+                        failed = Some(error);
+                        return ControlFlow::Break(());
+                    }
+                }
+                done += samples.len() as u64;
+                progress.at(done);
+            }
+            Event::Fault(record) => fault = Some(*record),
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    })?;
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    writer.finish()?;
+    if let Some(record) = fault {
+        return Err(CommandError::Sentence(format!(
+            "The rig has stopped with the fault {:?} ({}) at tick {}; {} holds what was recorded until the end.",
+            record.fault,
+            record.value,
+            record.tick,
+            out.display()
+        )));
+    }
+    Ok(losses)
+}
+
+fn names(modes: &[Mode]) -> String {
+    let list: Vec<String> = modes
+        .iter()
+        .enumerate()
+        .map(|(k, mode)| format!("{k} {}", mode.name()))
+        .collect();
+    list.join(", ")
+}

@@ -1,0 +1,105 @@
+//! `rig validate`: a description against data that it was not made from.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line};
+use super::ui::Ui;
+use crate::files::{folder, write_whole};
+use crate::pages::{self, Context};
+use crate::report::{self, format_significant};
+use crate::validate::{Motion, Options, Validation, validate};
+
+/// Predicts torque and simulates motion on data not used before.
+///
+/// Writes validation.json and report.html into the folder given with --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording to judge by, CSV or MCAP; may be given several times
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming the file, line or value at fault.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let robot = args.robot.load()?;
+    let inputs = Inputs::open(&robot, &args.data)?;
+    for warning in inputs.warnings() {
+        ui.remark(&warning);
+    }
+    folder(&args.out)?;
+    let mut progress = ui.progress("validating", 1000);
+    let validation = validate(
+        &robot,
+        &inputs.recordings(),
+        &Options::default(),
+        &mut |share| {
+            progress.at((1000.0 * share) as u64);
+        },
+    )?;
+    drop(progress);
+    let context = Context {
+        command: command_line(),
+        warnings: inputs.warnings().collect(),
+        ..Context::default()
+    };
+    let json = serde_json::to_string_pretty(&validation).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("validation.json"), (json + "\n").as_bytes())?;
+    report::write(
+        &args.out.join("report.html"),
+        &pages::validation(&robot, &validation, &context),
+    )?;
+    for line in summary(&validation) {
+        ui.say(&line);
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// The result at a glance: one line a joint and recording for the torque, one for the motion.
+fn summary(validation: &Validation) -> Vec<String> {
+    let mut lines = Vec::new();
+    for checked in &validation.recordings {
+        for torque in &checked.torque {
+            lines.push(format!(
+                "{}, {}: torque off by {} {} rms, {:.2} % of the torque",
+                checked.recording,
+                torque.joint,
+                format_significant(torque.residual.rms, 4),
+                torque.unit,
+                100.0 * torque.residual.relative_error
+            ));
+        }
+        match &checked.motion {
+            Motion::NotSimulated { why } => lines.push(format!("{}: motion not simulated: {why}", checked.recording)),
+            Motion::Simulated { joints, .. } => lines.extend(joints.iter().map(|joint| {
+                format!(
+                    "{}, {}: simulated position off by {} {} rms, {:.2} % of the motion; torque by {} {} rms",
+                    checked.recording,
+                    joint.joint,
+                    format_significant(joint.position_rms_error, 4),
+                    joint.position_unit,
+                    100.0 * joint.position_relative_error,
+                    format_significant(joint.torque_rms_error, 4),
+                    joint.torque_unit
+                )
+            })),
+        }
+    }
+    lines
+}

@@ -1,0 +1,177 @@
+//! Passes over recordings with fitted parameters: covariance and residuals.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::base::Independent;
+use super::covariance::{Estimate, Groups, Memory, t_quantile};
+use super::factor::TriangularFactor;
+use super::linear::{classical, kept_columns, product, spread};
+use super::model::{Plan, each_rows};
+use super::residual::{Ranges, ResidualReport, ResidualStream};
+use super::{IdentifyError, ModelKind, Options};
+use crate::prepare::{Recording, Survey};
+
+/// The estimate with its covariance, from one pass over the rows that were fitted.
+pub(super) fn covariance(
+    training: &[&dyn Recording],
+    plan: &Plan,
+    options: &Options,
+    factor: &TriangularFactor,
+    data: &Independent,
+    beta: &[f64],
+    weights: &[f64],
+    loss: Option<(super::Loss, &[f64])>,
+    instants: u64,
+) -> Result<Estimate, IdentifyError> {
+    let (classical_std, inverse) = classical(factor, data, beta)?;
+    let full = spread(beta, &data.kept, factor.columns());
+    let (p, size) = (full.len(), beta.len());
+    let mut groups = Groups::new(size, instants);
+    let mut memories = vec![Memory::default(); weights.len()];
+    let mut index = 0u64;
+    let whiten = inverse.transpose();
+    let mut x_kept = DVector::zeros(size);
+    let mut z = DVector::zeros(size);
+    for recording in training {
+        each_rows(*recording, plan, options.model, &mut |rows| {
+            for i in 0..rows.t.len() {
+                for (k, equation) in rows.equations.iter().enumerate() {
+                    if !equation.keep[i] {
+                        continue;
+                    }
+                    let x = &equation.x[i * p..(i + 1) * p];
+                    let e = equation.y[i] - product(x, &full);
+                    memories[k].push(e);
+                    let mut weight = weights[k];
+                    if let Some((loss, scale)) = loss {
+                        weight *= loss.weight(e / scale[k].max(f64::MIN_POSITIVE)).sqrt();
+                    }
+                    for (to, &c) in x_kept.iter_mut().zip(&data.kept) {
+                        *to = weight * x[c];
+                    }
+                    z.gemv(1.0, &whiten, &x_kept, 0.0);
+                    groups.push(index, &z, weight * e);
+                }
+                index += 1;
+            }
+            Ok(())
+        })?;
+    }
+    let memory = memories.iter().map(Memory::length).fold(1.0, f64::max);
+    let rows: u64 = memories.iter().map(Memory::seen).sum();
+    let (white, count) = groups.jackknife(memory).ok_or_else(|| {
+        let seconds = training.len() as f64
+            * instants as f64
+            * plan.treatment.decimation as f64
+            * plan.treatment.dt();
+        IdentifyError::TooShortForIntervals {
+            rows,
+            memory,
+            needed: (2.0 * seconds).ceil() as u64,
+        }
+    })?;
+    let covariance = &inverse * white * inverse.transpose();
+    let std: Vec<f64> = (0..size)
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
+    let quantile = t_quantile(count - 1);
+    let (a, _) = kept_columns(factor, data);
+    let condition = |m: DMatrix<f64>| {
+        let s = m.singular_values();
+        s.max() / s.min()
+    };
+    let mut scaled = a.clone();
+    for mut column in scaled.column_iter_mut() {
+        let norm = column.norm();
+        column /= norm;
+    }
+    let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
+        (0..size)
+            .map(|i| (0..size).map(|j| m(i, j)).collect())
+            .collect::<Vec<Vec<f64>>>()
+    };
+    Ok(Estimate {
+        interval: (0..size)
+            .map(|k| [beta[k] - quantile * std[k], beta[k] + quantile * std[k]])
+            .collect(),
+        covariance: rows_of(&|i, j| covariance[(i, j)]),
+        correlation: rows_of(&|i, j| covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)),
+        values: beta.to_vec(),
+        classical_std,
+        degrees_of_freedom: count - 1,
+        rows,
+        effective_rows: rows as f64 / memory,
+        memory_rows: memory,
+        condition: condition(a),
+        scaled_condition: condition(scaled),
+        std,
+    })
+}
+
+/// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
+/// can be compared.
+pub(crate) fn torque_residuals(
+    recordings: &[&dyn Recording],
+    surveys: &[Survey],
+    plan: &Plan,
+    full: &[f64],
+) -> Result<Vec<ResidualReport>, IdentifyError> {
+    let total: u64 = surveys
+        .iter()
+        .map(|s| s.rows / plan.treatment.decimation as u64)
+        .sum();
+    let joints = surveys.first().map_or(0, |s| s.joints.len());
+    let extremes = |j: usize, of: &dyn Fn(&crate::prepare::JointSurvey) -> [f64; 2]| {
+        surveys
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| {
+                let [low, high] = of(&s.joints[j]);
+                [l.min(low), h.max(high)]
+            })
+    };
+    let p = full.len();
+    // The survey's peak speed is that of raw differences, noise included; the filtered one needs a look.
+    let mut speed = vec![0.0f64; joints];
+    for recording in recordings {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for (s, qd) in speed.iter_mut().zip(&rows.qd) {
+                *s = qd.iter().fold(*s, |m, v| m.max(v.abs()));
+            }
+            Ok(())
+        })?;
+    }
+    let mut streams: Vec<ResidualStream> = (0..joints)
+        .map(|j| {
+            ResidualStream::new(
+                total,
+                Ranges {
+                    position: extremes(j, &|s| s.position),
+                    speed: speed[j],
+                    torque: extremes(j, &|s| s.torque),
+                },
+            )
+        })
+        .collect();
+    let mut index = 0u64;
+    for recording in recordings {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for i in 0..rows.t.len() {
+                for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
+                    let predicted = product(&equation.x[i * p..(i + 1) * p], full);
+                    stream.push(
+                        index,
+                        rows.t[i],
+                        rows.q[j][i],
+                        rows.qd[j][i],
+                        equation.y[i],
+                        predicted,
+                        equation.keep[i],
+                    );
+                }
+                index += 1;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(streams.into_iter().map(ResidualStream::report).collect())
+}

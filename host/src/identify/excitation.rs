@@ -1,0 +1,86 @@
+//! What the data tell apart, and what they do not.
+
+use nalgebra::DMatrix;
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::NotExcited;
+use super::base::{Base, Independent, column_name, independent_columns, preference};
+use super::factor::TriangularFactor;
+use crate::robot::JointKind;
+
+/// A base parameter counts as not excited when its column, scaled to length one, differs from a combination of
+/// the others by less than this: its value would rest on a thousandth of the torque, which is the order of
+/// what filters and sensors distort.
+const EXCITED: f64 = 1e-3;
+
+/// Columns of the accumulated regressor that the data tell apart, and what the others join.
+pub(super) fn excited(base: &Base, factor: &TriangularFactor) -> Independent {
+    let (excitation, _) = factor.system();
+    without_traces(
+        independent_columns(&excitation, &data_order(base), EXCITED),
+        &excitation,
+    )
+}
+
+/// Base columns in the order in which they are kept when the data cannot tell all of them apart.
+fn data_order(base: &Base) -> Vec<usize> {
+    let preferred = preference(&base.kinds);
+    let rank = |c: usize| preferred.iter().position(|&x| x == c).unwrap_or(usize::MAX);
+    let mut order: Vec<usize> = (0..base.len()).collect();
+    order.sort_by_key(|&k| rank(base.columns[k]));
+    order
+}
+
+/// Leaves out of the combinations what is too small for these data to show, so that a parameter is not printed
+/// with a hundred-thousandth of another beside it.
+fn without_traces(mut data: Independent, excitation: &DMatrix<f64>) -> Independent {
+    for k in 0..excitation.ncols() {
+        let length = excitation.column(k).norm();
+        for (row, &c) in data.kept.iter().enumerate() {
+            let share = data.combination[(row, k)].abs() * excitation.column(c).norm();
+            if c != k && share < EXCITED * length {
+                data.combination[(row, k)] = 0.0;
+            }
+        }
+    }
+    data
+}
+
+/// What is not identified on its own, with the reason and a motion that would help.
+pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
+    (0..base.len())
+        .filter(|k| !data.kept.contains(k))
+        .map(|k| {
+            let partners: Vec<String> = data
+                .kept
+                .iter()
+                .enumerate()
+                .filter(|(row, _)| data.combination[(*row, k)].abs() > 1e-6)
+                .map(|(_, &c)| column_name(base.columns[c]))
+                .collect();
+            let joint = base.columns[k] / COLUMNS + 1;
+            let why = if partners.is_empty() {
+                "It has no effect on the torque in these data.".to_owned()
+            } else {
+                format!(
+                    "In these data its torque is, to within {:.2} % of itself, a combination of that of {}; their sum is identified instead.",
+                    100.0 * data.remainder[k],
+                    partners.join(", ")
+                )
+            };
+            let revolute = base.kinds[joint - 1] == JointKind::Revolute;
+            let motion = match base.columns[k] % COLUMNS {
+                column::VISCOUS => format!("Move joint {joint} at several clearly different speeds, in both directions."),
+                column::COULOMB => format!("Move joint {joint} slowly in both directions, with reversals."),
+                column::OFFSET => format!("Move joint {joint} in both directions and, where it lifts, over a wider range of positions."),
+                1..=3 if revolute => format!("Move joint {joint} over a wider range of positions, at best half a turn."),
+                _ => format!("Accelerate joint {joint} and its neighbours harder, in different postures."),
+            };
+            NotExcited {
+                combination: base.expression(k),
+                why,
+                motion,
+            }
+        })
+        .collect()
+}

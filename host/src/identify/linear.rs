@@ -1,0 +1,72 @@
+//! Least squares on a triangular factor, some of its columns left out.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::IdentifyError;
+use super::base::{Base, Independent, column_name};
+use super::factor::TriangularFactor;
+
+/// Row times parameters.
+pub(super) fn product(x: &[f64], beta: &[f64]) -> f64 {
+    x.iter().zip(beta).map(|(x, b)| x * b).sum()
+}
+
+/// Values of the kept columns spread over all columns, zero elsewhere.
+pub(super) fn spread(beta: &[f64], kept: &[usize], p: usize) -> Vec<f64> {
+    let mut full = vec![0.0; p];
+    for (value, &k) in beta.iter().zip(kept) {
+        full[k] = *value;
+    }
+    full
+}
+
+pub(super) fn kept_columns(
+    factor: &TriangularFactor,
+    data: &Independent,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let (r, z) = factor.system();
+    (r.select_columns(&data.kept), z)
+}
+
+/// Triangular R of the kept columns alone and their solution.
+pub(super) fn least_squares(
+    factor: &TriangularFactor,
+    data: &Independent,
+    base: &Base,
+) -> Result<Vec<f64>, IdentifyError> {
+    let (a, z) = kept_columns(factor, data);
+    let qr = a.clone().qr();
+    let right = qr.q().transpose() * z;
+    qr.r()
+        .solve_upper_triangular(&right)
+        .filter(|x| x.iter().all(|v| v.is_finite()))
+        .map(|x| x.as_slice().to_vec())
+        .ok_or_else(|| {
+            let smallest = (0..a.ncols())
+                .min_by(|&i, &j| a.column(i).norm().total_cmp(&a.column(j).norm()))
+                .unwrap_or(0);
+            IdentifyError::Singular {
+                column: column_name(base.columns[data.kept[smallest]]),
+            }
+        })
+}
+
+/// Standard deviations of the textbook, σ²·(XᵀX)⁻¹, and the inverse of the triangular factor.
+pub(super) fn classical(
+    factor: &TriangularFactor,
+    data: &Independent,
+    beta: &[f64],
+) -> Result<(Vec<f64>, DMatrix<f64>), IdentifyError> {
+    let (a, _) = kept_columns(factor, data);
+    let r = a.qr().r();
+    let inverse = r.try_inverse().ok_or(IdentifyError::Singular {
+        column: "unknown".into(),
+    })?;
+    let full = spread(beta, &data.kept, factor.columns());
+    let freedom = factor.rows().saturating_sub(beta.len() as u64).max(1);
+    let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
+    let std = (0..beta.len())
+        .map(|k| sigma * inverse.row(k).norm())
+        .collect();
+    Ok((std, inverse))
+}

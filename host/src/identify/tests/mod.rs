@@ -1,0 +1,90 @@
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod emps;
+mod made;
+
+use super::*;
+use crate::data::{Block, JointColumns};
+use crate::prepare::{Choice, InMemory};
+use crate::robot::{Joint, JointKind, Robot};
+use rand::{RngExt, SeedableRng};
+
+fn joint(kind: JointKind, alpha: f64) -> Joint {
+    Joint {
+        name: "axis".into(),
+        kind,
+        alpha,
+        a: 0.0,
+        theta: 0.0,
+        d: 0.0,
+        inertial: None,
+        limits: None,
+        friction: None,
+        drive: None,
+        controller: None,
+    }
+}
+
+fn robot(name: &str, joints: Vec<Joint>) -> Robot {
+    Robot {
+        name: name.into(),
+        gravity: [0.0, 0.0, -9.81],
+        joints,
+        effects: Vec::new(),
+    }
+}
+
+/// A slide along the horizontal.
+fn slide() -> Robot {
+    robot(
+        "slide",
+        vec![joint(JointKind::Prismatic, std::f64::consts::FRAC_PI_2)],
+    )
+}
+
+/// A pendulum: axis horizontal, angle zero along the horizontal.
+fn pendulum() -> Robot {
+    robot(
+        "pendulum",
+        vec![joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2)],
+    )
+}
+
+fn show(title: &str, found: &Identification) {
+    let d = &found.details;
+    println!(
+        "== {title}: cut-off {:.2} Hz, decimation {}, rows {}, memory {:.1}, dof {}, cond {:.1} scaled {:.2}, motion {:.2} Hz, threshold {:?}, window {:?}",
+        d.treatment.cutoff,
+        d.treatment.decimation,
+        d.estimate.rows,
+        d.estimate.memory_rows,
+        d.estimate.degrees_of_freedom,
+        d.estimate.condition,
+        d.estimate.scaled_condition,
+        d.treatment.motion_frequency,
+        d.treatment.speed_threshold,
+        d.window.as_ref().map(|w| w.0)
+    );
+    println!("   {} | {:?}", d.treatment.cutoff_reason, d.masked);
+    for b in &found.base_parameters {
+        println!(
+            "   {:10} {:10.4} ± {:.3} % (classical {:.3} %) [{:.4}, {:.4}] {}",
+            b.expression,
+            b.value,
+            b.relative_std_percent,
+            b.classical_relative_std_percent,
+            b.interval[0],
+            b.interval[1],
+            b.unit
+        );
+    }
+    for j in &found.joints {
+        println!(
+            "   train {:.4} ({:.3} %) hold-out {:?} ({:?})",
+            j.train_residual_rms,
+            100.0 * j.train_relative_error,
+            j.holdout_residual_rms,
+            j.holdout_relative_error
+        );
+    }
+}

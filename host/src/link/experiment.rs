@@ -1,0 +1,89 @@
+//! An experiment on the rig: settings up, armed, a trajectory run and recorded, off again.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use rig_shared::trajectory::Trajectory;
+use rig_shared::wire::message::{Refusal, RequestBody};
+
+use super::error::LinkError;
+use super::port::Port;
+use super::recorder::{Event, LossReport, RecordSettings, record};
+use super::session::Session;
+
+/// Longest wait for a rig that is still measuring its current offset.
+const CALIBRATION_PATIENCE: Duration = Duration::from_secs(3);
+/// Pause between two attempts to arm.
+const CALIBRATION_PAUSE: Duration = Duration::from_millis(50);
+
+/// What to do on the rig.
+#[derive(Clone, Debug, Default)]
+pub struct Experiment {
+    /// Requests carried out first, while the rig is disarmed.
+    pub settings: Vec<RequestBody>,
+    /// The motion; none to record a rig at rest, disarmed.
+    pub trajectory: Option<Trajectory<f32>>,
+    /// How long to record after the trajectory has ended, or in all without one, s.
+    pub rest: f64,
+}
+
+impl Experiment {
+    /// Telemetry samples that the experiment takes.
+    pub fn samples(&self, sample_rate: f64) -> u64 {
+        let motion = self
+            .trajectory
+            .as_ref()
+            .map_or(0.0, |t| t.duration_micros() as f64 * 1e-6);
+        ((motion + self.rest) * sample_rate).ceil() as u64
+    }
+}
+
+/// Runs an experiment; every sample and every hole goes to `on_event`. The rig is disarmed afterwards, also
+/// when the recording was broken off or failed.
+///
+/// # Errors
+/// What the link says: a refused request, a silent rig, a broken line.
+pub fn run<P: Port>(
+    session: &mut Session<P>,
+    experiment: &Experiment,
+    on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
+) -> Result<LossReport, LinkError> {
+    let greeting = session.greeting();
+    let rate =
+        f64::from(greeting.control_rate_hz) / f64::from(greeting.telemetry_decimation.max(1));
+    let mut settings = RecordSettings {
+        samples: Some(experiment.samples(rate)),
+        ..RecordSettings::default()
+    };
+    when_calibrated(session, RequestBody::Disarm)?;
+    for body in &experiment.settings {
+        when_calibrated(session, body.clone())?;
+    }
+    if let Some(trajectory) = &experiment.trajectory {
+        session.request(RequestBody::SetTrajectory(trajectory.clone()))?;
+        when_calibrated(session, RequestBody::Arm)?;
+        settings.at_start = vec![RequestBody::Start];
+    }
+    let recorded = record(session, &settings, on_event);
+    // Off in any case; the recording's own error comes first, because it says more.
+    let off = session.request(RequestBody::Disarm);
+    let losses = recorded?;
+    off?;
+    Ok(losses)
+}
+
+/// A request that the rig refuses only because it is still calibrating.
+fn when_calibrated<P: Port>(session: &mut Session<P>, body: RequestBody) -> Result<(), LinkError> {
+    let begin = session.port().now();
+    loop {
+        match session.request(body.clone()) {
+            Err(LinkError::Refused {
+                refusal: Refusal::WrongMode,
+                ..
+            }) if session.port().now().saturating_sub(begin) < CALIBRATION_PATIENCE => {
+                session.next_report(CALIBRATION_PAUSE)?;
+            }
+            other => return other,
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! A description as the numbers that the mathematics takes.
+
+use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind as Kind, column};
+
+use super::{JointKind, Robot};
+
+impl Robot {
+    /// Geometry, joint by joint, for [`rig_shared::multibody::Chain::new`].
+    pub fn geometry(&self) -> Vec<JointGeometry<f64>> {
+        let joint = |joint: &super::Joint| JointGeometry {
+            kind: match joint.kind {
+                JointKind::Revolute => Kind::Revolute,
+                JointKind::Prismatic => Kind::Prismatic,
+            },
+            alpha: joint.alpha,
+            a: joint.a,
+            theta: joint.theta,
+            d: joint.d,
+        };
+        self.joints.iter().map(joint).collect()
+    }
+
+    /// Standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 where the description is silent.
+    /// The drive's inertia stands on the joint side.
+    pub fn standard_parameters(&self) -> Vec<[f64; COLUMNS]> {
+        let joint = |joint: &super::Joint| {
+            let mut row = [0.0; COLUMNS];
+            if let Some(inertial) = &joint.inertial {
+                row[column::MASS] = inertial.mass;
+                row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&inertial.first_moment);
+                row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
+            }
+            if let Some(drive) = &joint.drive {
+                row[column::DRIVE_INERTIA] =
+                    drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
+            }
+            if let Some(friction) = &joint.friction {
+                row[column::VISCOUS] = friction.viscous;
+                row[column::COULOMB] = friction.coulomb;
+                row[column::OFFSET] = friction.offset;
+            }
+            row
+        };
+        self.joints.iter().map(joint).collect()
+    }
+}

@@ -1,0 +1,340 @@
+//! Validation: what a description predicts for recordings that it was not fitted to. Nothing is refitted.
+//!
+//! Two checks a recording. *Torque*: the model's torque for the measured motion against the measured torque,
+//! prepared and evaluated as [`crate::identify`] evaluates its hold-out, so that both figures can be compared.
+//! *Motion*: the closed loop of model and controller, driven by the recorded reference from the recording's
+//! first state, against the measured position and torque; here errors of the model add up over time.
+//!
+//! A recording may say that the drive applied more than its controller asked for. Column `added<k>`: torque or
+//! force on joint k beside the controller's, N·m or N. Column `pulses`: added to the output of the first joint's
+//! controller, in its unit, and so multiplied by the description's `torque_gain`. Both are part of `tau<k>`, the
+//! whole torque of the drive: measured and simulated torque are compared as wholes, and the description's torque
+//! limit acts on the whole. (For the pulses of EMPS this was measured: `u1` less what the controller's law gives for
+//! `ref1` and `q1` is the column `pulses`, and the torque balance has no room for a further force.)
+//!
+//! Leaves out: the description's effects beyond the standard model (a warning says so); uncertainty of the
+//! description's parameters; measured inputs other than reference and added torque.
+
+mod motion;
+#[cfg(test)]
+mod tests;
+
+use rig_shared::multibody::COLUMNS;
+use serde::Serialize;
+
+use crate::identify::{IdentifyError, Plan, ResidualReport, chain_of, torque_residuals};
+use crate::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment};
+use crate::robot::{JointKind, Robot};
+use crate::simulate::{Model, SimulateError};
+
+/// Settings of a validation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Filters, decimation, masks of the torque check.
+    pub prepare: PrepareOptions,
+    /// Steps of the simulation within one sample; doubled until halving the step no longer matters where absent.
+    pub substeps: Option<u32>,
+    /// Most samples of one recording whose motion is simulated; memory grows with it.
+    pub most_samples: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            prepare: PrepareOptions::default(),
+            substeps: None,
+            // Ten minutes at 1 kHz; about 50 MB a joint.
+            most_samples: 600_000,
+        }
+    }
+}
+
+/// Why a description cannot be validated.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidateError {
+    /// No recording.
+    #[error("No recording was given; name at least one.")]
+    NoRecording,
+    /// Nothing to predict with.
+    #[error(
+        "The description of {robot} states neither inertia nor friction, so it predicts no torque; `rig identify` writes a description that does."
+    )]
+    NothingKnown {
+        /// Name of the robot.
+        robot: String,
+    },
+    /// Reading or preparing has failed.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// The torque could not be predicted.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// The model could not be built.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+}
+
+/// Torque of one joint, predicted and measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TorqueCheck {
+    /// Name of the joint.
+    pub joint: String,
+    /// `N*m` or `N`
+    pub unit: String,
+    /// What is left, and what it looks like.
+    #[serde(flatten)]
+    pub residual: ResidualReport,
+}
+
+/// Motion of one joint, simulated and measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionCheck {
+    /// Name of the joint.
+    pub joint: String,
+    /// `rad` or `m`
+    pub position_unit: String,
+    /// `N*m` or `N`
+    pub torque_unit: String,
+    /// RMS of simulated less measured position.
+    pub position_rms_error: f64,
+    /// Largest such difference.
+    pub position_max_error: f64,
+    /// RMS error over the RMS of the measured position about its mean.
+    pub position_relative_error: f64,
+    /// RMS of the measured tracking error, reference less position.
+    pub tracking_rms: f64,
+    /// RMS error over the RMS of the tracking error: a controller hides what a model gets wrong in the position,
+    /// not in this.
+    pub tracking_relative_error: f64,
+    /// RMS of simulated less measured torque.
+    pub torque_rms_error: f64,
+    /// Largest such difference.
+    pub torque_max_error: f64,
+    /// RMS error over the RMS of the measured torque.
+    pub torque_relative_error: f64,
+    /// Samples at which the torque limit cut the simulated controller's wish.
+    pub saturated: u64,
+    /// RMS change of the simulated position when the step is halved.
+    pub position_step_change: f64,
+    /// RMS change of the simulated torque when the step is halved.
+    pub torque_step_change: f64,
+    /// Curves for a plot.
+    #[serde(skip)]
+    pub series: MotionSeries,
+}
+
+/// Curves for a plot, at most 4000 points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionSeries {
+    /// s
+    pub t: Vec<f64>,
+    /// Reference position.
+    pub reference: Vec<f64>,
+    /// Measured position.
+    pub measured: Vec<f64>,
+    /// Simulated position.
+    pub simulated: Vec<f64>,
+    /// Measured torque.
+    pub torque_measured: Vec<f64>,
+    /// Simulated torque.
+    pub torque_simulated: Vec<f64>,
+}
+
+/// Simulated motion, or why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "status", rename_all = "snake_case")]
+pub enum Motion {
+    /// Simulated and compared.
+    Simulated {
+        /// One a joint.
+        joints: Vec<MotionCheck>,
+        /// Samples simulated.
+        samples: u64,
+        /// Samples of the recording.
+        of: u64,
+        /// Stretches without a gap in time, each from its own first state.
+        stretches: usize,
+        /// Steps within one sample.
+        substeps: u32,
+        /// Sentences: initial state, step, added torque, what was left out.
+        remarks: Vec<String>,
+    },
+    /// Not simulated.
+    NotSimulated {
+        /// A sentence.
+        why: String,
+    },
+}
+
+/// One recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checked {
+    /// Name of the recording.
+    pub recording: String,
+    /// Rows.
+    pub rows: u64,
+    /// Hz
+    pub sample_rate: f64,
+    /// One a joint.
+    pub torque: Vec<TorqueCheck>,
+    /// The closed loop.
+    pub motion: Motion,
+}
+
+/// The result; serialises to `validation.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Validation {
+    /// `rig-validation/1`
+    pub schema: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// One a recording.
+    pub recordings: Vec<Checked>,
+    /// Sentences.
+    pub warnings: Vec<String>,
+    /// What was done to the recordings for the torque check.
+    #[serde(skip)]
+    pub treatment: Treatment,
+}
+
+/// Units of position and torque of a joint, ASCII.
+pub(crate) fn units(kind: JointKind) -> (&'static str, &'static str) {
+    match kind {
+        JointKind::Revolute => ("rad", "N*m"),
+        JointKind::Prismatic => ("m", "N"),
+    }
+}
+
+/// Share of the torque unexplained above which a warning says so; [`crate::identify`] uses the same.
+const UNEXPLAINED: f64 = 0.3;
+
+/// Checks what `robot` predicts against `recordings`. `progress` is told the share that is done.
+///
+/// # Errors
+/// [`ValidateError`]: nothing to check or to check with, recordings that cannot be prepared. A motion that cannot
+/// be simulated is no error but a [`Motion::NotSimulated`] that says why.
+pub fn validate(
+    robot: &Robot,
+    recordings: &[&dyn Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Validation, ValidateError> {
+    if recordings.is_empty() {
+        return Err(ValidateError::NoRecording);
+    }
+    let chain = chain_of(robot)?;
+    let model = Model::from_robot(robot)?;
+    // Parameters that are zero add nothing to the torque: their columns are not formed.
+    let (columns, values): (Vec<usize>, Vec<f64>) = model
+        .parameters
+        .iter()
+        .flatten()
+        .copied()
+        .enumerate()
+        .filter(|(_, value)| *value != 0.0)
+        .unzip();
+    if columns.is_empty() {
+        return Err(ValidateError::NothingKnown {
+            robot: robot.name.clone(),
+        });
+    }
+    let joints = robot.joints.len();
+    let surveys = recordings
+        .iter()
+        .map(|r| Survey::take(*r, joints))
+        .collect::<Result<Vec<_>, _>>()?;
+    let limits: Vec<Option<f64>> = robot
+        .joints
+        .iter()
+        .map(|j| j.limits.as_ref().and_then(|l| l.torque))
+        .collect();
+    let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let plan = Plan {
+        chain: &chain,
+        columns: &columns,
+        treatment: &treatment,
+        window: 0,
+        stride: 1,
+        loudness: vec![1.0; joints],
+    };
+    let mut warnings = prior_warnings(robot, &columns);
+    let mut checked = Vec::with_capacity(recordings.len());
+    let share = 1.0 / recordings.len() as f64;
+    for (k, (recording, survey)) in recordings.iter().zip(&surveys).enumerate() {
+        let torque: Vec<TorqueCheck> =
+            torque_residuals(&[*recording], std::slice::from_ref(survey), &plan, &values)?
+                .into_iter()
+                .zip(&robot.joints)
+                .map(|(residual, joint)| TorqueCheck {
+                    joint: joint.name.clone(),
+                    unit: units(joint.kind).1.to_owned(),
+                    residual,
+                })
+                .collect();
+        for check in &torque {
+            if check.residual.rows == 0 {
+                warnings.push(format!(
+                    "{}, joint {}: every row is masked (too slow, or at the torque limit), so its torque was not checked.",
+                    survey.label, check.joint
+                ));
+            } else if check.residual.relative_error > UNEXPLAINED {
+                warnings.push(format!(
+                    "{}, joint {}: the description leaves {:.0} % of the torque unexplained.",
+                    survey.label,
+                    check.joint,
+                    100.0 * check.residual.relative_error
+                ));
+            }
+        }
+        let done = k as f64 * share;
+        let motion = motion::check(robot, &model, *recording, survey, options, &mut |part| {
+            progress(done + share * part);
+        })?;
+        if let Motion::NotSimulated { why } = &motion {
+            warnings.push(format!(
+                "{}: the motion was not simulated. {why}",
+                survey.label
+            ));
+        }
+        checked.push(Checked {
+            recording: survey.label.clone(),
+            rows: survey.rows,
+            sample_rate: survey.sample_rate,
+            torque,
+            motion,
+        });
+        progress(done + share);
+    }
+    Ok(Validation {
+        schema: "rig-validation/1".into(),
+        robot: robot.name.clone(),
+        recordings: checked,
+        warnings,
+        treatment,
+    })
+}
+
+/// What the description itself gives reason to say.
+fn prior_warnings(robot: &Robot, columns: &[usize]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (j, joint) in robot.joints.iter().enumerate() {
+        if !columns.iter().any(|c| c / COLUMNS == j) {
+            warnings.push(format!(
+                "The description states neither inertia nor friction for joint {}; they count as zero.",
+                joint.name
+            ));
+        } else if joint.friction.is_none() {
+            warnings.push(format!(
+                "The description states no friction for joint {}; it counts as zero.",
+                joint.name
+            ));
+        }
+    }
+    if !robot.effects.is_empty() {
+        warnings.push(
+            "The description's effects beyond the standard model are not part of this check."
+                .into(),
+        );
+    }
+    warnings
+}

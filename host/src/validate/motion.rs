@@ -1,0 +1,477 @@
+//! The closed loop of model and controller against the recorded motion.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError, units};
+use crate::data::Block;
+use crate::prepare::{Recording, Survey};
+use crate::robot::{Controller, Robot};
+use crate::simulate::{Inputs, Model, SimulateError, closed_loop};
+
+/// Rows at the start of a stretch through which a parabola is laid for the first state.
+const FIRST_ROWS: usize = 21;
+/// Shorter stretches between gaps are left out: the first state would decide over most of them.
+const FEWEST_ROWS: usize = 5 * FIRST_ROWS;
+/// Steps within a sample to begin with, and the most that are tried.
+const SUBSTEPS: [u32; 2] = [4, 64];
+/// The step is fine enough when halving it changes the motion by less than this share of the error reported.
+const STEP_SHARE: f64 = 0.01;
+/// Most points of a curve that is kept for plots.
+const SERIES_POINTS: usize = 4000;
+
+/// A stretch without a gap, joint by joint.
+struct Stretch {
+    t: Vec<f64>,
+    reference: Vec<Vec<f64>>,
+    q: Vec<Vec<f64>>,
+    tau: Vec<Vec<f64>>,
+    added: Vec<Vec<f64>>,
+    first_velocity: Vec<Option<f64>>,
+}
+
+/// What `recording` holds for a simulation.
+struct Gathered {
+    stretches: Vec<Stretch>,
+    /// Per joint, what was added, in words.
+    added: Vec<String>,
+    short: usize,
+}
+
+/// Simulates `recording` and compares; `progress` is told the share done.
+pub(super) fn check(
+    robot: &Robot,
+    model: &Model,
+    recording: &dyn Recording,
+    survey: &Survey,
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Motion, ValidateError> {
+    let not = |why: String| Ok(Motion::NotSimulated { why });
+    let mut controllers: Vec<Controller> = Vec::new();
+    for joint in &robot.joints {
+        match &joint.controller {
+            Some(c) if stiffness(c) == 0.0 => {
+                return not(format!(
+                    "A gain of the controller of joint {} is zero, so it does not follow its reference.",
+                    joint.name
+                ));
+            }
+            Some(controller) => controllers.push(controller.clone()),
+            None => {
+                return not(format!(
+                    "The description has no controller for joint {}; add its [joint.controller] table.",
+                    joint.name
+                ));
+            }
+        }
+    }
+    let gathered = match gather(robot, &controllers, recording, options.most_samples)? {
+        Ok(gathered) => gathered,
+        Err(why) => return not(why),
+    };
+    let samples: usize = gathered.stretches.iter().map(|s| s.t.len()).sum();
+    if samples == 0 {
+        return not(format!(
+            "No stretch between gaps in time has {FEWEST_ROWS} rows, the fewest that are simulated."
+        ));
+    }
+    let period = 1.0 / survey.sample_rate;
+    let run = |substeps: u32, tell: &mut dyn FnMut(f64)| {
+        let mut errors = Accumulated::new(robot.joints.len());
+        let mut motions = Vec::with_capacity(gathered.stretches.len());
+        let mut before = 0;
+        for stretch in &gathered.stretches {
+            let (q, v) = first_state(stretch, period);
+            // The drive's limit acts on its whole torque. Added torque therefore enters before the limit, as the
+            // shift of the reference that makes the controller ask for just as much more.
+            let reference: Vec<Vec<f64>> = stretch
+                .reference
+                .iter()
+                .zip(&stretch.added)
+                .zip(&controllers)
+                .map(|((r, a), c)| r.iter().zip(a).map(|(r, a)| r + a / stiffness(c)).collect())
+                .collect();
+            let motion = closed_loop(
+                robot,
+                model,
+                &controllers,
+                &Inputs {
+                    period,
+                    reference: &reference,
+                    added: &[],
+                    q: &q,
+                    v: &v,
+                    substeps,
+                },
+                |k| {
+                    if k.is_multiple_of(1024) {
+                        tell((before + k) as f64 / samples as f64);
+                    }
+                },
+            )?;
+            before += stretch.t.len();
+            errors.push(stretch, &motion);
+            motions.push(motion);
+        }
+        Ok::<_, SimulateError>((errors, motions))
+    };
+    let mut substeps = options.substeps.unwrap_or(SUBSTEPS[0]).max(1);
+    let last = options.substeps.unwrap_or(SUBSTEPS[1]).max(1);
+    // The work doubles from run to run: the first ones are a small share of it.
+    let outcome = (|| {
+        let mut coarse = run(substeps, &mut |p| progress(0.3 * p))?;
+        loop {
+            let fine = run(2 * substeps, &mut |p| progress(0.3 + 0.6 * p))?;
+            let change = Change::between(&coarse.1, &fine.1);
+            let settled = coarse.0.joints.iter().zip(&change).all(|(e, c)| {
+                c.position <= STEP_SHARE * e.position_rms()
+                    && c.torque <= STEP_SHARE * e.torque_rms()
+            });
+            if settled || 2 * substeps > last {
+                return Ok::<_, SimulateError>((coarse.0, coarse.1, change, settled));
+            }
+            coarse = fine;
+            substeps *= 2;
+        }
+    })();
+    let (errors, motions, change, settled) = match outcome {
+        Ok(outcome) => outcome,
+        Err(e) => return not(sentence(&e.to_string())),
+    };
+    let step = period / f64::from(substeps);
+    let mut remarks = vec![
+        format!(
+            "Every stretch starts from its own first position and velocity (a parabola through its first {FIRST_ROWS} rows, or the recorded velocity). After that only {} the simulation.",
+            if gathered.added.is_empty() {
+                "the reference drives"
+            } else {
+                "the reference and the added torque drive"
+            }
+        ),
+        if settled {
+            format!(
+                "Step {:.4} ms ({substeps} a sample); halving it changes the motion by less than {:.0} % of the errors shown.",
+                1e3 * step,
+                100.0 * STEP_SHARE
+            )
+        } else {
+            format!(
+                "Step {:.4} ms ({substeps} a sample); halving it still changes the motion by more than {:.0} % of the errors shown: compare the columns.",
+                1e3 * step,
+                100.0 * STEP_SHARE
+            )
+        },
+    ];
+    remarks.extend(gathered.added.iter().cloned());
+    if gathered.short > 0 {
+        remarks.push(format!(
+            "{} stretches between gaps in time are shorter than {FEWEST_ROWS} rows and were not simulated.",
+            gathered.short
+        ));
+    }
+    if (samples as u64) < survey.rows && samples >= options.most_samples {
+        remarks.push(format!(
+            "Only the first {samples} of {} samples ({:.1} s) were simulated, to bound memory.",
+            survey.rows,
+            samples as f64 * period
+        ));
+    }
+    let joints = errors
+        .joints
+        .iter()
+        .zip(&robot.joints)
+        .zip(&change)
+        .enumerate()
+        .map(|(j, ((e, joint), change))| {
+            let (position_unit, torque_unit) = units(joint.kind);
+            MotionCheck {
+                joint: joint.name.clone(),
+                position_unit: position_unit.to_owned(),
+                torque_unit: torque_unit.to_owned(),
+                position_rms_error: e.position_rms(),
+                position_max_error: e.position_max,
+                position_relative_error: e.position_rms() / e.spread(),
+                tracking_rms: e.rms(e.tracking),
+                tracking_relative_error: e.position_rms() / e.rms(e.tracking),
+                torque_rms_error: e.torque_rms(),
+                torque_max_error: e.torque_max,
+                torque_relative_error: e.torque_rms() / e.rms(e.torque_squares),
+                saturated: motions.iter().map(|m| m.saturated[j] as u64).sum(),
+                position_step_change: change.position,
+                torque_step_change: change.torque,
+                series: series(j, &gathered.stretches, &motions, samples),
+            }
+        })
+        .collect();
+    Ok(Motion::Simulated {
+        joints,
+        samples: samples as u64,
+        of: survey.rows,
+        stretches: gathered.stretches.len(),
+        substeps,
+        remarks,
+    })
+}
+
+/// Torque that a controller answers a position error with, N·m/rad or N/m.
+fn stiffness(c: &Controller) -> f64 {
+    c.torque_gain * c.velocity_gain * c.position_gain
+}
+
+/// A message of another room as a sentence of its own.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters
+        .next()
+        .map(|c| c.to_uppercase().chain(letters).collect())
+        .unwrap_or_default()
+}
+
+/// Reads what the simulation needs; the inner error is the sentence that says what is missing.
+fn gather(
+    robot: &Robot,
+    controllers: &[Controller],
+    recording: &dyn Recording,
+    most: usize,
+) -> Result<Result<Gathered, String>, ValidateError> {
+    let n = robot.joints.len();
+    let mut all: Vec<Stretch> = Vec::new();
+    let mut seen = 0usize;
+    let mut missing: Option<String> = None;
+    let mut named: Vec<String> = Vec::new();
+    recording.each_block(1 << 16, &mut |block| {
+        let room = most.saturating_sub(seen).min(block.len());
+        if missing.is_some() || room == 0 {
+            return Ok(());
+        }
+        if let Some(j) = block.joints.iter().position(|j| j.reference.is_none()) {
+            missing = Some(format!(
+                "The recording has no reference for joint {} (column ref{}).",
+                robot.joints[j].name,
+                j + 1
+            ));
+            return Ok(());
+        }
+        if !block.continues || all.is_empty() {
+            all.push(Stretch {
+                t: Vec::new(),
+                reference: vec![Vec::new(); n],
+                q: vec![Vec::new(); n],
+                tau: vec![Vec::new(); n],
+                added: vec![Vec::new(); n],
+                first_velocity: block
+                    .joints
+                    .iter()
+                    .map(|j| j.qd.as_ref().and_then(|v| v.first().copied()))
+                    .collect(),
+            });
+        }
+        let Some(stretch) = all.last_mut() else {
+            return Ok(());
+        };
+        stretch.t.extend(&block.t[..room]);
+        for (j, joint) in block.joints.iter().enumerate() {
+            stretch.q[j].extend(&joint.q[..room]);
+            stretch.tau[j].extend(&joint.tau[..room]);
+            if let Some(reference) = &joint.reference {
+                stretch.reference[j].extend(&reference[..room]);
+            }
+            let added = added_torque(&block, j, controllers, room, &mut named);
+            if added.iter().any(|a| a.is_nan()) {
+                missing = Some(format!(
+                    "The torque added to joint {} is not a number in some rows.",
+                    robot.joints[j].name
+                ));
+            }
+            stretch.added[j].extend(added);
+        }
+        seen += room;
+        Ok(())
+    })?;
+    if let Some(why) = missing {
+        return Ok(Err(why));
+    }
+    let before = all.len();
+    all.retain(|s| s.t.len() >= FEWEST_ROWS);
+    Ok(Ok(Gathered {
+        short: before - all.len(),
+        stretches: all,
+        added: named,
+    }))
+}
+
+/// The torque added to joint `j` over the first `rows` rows of a block, and in words where it is the first such.
+fn added_torque(
+    block: &Block,
+    j: usize,
+    controllers: &[Controller],
+    rows: usize,
+    named: &mut Vec<String>,
+) -> Vec<f64> {
+    let mut sum = vec![0.0; rows];
+    let mut add = |name: &str, gain: f64, words: String| {
+        if let Some((_, column)) = block.extra.iter().find(|(n, _)| n == name) {
+            for (s, v) in sum.iter_mut().zip(column) {
+                *s += gain * v;
+            }
+            if !named.contains(&words) {
+                named.push(words);
+            }
+        }
+    };
+    let column = format!("added{}", j + 1);
+    add(
+        &column,
+        1.0,
+        format!(
+            "Column {column} is taken as a torque beside the controller's on joint {}, part of tau{}.",
+            j + 1,
+            j + 1
+        ),
+    );
+    if j == 0 {
+        let gain = controllers.first().map_or(1.0, |c| c.torque_gain);
+        add(
+            "pulses",
+            gain,
+            format!(
+                "Column pulses is taken as added to the output of the first joint's controller, in its unit (times its torque_gain of {gain}), and as part of tau1."
+            ),
+        );
+    }
+    sum
+}
+
+/// Position and velocity at the first row of a stretch.
+fn first_state(stretch: &Stretch, period: f64) -> (Vec<f64>, Vec<f64>) {
+    let n = stretch.q.len();
+    let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
+    let rows = FIRST_ROWS.min(stretch.t.len());
+    let a = DMatrix::from_fn(rows, 3, |i, power| (i as f64).powi(power as i32));
+    let svd = a.svd(true, true);
+    for j in 0..n {
+        let y = DVector::from_fn(rows, |i, _| stretch.q[j][i]);
+        // A parabola over distinct instants always has a solution; the first row stands in otherwise.
+        let (position, slope) = svd
+            .solve(&y, 1e-12)
+            .map_or((stretch.q[j][0], 0.0), |x| (x[0], x[1] / period));
+        q[j] = position;
+        v[j] = stretch.first_velocity[j].unwrap_or(slope);
+    }
+    (q, v)
+}
+
+/// Sums over the samples of one joint.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    n: f64,
+    position: f64,
+    position_max: f64,
+    torque: f64,
+    torque_max: f64,
+    torque_squares: f64,
+    tracking: f64,
+    // About the first sample, so that the mean of a distant position costs no digits.
+    origin: f64,
+    first: f64,
+    second: f64,
+}
+
+impl Sums {
+    fn rms(&self, squares: f64) -> f64 {
+        (squares / self.n.max(1.0)).sqrt()
+    }
+    fn position_rms(&self) -> f64 {
+        self.rms(self.position)
+    }
+    fn torque_rms(&self) -> f64 {
+        self.rms(self.torque)
+    }
+    fn spread(&self) -> f64 {
+        let n = self.n.max(1.0);
+        (self.second / n - (self.first / n).powi(2)).max(0.0).sqrt()
+    }
+}
+
+struct Accumulated {
+    joints: Vec<Sums>,
+}
+
+impl Accumulated {
+    fn new(joints: usize) -> Self {
+        Self {
+            joints: vec![Sums::default(); joints],
+        }
+    }
+
+    fn push(&mut self, stretch: &Stretch, motion: &crate::simulate::Motion) {
+        for (j, s) in self.joints.iter_mut().enumerate() {
+            for k in 0..motion.q[j].len() {
+                let q = stretch.q[j][k];
+                if s.n == 0.0 {
+                    s.origin = q;
+                }
+                let e = motion.q[j][k] - q;
+                let tau = motion.tau[j][k] - stretch.tau[j][k];
+                s.n += 1.0;
+                s.position += e * e;
+                s.position_max = s.position_max.max(e.abs());
+                s.torque += tau * tau;
+                s.torque_max = s.torque_max.max(tau.abs());
+                s.torque_squares += stretch.tau[j][k].powi(2);
+                s.tracking += (stretch.reference[j][k] - q).powi(2);
+                s.first += q - s.origin;
+                s.second += (q - s.origin).powi(2);
+            }
+        }
+    }
+}
+
+/// RMS differences between two runs of one joint.
+struct Change {
+    position: f64,
+    torque: f64,
+}
+
+impl Change {
+    fn between(a: &[crate::simulate::Motion], b: &[crate::simulate::Motion]) -> Vec<Self> {
+        let joints = a.first().map_or(0, |m| m.q.len());
+        let rms = |of: &dyn Fn(&crate::simulate::Motion) -> &[f64]| {
+            let (mut n, mut sum) = (0.0f64, 0.0);
+            for (a, b) in a.iter().zip(b) {
+                for (x, y) in of(a).iter().zip(of(b)) {
+                    n += 1.0;
+                    sum += (x - y).powi(2);
+                }
+            }
+            (sum / n.max(1.0)).sqrt()
+        };
+        (0..joints)
+            .map(|j| Self {
+                position: rms(&|m| &m.q[j]),
+                torque: rms(&|m| &m.tau[j]),
+            })
+            .collect()
+    }
+}
+
+fn series(
+    j: usize,
+    stretches: &[Stretch],
+    motions: &[crate::simulate::Motion],
+    samples: usize,
+) -> MotionSeries {
+    let every = samples.div_ceil(SERIES_POINTS).max(1);
+    let mut series = MotionSeries::default();
+    for (stretch, motion) in stretches.iter().zip(motions) {
+        for k in (0..stretch.t.len()).step_by(every) {
+            series.t.push(stretch.t[k]);
+            series.reference.push(stretch.reference[j][k]);
+            series.measured.push(stretch.q[j][k]);
+            series.simulated.push(motion.q[j][k]);
+            series.torque_measured.push(stretch.tau[j][k]);
+            series.torque_simulated.push(motion.tau[j][k]);
+        }
+    }
+    series
+}

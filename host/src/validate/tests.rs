@@ -1,0 +1,267 @@
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::path::Path;
+
+use super::*;
+use crate::data::{Block, JointColumns};
+use crate::prepare::{Choice, InMemory};
+use crate::robot::{Controller, JointFriction};
+use crate::simulate::{Inputs, closed_loop};
+
+/// EMPS with the published values (Janot, Gautier & Brunot 2019).
+fn emps() -> Robot {
+    let mut robot = Robot::from_toml(crate::robot::EMPS, Path::new("emps.toml")).unwrap();
+    robot.joints[0].inertial = Some(crate::robot::Inertial {
+        mass: 95.1089,
+        first_moment: [0.0; 3],
+        inertia: [0.0; 6],
+    });
+    robot.joints[0].friction = Some(JointFriction {
+        coulomb: 20.3935,
+        viscous: 203.5034,
+        offset: -3.1648,
+    });
+    robot
+}
+
+/// A pendulum on a gear with a cascade controller.
+fn pendulum() -> Robot {
+    let mut robot =
+        Robot::from_toml(crate::robot::ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+    robot.joints[0].controller = Some(Controller {
+        position_gain: 16.0,
+        velocity_gain: 60.0,
+        torque_gain: 0.17,
+    });
+    robot
+}
+
+/// Twenty seconds at 1 kHz of the robot's own closed loop, with a test signal added where `added` is not zero.
+fn simulated(robot: &Robot, added: f64) -> Block {
+    let period = 1e-3;
+    let t: Vec<f64> = (0..20_000).map(|k| f64::from(k) * period).collect();
+    let reference: Vec<f64> = t
+        .iter()
+        .map(|t| 0.8 * (1.0 - (1.3 * t).cos()) + 0.3 * (3.7 * t).sin().powi(2))
+        .collect();
+    let pulses: Vec<f64> = t
+        .iter()
+        .map(|t| if (0.7 * t).fract() < 0.3 { added } else { 0.0 })
+        .collect();
+    let model = Model::from_robot(robot).unwrap();
+    let controllers = [robot.joints[0].controller.clone().unwrap()];
+    let motion = closed_loop(
+        robot,
+        &model,
+        &controllers,
+        &Inputs {
+            period,
+            reference: std::slice::from_ref(&reference),
+            added: std::slice::from_ref(&pulses),
+            q: &[0.0],
+            v: &[0.0],
+            substeps: 16,
+        },
+        |_| (),
+    )
+    .unwrap();
+    let tau = motion.tau[0]
+        .iter()
+        .zip(&pulses)
+        .map(|(a, b)| a + b)
+        .collect();
+    Block {
+        t,
+        joints: vec![JointColumns {
+            q: motion.q[0].clone(),
+            tau,
+            reference: Some(reference),
+            qd: Some(motion.qd[0].clone()),
+            ..JointColumns::default()
+        }],
+        extra: vec![("added1".into(), pulses)],
+        first_line: 2,
+        continues: false,
+    }
+}
+
+fn run(robot: &Robot, block: Block) -> Validation {
+    let recording = InMemory {
+        label: "made".into(),
+        blocks: vec![block],
+    };
+    validate(robot, &[&recording], &Options::default(), &mut |_| ()).unwrap()
+}
+
+fn motion_of(found: &Validation) -> &MotionCheck {
+    match &found.recordings[0].motion {
+        Motion::Simulated { joints, .. } => &joints[0],
+        Motion::NotSimulated { why } => panic!("{why}"),
+    }
+}
+
+#[test]
+fn a_recording_of_the_description_itself_leaves_nothing() {
+    let robot = pendulum();
+    for added in [0.0, 1.5] {
+        let found = run(&robot, simulated(&robot, added));
+        let torque = &found.recordings[0].torque[0].residual;
+        // What the filters and differences leave at reversals of dry friction, and where pulses switch.
+        assert!(torque.relative_error < 0.05, "{}", torque.relative_error);
+        let motion = motion_of(&found);
+        assert!(motion.tracking_rms > 0.05);
+        assert!(
+            motion.position_rms_error < 1e-4 * motion.tracking_rms,
+            "{motion:?}"
+        );
+        assert!(motion.torque_relative_error < 1e-3, "{motion:?}");
+    }
+}
+
+#[test]
+fn a_wrong_friction_shows_in_torque_and_motion() {
+    let robot = pendulum();
+    let block = simulated(&robot, 0.0);
+    let right = run(&robot, block.clone());
+    let mut wrong = robot.clone();
+    wrong.joints[0].friction.as_mut().unwrap().coulomb += 0.3;
+    let found = run(&wrong, block);
+    let rms = found.recordings[0].torque[0].residual.rms;
+    // 0.3 N·m too much, opposing the motion throughout.
+    assert!((rms / 0.3 - 1.0).abs() < 0.1, "{rms}");
+    let (a, b) = (motion_of(&right), motion_of(&found));
+    assert!(
+        b.position_rms_error > 100.0 * a.position_rms_error,
+        "{a:?} {b:?}"
+    );
+    // At the controller's stiffness, 0.3 N·m are this far.
+    let stiff = 0.17 * 60.0 * 16.0;
+    assert!(
+        (b.position_rms_error * stiff / 0.3 - 1.0).abs() < 0.3,
+        "{b:?}"
+    );
+}
+
+#[test]
+fn a_torque_that_was_added_and_not_recorded_shows() {
+    let robot = pendulum();
+    let mut block = simulated(&robot, 1.5);
+    block.extra.clear();
+    let found = run(&robot, block);
+    // The torque explains the motion all the same; the controller alone does not make it.
+    assert!(found.recordings[0].torque[0].residual.relative_error < 0.05);
+    assert!(motion_of(&found).tracking_relative_error > 0.05);
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let robot = pendulum();
+    let mut block = simulated(&robot, 0.0);
+    block.joints[0].reference = None;
+    let found = run(&robot, block.clone());
+    let Motion::NotSimulated { why } = &found.recordings[0].motion else {
+        panic!("simulated without a reference");
+    };
+    assert!(why.contains("ref1"), "{why}");
+    assert!(found.warnings.iter().any(|w| w.contains("ref1")));
+    let mut open = robot.clone();
+    open.joints[0].controller = None;
+    let found = run(&open, block);
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.contains("[joint.controller]"))
+    );
+    let json = serde_json::to_value(&found).unwrap();
+    assert_eq!(json["schema"], "rig-validation/1");
+    assert_eq!(json["recordings"][0]["motion"]["status"], "not_simulated");
+    assert!(json["recordings"][0]["torque"][0]["relative_error"].is_number());
+}
+
+#[test]
+fn a_description_without_dynamics_is_refused() {
+    let robot = Robot::from_toml(crate::robot::EMPS, Path::new("emps.toml")).unwrap();
+    let recording = InMemory {
+        label: "made".into(),
+        blocks: vec![simulated(&pendulum(), 0.0)],
+    };
+    let error = validate(&robot, &[&recording], &Options::default(), &mut |_| ());
+    assert!(matches!(error, Err(ValidateError::NothingKnown { .. })));
+    let none = validate(&emps(), &[], &Options::default(), &mut |_| ());
+    assert!(matches!(none, Err(ValidateError::NoRecording)));
+}
+
+#[test]
+fn a_long_recording_is_cut_and_says_so() {
+    let robot = pendulum();
+    let recording = InMemory {
+        label: "made".into(),
+        blocks: vec![simulated(&robot, 0.0)],
+    };
+    let options = Options {
+        most_samples: 5000,
+        ..Options::default()
+    };
+    let found = validate(&robot, &[&recording], &options, &mut |_| ()).unwrap();
+    let Motion::Simulated {
+        samples,
+        of,
+        remarks,
+        ..
+    } = &found.recordings[0].motion
+    else {
+        panic!("not simulated");
+    };
+    assert_eq!((*samples, *of), (5000, 20_000));
+    assert!(remarks.iter().any(|r| r.contains("first 5000 of 20000")));
+}
+
+/// The published description on the published recordings, as the literature processes them.
+#[test]
+fn emps_moves_as_published() {
+    let Some(folder) = crate::data::data_dir() else {
+        println!("SKIPPED: the folder of real recordings is not there; set RIG_DATA to it.");
+        return;
+    };
+    let robot = emps();
+    let open = |file| crate::data::Source::open(&folder.join("emps").join(file), &robot).unwrap();
+    let (train, test) = (open("train.csv"), open("test_pulses.csv"));
+    let options = Options {
+        prepare: PrepareOptions {
+            cutoff: Choice::Fixed(100.0),
+            decimation: Choice::Fixed(10),
+            speed_threshold: Choice::Fixed(0.0),
+            ..PrepareOptions::default()
+        },
+        ..Options::default()
+    };
+    let found = validate(&robot, &[&train, &test], &options, &mut |_| ()).unwrap();
+    for recording in &found.recordings {
+        let torque = &recording.torque[0].residual;
+        println!(
+            "{}: torque rms {:.4}, relative {:.5}",
+            recording.recording, torque.rms, torque.relative_error
+        );
+        let Motion::Simulated {
+            joints,
+            remarks,
+            substeps,
+            ..
+        } = &recording.motion
+        else {
+            panic!("not simulated");
+        };
+        let mut shown = joints[0].clone();
+        shown.series = MotionSeries::default();
+        println!("   {substeps} {shown:?} {remarks:?}");
+        let m = &joints[0];
+        assert!(
+            m.position_step_change < 0.02 * m.position_rms_error,
+            "{m:?}"
+        );
+        assert!(m.torque_relative_error < 0.2, "{m:?}");
+    }
+    // The figure that an independent refit of the same data reached.
+    assert!((found.recordings[0].torque[0].residual.relative_error - 0.0404).abs() < 5e-4);
+}

@@ -1,0 +1,233 @@
+//! Wrong input gets one clear sentence and an exit status that is not 0.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::run::{refuse, rig, robot};
+
+/// A recording of the one-link rig: 4 s at 1 kHz of a motion within the limits, changed by `change`.
+fn recording(folder: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf {
+    let mut text = String::from("t,q1,tau1\n");
+    for k in 0..4000 {
+        let t = k as f64 * 1e-3;
+        let q = 1.5 * (3.0 * t).sin() + 0.3 * (11.0 * t).cos();
+        let mut row = vec![
+            format!("{t:.3}"),
+            format!("{q:.9}"),
+            format!("{:.6}", 2.9 * q.cos() + 0.4),
+        ];
+        change(k, &mut row);
+        text += &row.join(",");
+        text.push('\n');
+    }
+    let path = folder.join("recording.csv");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+fn identify(robot: &Path, data: &Path, out: &Path) -> std::process::Command {
+    let mut command = rig();
+    command
+        .arg("identify")
+        .arg("--robot")
+        .arg(robot)
+        .arg("--data")
+        .arg(data)
+        .arg("--out")
+        .arg(out);
+    command
+}
+
+/// What `rig identify` says of the one-link rig and this file; nothing may be left behind.
+fn sentence(data: &Path) -> String {
+    let out = tempfile::tempdir().unwrap();
+    let text = refuse(&mut identify(&robot("one-link.toml"), data, out.path()));
+    assert_eq!(
+        fs::read_dir(out.path()).unwrap().count(),
+        0,
+        "something was written"
+    );
+    text
+}
+
+/// Asserts that a sentence names all of these.
+fn names(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "no \"{part}\" in: {text}");
+    }
+}
+
+#[test]
+fn a_missing_column_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording.csv");
+    fs::write(&path, "t,q1\n0,0\n0.001,0\n").unwrap();
+    names(&sentence(&path), &["recording.csv", "tau1", "i1"]);
+    fs::write(&path, "t,tau1\n0,0\n0.001,0\n").unwrap();
+    names(&sentence(&path), &["recording.csv", "q1"]);
+    fs::write(&path, "q1,tau1\n0,0\n0.001,0\n").unwrap();
+    names(&sentence(&path), &["recording.csv", "t"]);
+}
+
+#[test]
+fn not_a_number_is_named_by_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    for bad in ["NaN", "inf", "hello", ""] {
+        let path = recording(folder.path(), |k, row| {
+            if k == 1234 {
+                row[2] = bad.into();
+            }
+        });
+        // One line of header, counted from 1.
+        names(&sentence(&path), &["recording.csv:1236", "tau1"]);
+    }
+}
+
+#[test]
+fn time_that_jumps_back_is_named_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recording(folder.path(), |k, row| {
+        if k == 2000 {
+            row[0] = "0.5".into();
+        }
+    });
+    names(&sentence(&path), &["recording.csv:2002"]);
+}
+
+#[test]
+fn units_off_by_a_thousand_and_degrees_are_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let scaled = |column: usize, factor: f64| {
+        recording(folder.path(), |_, row| {
+            let value: f64 = row[column].parse().unwrap();
+            row[column] = format!("{}", value * factor);
+        })
+    };
+    names(&sentence(&scaled(1, 1000.0)), &["q1"]);
+    names(&sentence(&scaled(2, 1000.0)), &["tau1", "1000"]);
+    names(&sentence(&scaled(2, 0.001)), &["tau1", "1000"]);
+    names(
+        &sentence(&scaled(1, 180.0 / core::f64::consts::PI)),
+        &["q1", "degrees"],
+    );
+    names(&sentence(&scaled(0, 1000.0)), &["t", "millisecond"]);
+}
+
+#[test]
+fn a_motion_that_never_moves_is_no_identification() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recording(folder.path(), |_, row| row[1] = "0.25".into());
+    sentence(&path);
+}
+
+#[test]
+fn a_recording_too_short_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording.csv");
+    fs::write(&path, "t,q1,tau1\n0,0,0\n0.001,0,0\n0.002,0,0\n").unwrap();
+    names(&sentence(&path), &["short"]);
+}
+
+#[test]
+fn empty_file_directory_and_missing_file_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = folder.path().join("empty.csv");
+    fs::write(&empty, "").unwrap();
+    names(&sentence(&empty), &["empty.csv", "empty"]);
+    names(&sentence(folder.path()), &["directory"]);
+    names(
+        &sentence(&folder.path().join("absent.csv")),
+        &["absent.csv"],
+    );
+}
+
+#[test]
+fn two_gigabytes_of_nothing_are_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["zeros.csv", "zeros.mcap"] {
+        let path = folder.path().join(name);
+        fs::File::create(&path).unwrap().set_len(2 << 30).unwrap();
+        let begin = Instant::now();
+        names(&sentence(&path), &[name]);
+        // Not a matter of speed: reading it all would take far longer, holding it all would not fit.
+        assert!(begin.elapsed() < Duration::from_secs(20));
+    }
+    let path = folder.path().join("zeros.toml");
+    fs::File::create(&path).unwrap().set_len(2 << 30).unwrap();
+    let text = refuse(&mut identify(&path, &path, folder.path()));
+    names(&text, &["zeros.toml"]);
+}
+
+#[test]
+fn a_description_with_a_fault_is_named_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = fs::read_to_string(robot("one-link.toml")).unwrap();
+    let data = recording(folder.path(), |_, _| ());
+    let out = folder.path().join("out");
+    let said = |text: String| {
+        let path = folder.path().join("robot.toml");
+        fs::write(&path, text).unwrap();
+        refuse(&mut identify(&path, &data, &out))
+    };
+    let line = |part: &str| good.lines().position(|l| l.starts_with(part)).unwrap() + 1;
+    let at = format!("robot.toml:{}", line("mass"));
+    names(
+        &said(good.replace("mass = 1.0", "mass = -1.0")),
+        &[&at, "mass"],
+    );
+    names(
+        &said(good.replace("mass = 1.0", "mass = \"heavy\"")),
+        &[&at],
+    );
+    names(
+        &said(good.replace("gear_ratio = 50.0", "gear_ration = 50.0")),
+        &["robot.toml:", "gear_ration"],
+    );
+    let effect = "\n[[effect]]\nkind = \"stribeck\"\njoint = \"lnik\"\n";
+    names(
+        &said(format!("{good}{effect}")),
+        &["robot.toml:", "lnik", "link"],
+    );
+    names(&said(String::new()), &["robot.toml"]);
+}
+
+#[test]
+fn a_urdf_without_inertia_names_the_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    fs::write(
+        &path,
+        r#"<robot name="arm"><link name="base"/><link name="upper"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="3" effort="10"/></joint></robot>"#,
+    )
+    .unwrap();
+    let data = recording(folder.path(), |_, _| ());
+    let text = refuse(&mut identify(&path, &data, &folder.path().join("out")));
+    names(&text, &["arm.urdf", "upper", "inertia"]);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = recording(folder.path(), |_, _| ());
+    let blocked = folder.path().join("file");
+    fs::write(&blocked, "").unwrap();
+    let text = refuse(&mut identify(
+        &robot("one-link.toml"),
+        &data,
+        &blocked.join("out"),
+    ));
+    names(&text, &["file"]);
+}
+
+#[test]
+fn an_existing_description_is_not_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.toml");
+    fs::write(&path, "my work").unwrap();
+    let text = refuse(rig().args(["init", "one-link", "--out"]).arg(&path));
+    names(&text, &["mine.toml", "--force"]);
+    assert_eq!(fs::read_to_string(&path).unwrap(), "my work");
+}

@@ -1,0 +1,7 @@
+//! The `rig` program as a person meets it at the terminal.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod bad_input;
+mod memory;
+mod run;
+mod workflow;

@@ -1,0 +1,197 @@
+//! Whole ways through the program, from an empty folder to a number.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::run::{real_data, rig, robot, succeed};
+
+fn json(path: &std::path::Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn value(result: &Value, expression: &str) -> (f64, f64) {
+    let found = result["base_parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["expression"] == expression);
+    let parameter = found.unwrap_or_else(|| panic!("no {expression} in {result:#}"));
+    (
+        parameter["value"].as_f64().unwrap(),
+        parameter["std"].as_f64().unwrap(),
+    )
+}
+
+#[test]
+fn init_excite_record_identify_validate() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(
+        rig()
+            .args(["init", "one-link", "--out"])
+            .arg(at("rig.toml")),
+    );
+    succeed(
+        rig()
+            .args(["excite", "--start", "-1.5707963", "--robot"])
+            .arg(at("rig.toml"))
+            .arg("--out")
+            .arg(at("motion.toml")),
+    );
+    for (seed, name) in [("3", "train.csv"), ("3", "again.mcap")] {
+        let said = succeed(
+            rig()
+                .args([
+                    "record",
+                    "--emulated",
+                    "--home",
+                    "-1.5707963",
+                    "--seed",
+                    seed,
+                    "--robot",
+                ])
+                .arg(at("rig.toml"))
+                .arg("--trajectory")
+                .arg(at("motion.toml"))
+                .arg("--out")
+                .arg(at(name)),
+        );
+        assert!(said.contains("0 missing"), "{said}");
+    }
+    let identify = |data: &str, model: &str, out: &str| {
+        succeed(
+            rig()
+                .args(["identify", "--model", model, "--robot"])
+                .arg(at("rig.toml"))
+                .arg("--data")
+                .arg(at(data))
+                .arg("--out")
+                .arg(at(out)),
+        );
+        json(&at(out).join("identification.json"))
+    };
+    let differential = identify("train.csv", "differential", "by-torque");
+    let integral = identify("train.csv", "integral", "by-energy");
+    assert_eq!(differential["schema"], "rig-identification/1");
+    for expression in ["fv1", "fc1"] {
+        let ((a, sa), (b, sb)) = (
+            value(&differential, expression),
+            value(&integral, expression),
+        );
+        assert!(
+            (a - b).abs() < 4.0 * sa.hypot(sb),
+            "{expression}: {a} ± {sa} by torque, {b} ± {sb} by energy"
+        );
+    }
+    // The same samples from the other format give the same numbers.
+    let mcap = identify("again.mcap", "differential", "by-mcap");
+    assert_eq!(value(&mcap, "fv1"), value(&differential, "fv1"));
+    let said = succeed(
+        rig()
+            .args(["validate", "--robot"])
+            .arg(at("by-torque").join("identified.toml"))
+            .arg("--data")
+            .arg(at("train.csv"))
+            .arg("--out")
+            .arg(at("check")),
+    );
+    assert!(said.contains("report"), "{said}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = |name: &str, seed: &str| {
+        let path = folder.path().join(name);
+        succeed(
+            rig()
+                .args([
+                    "record",
+                    "--emulated",
+                    "--seconds",
+                    "2",
+                    "--seed",
+                    seed,
+                    "--out",
+                ])
+                .arg(&path),
+        );
+        fs::read(path).unwrap()
+    };
+    let first = record("a.csv", "7");
+    assert_eq!(first, record("b.csv", "7"));
+    assert_ne!(first, record("c.csv", "8"));
+}
+
+/// Janot, Gautier & Brunot 2019: mass, viscous, Coulomb friction and offset of EMPS.
+const PUBLISHED: [(&str, f64); 4] = [
+    ("m1 + Ia1", 95.1089),
+    ("fv1", 203.5034),
+    ("fc1", 20.3935),
+    ("off1", -3.1648),
+];
+
+fn emps(arguments: &[&str]) -> Option<Value> {
+    let data = real_data("emps")?;
+    let out = tempfile::tempdir().unwrap();
+    succeed(
+        rig()
+            .arg("identify")
+            .args(arguments)
+            .arg("--robot")
+            .arg(robot("emps.toml"))
+            .arg("--data")
+            .arg(data.join("train.csv"))
+            .arg("--out")
+            .arg(out.path()),
+    );
+    Some(json(&out.path().join("identification.json")))
+}
+
+fn within(result: &Value, share: f64, what: &str) {
+    for (expression, published) in PUBLISHED {
+        let (found, std) = value(result, expression);
+        println!("{what}: {expression} {found:.4} ± {std:.4}, published {published}");
+        assert!(
+            (found / published - 1.0).abs() < share,
+            "{what}: {expression} {found} against {published}"
+        );
+    }
+}
+
+#[test]
+fn emps_with_the_published_treatment_is_within_half_a_percent() {
+    let published = [
+        "--estimator",
+        "ols",
+        "--cutoff",
+        "100",
+        "--decimation",
+        "10",
+        "--min-speed",
+        "0",
+    ];
+    if let Some(result) = emps(&published) {
+        within(&result, 0.005, "published treatment");
+    }
+}
+
+#[test]
+fn emps_with_the_defaults_is_within_two_percent_by_both_models_and_they_agree() {
+    let (Some(differential), Some(integral)) = (emps(&[]), emps(&["--model", "integral"])) else {
+        return;
+    };
+    within(&differential, 0.02, "differential");
+    within(&integral, 0.02, "integral");
+    for (expression, _) in PUBLISHED {
+        let ((a, sa), (b, sb)) = (
+            value(&differential, expression),
+            value(&integral, expression),
+        );
+        assert!(
+            (a - b).abs() < 1.96 * (sa + sb),
+            "{expression}: {a} ± {sa} and {b} ± {sb}"
+        );
+    }
+}
