@@ -44,6 +44,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     let path = args.out.join("report.html");
     report::write(&path, &demo.page(&command_line())?)?;
+    report::write_svg(&args.out.join("tracking.svg"), &demo.picture())?;
     for line in demo.summary()? {
         ui.say(&line);
     }

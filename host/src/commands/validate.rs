@@ -89,12 +89,12 @@ fn summary(validation: &Validation) -> Vec<String> {
             Motion::NotSimulated { why } => lines.push(format!("{}: motion not simulated: {why}", checked.recording)),
             Motion::Simulated { joints, .. } => lines.extend(joints.iter().map(|joint| {
                 format!(
-                    "{}, {}: simulated position off by {} {} rms, {:.2} % of the motion; torque by {} {} rms",
+                    "{}, {}: simulated position off by {} {} rms, {:.2} % of the tracking error; torque by {} {} rms",
                     checked.recording,
                     joint.joint,
                     format_significant(joint.position_rms_error, 4),
                     joint.position_unit,
-                    100.0 * joint.position_relative_error,
+                    100.0 * joint.tracking_relative_error,
                     format_significant(joint.torque_rms_error, 4),
                     joint.torque_unit
                 )

@@ -8,7 +8,7 @@ use rig_shared::multibody::{COLUMNS, column, gravity_vector};
 use super::{Demo, DemoError, Run};
 use crate::identify::Identification;
 use crate::pages::{self, DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire};
-use crate::report::{Document, format_significant, format_value};
+use crate::report::{Document, Plot, format_significant, format_value};
 use crate::simulate::Model;
 
 /// Meanings and units, in the order of [`PARAMETER_NAMES`].
@@ -93,6 +93,11 @@ impl Demo {
         Ok(pages::demo(&self.figures(command)?))
     }
 
+    /// The tracking error with and without precompensation, as a picture of its own.
+    pub fn picture(&self) -> Plot {
+        pages::tracking_plot(&tracking(&self.without, &self.with))
+    }
+
     fn parameters(&self) -> Result<Vec<DemoParameter>, DemoError> {
         let factors = gravity_factors(self)?;
         let (differential, integral) = (
@@ -144,10 +149,7 @@ impl Demo {
         Ok(DemoFigures {
             robot: self.robot.clone(),
             command: command.into(),
-            seconds: self
-                .runs()
-                .map(|run| run.rows.last().map_or(0.0, |r| r.t) - run.rows[0].t)
-                .sum(),
+            seconds: self.losses.iter().map(|l| l.taken as f64).sum::<f64>() / self.sample_rate,
             parameters: self.parameters()?,
             online: OnlineEstimates {
                 t: estimates.iter().map(|(t, _)| *t).collect(),
@@ -178,10 +180,6 @@ impl Demo {
                 .map(|(name, holds)| (name.into(), holds.into()))
                 .into(),
         })
-    }
-
-    fn runs(&self) -> impl Iterator<Item = &Run> {
-        [&self.training, &self.holdout, &self.without, &self.with].into_iter()
     }
 
     /// The result at a glance, for the terminal.
@@ -231,7 +229,7 @@ const BEYOND_MODEL: [&str; 6] = [
     "masses and centres of mass that differ from the description by up to 30 %",
 ];
 
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     (
         "train.csv",
         "the excitation that the parameters were identified from",
@@ -240,6 +238,10 @@ const FILES: [(&str, &str); 6] = [
     ("sweep.csv", "constant speeds, for the friction map"),
     ("slow-without.csv", "slow reversals without precompensation"),
     ("slow-with.csv", "the same with it"),
+    (
+        "tracking.svg",
+        "the tracking error with and without precompensation",
+    ),
     (
         "identified.toml",
         "the description with the identified values",
@@ -252,7 +254,7 @@ fn tracking(without: &Run, with: &Run) -> Tracking {
     let error = |run: &Run| {
         run.rows
             .iter()
-            .map(|row| row.q1 - row.ref1)
+            .map(|row| row.ref1 - row.q1)
             .collect::<Vec<_>>()
     };
     let (mut error_without, mut error_with) = (error(without), error(with));

@@ -90,8 +90,8 @@ pub struct Demo {
     pub with: Run,
     /// What the wire lost in all runs.
     pub losses: Vec<LossReport>,
-    /// Criterion of the excitation: condition number of the base regressor.
-    pub condition: f64,
+    /// Telemetry samples a second.
+    pub sample_rate: f64,
 }
 
 /// Runs the demonstration; recordings and the identified description are written into `out`. `progress` is
@@ -193,7 +193,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         without,
         with,
         losses,
-        condition: design.values.si_condition_number,
+        sample_rate: f64::from(nameplate.config.rates.telemetry_hz()),
     })
 }
 

@@ -310,6 +310,54 @@ fn parameters(figures: &DemoFigures) -> Section {
     .with(Block::Plot(plot))
 }
 
+/// Factor and unit in which a tracking error reads best.
+fn shown(t: &Tracking) -> (f64, String) {
+    let unit = parts::unit(&t.unit);
+    if t.rms_without.abs() < 0.1 {
+        (1e3, format!("m{unit}"))
+    } else {
+        (1.0, unit)
+    }
+}
+
+/// The tracking error with and without precompensation; also worth a picture of its own.
+pub fn tracking_plot(t: &Tracking) -> Plot {
+    let (scale, shown) = shown(t);
+    let scaled = |v: &[f64]| v.iter().map(|e| scale * e).collect::<Vec<_>>();
+    let note = format!(
+        "n = {}, RMS {} {shown} without and {} {shown} with{}. {}",
+        t.t.len(),
+        format_significant(scale * t.rms_without, 3),
+        format_significant(scale * t.rms_with, 3),
+        gain(t).map_or(String::new(), |g| format!(
+            ": {} times smaller",
+            format_significant(g, 2)
+        )),
+        t.note
+    );
+    let mut error = Plot::new(
+        format!("Tracking error: {}", t.motion),
+        Axis::new("time", "s"),
+        Axis::new("reference less position", &shown),
+    )
+    .with(Series::line(
+        "feedback alone",
+        Role::Before,
+        t.t.clone(),
+        scaled(&t.error_without),
+    ))
+    .with(Series::line(
+        "with precompensation",
+        Role::After,
+        t.t.clone(),
+        scaled(&t.error_with),
+    ))
+    .mark(Marker::horizontal(0.0, ""))
+    .note(note.trim_end());
+    error.height = 280;
+    error
+}
+
 fn tracking(figures: &DemoFigures) -> Section {
     let mut section = Section::new(
         "tracking",
@@ -317,48 +365,10 @@ fn tracking(figures: &DemoFigures) -> Section {
         "The same motion twice: with feedback alone, and with the torque that the identified model predicts added before the feedback has to ask for it.",
     );
     for t in &figures.tracking {
-        let unit = parts::unit(&t.unit);
-        let (scale, shown) = if t.rms_without.abs() < 0.1 {
-            (1e3, format!("m{unit}"))
-        } else {
-            (1.0, unit.clone())
-        };
-        let scaled = |v: &[f64]| v.iter().map(|e| scale * e).collect::<Vec<_>>();
-        let note = format!(
-            "n = {}, RMS {} {shown} without and {} {shown} with{}. {}",
-            t.t.len(),
-            format_significant(scale * t.rms_without, 3),
-            format_significant(scale * t.rms_with, 3),
-            gain(t).map_or(String::new(), |g| format!(
-                ": {} times smaller",
-                format_significant(g, 2)
-            )),
-            t.note
-        );
-        let mut error = Plot::new(
-            format!("Tracking error: {}", t.motion),
-            Axis::new("time", "s"),
-            Axis::new("reference less position", &shown),
-        )
-        .with(Series::line(
-            "feedback alone",
-            Role::Before,
-            t.t.clone(),
-            scaled(&t.error_without),
-        ))
-        .with(Series::line(
-            "with precompensation",
-            Role::After,
-            t.t.clone(),
-            scaled(&t.error_with),
-        ))
-        .mark(Marker::horizontal(0.0, ""))
-        .note(note.trim_end());
-        error.height = 280;
         let mut reference = Plot::new(
             format!("Reference: {}", t.motion),
             Axis::new("time", "s"),
-            Axis::new("position", &unit),
+            Axis::new("position", &parts::unit(&t.unit)),
         )
         .with(Series::line(
             "reference",
@@ -369,7 +379,7 @@ fn tracking(figures: &DemoFigures) -> Section {
         .note(format!("n = {}.", t.t.len()));
         reference.height = 160;
         section = section
-            .with(Block::Plot(error))
+            .with(Block::Plot(tracking_plot(t)))
             .with(Block::Plot(reference));
     }
     if figures.tracking.is_empty() {

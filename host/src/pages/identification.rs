@@ -165,11 +165,11 @@ fn parameters(found: &Identification) -> Section {
             };
             vec![
                 b.expression.clone(),
+                parts::unit(&b.unit),
                 format_value(b.value, b.std),
                 format!("{} … {}", end(b.interval[0]), end(b.interval[1])),
                 format_significant(b.relative_std_percent, 2),
                 format_significant(b.classical_relative_std_percent, 2),
-                parts::unit(&b.unit),
             ]
         })
         .collect();
@@ -183,15 +183,15 @@ fn parameters(found: &Identification) -> Section {
         caption: "Base parameters".into(),
         columns: vec![
             Column::text("Parameter"),
-            Column::number("Value ± standard deviation", ""),
-            Column::number("95 % interval", ""),
-            Column::number("Relative deviation", "%"),
-            Column::number("Classical", "%"),
             Column::text("Unit"),
+            Column::number("Value ± std", ""),
+            Column::number("95 % interval", ""),
+            Column::number("Std", "%"),
+            Column::number("Classical", "%"),
         ],
         rows,
         note: format!(
-            "{} rows; the residual remembers {} of them, so they count as {}. Intervals by Student's t with {} degrees of freedom.",
+            "Std: standard deviation. {} rows; the residual remembers {} of them, so they count as {}. Intervals by Student's t with {} degrees of freedom.",
             parts::count(e.rows),
             format_significant(e.memory_rows, 2),
             parts::count(e.effective_rows as u64),

@@ -11,7 +11,9 @@ mod parts;
 mod tests;
 mod validation;
 
-pub use demo::{DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo};
+pub use demo::{
+    DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
+};
 pub use friction_map::friction_map;
 pub use identification::identification;
 pub use validation::validation;

@@ -13,16 +13,32 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     let mut sections: Vec<Section> = Vec::new();
     sections.extend(parts::warnings(&[&found.warnings, &context.warnings]));
     sections.push(overview(found));
-    for (k, checked) in found.recordings.iter().enumerate() {
-        sections.push(torque(robot, checked, k));
-        sections.push(motion(robot, checked, k));
+    let names = names(found);
+    for (k, (checked, name)) in found.recordings.iter().zip(&names).enumerate() {
+        sections.push(torque(robot, checked, name, k));
+        sections.push(motion(robot, checked, name, k));
     }
     let mut data = Section::new(
         "data",
         "What was done to the data for the torque",
         "The motion is compared as recorded, without any filter.",
     );
-    data.blocks = parts::treatment(&robot.joints, &found.treatment);
+    data.blocks.push(Block::List(
+        found
+            .recordings
+            .iter()
+            .map(|r| {
+                format!(
+                    "{}: {} rows at {} Hz",
+                    r.recording,
+                    parts::count(r.rows),
+                    format_significant(r.sample_rate, 4)
+                )
+            })
+            .collect(),
+    ));
+    data.blocks
+        .extend(parts::treatment(&robot.joints, &found.treatment));
     sections.push(data);
     let mut tests = Section::new(
         "residuals",
@@ -30,10 +46,10 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
         "A residual that depends on something shows what the model leaves out.",
     );
     let period = 1.0 / found.treatment.kept_rate();
-    for checked in &found.recordings {
+    for (checked, name) in found.recordings.iter().zip(&names) {
         for (joint, check) in robot.joints.iter().zip(&checked.torque) {
             tests.blocks.push(Block::Details {
-                summary: format!("{}, joint {}", checked.recording, joint.name),
+                summary: format!("{name}, joint {}", joint.name),
                 blocks: parts::residual_tests(joint, &check.residual, period),
             });
         }
@@ -130,12 +146,12 @@ fn summary(found: &Validation, context: &Context) -> Vec<Fact> {
 
 fn overview(found: &Validation) -> Section {
     let mut rows = Vec::new();
-    for checked in &found.recordings {
+    for (checked, name) in found.recordings.iter().zip(names(found)) {
         for (j, check) in checked.torque.iter().enumerate() {
             let motion = simulated(checked).get(j);
             let of = |f: &dyn Fn(&MotionCheck) -> String| motion.map_or("–".into(), f);
             rows.push(vec![
-                checked.recording.clone(),
+                name.clone(),
                 check.joint.clone(),
                 format!(
                     "{} {}",
@@ -144,7 +160,6 @@ fn overview(found: &Validation) -> Section {
                 ),
                 parts::percent(check.residual.relative_error),
                 of(&|m| length(m.position_rms_error, &m.position_unit)),
-                of(&|m| length(m.position_max_error, &m.position_unit)),
                 of(&|m| parts::percent(m.tracking_relative_error)),
                 of(&|m| parts::percent(m.torque_relative_error)),
             ]);
@@ -160,21 +175,22 @@ fn overview(found: &Validation) -> Section {
         columns: vec![
             Column::text("Recording"),
             Column::text("Joint"),
-            Column::number("Torque residual RMS", ""),
+            Column::number("Torque residual", ""),
             Column::number("of torque", "%"),
-            Column::number("Simulated position, RMS error", ""),
-            Column::number("largest", ""),
-            Column::number("of tracking error", "%"),
-            Column::number("Simulated torque, RMS error", "%"),
+            Column::number("Simulated position", ""),
+            Column::number("of tracking", "%"),
+            Column::number("Simulated torque", "%"),
         ],
         rows,
-        note: "A dash: the motion was not simulated; the recording's section says why.".into(),
+        note: "All RMS: residual of the predicted torque and its share of the torque; error of the simulated position and its share of the tracking error; error of the simulated torque as a share of the torque. A dash: the motion was not simulated; the recording's section says why.".into(),
     }))
 }
 
 /// A small length or angle in the unit that reads best.
 fn length(value: f64, unit: &str) -> String {
-    let (scale, prefix) = if value < 1e-3 {
+    let (scale, prefix) = if value < 1e-6 {
+        (1e9, "n")
+    } else if value < 1e-3 {
         (1e6, "µ")
     } else if value < 1.0 {
         (1e3, "m")
@@ -184,33 +200,32 @@ fn length(value: f64, unit: &str) -> String {
     format!("{} {prefix}{unit}", format_significant(scale * value, 3))
 }
 
-fn torque(robot: &Robot, checked: &Checked, k: usize) -> Section {
-    let mut section = Section::new(
-        format!("torque-{}", k + 1),
-        format!("Torque: {}", checked.recording),
-        "",
-    );
+fn torque(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
+    let mut section = Section::new(format!("torque-{}", k + 1), format!("Torque: {name}"), "");
     for (joint, check) in robot.joints.iter().zip(&checked.torque) {
-        section.blocks.extend(parts::torque_plots(
-            joint,
-            &check.residual,
-            &short(&checked.recording),
-        ));
+        section
+            .blocks
+            .extend(parts::torque_plots(joint, &check.residual, name));
     }
     section
 }
 
-/// The last part of a path.
-fn short(label: &str) -> String {
-    label.rsplit(['/', '\\']).next().unwrap_or(label).to_owned()
+/// The recordings' file names, or their whole paths where the names do not tell them apart.
+fn names(found: &Validation) -> Vec<String> {
+    let labels = || found.recordings.iter().map(|r| r.recording.as_str());
+    let short: Vec<&str> = labels()
+        .map(|l| l.rsplit(['/', '\\']).next().unwrap_or(l))
+        .collect();
+    let unique = short.iter().collect::<std::collections::HashSet<_>>().len() == short.len();
+    if unique {
+        short.into_iter().map(str::to_owned).collect()
+    } else {
+        labels().map(str::to_owned).collect()
+    }
 }
 
-fn motion(robot: &Robot, checked: &Checked, k: usize) -> Section {
-    let section = Section::new(
-        format!("motion-{}", k + 1),
-        format!("Motion: {}", checked.recording),
-        "",
-    );
+fn motion(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
+    let section = Section::new(format!("motion-{}", k + 1), format!("Motion: {name}"), "");
     match &checked.motion {
         Motion::NotSimulated { why } => section.with(parts::warning(format!(
             "The motion was not simulated. {why}"
@@ -237,13 +252,13 @@ fn steps(joints: &[MotionCheck]) -> Block {
         caption: "Simulation against measurement".into(),
         columns: vec![
             Column::text("Joint"),
-            Column::number("Position RMS error", ""),
-            Column::number("changes with half the step by", ""),
-            Column::number("of the motion's RMS", "%"),
-            Column::number("Torque RMS error", ""),
+            Column::number("Position RMS", ""),
             Column::number("largest", ""),
-            Column::number("changes with half the step by", ""),
-            Column::number("Samples at the torque limit", ""),
+            Column::number("half step", ""),
+            Column::number("Torque RMS", ""),
+            Column::number("largest", ""),
+            Column::number("half step", ""),
+            Column::number("At limit", ""),
         ],
         rows: joints
             .iter()
@@ -252,8 +267,8 @@ fn steps(joints: &[MotionCheck]) -> Block {
                 vec![
                     m.joint.clone(),
                     length(m.position_rms_error, &m.position_unit),
+                    length(m.position_max_error, &m.position_unit),
                     length(m.position_step_change, &m.position_unit),
-                    format_significant(100.0 * m.position_relative_error, 2),
                     format!("{} {unit}", format_significant(m.torque_rms_error, 3)),
                     format!("{} {unit}", format_significant(m.torque_max_error, 3)),
                     format!("{} {unit}", format_significant(m.torque_step_change, 2)),
@@ -261,7 +276,7 @@ fn steps(joints: &[MotionCheck]) -> Block {
                 ]
             })
             .collect(),
-        note: String::new(),
+        note: "Errors of the simulation. Half step: RMS change of the simulation when its step is halved. At limit: samples at which the torque limit cut the controller's wish.".into(),
     })
 }
 

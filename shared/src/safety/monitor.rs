@@ -108,7 +108,13 @@ pub fn step(
 ) -> Option<(Fault, f32)> {
     let magnitude = now.current.abs();
     let n = config.persistence;
-    state.heat += (now.current * now.current - state.heat) * (config.period / config.thermal_time);
+    // With the bridge off the winding is open: what a broken converter then reads heats nothing.
+    let heating = if now.driving {
+        now.current * now.current
+    } else {
+        0.0
+    };
+    state.heat += (heating - state.heat) * (config.period / config.thermal_time);
     let rating = limits.continuous_current * limits.continuous_current;
     // The cause acts until the motor has cooled: an instant after the bridge is off it is just below its limit.
     state.overloaded = !(state.heat

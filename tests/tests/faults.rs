@@ -1,0 +1,286 @@
+//! Faults injected at the plant: bridge off, the right one latched first, explained by its snapshot, cleared.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::time::Duration;
+
+use rig_host::link::LinkError;
+use rig_host::plant::{Faults, PlantConfig};
+use rig_shared::safety::{Fault, Mode};
+use rig_shared::trajectory::Trajectory;
+use rig_shared::wire::message::{Refusal, Report, RequestBody};
+use rig_tests::{Line, bench, calibrated, connect, excitation, nameplate, wait};
+
+fn refused(line: &mut Line, body: RequestBody) -> Refusal {
+    match line.request(body) {
+        Err(LinkError::Refused { refusal, .. }) => refusal,
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+fn inject(line: &mut Line, change: impl Fn(&mut Faults)) {
+    change(line.port_mut().device_mut().plant_mut().faults_mut());
+}
+
+fn mode(line: &Line) -> Mode {
+    line.port().device().state().mode
+}
+
+/// A rig in the middle of an excitation, moving.
+fn moving(seed: u64) -> Line {
+    let (mut line, _) = bench(seed);
+    line.request(RequestBody::SetTrajectory(excitation(seed, 5, 5)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 3.3);
+    assert_eq!(mode(&line), Mode::Running);
+    line
+}
+
+/// The snapshot over the wire: consecutive ticks, the fault's among them with many before it.
+fn check_snapshot(line: &mut Line, fault: Fault) {
+    line.request(RequestBody::GetSnapshot).unwrap();
+    let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
+    while ticks.len() < total {
+        match line
+            .next_report(Duration::from_millis(500))
+            .unwrap()
+            .unwrap()
+        {
+            Report::Fault(found) => record = Some(found),
+            Report::Snapshot(part) => {
+                assert_eq!(usize::from(part.first), ticks.len());
+                total = usize::from(part.total);
+                ticks.extend(part.samples.iter().map(|sample| sample.tick));
+            }
+            _ => {}
+        }
+    }
+    let record = record.unwrap();
+    assert_eq!(record.fault, fault);
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    let place = ticks.iter().position(|tick| *tick == record.tick).unwrap();
+    assert!(
+        place > 400 && place < ticks.len() - 1,
+        "{place} of {}",
+        ticks.len()
+    );
+}
+
+#[test]
+fn each_fault_takes_the_bridge_off_in_time_and_the_rig_works_again() {
+    type Change = fn(&mut Faults);
+    // Fault, what is done, seconds until the bridge must be off, whether its cause can be seen with the bridge off.
+    let cases: [(Fault, Change, f64, bool); 9] = [
+        (Fault::EncoderLost, |f| f.encoder_cut = true, 1.0, false),
+        (Fault::EncoderJump, |f| f.encoder_jump = 2000, 0.001, false),
+        (
+            Fault::AdcStuck,
+            |f| f.current_stuck = Some(4095),
+            0.001,
+            true,
+        ),
+        (
+            Fault::AdcStuck,
+            |f| f.current_stuck = Some(2048),
+            0.1,
+            false,
+        ),
+        (
+            Fault::OverCurrent,
+            |f| f.current_stuck = Some(2048 + 1500),
+            0.001,
+            true,
+        ),
+        (Fault::Supply, |f| f.supply = Some(12.0), 0.001, true),
+        (Fault::Driver, |f| f.driver = true, 0.001, true),
+        (
+            Fault::Temperature,
+            |f| f.temperature_stuck = Some(2000),
+            0.001,
+            true,
+        ),
+        (Fault::Deadline, |f| f.overrun = true, 0.001, false),
+    ];
+    let mut wrong = Vec::new();
+    for (case, (fault, change, within, seen)) in cases.into_iter().enumerate() {
+        let mut line = moving(case as u64);
+        inject(&mut line, change);
+        wait(&mut line, within + 0.001);
+        let record = line.port().device().state().latch.first();
+        if mode(&line) != Mode::Fault || record.map(|r| r.fault) != Some(fault) {
+            wrong.push(format!(
+                "{case}: {fault:?} after {within} s: {:?} {record:?}",
+                mode(&line)
+            ));
+            continue;
+        }
+        assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
+        check_snapshot(&mut line, fault);
+        wait(&mut line, 0.2);
+        if seen {
+            assert_eq!(
+                refused(&mut line, RequestBody::ClearFault),
+                Refusal::CauseActing,
+                "{fault:?}"
+            );
+        }
+        // A jumped counter stays where it is: jumping back would be another fault.
+        if fault != Fault::EncoderJump {
+            inject(&mut line, |f| *f = Faults::default());
+        }
+        wait(&mut line, 2.0);
+        // What the cut encoder missed shows as a jump when it is back.
+        let cleared = line.request(RequestBody::ClearFault);
+        if let Err(error) = cleared {
+            let state = line.port().device().state();
+            wrong.push(format!(
+                "{case}: {fault:?}: {error} at {} rad, {} rad/s",
+                state.position, state.velocity
+            ));
+            continue;
+        }
+        line.request(RequestBody::Arm).unwrap();
+        wait(&mut line, 0.5);
+        if mode(&line) != Mode::Holding {
+            let record = line.port().device().state().latch.first();
+            wrong.push(format!(
+                "{case}: after {fault:?}: {:?} {record:?}",
+                mode(&line)
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn over_speed_position_and_overload_from_outside() {
+    let mut line = moving(1);
+    inject(&mut line, |f| f.external_torque = 60.0);
+    wait(&mut line, 0.5);
+    assert_eq!(
+        line.port().device().state().latch.first().unwrap().fault,
+        Fault::OverSpeed
+    );
+    check_snapshot(&mut line, Fault::OverSpeed);
+
+    let (mut line, plant) = bench(2);
+    let mut limits = nameplate(&plant).settings.limits;
+    let here = line.port().device().state().position;
+    (limits.position_low, limits.position_high) = (here - 0.05, here + 0.05);
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    inject(&mut line, |f| f.external_torque = 14.0);
+    wait(&mut line, 0.5);
+    assert_eq!(
+        line.port().device().state().latch.first().unwrap().fault,
+        Fault::Position
+    );
+
+    let (mut line, _) = bench(3);
+    line.request(RequestBody::Arm).unwrap();
+    inject(&mut line, |f| f.external_torque = 6.0);
+    wait(&mut line, 12.0);
+    assert_eq!(
+        line.port().device().state().latch.first().unwrap().fault,
+        Fault::Overload
+    );
+    inject(&mut line, |f| f.external_torque = 0.0);
+    assert_eq!(
+        refused(&mut line, RequestBody::ClearFault),
+        Refusal::CauseActing
+    );
+    wait(&mut line, 8.0);
+    line.request(RequestBody::ClearFault).unwrap();
+}
+
+#[test]
+fn an_offset_out_of_band_at_start_is_measured_again_after_clearing() {
+    let plant = PlantConfig::laboratory(4);
+    let mut line = connect(&nameplate(&plant), plant, 4);
+    inject(&mut line, |f| f.current_stuck = Some(2048 + 99));
+    wait(&mut line, 0.6);
+    assert_eq!(
+        line.port().device().state().latch.first().unwrap().fault,
+        Fault::CurrentOffset
+    );
+    inject(&mut line, |f| *f = Faults::default());
+    line.request(RequestBody::ClearFault).unwrap();
+    assert_eq!(mode(&line), Mode::Calibrating);
+    calibrated(&mut line);
+    line.request(RequestBody::Arm).unwrap();
+}
+
+#[test]
+fn a_fault_in_the_middle_of_calibration_leaves_it_to_be_done() {
+    let plant = PlantConfig::laboratory(5);
+    let mut line = connect(&nameplate(&plant), plant, 5);
+    inject(&mut line, |f| f.driver = true);
+    wait(&mut line, 0.1);
+    assert_eq!(mode(&line), Mode::Fault);
+    inject(&mut line, |f| f.driver = false);
+    wait(&mut line, 0.01);
+    line.request(RequestBody::ClearFault).unwrap();
+    assert_eq!(mode(&line), Mode::Calibrating);
+}
+
+#[test]
+fn a_silent_host_brings_a_controlled_stop_and_then_the_fault() {
+    let mut line = moving(6);
+    // Only the device runs: nothing is sent to it.
+    let rig = line.port_mut().device_mut();
+    let mut stood = false;
+    for _ in 0..20_000 {
+        rig.tick();
+        stood |= rig.state().mode == Mode::Holding;
+    }
+    assert!(stood, "it comes to rest under control first");
+    assert_eq!(rig.state().mode, Mode::Fault);
+    assert_eq!(rig.state().latch.first().unwrap().fault, Fault::HostSilent);
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_and_changes_nothing() {
+    let (mut line, plant) = bench(7);
+    let good = nameplate(&plant).settings;
+    let before = *line.port().device().state().settings();
+    let mut gains = good.gains;
+    gains.proportional = f32::NAN;
+    let mut friction = good.friction;
+    friction.coulomb = -0.1;
+    let mut limits = good.limits;
+    limits.torque = f32::NAN;
+    let mut estimator = good.estimator;
+    estimator.memory = -1.0;
+    for body in [
+        RequestBody::SetGains(gains),
+        RequestBody::SetFriction(friction),
+        RequestBody::SetLimits(limits),
+        RequestBody::SetEstimator(estimator),
+        RequestBody::SetPosition(f32::NAN),
+    ] {
+        assert_eq!(refused(&mut line, body), Refusal::BadValue);
+    }
+    assert_eq!(*line.port().device().state().settings(), before);
+    assert_eq!(refused(&mut line, RequestBody::Start), Refusal::WrongMode);
+    let fast = match excitation(1, 5, 5) {
+        Trajectory::Fourier(mut shape) => {
+            shape.sine.iter_mut().for_each(|x| *x *= 20.0);
+            Trajectory::Fourier(shape)
+        }
+        other => other,
+    };
+    assert_eq!(
+        refused(&mut line, RequestBody::SetTrajectory(fast)),
+        Refusal::OutsideLimits
+    );
+    line.request(RequestBody::Arm).unwrap();
+    assert_eq!(
+        refused(&mut line, RequestBody::Start),
+        Refusal::NoTrajectory
+    );
+    assert_eq!(
+        refused(&mut line, RequestBody::SetPosition(0.0)),
+        Refusal::WrongMode
+    );
+}
