@@ -60,6 +60,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
 
     let tick = Tick {
         position: state.counts,
+        velocity: state.velocity,
         current: readings.current,
         voltage: state.duty * readings.supply,
         reference: state.reference.position,
@@ -285,7 +286,7 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
         .push(tick, config.rates.telemetry_decimation)?;
     let sample = StateSample {
         position_sum: window.position,
-        velocity: state.velocity,
+        velocity: window.mean(window.velocity),
         current: window.mean(window.current),
         voltage: window.mean(window.voltage),
         reference: window.mean(window.reference),

@@ -10,6 +10,8 @@ pub struct Window {
     pub ticks: u16,
     /// Unwrapped counts, exact.
     pub position: i64,
+    /// Estimated joint velocity, rad/s.
+    pub velocity: f32,
     /// Motor current, A.
     pub current: f32,
     /// Motor voltage, V.
@@ -27,6 +29,8 @@ pub struct Window {
 pub struct Tick {
     /// Unwrapped counts.
     pub position: i64,
+    /// Estimated joint velocity, rad/s.
+    pub velocity: f32,
     /// Motor current, A.
     pub current: f32,
     /// Motor voltage that acts now, V.
@@ -44,6 +48,7 @@ impl Window {
     pub fn push(&mut self, tick: &Tick, length: u16) -> Option<Self> {
         self.ticks += 1;
         self.position += tick.position;
+        self.velocity += tick.velocity;
         self.current += tick.current;
         self.voltage += tick.voltage;
         self.reference += tick.reference;

@@ -126,7 +126,7 @@ fn a_recording_too_short_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording.csv");
     fs::write(&path, "t,q1,tau1\n0,0,0\n0.001,0,0\n0.002,0,0\n").unwrap();
-    names(&sentence(&path), &["short"]);
+    names(&sentence(&path), &["3 rows", "256"]);
 }
 
 #[test]

@@ -363,7 +363,9 @@ fn worst(
         for (factor, what) in room {
             let tight = factor * (1.0 - ROUNDING);
             // NaN counts as outside.
-            if !(tight >= 1.0) && worst.is_none_or(|(w, _, _)| !(tight >= w)) {
+            if (tight.is_nan() || tight < 1.0)
+                && worst.is_none_or(|(w, _, _)| tight.is_nan() || tight < w)
+            {
                 worst = Some((tight, j, what));
             }
         }
@@ -371,12 +373,15 @@ fn worst(
     worst
 }
 
+/// A motion and its proved reach, or the joint and the quantity at fault.
+type Fitted = Result<(Vec<JointMotion>, Vec<Reach>), (usize, &'static str)>;
+
 /// A motion scaled down about its start until the proof succeeds; the joint and quantity at fault where it never does.
 fn fit_within(
     frame: &Frame,
     enclosing: &Chain<Interval>,
     mut motions: Vec<JointMotion>,
-) -> Result<Result<(Vec<JointMotion>, Vec<Reach>), (usize, &'static str)>, ExciteError> {
+) -> Result<Fitted, ExciteError> {
     let mut blame = (0, "position");
     for _ in 0..SHRINKS {
         let reaches = reach(

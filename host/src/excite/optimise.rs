@@ -70,7 +70,8 @@ fn bfgs(objective: &mut impl Objective, mut x: DVector<f64>, iterations: usize) 
         for _ in 0..BISECTIONS {
             let trial = &x + step * &direction;
             let trial_value = objective.value(&trial, &mut trial_gradient);
-            if !(trial_value <= value + ARMIJO * step * slope) {
+            let enough = value + ARMIJO * step * slope;
+            if trial_value.is_nan() || trial_value > enough {
                 high = step;
             } else if trial_gradient.dot(&direction) < WOLFE * slope {
                 low = step;

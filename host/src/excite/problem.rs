@@ -159,6 +159,9 @@ fn criterion_of(information: &DMatrix<f64>, criterion: Criterion) -> (f64, DMatr
     }
 }
 
+/// Takes a constraint's number, its value, its sample, and its derivatives joint by joint.
+type Visit<'a> = dyn FnMut(usize, f64, usize, &[[f64; 3]]) + 'a;
+
 /// One start's view of the frame.
 pub(super) struct Problem<'a> {
     frame: &'a Frame,
@@ -352,10 +355,7 @@ impl<'a> Problem<'a> {
 
     /// Calls `visit` with each constraint's number, value (0 or less is allowed) and what it depends on: sample,
     /// and per joint the derivatives by position, velocity and acceleration.
-    fn constraints(
-        &self,
-        visit: &mut dyn FnMut(usize, f64, usize, &[[f64; 3]]),
-    ) -> Result<(), ExciteError> {
+    fn constraints(&self, visit: &mut Visit<'_>) -> Result<(), ExciteError> {
         let n = self.joints();
         let samples = self.motion[0].len() / n;
         let keep = 1.0 - MARGIN;

@@ -203,7 +203,7 @@ pub fn staged(
     };
     let b = bounds[moving];
     let distance = SHARE * (b.high - start[moving]).min(start[moving] - b.low);
-    if !(distance > 0.0) {
+    if distance.is_nan() || distance <= 0.0 {
         return Err(no_room(format!(
             "it starts at {}, which leaves nothing between {} and {}; start it elsewhere",
             start[moving], b.low, b.high
@@ -255,7 +255,7 @@ pub fn staged(
         }
         if known && limited {
             let share = torque_share(&model, &bounds, &start, moving, &trajectory)?;
-            if !(share <= 1.0) {
+            if share.is_nan() || share > 1.0 {
                 why = format!(
                     "even slowly it needs {:.0} % of a torque limit; start it where gravity is weaker",
                     100.0 * share

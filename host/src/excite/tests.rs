@@ -461,7 +461,7 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
     for k in 0..last {
         let way = motion.q[0][k + 1] - motion.q[0][k];
         let speed = way / run.period;
-        put_in += motion.tau[0][k] * way;
+        put_in += 0.5 * (motion.tau[0][k] + motion.tau[0][k + 1]) * way;
         lost += 0.4 * way.abs() + 0.3 * speed * way + 0.1 * way;
     }
     let gained = energy(last) - energy(0);
@@ -493,6 +493,37 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
             load_reference(&path, &robot, 1.0).unwrap().position,
             reference.position
         );
+    }
+}
+
+#[test]
+fn a_noiseless_run_gives_its_parameters_back() {
+    let robot = one_link();
+    let file = designed(&robot, &quick(Criterion::ConditionNumber)).file;
+    let reference = file.sampled(1000.0).unwrap();
+    let run = replay(&robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
+    let (q, qd, tau) = (&run.motion.q[0], &run.motion.qd[0], &run.motion.tau[0]);
+    // The whole periods, by the model written out; acceleration by central differences.
+    let used: Vec<usize> = (3300..q.len() - 3300)
+        .filter(|k| qd[*k].abs() > 0.05)
+        .collect();
+    let rows = DMatrix::from_fn(used.len(), 6, |row, c| {
+        let k = used[row];
+        let acceleration = (qd[k + 1] - qd[k - 1]) / (2.0 * run.period);
+        let (s, cos) = q[k].sin_cos();
+        [
+            9.81 * cos,
+            -9.81 * s,
+            acceleration,
+            qd[k],
+            qd[k].signum(),
+            1.0,
+        ][c]
+    });
+    let right = DVector::from_iterator(used.len(), used.iter().map(|k| tau[*k]));
+    let found = rows.svd(true, true).solve(&right, 0.0).unwrap();
+    for (value, truth) in found.iter().zip([0.3, 0.0, 0.17, 0.3, 0.4, 0.0]) {
+        assert!((value - truth).abs() < 1e-3, "{found}");
     }
 }
 

@@ -723,7 +723,7 @@ pub fn load_reference(
         }
     }
     // One sample has no period.
-    if !(sampled.period > 0.0) {
+    if sampled.period <= 0.0 {
         return Err(uneven(1));
     }
     Ok(sampled)

@@ -60,7 +60,7 @@ pub struct ResidualReport {
     pub series: Series,
 }
 
-/// Curves for a plot, at most [`SERIES_POINTS`] points.
+/// Curves for a plot, at most `SERIES_POINTS` points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Series {
     /// s

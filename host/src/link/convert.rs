@@ -9,9 +9,8 @@ pub const COLUMNS: [&str; 9] = [
     "t", "q1", "i1", "u1", "ref1", "qd1", "tau_cmd1", "limits", "mode",
 ];
 
-/// One sample in SI units, joint-side unless said. Position, current, voltage, reference and torque command
-/// are means over the window and belong to its middle, `t`; velocity, limits and mode are as [`StateSample`]
-/// says (velocity and mode at the window's end, half a window after `t`).
+/// One sample in SI units, joint-side unless said. Position, velocity, current, voltage, reference and
+/// torque command are means over the window and belong to its middle, `t`; limits and mode are as [`StateSample`] says.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row {
     /// Middle of the averaging window, s since control tick 0.

@@ -193,21 +193,18 @@ fn summary(figures: &DemoFigures) -> Vec<Fact> {
     for t in &figures.tracking {
         if let Some(factor) = gain(t) {
             facts.push(
-                Fact::new(
-                    format!("Tracking error, {}", t.motion),
-                    format!("{} times smaller", format_significant(factor, 2)),
-                )
-                .note(format!(
-                    "RMS {} → {} {} with precompensation",
-                    format_significant(t.rms_without, 2),
-                    format_significant(t.rms_with, 2),
-                    parts::unit(&t.unit)
-                ))
-                .tone(if factor > 1.0 {
-                    Tone::Good
-                } else {
-                    Tone::Warning
-                }),
+                Fact::new(format!("Tracking error, {}", t.motion), times(factor))
+                    .note(format!(
+                        "RMS {} → {} {} with precompensation",
+                        format_significant(t.rms_without, 2),
+                        format_significant(t.rms_with, 2),
+                        parts::unit(&t.unit)
+                    ))
+                    .tone(if factor > 1.0 {
+                        Tone::Good
+                    } else {
+                        Tone::Warning
+                    }),
             );
         }
     }
@@ -239,6 +236,15 @@ fn summary(figures: &DemoFigures) -> Vec<Fact> {
 /// By what factor precompensation reduces the tracking error.
 fn gain(t: &Tracking) -> Option<f64> {
     (t.rms_with > 0.0 && t.rms_without.is_finite()).then(|| t.rms_without / t.rms_with)
+}
+
+/// A factor of improvement in words, also where it is none.
+fn times(factor: f64) -> String {
+    if factor >= 1.0 {
+        format!("{} times smaller", format_significant(factor, 2))
+    } else {
+        format!("{} times larger", format_significant(1.0 / factor, 2))
+    }
 }
 
 fn parameters(figures: &DemoFigures) -> Section {
@@ -325,14 +331,11 @@ pub fn tracking_plot(t: &Tracking) -> Plot {
     let (scale, shown) = shown(t);
     let scaled = |v: &[f64]| v.iter().map(|e| scale * e).collect::<Vec<_>>();
     let note = format!(
-        "n = {}, RMS {} {shown} without and {} {shown} with{}. {}",
+        "{} points drawn; over the whole run RMS {} {shown} without and {} {shown} with{}. {}",
         t.t.len(),
         format_significant(scale * t.rms_without, 3),
         format_significant(scale * t.rms_with, 3),
-        gain(t).map_or(String::new(), |g| format!(
-            ": {} times smaller",
-            format_significant(g, 2)
-        )),
+        gain(t).map_or(String::new(), |g| format!(": {}", times(g))),
         t.note
     );
     let mut error = Plot::new(

@@ -71,7 +71,7 @@ impl Welch {
         }
     }
 
-    /// Frequencies [Hz] and the one-sided density of the POSITION [unit²/Hz], without zero frequency.
+    /// Frequencies in Hz and the one-sided density of the POSITION in unit²/Hz, without zero frequency.
     pub fn density(&self, sample_rate: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         if self.count == 0 {
             return None;

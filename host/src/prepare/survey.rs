@@ -24,7 +24,7 @@ pub struct JointSurvey {
     pub torque_rms: f64,
     /// Lowest and highest torque.
     pub torque: [f64; 2],
-    /// Torques at which the recording rests at its extreme for at least [`CLIPPED_RUN`] rows: it was clipped there.
+    /// Torques at which the recording rests at its extreme for at least `CLIPPED_RUN` rows: it was clipped there.
     pub clipped: [Option<f64>; 2],
     /// Spectrum of the position.
     pub spectrum: PositionSpectrum,

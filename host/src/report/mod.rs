@@ -1,6 +1,6 @@
 //! Documents of text, tables and plots, and their one-file HTML form.
 //!
-//! Compose a [`Document`], then [`write`] it: the page holds everything it needs, asks nothing of any
+//! Compose a [`Document`], then [`write()`] it: the page holds everything it needs, asks nothing of any
 //! network, reads without JavaScript (every plot is there as a still picture), zooms with it, and
 //! prints on paper with everything unfolded. The same document gives the same bytes. Every text is
 //! taken as text: a name read from a file cannot become mark-up.

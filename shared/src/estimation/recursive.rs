@@ -35,6 +35,7 @@ pub struct Config<T, const N: usize> {
     residuals: uncertainty::Config<T>,
     centre: [T; N],
     half: [T; N],
+    band: [[T; N]; 2],
     scale: [T; N],
     unit: T,
     edge_hold: u32,
@@ -63,6 +64,7 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
             ),
             centre: [T::ZERO; N],
             half: [T::ZERO; N],
+            band: [*lower, *upper],
             scale: [T::ZERO; N],
             unit: noise,
             edge_hold: block.max(1).saturating_mul(EDGE_HOLD_BLOCKS),
@@ -220,7 +222,12 @@ pub fn report<T: Real<Mask = bool>, const N: usize>(
     let variances = state.uncertainty.variances();
     let share = T::from_f64(2.0 * TRUSTED_SHARE_OF_BAND);
     for i in 0..N {
-        out.value[i] += config.half[i] * state.x[i].clamp_to(-T::ONE, T::ONE);
+        let value = config.centre[i] + config.half[i] * state.x[i].clamp_to(-T::ONE, T::ONE);
+        // centre ± half is the band's edge up to rounding only, which has been seen to fall outside.
+        let [lower, upper] = [config.band[0][i], config.band[1][i]];
+        if T::ZERO.lt(config.half[i]) {
+            out.value[i] = value.clamp_to(lower, upper);
+        }
         if let Some(v) = variances {
             let std = v[i].sqrt();
             out.std[i] = config.half[i] * std;

@@ -160,7 +160,7 @@ pub struct Batch {
 pub struct StateSample {
     /// Unwrapped motor-encoder counts summed over the window: exact, no rounding.
     pub position_sum: i64,
-    /// Estimated joint velocity at the window's end, rad/s.
+    /// Estimated joint velocity, mean, rad/s.
     pub velocity: f32,
     /// Motor current, mean, A.
     pub current: f32,
