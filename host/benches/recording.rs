@@ -218,7 +218,9 @@ fn ticks(criterion: &mut Criterion) {
                 || {
                     let mut rig =
                         EmulatedRig::new(&nameplate, PlantConfig::laboratory(1), 1).unwrap();
-                    (0..2 * nameplate.config.calibration_ticks).for_each(|_| drop(rig.tick()));
+                    for _ in 0..2 * nameplate.config.calibration_ticks {
+                        rig.tick();
+                    }
                     Session::open(EmulatedPort::new(rig), SessionSettings::default()).unwrap()
                 },
                 |session| run(session, &experiment, |_| ControlFlow::Continue(())).unwrap(),
