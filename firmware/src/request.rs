@@ -183,7 +183,10 @@ fn usable(settings: &Settings) -> Result<(), Refusal> {
         && settings.gains.usable()
         && settings.friction.check().is_ok()
         && model_is_usable(&settings.model)
-        && settings.precompensation.check().is_ok();
+        && settings.precompensation.check().is_ok()
+        // The adaptive law smooths its sign by it, whether or not friction is precompensated.
+        && settings.precompensation.velocity_threshold > 0.0
+        && settings.precompensation.velocity_threshold.is_finite();
     if good { Ok(()) } else { Err(Refusal::BadValue) }
 }
 
@@ -194,7 +197,6 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
         && model.coulomb >= 0.0
 }
 
-/// Also while switched off: what is kept may be switched on.
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run.
 fn fits(

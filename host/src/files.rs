@@ -30,6 +30,12 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    if !folder.is_dir() {
+        return Err(at(io::Error::new(
+            io::ErrorKind::NotFound,
+            format!("the folder {} does not exist", folder.display()),
+        )));
+    }
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(at)?;
     file.write_all(bytes).map_err(at)?;
     make_readable(&file).map_err(at)?;
@@ -55,6 +61,15 @@ fn make_readable(_file: &tempfile::NamedTempFile) -> io::Result<()> {
 /// # Errors
 /// [`WriteError`] naming the folder.
 pub fn folder(path: &Path) -> Result<(), WriteError> {
+    if path.is_file() {
+        return Err(WriteError {
+            path: path.into(),
+            cause: io::Error::new(
+                io::ErrorKind::NotADirectory,
+                "this is a file, and a folder is wanted",
+            ),
+        });
+    }
     fs::create_dir_all(path).map_err(|cause| WriteError {
         path: path.into(),
         cause,

@@ -231,3 +231,68 @@ fn an_existing_description_is_not_overwritten() {
     names(&text, &["mine.toml", "--force"]);
     assert_eq!(fs::read_to_string(&path).unwrap(), "my work");
 }
+
+#[test]
+fn a_torque_of_the_wrong_sign_is_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recording(folder.path(), |k, row| {
+        // A motion with friction, its torque recorded with the wrong sign.
+        let t = k as f64 * 1e-3;
+        let q = 1.5 * (3.0 * t).sin() + 0.3 * (11.0 * t).cos();
+        let qd = 4.5 * (3.0 * t).cos() - 3.3 * (11.0 * t).sin();
+        let qdd = -13.5 * (3.0 * t).sin() - 36.3 * (11.0 * t).cos();
+        let tau = 0.12 * qdd + 2.9 * q.cos() + 0.3 * qd + 0.4 * qd.signum();
+        row[2] = format!("{:.6}", -tau);
+    });
+    names(&sentence(&path), &["sign", "tau1", "gear_ratio"]);
+}
+
+#[test]
+fn a_recording_cannot_judge_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = recording(folder.path(), |_, _| ());
+    let out = folder.path().join("out");
+    let mut command = identify(&robot("one-link.toml"), &data, &out);
+    names(
+        &refuse(command.arg("--holdout").arg(&data)),
+        &["recording.csv", "--holdout"],
+    );
+}
+
+#[test]
+fn a_recording_is_not_overwritten_and_a_strange_joint_is_not_moved() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let record = |out: &Path| {
+        let mut command = rig();
+        command
+            .args(["record", "--emulated", "--seconds", "0.1", "--out"])
+            .arg(out);
+        command
+    };
+    fs::write(at("precious.csv"), "measured once").unwrap();
+    names(
+        &refuse(&mut record(&at("precious.csv"))),
+        &["precious.csv", "--force"],
+    );
+    assert_eq!(
+        fs::read_to_string(at("precious.csv")).unwrap(),
+        "measured once"
+    );
+    crate::run::succeed(
+        rig()
+            .args(["excite", "--kind", "reversals", "--robot"])
+            .arg(robot("one-link.toml"))
+            .arg("--out")
+            .arg(at("motion.toml")),
+    );
+    let text = fs::read_to_string(at("motion.toml")).unwrap();
+    fs::write(at("elbow.toml"), text.replace("\"link\"", "\"elbow\"")).unwrap();
+    let mut command = record(&at("new.csv"));
+    command
+        .arg("--robot")
+        .arg(robot("one-link.toml"))
+        .arg("--trajectory")
+        .arg(at("elbow.toml"));
+    names(&refuse(&mut command), &["elbow"]);
+}

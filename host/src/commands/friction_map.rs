@@ -57,7 +57,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             robot.joints.len()
         )));
     };
-    folder(&args.out)?;
     let context = Context {
         command: command_line(),
         warnings: training.warnings().chain(sweep.warnings()).collect(),
@@ -72,6 +71,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             joint,
             FrictionMapOptions::default(),
         )?;
+        folder(&args.out)?;
         let json = serde_json::to_string_pretty(&map).map_err(|error| {
             CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
         })?;

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
+use rig_shared::multibody::{COLUMNS, column};
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings};
@@ -16,6 +17,7 @@ use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
 use crate::report::format_value;
+use crate::robot::Robot;
 
 /// Which equations are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -133,7 +135,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }
-    folder(&args.out)?;
+    refuse_shared(&args.data, &args.holdout)?;
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
@@ -144,6 +146,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &args.options(),
     )?;
     drop(progress);
+    refuse_driving_friction(&robot, &identification)?;
+    folder(&args.out)?;
     let (identified, remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
     let context = Context {
@@ -164,6 +168,44 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     report::write(&args.out.join("report.html"), &page)?;
     print(ui, &identification, &args.out);
+    Ok(())
+}
+
+/// A recording that was learnt from says nothing as a judge.
+fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
+    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    match holdout
+        .iter()
+        .find(|held| data.iter().any(|path| real(path) == real(held)))
+    {
+        Some(path) => Err(CommandError::Sentence(format!(
+            "{} is given as --data and as --holdout; judge by a recording that was not learnt from.",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Friction that drives the motion at every speed is no friction: the torque has the wrong sign.
+fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), CommandError> {
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let below_zero = |place: usize| {
+            let row = found
+                .details
+                .columns
+                .iter()
+                .position(|column| *column == j * COLUMNS + place);
+            row.and_then(|row| found.base_parameters.get(row))
+                .is_some_and(|parameter| parameter.interval[1] < 0.0)
+        };
+        if below_zero(column::VISCOUS) && below_zero(column::COULOMB) {
+            return Err(CommandError::Implausible(format!(
+                "viscous and Coulomb friction of joint \"{}\" both come out below zero, so that friction would drive the motion: the sign of tau{n} or i{n}, of q{n}, or of gear_ratio is wrong.",
+                joint.name,
+                n = j + 1
+            )));
+        }
+    }
     Ok(())
 }
 

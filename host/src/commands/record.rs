@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// Seed of the emulated rig
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Replace the recording if it exists
+    #[arg(long)]
+    pub(crate) force: bool,
     /// File to write, .csv or .mcap
     #[arg(long)]
     out: PathBuf,
@@ -69,6 +72,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             args.seconds
         )));
     }
+    if args.out.exists() && !args.force {
+        return Err(CommandError::Exists {
+            path: args.out.clone(),
+        });
+    }
     let robot = args.robot.as_deref().map(Robot::load).transpose()?;
     let mut settings: Vec<RequestBody> = args
         .home
@@ -79,7 +87,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         settings.extend(upload(&Nameplate::from_robot(robot)?, args.precompensation));
     }
     let trajectory = match &args.trajectory {
-        Some(path) => Some(single(&TrajectoryFile::load(path)?, path, args.home)?),
+        Some(path) => {
+            let file = TrajectoryFile::load(path)?;
+            if let Some(robot) = &robot {
+                file.fits(robot, path)?;
+            }
+            Some(single(&file, path, args.home)?)
+        }
         None => None,
     };
     let experiment = Experiment {

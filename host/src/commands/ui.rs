@@ -1,6 +1,6 @@
 //! What a person sees while a command works: progress on a terminal, sentences everywhere.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,7 +21,14 @@ impl Ui {
 
     /// A result: one line on standard output.
     pub(crate) fn say(&self, text: &str) {
-        println!("{text}");
+        if let Err(error) = writeln!(std::io::stdout(), "{text}") {
+            // A reader that has seen enough (`rig … | head`) is no failure; a full disk is.
+            if error.kind() == std::io::ErrorKind::BrokenPipe {
+                std::process::exit(0);
+            }
+            eprintln!("rig: standard output cannot be written: {error}.");
+            std::process::exit(1);
+        }
     }
 
     /// A remark that is no result: one line on standard error.

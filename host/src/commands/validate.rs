@@ -37,7 +37,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in inputs.warnings() {
         ui.remark(&warning);
     }
-    folder(&args.out)?;
     let mut progress = ui.progress("validating", 1000);
     let validation = validate(
         &robot,
@@ -53,6 +52,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings: inputs.warnings().collect(),
         ..Context::default()
     };
+    folder(&args.out)?;
     let json = serde_json::to_string_pretty(&validation).map_err(|error| {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;

@@ -298,7 +298,7 @@ fn parameters(figures: &DemoFigures) -> Section {
     Section::new(
         "parameters",
         "Truth and estimates",
-        "The same motion identified three ways: off-line from the torque balance, off-line from the energy balance, and by the firmware while it moved.",
+        "The same motion identified three ways: off-line from the torque balance, off-line from the energy balance, and by the firmware while it moved. The torque constant is taken from the nameplate as true: an error in it would scale every parameter alike and is not in the intervals.",
     )
     .with(Block::Table(Table {
         caption: "Parameters of the link, ± half the 95 % interval".into(),

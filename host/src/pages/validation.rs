@@ -21,7 +21,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
     let mut data = Section::new(
         "data",
         "What was done to the data for the torque",
-        "The motion is compared as recorded, without any filter.",
+        "The motion is compared as recorded, without any filter. Slow rows are counted here that an identification may leave out because friction below their speed is not what its model says; its hold-out figure can therefore be smaller.",
     );
     data.blocks.push(Block::List(
         found
