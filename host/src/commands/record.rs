@@ -17,7 +17,8 @@ use crate::excite::TrajectoryFile;
 use crate::link::experiment::{Experiment, run as run_experiment};
 use crate::link::serial::DEFAULT_BAUD;
 use crate::link::{
-    COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session, SessionSettings,
+    COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session,
+    SessionSettings, UNITS,
 };
 use crate::plant::PlantConfig;
 use crate::robot::{ONE_LINK_TEMPLATE, Robot};
@@ -171,9 +172,6 @@ pub(crate) fn upload(nameplate: &Nameplate, precompensation: bool) -> Vec<Reques
         RequestBody::SetEstimator(settings.estimator),
     ]
 }
-
-/// Units of [`COLUMNS`].
-const UNITS: [&str; COLUMNS.len()] = ["s", "rad", "A", "V", "rad", "rad/s", "N*m", "", ""];
 
 fn record<P: Port>(
     port: P,

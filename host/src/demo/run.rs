@@ -10,10 +10,7 @@ use rig_shared::wire::message::{Estimate, RequestBody};
 use super::DemoError;
 use crate::data::{Column, RecordingWriter};
 use crate::link::experiment::{Experiment, run};
-use crate::link::{COLUMNS, Converter, Event, LossReport, Port, Row, Session};
-
-/// Units of [`COLUMNS`].
-const UNITS: [&str; COLUMNS.len()] = ["s", "rad", "A", "V", "rad", "rad/s", "N*m", "", ""];
+use crate::link::{COLUMNS, Converter, Event, LossReport, Port, Row, Session, UNITS};
 
 /// A recorded run.
 pub struct Run {

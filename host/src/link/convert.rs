@@ -9,6 +9,9 @@ pub const COLUMNS: [&str; 9] = [
     "t", "q1", "i1", "u1", "ref1", "qd1", "tau_cmd1", "limits", "mode",
 ];
 
+/// Units of [`COLUMNS`], ASCII; empty for a plain number.
+pub const UNITS: [&str; COLUMNS.len()] = ["s", "rad", "A", "V", "rad", "rad/s", "N*m", "", ""];
+
 /// One sample in SI units, joint-side unless said. Position, velocity, current, voltage, reference and
 /// torque command are means over the window and belong to its middle, `t`; limits and mode are as [`StateSample`] says.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -14,7 +14,7 @@ pub mod recorder;
 pub mod serial;
 pub mod session;
 
-pub use convert::{COLUMNS, Converter, Row};
+pub use convert::{COLUMNS, Converter, Row, UNITS};
 pub use emulated::{Device, EmulatedPort};
 pub use error::LinkError;
 pub use lossy::{Disturbance, Lossy};
