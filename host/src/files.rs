@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
 use thiserror::Error;
 
 /// Why a file or folder could not be written.
@@ -17,43 +18,55 @@ pub struct WriteError {
     pub cause: io::Error,
 }
 
-/// Writes a whole file: to a temporary one beside it first, which then takes its name.
+/// A temporary file beside `path`, to be filled and then given that name by [`persist`].
+///
+/// It is as readable as any other file (the user's umask decides): a result is for everybody in the laboratory.
 ///
 /// # Errors
-/// [`WriteError`] naming the file.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let at = |cause| WriteError {
-        path: path.into(),
-        cause,
-    };
+/// What the system says, or that the folder does not exist.
+pub fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     if !folder.is_dir() {
-        return Err(at(io::Error::new(
+        return Err(io::Error::new(
             io::ErrorKind::NotFound,
             format!("the folder {} does not exist", folder.display()),
-        )));
+        ));
     }
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(at)?;
-    file.write_all(bytes).map_err(at)?;
-    make_readable(&file).map_err(at)?;
-    file.persist(path).map_err(|error| at(error.error))?;
-    Ok(())
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".rig-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
 }
 
-/// Temporary files are private; a result is for everybody in the laboratory to read.
-#[cfg(unix)]
-fn make_readable(file: &tempfile::NamedTempFile) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.as_file()
-        .set_permissions(fs::Permissions::from_mode(0o644))
+/// Gives a filled temporary file its name, in one step.
+///
+/// # Errors
+/// What the system says; the file under that name is then as it was.
+pub fn persist(file: NamedTempFile, path: &Path) -> io::Result<()> {
+    file.as_file().sync_all()?;
+    file.persist(path).map(drop).map_err(|error| error.error)
 }
 
-#[cfg(not(unix))]
-fn make_readable(_file: &tempfile::NamedTempFile) -> io::Result<()> {
-    Ok(())
+/// Writes a whole file: to a temporary one beside it first, which then takes its name.
+///
+/// # Errors
+/// [`WriteError`] naming the file.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let written = temporary(path).and_then(|mut file| {
+        file.write_all(bytes)?;
+        persist(file, path)
+    });
+    written.map_err(|cause| WriteError {
+        path: path.into(),
+        cause,
+    })
 }
 
 /// Makes sure that a folder for results is there.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::error::DataError;
 use super::mcap_rows::TOPIC;
+use crate::files::{persist, temporary};
 
 /// A column to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -141,27 +141,6 @@ impl Rows {
             source,
         }
     }
-}
-
-fn temporary(path: &Path) -> io::Result<NamedTempFile> {
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".rig-");
-    #[cfg(unix)]
-    {
-        // A recording is as readable as any other file: the user's umask decides.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
-}
-
-fn persist(file: NamedTempFile, path: &Path) -> io::Result<()> {
-    file.as_file().sync_all()?;
-    file.persist(path).map(|_: File| ()).map_err(|e| e.error)
 }
 
 /// CSV: a header line, then one line per row, numbers in the shortest form that reads back the same.

@@ -17,8 +17,9 @@ mod scene;
 mod svg;
 mod thin;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use crate::files::write_whole;
 
 pub use document::{Alignment, Block, Column, Document, Fact, NoteKind, Section, Table, Tone};
 pub use format::{format_p_value, format_significant, format_value};
@@ -122,28 +123,10 @@ pub fn write_svg(path: &Path, plot: &Plot) -> Result<(), ReportError> {
 
 /// Puts a text in the place of a file in one step.
 fn replace(path: &Path, text: &str) -> Result<(), ReportError> {
-    let fail = |source| ReportError::File {
-        path: path.to_owned(),
-        source,
-    };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are for their owner's eyes only; a report is as readable as any other file.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder
-        .prefix(".report-")
-        .tempfile_in(folder)
-        .map_err(fail)?;
-    file.write_all(text.as_bytes()).map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
-    Ok(())
+    write_whole(path, text.as_bytes()).map_err(|error| ReportError::File {
+        path: error.path,
+        source: error.cause,
+    })
 }
 
 #[cfg(test)]
