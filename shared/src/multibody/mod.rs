@@ -18,6 +18,7 @@
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
+pub mod block;
 mod chain;
 mod coriolis;
 mod energy;
