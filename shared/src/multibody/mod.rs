@@ -18,6 +18,7 @@
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
+mod adjoint;
 mod chain;
 mod coriolis;
 mod energy;
@@ -39,6 +40,7 @@ mod textbook;
 #[cfg(test)]
 mod timing;
 
+pub use adjoint::regressor_gradient;
 pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
 pub use coriolis::coriolis_matrix;
 pub use energy::{
