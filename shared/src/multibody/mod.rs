@@ -25,6 +25,7 @@ mod energy;
 mod forward;
 mod inertia_matrix;
 mod inverse;
+mod kinematics;
 mod parameters;
 mod regressor;
 mod spatial;
@@ -50,6 +51,7 @@ pub use energy::{
 pub use forward::forward_dynamics;
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
+pub use kinematics::point_position;
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
 
