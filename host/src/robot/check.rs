@@ -6,6 +6,7 @@
 use std::collections::HashSet;
 
 use super::check_drives::check_transmission;
+use super::workspace::check_workspace;
 use super::{Drive, Joint, JointKind, Robot};
 
 /// Names of effects beyond the standard model.
@@ -99,6 +100,7 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
         })?;
     }
     check_transmission(robot)?;
+    check_workspace(robot)?;
     check_effects(robot)
 }
 

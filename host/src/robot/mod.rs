@@ -14,6 +14,7 @@ mod error;
 mod numbers;
 mod text;
 mod urdf;
+mod workspace;
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,6 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
 pub use error::{Place, RobotError};
+pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
 pub const MAX_BYTES: u64 = 16 << 20;
@@ -55,6 +57,9 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
+    /// Where points of the links must stay.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub workspace: Vec<Region>,
     /// Effects beyond the standard model, as `diagnose` adds them; kept as read.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<toml::Table>,
