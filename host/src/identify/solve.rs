@@ -240,7 +240,7 @@ pub fn identify(
             value: estimate.values[k],
             std: estimate.std[k],
             relative_std_percent: 100.0 * estimate.std[k] / estimate.values[k].abs(),
-            unit: super::unit(columns[k], &base.kinds).to_owned(),
+            unit: base.column_unit(columns[k]).to_owned(),
             interval: estimate.interval[k],
             classical_relative_std_percent: 100.0 * estimate.classical_std[k]
                 / estimate.values[k].abs(),
