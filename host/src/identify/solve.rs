@@ -111,7 +111,7 @@ pub fn identify(
             instants += rows.t.len() as u64;
             Ok(())
         })?;
-        add(&mut tally, &part);
+        tally.add(&part);
     }
     if tally.used < 2 * p as u64 {
         return Err(IdentifyError::NothingLeft {
@@ -303,20 +303,6 @@ pub fn identify(
             treatment,
         },
     })
-}
-
-fn add(total: &mut Tally, part: &Tally) {
-    total.used += part.used;
-    total.short += part.short;
-    for (list, more) in [
-        (&mut total.slow, &part.slow),
-        (&mut total.saturated, &part.saturated),
-    ] {
-        list.resize(list.len().max(more.len()), 0);
-        for (a, b) in list.iter_mut().zip(more) {
-            *a += b;
-        }
-    }
 }
 
 /// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet

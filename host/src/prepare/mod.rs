@@ -14,14 +14,16 @@ mod pieces;
 mod spectrum;
 mod survey;
 mod treatment;
+mod workers;
 
 pub use decimate::{Decimator, Stream};
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
-pub use motion::{JointMotion, Motion, each_motion};
+pub use motion::{JointMotion, Motion, each_motion, worked_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
 pub use survey::{JointSurvey, Survey};
 pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
+pub(crate) use workers::{each_of, threads};
 
 /// Why a recording cannot be prepared.
 #[derive(Debug, thiserror::Error)]

@@ -160,7 +160,7 @@ pub fn each_piece(
     recording: &dyn Recording,
     core: usize,
     margin: usize,
-    take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>,
+    take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>,
 ) -> Result<(), PrepareError> {
     let mut buffer = Block::default();
     let mut offset = 0u64;
@@ -171,7 +171,7 @@ pub fn each_piece(
                  offset: &mut u64,
                  done: &mut usize,
                  segment: usize,
-                 take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
+                 take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>| {
         if !buffer.is_empty() {
             let piece = Piece {
                 core_start: *done,
@@ -181,7 +181,7 @@ pub fn each_piece(
                 segment,
                 at_ends: [*offset == 0, true],
             };
-            take(&piece)?;
+            take(piece)?;
         }
         *buffer = Block::default();
         (*offset, *done) = (0, 0);
@@ -208,7 +208,7 @@ pub fn each_piece(
                 segment,
                 at_ends: [offset == 0, false],
             };
-            take(&piece)?;
+            take(piece)?;
             let drop = (done + core).saturating_sub(margin);
             drop_front(&mut buffer, drop);
             done = done + core - drop;
