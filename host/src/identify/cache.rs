@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{ErrorKind, Read, Seek, Write};
+use std::io::Seek;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::model::{Equation, Rows, Tally};
 use super::{IdentifyError, ModelKind};
+use crate::prepare::record::{self, Record, begin, put_count, put_numbers, unusable};
 use crate::prepare::{PrepareError, Recording};
 
 /// Which rows: of which recording (by address and name, both fixed while it is borrowed), of which model.
@@ -15,6 +16,8 @@ type Key = (usize, String, bool);
 /// Rows of every recording that a plan has been applied to.
 #[derive(Debug, Default)]
 pub struct RowCache {
+    /// Rows that differ from the wanted ones only in which of them are used.
+    earlier: Option<Box<RowCache>>,
     kept: Mutex<HashMap<Key, (File, Tally)>>,
 }
 
@@ -23,13 +26,45 @@ fn key(recording: &dyn Recording, model: ModelKind) -> Key {
     (address, recording.label(), model == ModelKind::Integral)
 }
 
-fn failed(e: std::io::Error) -> PrepareError {
-    PrepareError::Stopped(format!(
-        "The temporary file for prepared rows cannot be used ({e}); make room in the folder for temporary files."
-    ))
-}
-
 impl RowCache {
+    /// A cache for a plan that differs from that of `earlier` only in which rows are used: the rows of the
+    /// differential model are then taken from there.
+    pub(super) fn after(earlier: Self) -> Self {
+        Self {
+            earlier: Some(Box::new(earlier)),
+            ..Self::default()
+        }
+    }
+
+    /// Rows of the earlier plan, record by record, if there are any.
+    pub(super) fn earlier(
+        &self,
+        recording: &dyn Recording,
+        model: ModelKind,
+    ) -> Result<Option<Records>, PrepareError> {
+        match &self.earlier {
+            Some(earlier) => Ok(earlier
+                .records(recording, model)?
+                .map(|(records, _)| records)),
+            None => Ok(None),
+        }
+    }
+
+    fn records(
+        &self,
+        recording: &dyn Recording,
+        model: ModelKind,
+    ) -> Result<Option<(Records, Tally)>, PrepareError> {
+        let key = key(recording, model);
+        let (mut file, tally) = match self.files().get(&key) {
+            Some((file, tally)) => (file.try_clone().map_err(unusable)?, tally.clone()),
+            None => return Ok(None),
+        };
+        file.rewind().map_err(unusable)?;
+        let record = Vec::new();
+        Ok(Some((Records { file, record }, tally)))
+    }
+
     fn files(&self) -> MutexGuard<'_, HashMap<Key, (File, Tally)>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -41,14 +76,10 @@ impl RowCache {
         model: ModelKind,
         take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
     ) -> Result<Option<Tally>, IdentifyError> {
-        let key = key(recording, model);
-        let (mut file, tally) = match self.files().get(&key) {
-            Some((file, tally)) => (file.try_clone().map_err(failed)?, tally.clone()),
-            None => return Ok(None),
+        let Some((mut records, tally)) = self.records(recording, model)? else {
+            return Ok(None);
         };
-        file.rewind().map_err(failed)?;
-        let mut record = Vec::new();
-        while let Some(rows) = read(&mut file, &mut record).map_err(failed)? {
+        while let Some(rows) = records.next()? {
             take(&rows)?;
         }
         Ok(Some(tally))
@@ -64,10 +95,10 @@ impl RowCache {
         ) -> Result<Tally, IdentifyError>,
         take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
     ) -> Result<Tally, IdentifyError> {
-        let mut file = tempfile::tempfile().map_err(failed)?;
+        let mut file = tempfile::tempfile().map_err(unusable)?;
         let mut record = Vec::new();
         let tally = make(&mut |rows| {
-            write(&mut file, &mut record, rows).map_err(failed)?;
+            write(&mut file, &mut record, rows).map_err(unusable)?;
             take(rows)
         })?;
         self.files()
@@ -76,17 +107,16 @@ impl RowCache {
     }
 }
 
-fn put_count(to: &mut Vec<u8>, count: usize) {
-    to.extend_from_slice(&(count as u64).to_le_bytes());
+/// Rows that are read again.
+pub(super) struct Records {
+    file: File,
+    record: Vec<u8>,
 }
 
-fn put_numbers<'a>(to: &mut Vec<u8>, list: impl ExactSizeIterator<Item = &'a f64>) {
-    put_count(to, list.len());
-    let start = to.len();
-    to.resize(start + 8 * list.len(), 0);
-    // In place, eight bytes each: the compiler makes a plain copy of it.
-    for (bytes, x) in to[start..].as_chunks_mut::<8>().0.iter_mut().zip(list) {
-        *bytes = x.to_le_bytes();
+impl Records {
+    /// The rows of the next piece.
+    pub(super) fn next(&mut self) -> Result<Option<Rows>, PrepareError> {
+        read(&mut self.file, &mut self.record).map_err(unusable)
     }
 }
 
@@ -104,8 +134,7 @@ fn leading_zeros(equation: &Equation) -> usize {
 
 /// One record: its length in bytes, then the rows.
 fn write(to: &mut File, record: &mut Vec<u8>, rows: &Rows) -> std::io::Result<()> {
-    record.clear();
-    put_count(record, 0);
+    begin(record);
     put_count(record, rows.equations.len());
     put_count(record, rows.q.len());
     put_numbers(record, rows.t.iter());
@@ -123,60 +152,13 @@ fn write(to: &mut File, record: &mut Vec<u8>, rows: &Rows) -> std::io::Result<()
         }
         record.extend(equation.keep.iter().map(|keep| u8::from(*keep)));
     }
-    let length = record.len() as u64 - 8;
-    record[..8].copy_from_slice(&length.to_le_bytes());
-    to.write_all(record)
-}
-
-/// What is left of a record.
-struct Record<'a>(&'a [u8]);
-
-impl Record<'_> {
-    fn bytes(&mut self, count: usize) -> std::io::Result<&[u8]> {
-        let (head, rest) = self
-            .0
-            .split_at_checked(count)
-            .ok_or(ErrorKind::UnexpectedEof)?;
-        self.0 = rest;
-        Ok(head)
-    }
-
-    fn count(&mut self) -> std::io::Result<usize> {
-        let bytes = self
-            .bytes(8)?
-            .first_chunk()
-            .ok_or(ErrorKind::UnexpectedEof)?;
-        Ok(u64::from_le_bytes(*bytes) as usize)
-    }
-
-    fn numbers(&mut self, to: &mut Vec<f64>) -> std::io::Result<()> {
-        let count = self.count()?;
-        let bytes = self.bytes(8 * count)?;
-        to.extend(
-            bytes
-                .as_chunks::<8>()
-                .0
-                .iter()
-                .map(|b| f64::from_le_bytes(*b)),
-        );
-        Ok(())
-    }
-
-    fn list(&mut self) -> std::io::Result<Vec<f64>> {
-        let mut list = Vec::new();
-        self.numbers(&mut list)?;
-        Ok(list)
-    }
+    record::write(to, record)
 }
 
 fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Rows>> {
-    let mut length = [0; 8];
-    match from.read_exact(&mut length) {
-        Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(None),
-        other => other?,
+    if !record::read(from, record)? {
+        return Ok(None);
     }
-    record.resize(u64::from_le_bytes(length) as usize, 0);
-    from.read_exact(record)?;
     let mut record = Record(record);
     let (equations, joints) = (record.count()?, record.count()?);
     let t = record.list()?;

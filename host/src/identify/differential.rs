@@ -104,34 +104,43 @@ impl<'a> Differential<'a> {
             .map_err(failed)
     }
 
+    /// Rows of a piece that are kept.
+    fn picked(&self, motion: &Motion) -> Vec<usize> {
+        let step = self.decimator.step() as u64;
+        (motion.usable.0..motion.usable.1)
+            .filter(|k| (motion.offset + *k as u64).is_multiple_of(step))
+            .collect()
+    }
+
     /// The rows of one piece.
     pub(super) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
-        let n = motion.joints.len();
-        let (rows, p) = (motion.t.len(), self.plan.columns.len());
-        let step = self.decimator.step();
-        let kept = |k: i64| (motion.offset as i64 + k).rem_euclid(step as i64) == 0;
-        let picked: Vec<usize> = (motion.usable.0..motion.usable.1)
-            .filter(|k| kept(*k as i64))
-            .collect();
-        let mut result = Rows {
-            t: picked.iter().map(|&k| motion.t[k]).collect(),
-            q: picks(motion, &picked, |j| &j.q),
-            qd: picks(motion, &picked, |j| &j.qd),
-            equations: (0..n)
-                .map(|_| Equation {
-                    x: vec![0.0; picked.len() * p],
-                    y: vec![0.0; picked.len()],
-                    keep: Vec::new(),
-                })
-                .collect(),
-        };
+        let picked = self.picked(motion);
+        let p = self.plan.columns.len();
+        let mut result = self.used(motion, tally);
+        result.t = picked.iter().map(|&k| motion.t[k]).collect();
+        result.q = picks(motion, &picked, |j| &j.q);
+        result.qd = picks(motion, &picked, |j| &j.qd);
+        for equation in &mut result.equations {
+            equation.x = vec![0.0; picked.len() * p];
+            equation.y = vec![0.0; picked.len()];
+        }
         if let Some(&first) = picked.first() {
             self.filter(motion, first, &mut result)?;
         }
-        for (j, (joint, equation)) in motion.joints.iter().zip(&mut result.equations).enumerate() {
-            equation.keep = picks_to_keep(joint, &picked, step, rows, j, tally);
-        }
         Ok(result)
+    }
+
+    /// Which rows of the piece are used, and nothing else.
+    pub(super) fn used(&self, motion: &Motion, tally: &mut Tally) -> Rows {
+        let (picked, step) = (self.picked(motion), self.decimator.step());
+        let equations = motion.joints.iter().enumerate().map(|(j, joint)| Equation {
+            keep: kept(joint, &picked, step, j, tally),
+            ..Default::default()
+        });
+        Rows {
+            equations: equations.collect(),
+            ..Default::default()
+        }
     }
 
     fn filter(&self, motion: &Motion, first: usize, result: &mut Rows) -> Result<(), PrepareError> {
@@ -155,8 +164,8 @@ impl<'a> Differential<'a> {
         };
         // Whole blocks, each ending at a kept row.
         let first = first as i64 + 1;
-        let start = first - (first - begin).div_ceil_of(step) * step;
-        let blocks = (end - start).div_ceil_of(step) as usize;
+        let start = first - quotient_up(first - begin, step) * step;
+        let blocks = quotient_up(end - start, step) as usize;
         let origin = |k: i64| {
             let k = k.clamp(-low, rows - 1 + high);
             if k < 0 {
@@ -216,15 +225,9 @@ impl<'a> Differential<'a> {
     }
 }
 
-/// Division that rounds towards +∞.
-trait DivCeil {
-    fn div_ceil_of(self, by: Self) -> Self;
-}
-
-impl DivCeil for i64 {
-    fn div_ceil_of(self, by: Self) -> Self {
-        -(-self).div_euclid(by)
-    }
+/// Quotient rounded up; `by` > 0.
+fn quotient_up(a: i64, by: i64) -> i64 {
+    -(-a).div_euclid(by)
 }
 
 fn picks(motion: &Motion, picked: &[usize], of: fn(&JointMotion) -> &[f64]) -> Vec<Vec<f64>> {
@@ -246,14 +249,14 @@ fn running_count(list: &[bool]) -> Vec<u32> {
 }
 
 /// Whether each picked row of joint `j` is used.
-fn picks_to_keep(
+fn kept(
     joint: &JointMotion,
     picked: &[usize],
     step: usize,
-    rows: usize,
     j: usize,
     tally: &mut Tally,
 ) -> Vec<bool> {
+    let rows = joint.slow.len();
     let (slow_before, saturated_before) =
         (running_count(&joint.slow), running_count(&joint.saturated));
     // How many of the rows within `reach` of k are marked, and how many rows these are.

@@ -156,6 +156,19 @@ fn make_rows(
     match model {
         ModelKind::Differential => {
             let maker = Differential::new(plan)?;
+            if let Some(mut earlier) = plan.cache.earlier(recording, model)? {
+                let work =
+                    |motion: Motion| counted(&motion, |tally| Ok(maker.used(&motion, tally)));
+                let mut renew = |(used, part): (Rows, Tally)| {
+                    let mut rows = earlier.next()?.unwrap_or_default();
+                    for (equation, used) in rows.equations.iter_mut().zip(used.equations) {
+                        equation.keep = used.keep;
+                    }
+                    give((rows, part))
+                };
+                worked_motion(recording, treatment, 0, &work, &mut renew)?;
+                return Ok(total);
+            }
             let work = |motion: Motion| counted(&motion, |tally| maker.rows(&motion, tally));
             worked_motion(recording, treatment, 0, &work, &mut give)?;
         }

@@ -13,6 +13,10 @@ pub trait Recording {
         rows: usize,
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError>;
+    /// Told when `share` of it has been gone through once more without reading it: for progress.
+    fn passed(&self, share: f64) {
+        let _ = share;
+    }
 }
 
 /// A recording held in memory.
@@ -77,7 +81,7 @@ pub struct Piece {
 }
 
 /// Rows `start .. end` of a block.
-fn stretch(block: &Block, start: usize, end: usize) -> Block {
+pub(super) fn stretch(block: &Block, start: usize, end: usize) -> Block {
     let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
     Block {
         t: of(&block.t),
