@@ -7,7 +7,6 @@
 
 use rig_shared::multibody::COLUMNS;
 
-use super::IdentifyError;
 use super::model::{Equation, Plan, Rows, Tally, failed};
 use crate::batch::{BatchError, ChainBatch, RegressorBlock};
 use crate::prepare::{Decimator, JointMotion, Motion, PrepareError};
@@ -43,7 +42,7 @@ enum Origin {
 }
 
 impl<'a> Differential<'a> {
-    pub(super) fn new(plan: &'a Plan<'a>) -> Result<Self, IdentifyError> {
+    pub(super) fn new(plan: &'a Plan<'a>) -> Result<Self, PrepareError> {
         let n = plan.chain.joint_count();
         let low_pass = plan
             .treatment

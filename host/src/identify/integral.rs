@@ -2,7 +2,6 @@
 
 use rig_shared::multibody::{COLUMNS, column, energy_regressor};
 
-use super::IdentifyError;
 use super::model::{Equation, Plan, Rows, Tally, failed};
 use crate::prepare::{LowPass, Motion, PrepareError};
 
@@ -13,7 +12,7 @@ pub(super) struct Integral<'a> {
 }
 
 impl<'a> Integral<'a> {
-    pub(super) fn new(plan: &'a Plan<'a>) -> Result<Self, IdentifyError> {
+    pub(super) fn new(plan: &'a Plan<'a>) -> Result<Self, PrepareError> {
         let low_pass = plan
             .treatment
             .position_filter()

@@ -193,6 +193,19 @@ fn counted(
     Ok((rows(&mut tally)?, tally))
 }
 
+/// Rows of one piece of motion.
+pub(super) fn rows_of(
+    motion: &Motion,
+    plan: &Plan,
+    model: ModelKind,
+    tally: &mut Tally,
+) -> Result<Rows, PrepareError> {
+    match model {
+        ModelKind::Differential => Differential::new(plan)?.rows(motion, tally),
+        ModelKind::Integral => Integral::new(plan)?.rows(motion, tally),
+    }
+}
+
 pub(super) fn failed(e: impl std::fmt::Display) -> PrepareError {
     PrepareError::Stopped(e.to_string())
 }
