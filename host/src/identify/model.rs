@@ -139,13 +139,22 @@ fn make_rows(
         if motion.usable.0 >= motion.usable.1 {
             tally.short += motion.t.len() as u64;
         }
-        let rows = match model {
-            ModelKind::Differential => differential_rows(motion, plan, &mut tally)?,
-            ModelKind::Integral => integral_rows(motion, plan, &mut tally)?,
-        };
-        take(&rows)
+        take(&rows_of(motion, plan, model, &mut tally)?)
     })?;
     Ok(tally)
+}
+
+/// Rows of one piece of motion.
+pub(super) fn rows_of(
+    motion: &Motion,
+    plan: &Plan,
+    model: ModelKind,
+    tally: &mut Tally,
+) -> Result<Rows, PrepareError> {
+    match model {
+        ModelKind::Differential => differential_rows(motion, plan, tally),
+        ModelKind::Integral => integral_rows(motion, plan, tally),
+    }
 }
 
 fn failed(e: impl std::fmt::Display) -> PrepareError {
