@@ -62,6 +62,7 @@ fn six_joints() -> Robot {
         name: "six joints".into(),
         gravity: [0.0, 0.0, -9.81],
         joints: joints.collect(),
+        workspace: Vec::new(),
         effects: Vec::new(),
     }
 }

@@ -1,197 +1,115 @@
 //! What a design is judged by, with its exact gradient.
+//!
+//! The criterion depends on the information matrix M = YᵀY/S, and its derivative by the regressor's entries is
+//! 2/S·Y·∂f/∂M; the limits on torque add λ·πᵀ. Both are weights on the regressor's entries, and one sweep backwards
+//! through the chain ([`regressor_gradient`]) turns them into derivatives by position, velocity and acceleration of
+//! each sample; the Fourier functions turn these into derivatives by the coefficients.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rig_shared::dual::Dual;
-use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor, inverse_dynamics};
-use rig_shared::trajectory::{Fourier, Trajectory};
+use nalgebra::{DMatrix, DVector};
+use rig_shared::lanes::Lanes;
+use rig_shared::multibody::{
+    COLUMNS, column, differential_regressor, inverse_dynamics, point_position, regressor_gradient,
+};
+use rig_shared::scalar::Real;
 
-use super::optimise::Objective;
-use super::{Criterion, ExciteError};
+use super::ExciteError;
+use super::criterion::{Smoothing, criterion_of};
+use super::frame::Frame;
+use super::optimise::{Objective, Round};
+use super::schedule::{Basis, JointMotion};
 
-/// Derivatives by position, velocity and acceleration of one joint at a time.
-type D3 = Dual<f64, 3>;
+/// Samples computed side by side.
+pub(super) const LANES: usize = 4;
+type L = Lanes<LANES>;
 
-/// Samples per period of the fastest harmonic during optimisation: a peak between two of them hides at most
-/// (π/48)²/2 = 0.2 % of that harmonic's amplitude, which [`MARGIN`] keeps free.
-const SAMPLES: usize = 48;
-/// Part of each limit that the optimiser leaves free for what happens between its samples.
+/// Part of each limit that the optimiser leaves free for what happens between its samples: with 48 of them per period
+/// of the fastest harmonic a peak between two hides at most (π/48)²/2 = 0.2 % of that harmonic's amplitude.
 const MARGIN: f64 = 0.003;
-/// Constraints on a joint at a sample: two sides of position, velocity, acceleration and torque.
-const SIDES: usize = 8;
 /// Within this share of the velocity limit the sign of the velocity is rounded off for the optimiser alone, so
 /// that its gradient sees the Coulomb column; the values that are reported use the sign itself.
 const SIGN_WIDTH: f64 = 0.01;
 
-/// What a joint may do.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    /// Lowest position.
-    pub low: f64,
-    /// Highest position.
-    pub high: f64,
-    pub velocity: f64,
-    pub acceleration: Option<f64>,
-    pub torque: Option<f64>,
+/// What a pass over the constraints does with them.
+#[derive(Clone, Copy, PartialEq)]
+enum Pass {
+    /// Adds penalties and their derivatives.
+    Penalise,
+    /// Renews the multipliers.
+    Renew,
 }
 
-/// Times that all joints share.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Schedule {
-    pub period_us: u32,
-    pub ramp_us: u32,
-    pub periods: u16,
-    pub harmonics: usize,
-}
-
-impl Schedule {
-    /// Angular frequency of the fundamental, rad/s.
-    pub(super) fn omega(&self) -> f64 {
-        core::f64::consts::TAU / (f64::from(self.period_us) * 1e-6)
+/// One constraint c ≤ 0 with its multiplier: what it adds to the value, and the derivative of that by c.
+fn penalty(c: f64, multiplier: &mut f64, weight: f64, pass: Pass) -> (f64, f64) {
+    if pass == Pass::Renew {
+        *multiplier = (*multiplier + weight * c).max(0.0);
+        return (0.0, 0.0);
     }
-
-    /// The trajectory with these coefficients, sines first.
-    pub(super) fn trajectory(&self, coefficients: &[f64]) -> Trajectory<f64> {
-        let (sine, cosine) = coefficients.split_at(self.harmonics.min(coefficients.len()));
-        Trajectory::Fourier(Fourier {
-            period_us: self.period_us,
-            periods: self.periods,
-            ramp_us: self.ramp_us,
-            sine: sine.iter().copied().collect(),
-            cosine: cosine.iter().copied().collect(),
-        })
+    let idle = -0.5 * *multiplier * *multiplier / weight;
+    let active = c + *multiplier / weight;
+    if active > 0.0 {
+        (idle + 0.5 * weight * active * active, weight * active)
+    } else {
+        (idle, 0.0)
     }
 }
 
-/// Motion of one joint: where it starts, and sines then cosines.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct JointMotion {
-    pub base: f64,
-    pub coefficients: Vec<f64>,
+/// Both sides of |away| ≤ limit·keep.
+fn both_sides(share: f64, multipliers: &mut [f64; 2], weight: f64, pass: Pass) -> (f64, f64) {
+    let keep = 1.0 - MARGIN;
+    let [above, below] = multipliers;
+    let (up, force_up) = penalty(share - keep, above, weight, pass);
+    let (down, force_down) = penalty(-share - keep, below, weight, pass);
+    (up + down, force_up - force_down)
 }
-
-/// Everything that is the same for all starts.
-pub(super) struct Frame {
-    pub dual: Chain<D3>,
-    pub plain: Chain<f64>,
-    /// Regressor columns that stand for the base parameters.
-    pub columns: Vec<usize>,
-    /// Size of each of these columns by which it is divided.
-    pub sizes: Vec<f64>,
-    /// Factor of each joint's rows.
-    pub weights: Vec<f64>,
-    /// Prior parameters, where the description has them all.
-    pub parameters: Option<Vec<[f64; COLUMNS]>>,
-    pub bounds: Vec<Bounds>,
-    pub schedule: Schedule,
-    /// Where the joints start, if that is not free.
-    pub fixed: Option<Vec<f64>>,
-    pub criterion: Criterion,
-}
-
-/// Position, velocity and acceleration of each coefficient's function at the samples (samples × 2·harmonics). They
-/// are taken from the trajectory itself, envelope included, so that what is optimised is what runs.
-struct Basis {
-    /// Samples of one whole period, which come first; those of the two ramps follow.
-    whole: usize,
-    tables: [DMatrix<f64>; 3],
-}
-
-impl Basis {
-    fn new(schedule: &Schedule) -> Self {
-        let (ramp, period) = (f64::from(schedule.ramp_us), f64::from(schedule.period_us));
-        let whole = SAMPLES * schedule.harmonics;
-        let mut times: Vec<f64> = (0..whole)
-            .map(|k| ramp + period * k as f64 / whole as f64)
-            .collect();
-        let on_ramp = ((whole as f64 * ramp / period).ceil() as usize).max(8);
-        let down = ramp + period * f64::from(schedule.periods);
-        for from in [0.0, down] {
-            times.extend((0..on_ramp).map(|k| from + ramp * k as f64 / on_ramp as f64));
-        }
-        let width = 2 * schedule.harmonics;
-        let mut tables = [(); 3].map(|()| DMatrix::zeros(times.len(), width));
-        for c in 0..width {
-            let mut unit = vec![0.0; width];
-            unit[c] = 1.0;
-            let trajectory = schedule.trajectory(&unit);
-            for (row, time) in times.iter().enumerate() {
-                let at = trajectory.at(time * 1e-6);
-                tables[0][(row, c)] = at.position;
-                tables[1][(row, c)] = at.velocity;
-                tables[2][(row, c)] = at.acceleration;
-            }
-        }
-        Self { whole, tables }
-    }
-}
-
-/// The criterion's value at an information matrix, as a logarithm to be minimised, and its derivative by the
-/// matrix's entries.
-fn criterion_of(information: &DMatrix<f64>, criterion: Criterion) -> (f64, DMatrix<f64>) {
-    let p = information.nrows();
-    let eigen = SymmetricEigen::new(information.clone());
-    let outer = |k: usize, factor: f64| {
-        let v = eigen.eigenvectors.column(k);
-        v * v.transpose() * factor
-    };
-    let (least, most) = (eigen.eigenvalues.imin(), eigen.eigenvalues.imax());
-    // Rounding can make the smallest eigenvalue of a singular matrix negative.
-    let floor = 1e-15 * eigen.eigenvalues[most].max(f64::MIN_POSITIVE);
-    let value = |k: usize| eigen.eigenvalues[k].max(floor);
-    match criterion {
-        Criterion::ConditionNumber => (
-            0.5 * (value(most) / value(least)).ln(),
-            outer(most, 0.5 / value(most)) - outer(least, 0.5 / value(least)),
-        ),
-        Criterion::SmallestSingularValue => {
-            (-0.5 * value(least).ln(), -outer(least, 0.5 / value(least)))
-        }
-        Criterion::Determinant => {
-            let share = 0.5 / p as f64;
-            let mut slope = DMatrix::zeros(p, p);
-            let mut sum = 0.0;
-            for k in 0..p {
-                sum -= share * value(k).ln();
-                slope -= outer(k, share / value(k));
-            }
-            (sum, slope)
-        }
-    }
-}
-
-/// Takes a constraint's number, its value, its sample, and its derivatives joint by joint.
-type Visit<'a> = dyn FnMut(usize, f64, usize, &[[f64; 3]]) + 'a;
 
 /// One start's view of the frame.
 pub(super) struct Problem<'a> {
     frame: &'a Frame,
     basis: Basis,
-    multipliers: Vec<f64>,
+    smoothing: Smoothing,
     weight: f64,
-    /// Values of position, velocity, acceleration: sample-major, joints within.
-    motion: [Vec<f64>; 3],
+    /// By order (position, velocity, acceleration, torque), joint and sample: one for each side.
+    multipliers: [Vec<[f64; 2]>; 4],
+    /// By plane and sample.
+    plane_multipliers: Vec<f64>,
+    /// Position, velocity, acceleration: samples × joints.
+    motion: [DMatrix<f64>; 3],
     /// Derivative of the objective by each of them.
-    adjoint: [Vec<f64>; 3],
-    /// Scaled regressor rows, and their derivatives by joint and direction.
-    rows: DMatrix<f64>,
-    slopes: Vec<f64>,
+    adjoint: [DMatrix<f64>; 3],
+    /// Per joint the scaled rows of the whole period, one a column; only columns of links that load the joint.
+    rows: Vec<DMatrix<f64>>,
+    /// Derivative of the criterion by each of these entries.
+    pulls: Vec<DMatrix<f64>>,
+    /// First base column of each joint's rows.
+    first: Vec<usize>,
+    out: Vec<L>,
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(frame: &'a Frame) -> Self {
-        let basis = Basis::new(&frame.schedule);
+    /// With `density` samples per period of the fastest harmonic.
+    pub(super) fn new(frame: &'a Frame, density: usize, smoothing: Smoothing) -> Self {
+        let basis = Basis::new(&frame.schedule, density);
         let n = frame.bounds.len();
-        let p = frame.columns.len();
-        let samples = basis.tables[0].nrows();
-        let rows = DMatrix::zeros(basis.whole * n, p);
+        let (p, samples) = (frame.columns.len(), basis.samples());
+        let first: Vec<usize> = (0..n)
+            .map(|j| frame.columns.partition_point(|c| *c < j * COLUMNS))
+            .collect();
+        let rows: Vec<_> = first
+            .iter()
+            .map(|f| DMatrix::zeros(p - f, basis.whole))
+            .collect();
         Self {
             frame,
-            multipliers: vec![0.0; samples * n * SIDES],
+            smoothing,
             weight: 0.0,
-            motion: [(); 3].map(|()| vec![0.0; samples * n]),
-            adjoint: [(); 3].map(|()| vec![0.0; samples * n]),
-            slopes: vec![0.0; basis.whole * n * p * n * 3],
+            multipliers: [(); 4].map(|()| vec![[0.0; 2]; samples * n]),
+            plane_multipliers: vec![0.0; frame.planes.len() * samples],
+            motion: [(); 3].map(|()| DMatrix::zeros(samples, n)),
+            adjoint: [(); 3].map(|()| DMatrix::zeros(samples, n)),
+            pulls: rows.clone(),
             rows,
+            first,
+            out: vec![L::ZERO; n * n * COLUMNS],
             basis,
         }
     }
@@ -212,13 +130,12 @@ impl<'a> Problem<'a> {
     /// What one unit of a variable means.
     fn unit(&self, joint: usize, within: usize) -> f64 {
         let bounds = &self.frame.bounds[joint];
-        let half = 0.5 * (bounds.high - bounds.low);
         if within == 0 {
-            half
+            bounds.half()
         } else {
             let harmonic = (within - 1) % self.frame.schedule.harmonics + 1;
             let by_velocity = bounds.velocity / self.frame.schedule.omega();
-            half.min(by_velocity) / harmonic as f64
+            bounds.half().min(by_velocity) / harmonic as f64
         }
     }
 
@@ -226,13 +143,9 @@ impl<'a> Problem<'a> {
         let block = self.block();
         (0..self.joints())
             .map(|j| {
-                let bounds = &self.frame.bounds[j];
                 let base = match &self.frame.fixed {
                     Some(fixed) => fixed[j],
-                    None => {
-                        let middle = 0.5 * (bounds.low + bounds.high);
-                        middle + self.unit(j, 0) * x[j * block]
-                    }
+                    None => self.frame.bounds[j].middle() + self.unit(j, 0) * x[j * block],
                 };
                 let coefficients = (1..block)
                     .map(|c| self.unit(j, c) * x[j * block + c])
@@ -247,8 +160,7 @@ impl<'a> Problem<'a> {
         let block = self.block();
         let mut x = DVector::zeros(self.size());
         for (j, motion) in motions.iter().enumerate() {
-            let bounds = &self.frame.bounds[j];
-            let middle = 0.5 * (bounds.low + bounds.high);
+            let middle = self.frame.bounds[j].middle();
             x[j * block] = (motion.base - middle) / self.unit(j, 0);
             for (c, value) in motion.coefficients.iter().enumerate() {
                 x[j * block + 1 + c] = value / self.unit(j, c + 1);
@@ -258,67 +170,87 @@ impl<'a> Problem<'a> {
     }
 
     fn place(&mut self, x: &DVector<f64>) {
-        let n = self.joints();
-        for (j, motion) in self.decode(x).iter().enumerate() {
-            let coefficients = DVector::from_column_slice(&motion.coefficients);
-            for (order, table) in self.basis.tables.iter().enumerate() {
-                let offset = if order == 0 { motion.base } else { 0.0 };
-                for (s, value) in (table * &coefficients).iter().enumerate() {
-                    self.motion[order][s * n + j] = offset + value;
-                }
-            }
+        let motions = self.decode(x);
+        let width = self.block() - 1;
+        let coefficients =
+            DMatrix::from_fn(width, motions.len(), |c, j| motions[j].coefficients[c]);
+        for order in 0..3 {
+            self.motion[order].gemm(1.0, &self.basis.tables[order], &coefficients, 0.0);
+        }
+        for (j, motion) in motions.iter().enumerate() {
+            self.motion[0].column_mut(j).add_scalar_mut(motion.base);
         }
     }
 
     /// By how much to scale a motion about where it starts so that position, velocity and acceleration fit.
-    pub(super) fn room(&mut self, x: &DVector<f64>) -> f64 {
+    fn room(&mut self, x: &DVector<f64>) -> f64 {
         self.place(x);
-        let n = self.joints();
-        let bases: Vec<f64> = self.decode(x).iter().map(|m| m.base).collect();
         let mut room = f64::INFINITY;
-        for (i, q) in self.motion[0].iter().enumerate() {
-            let (bounds, base) = (&self.frame.bounds[i % n], bases[i % n]);
-            let (up, down) = (bounds.high - base, bounds.low - base);
-            let away = q - base;
-            // Where it starts and ends it is not away at all.
-            if away != 0.0 {
-                room = room.min(if away > 0.0 { up / away } else { down / away });
-            }
-            room = room.min(bounds.velocity / self.motion[1][i].abs());
-            if let Some(limit) = bounds.acceleration {
-                room = room.min(limit / self.motion[2][i].abs());
+        for (j, motion) in self.decode(x).iter().enumerate() {
+            let bounds = &self.frame.bounds[j];
+            let (up, down) = (bounds.high - motion.base, bounds.low - motion.base);
+            for s in 0..self.basis.samples() {
+                let away = self.motion[0][(s, j)] - motion.base;
+                // Where it starts and ends it is not away at all.
+                if away != 0.0 {
+                    room = room.min(if away > 0.0 { up / away } else { down / away });
+                }
+                room = room.min(bounds.velocity / self.motion[1][(s, j)].abs());
+                if let Some(limit) = bounds.acceleration {
+                    room = room.min(limit / self.motion[2][(s, j)].abs());
+                }
             }
         }
         room
     }
 
-    /// Regressor rows of the whole period and their derivatives.
+    /// The motion scaled about where it starts to `share` of the limits of position, velocity and acceleration; with
+    /// all of them only where it exceeds them.
+    pub(super) fn shrunk(&mut self, x: &DVector<f64>, share: f64) -> DVector<f64> {
+        let factor = share * self.room(x);
+        let factor = if share < 1.0 { factor } else { factor.min(1.0) };
+        let mut motions = self.decode(x);
+        for motion in &mut motions {
+            for c in &mut motion.coefficients {
+                *c *= factor;
+            }
+        }
+        self.encode(&motions)
+    }
+
+    /// The criterion alone, at `x`; not finite where undefined.
+    pub(super) fn judge(&mut self, x: &DVector<f64>) -> f64 {
+        self.place(x);
+        match self.fill_rows() {
+            Ok(()) => self.criterion(false),
+            Err(_) => f64::INFINITY,
+        }
+    }
+
+    /// Samples `s` to `s + LANES` of position, velocity or acceleration of all joints.
+    fn state(&self, order: usize, s: usize) -> Vec<L> {
+        (0..self.joints())
+            .map(|j| Lanes(core::array::from_fn(|k| self.motion[order][(s + k, j)])))
+            .collect()
+    }
+
+    /// Regressor rows of the whole period.
     fn fill_rows(&mut self) -> Result<(), ExciteError> {
         let n = self.joints();
         let frame = self.frame;
-        let (p, width) = (frame.columns.len(), n * COLUMNS);
-        let mut out = vec![D3::default(); n * width];
-        let constant = |list: &[f64]| list.iter().map(|v| D3::constant(*v)).collect::<Vec<_>>();
-        for s in 0..self.basis.whole {
-            let range = s * n..(s + 1) * n;
-            let [q, qd, qdd] = [0, 1, 2].map(|o| constant(&self.motion[o][range.clone()]));
-            for by in 0..n {
-                let (mut q, mut qd, mut qdd) = (q.clone(), qd.clone(), qdd.clone());
-                q[by] = D3::variable(q[by].value, 0);
-                qd[by] = D3::variable(qd[by].value, 1);
-                qdd[by] = D3::variable(qdd[by].value, 2);
-                differential_regressor(&frame.dual, &q, &qd, &qdd, &mut out)?;
-                for j in 0..n {
-                    out[j * width + j * COLUMNS + column::COULOMB] =
-                        soft_sign(qd[j], frame.bounds[j].velocity);
-                    for (c, source) in frame.columns.iter().enumerate() {
-                        let entry = out[j * width + source];
-                        let factor = frame.weights[j] / frame.sizes[c];
-                        self.rows[(s * n + j, c)] = factor * entry.value;
-                        let place = (((s * n + j) * p + c) * n + by) * 3;
-                        for d in 0..3 {
-                            self.slopes[place + d] = factor * entry.derivative[d];
-                        }
+        let width = n * COLUMNS;
+        for s in (0..self.basis.whole).step_by(LANES) {
+            let [q, qd, qdd] = [0, 1, 2].map(|order| self.state(order, s));
+            differential_regressor(&frame.lanes, &q, &qd, &qdd, &mut self.out)?;
+            for j in 0..n {
+                self.out[j * width + j * COLUMNS + column::COULOMB] =
+                    soft_sign(qd[j], frame.bounds[j].velocity);
+                let first = self.first[j];
+                for (c, source) in frame.columns.iter().enumerate().skip(first) {
+                    let factor = frame.weights[j] / frame.sizes[c];
+                    let entry = self.out[j * width + source].0;
+                    for k in 0..LANES {
+                        self.rows[j][(c - first, s + k)] = factor * entry[k];
                     }
                 }
             }
@@ -326,184 +258,256 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    fn add_criterion(&mut self) -> f64 {
-        let n = self.joints();
+    /// The criterion at the rows; with `pull` also its derivative by them.
+    fn criterion(&mut self, pull: bool) -> f64 {
         let p = self.frame.columns.len();
         let samples = self.basis.whole as f64;
-        let information = self.rows.tr_mul(&self.rows) / samples;
-        if information.iter().any(|v| !v.is_finite()) {
-            return f64::INFINITY;
+        let mut information = DMatrix::zeros(p, p);
+        for (rows, &first) in self.rows.iter().zip(&self.first) {
+            let size = p - first;
+            // Written out, so that the product runs through the fast kernel.
+            let transposed = rows.transpose();
+            information.view_mut((first, first), (size, size)).gemm(
+                1.0 / samples,
+                rows,
+                &transposed,
+                1.0,
+            );
         }
-        let (value, slope) = criterion_of(&information, self.frame.criterion);
-        // d tr(G·YᵀY)/S = 2/S·⟨Y·G, dY⟩
-        let pull = &self.rows * slope * (2.0 / samples);
-        for s in 0..self.basis.whole {
-            for j in 0..n {
-                for c in 0..p {
-                    let factor = pull[(s * n + j, c)];
-                    for by in 0..n {
-                        let place = (((s * n + j) * p + c) * n + by) * 3;
-                        for d in 0..3 {
-                            self.adjoint[d][s * n + by] += factor * self.slopes[place + d];
-                        }
-                    }
-                }
+        let (value, slope) = criterion_of(&information, self.frame.criterion, self.smoothing);
+        if pull && value.is_finite() {
+            // d tr(G·YᵀY)/S = 2/S·⟨Y·G, dY⟩
+            for j in 0..self.rows.len() {
+                let (first, size) = (self.first[j], p - self.first[j]);
+                let block = slope.view((first, first), (size, size)).into_owned();
+                self.pulls[j].gemm(2.0 / samples, &block, &self.rows[j], 0.0);
             }
         }
         value
     }
 
-    /// Calls `visit` with each constraint's number, value (0 or less is allowed) and what it depends on: sample,
-    /// and per joint the derivatives by position, velocity and acceleration.
-    fn constraints(&self, visit: &mut Visit<'_>) -> Result<(), ExciteError> {
-        let n = self.joints();
-        let samples = self.motion[0].len() / n;
-        let keep = 1.0 - MARGIN;
-        let dual_rows: Option<Vec<[D3; COLUMNS]>> = self.frame.parameters.as_ref().map(|rows| {
-            rows.iter()
-                .map(|row| {
-                    let mut row = row.map(D3::constant);
-                    row[column::COULOMB] = D3::default();
-                    row
-                })
-                .collect()
-        });
-        let torque_limited = self.frame.bounds.iter().any(|b| b.torque.is_some());
-        let mut slope = vec![[0.0; 3]; n];
-        let mut tau = vec![D3::default(); n];
-        let mut torque = vec![0.0; n];
-        let mut torque_slope = vec![[0.0; 3]; n * n];
-        for s in 0..samples {
-            let at = |order: usize, j: usize| self.motion[order][s * n + j];
-            for j in 0..n {
-                let bounds = &self.frame.bounds[j];
-                let number = (s * n + j) * SIDES;
-                let half = 0.5 * (bounds.high - bounds.low);
-                let middle = 0.5 * (bounds.high + bounds.low);
-                let mut both = |order: usize, first: usize, away: f64, limit: f64| {
-                    for (side, sign) in [(0, 1.0), (1, -1.0)] {
-                        slope[j][order] = sign / limit;
-                        visit(number + first + side, sign * away / limit - keep, s, &slope);
-                        slope[j][order] = 0.0;
-                    }
+    /// Penalties of position, velocity and acceleration.
+    fn kinematic(&mut self, pass: Pass) -> f64 {
+        let mut sum = 0.0;
+        let samples = self.basis.samples();
+        for order in 0..3 {
+            for (j, bounds) in self.frame.bounds.iter().enumerate() {
+                let (middle, limit) = match order {
+                    0 => (bounds.middle(), bounds.half()),
+                    1 => (0.0, bounds.velocity),
+                    _ => match bounds.acceleration {
+                        Some(limit) => (0.0, limit),
+                        None => continue,
+                    },
                 };
-                both(0, 0, at(0, j) - middle, half);
-                both(1, 2, at(1, j), bounds.velocity);
-                if let Some(limit) = bounds.acceleration {
-                    both(2, 4, at(2, j), limit);
-                }
-            }
-            let (Some(rows), true) = (&dual_rows, torque_limited) else {
-                continue;
-            };
-            let constant = |o: usize| (0..n).map(|j| D3::constant(at(o, j))).collect::<Vec<_>>();
-            let [q, qd, qdd] = [constant(0), constant(1), constant(2)];
-            for by in 0..n {
-                let (mut q, mut qd, mut qdd) = (q.clone(), qd.clone(), qdd.clone());
-                q[by] = D3::variable(q[by].value, 0);
-                qd[by] = D3::variable(qd[by].value, 1);
-                qdd[by] = D3::variable(qdd[by].value, 2);
-                inverse_dynamics(&self.frame.dual, rows, &q, &qd, &qdd, &mut tau)?;
-                for j in 0..n {
-                    let coulomb = self
-                        .frame
-                        .parameters
-                        .as_ref()
-                        .map_or(0.0, |p| p[j][column::COULOMB]);
-                    let total = tau[j]
-                        + D3::constant(coulomb) * soft_sign(qd[j], self.frame.bounds[j].velocity);
-                    torque[j] = total.value;
-                    torque_slope[j * n + by] = total.derivative;
-                }
-            }
-            for j in 0..n {
-                let Some(limit) = self.frame.bounds[j].torque else {
-                    continue;
-                };
-                for (side, sign) in [(6, 1.0), (7, -1.0)] {
-                    let slopes: Vec<[f64; 3]> = (0..n)
-                        .map(|by| torque_slope[j * n + by].map(|d| sign * d / limit))
-                        .collect();
-                    let number = (s * n + j) * SIDES + side;
-                    visit(number, sign * torque[j] / limit - keep, s, &slopes);
+                let multipliers = &mut self.multipliers[order][j * samples..(j + 1) * samples];
+                let motion = self.motion[order].column(j);
+                let mut adjoint = self.adjoint[order].column_mut(j);
+                for s in 0..samples {
+                    let share = (motion[s] - middle) / limit;
+                    let (value, force) = both_sides(share, &mut multipliers[s], self.weight, pass);
+                    sum += value;
+                    adjoint[s] += force / limit;
                 }
             }
         }
-        Ok(())
+        sum
+    }
+
+    /// Penalties of the torque, and the derivatives of these and of the criterion by the motion.
+    fn torque_and_rows(&mut self, pass: Pass) -> Result<f64, ExciteError> {
+        let (n, frame, samples) = (self.joints(), self.frame, self.basis.samples());
+        let width = n * COLUMNS;
+        let limited = frame.bounds.iter().any(|b| b.torque.is_some());
+        let prior: Option<Vec<[L; COLUMNS]>> = match &frame.parameters {
+            Some(rows) if limited => Some(
+                rows.iter()
+                    .map(|row| {
+                        let mut row = row.map(L::splat);
+                        row[column::COULOMB] = L::ZERO;
+                        row
+                    })
+                    .collect(),
+            ),
+            _ => None,
+        };
+        let mut sum = 0.0;
+        let mut tau = vec![L::ZERO; n];
+        let mut by = [(); 3].map(|()| vec![L::ZERO; n]);
+        for s in (0..samples).step_by(LANES) {
+            let within = s < self.basis.whole && pass == Pass::Penalise;
+            if !within && prior.is_none() {
+                break;
+            }
+            let [q, qd, qdd] = [0, 1, 2].map(|order| self.state(order, s));
+            let mut forces = vec![L::ZERO; n];
+            let mut pushed = false;
+            if let (Some(prior), Some(parameters)) = (&prior, &frame.parameters) {
+                inverse_dynamics(&frame.lanes, prior, &q, &qd, &qdd, &mut tau)?;
+                for j in 0..n {
+                    let Some(limit) = frame.bounds[j].torque else {
+                        continue;
+                    };
+                    let coulomb = parameters[j][column::COULOMB];
+                    let total =
+                        tau[j] + L::splat(coulomb) * soft_sign(qd[j], frame.bounds[j].velocity);
+                    for k in 0..LANES {
+                        let multipliers = &mut self.multipliers[3][j * samples + s + k];
+                        let (value, force) =
+                            both_sides(total.0[k] / limit, multipliers, self.weight, pass);
+                        sum += value;
+                        forces[j].0[k] = force / limit;
+                        pushed |= force != 0.0;
+                    }
+                }
+            }
+            if !within && !pushed {
+                continue;
+            }
+            // Weights on the entries of the regressor.
+            self.out.fill(L::ZERO);
+            for j in 0..n {
+                let velocity = frame.bounds[j].velocity;
+                let mut coulomb = L::ZERO;
+                if within {
+                    let first = self.first[j];
+                    for (c, source) in frame.columns.iter().enumerate().skip(first) {
+                        let factor = frame.weights[j] / frame.sizes[c];
+                        let pull = Lanes(core::array::from_fn(|k| {
+                            factor * self.pulls[j][(c - first, s + k)]
+                        }));
+                        if *source == j * COLUMNS + column::COULOMB {
+                            coulomb += pull;
+                        } else {
+                            self.out[j * width + source] = pull;
+                        }
+                    }
+                }
+                if let (true, Some(prior), Some(parameters)) = (pushed, &prior, &frame.parameters) {
+                    for (i, row) in prior.iter().enumerate().skip(j) {
+                        let start = j * width + i * COLUMNS;
+                        let weights = &mut self.out[start..start + COLUMNS];
+                        for (weight, parameter) in weights.iter_mut().zip(row) {
+                            *weight += forces[j] * *parameter;
+                        }
+                    }
+                    coulomb += forces[j] * L::splat(parameters[j][column::COULOMB]);
+                }
+                let slope = coulomb * soft_sign_slope(qd[j], velocity);
+                for k in 0..LANES {
+                    self.adjoint[1][(s + k, j)] += slope.0[k];
+                }
+            }
+            let [by_q, by_qd, by_qdd] = &mut by;
+            regressor_gradient(&frame.lanes, &q, &qd, &qdd, &self.out, by_q, by_qd, by_qdd)?;
+            for (adjoint, by) in self.adjoint.iter_mut().zip(&by) {
+                for j in 0..n {
+                    for k in 0..LANES {
+                        adjoint[(s + k, j)] += by[j].0[k];
+                    }
+                }
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Penalties of the points that must stay within planes.
+    fn cartesian(&mut self, pass: Pass) -> Result<f64, ExciteError> {
+        let (n, samples) = (self.joints(), self.basis.samples());
+        let mut sum = 0.0;
+        let mut jacobian = vec![[0.0; 3]; n];
+        for (number, plane) in self.frame.planes.iter().enumerate() {
+            for s in 0..samples {
+                let q: Vec<f64> = (0..n).map(|j| self.motion[0][(s, j)]).collect();
+                let at = point_position(
+                    &self.frame.plain,
+                    &q,
+                    plane.link,
+                    plane.point,
+                    &mut jacobian,
+                )?;
+                let c = (plane.least - plane.height(at)) / plane.reach + MARGIN;
+                let multiplier = &mut self.plane_multipliers[number * samples + s];
+                let (value, force) = penalty(c, multiplier, self.weight, pass);
+                sum += value;
+                if force != 0.0 {
+                    for (j, column) in jacobian.iter().enumerate() {
+                        self.adjoint[0][(s, j)] -= force * plane.height(*column) / plane.reach;
+                    }
+                }
+            }
+        }
+        Ok(sum)
+    }
+
+    fn penalties(&mut self, pass: Pass) -> Result<f64, ExciteError> {
+        let kinematic = self.kinematic(pass);
+        Ok(kinematic + self.torque_and_rows(pass)? + self.cartesian(pass)?)
+    }
+
+    fn objective(&mut self, x: &DVector<f64>) -> Result<f64, ExciteError> {
+        self.place(x);
+        for table in &mut self.adjoint {
+            table.fill(0.0);
+        }
+        self.fill_rows()?;
+        let criterion = self.criterion(true);
+        if !criterion.is_finite() {
+            return Ok(f64::INFINITY);
+        }
+        Ok(criterion + self.penalties(Pass::Penalise)?)
     }
 }
 
 /// The sign of a velocity, rounded off about zero.
-fn soft_sign(velocity: D3, limit: f64) -> D3 {
-    use rig_shared::scalar::Real;
-    let width = D3::constant(SIGN_WIDTH * limit);
+fn soft_sign(velocity: L, limit: f64) -> L {
+    let width = L::splat(SIGN_WIDTH * limit);
     velocity / (velocity * velocity + width * width).sqrt()
+}
+
+fn soft_sign_slope(velocity: L, limit: f64) -> L {
+    let square = L::splat((SIGN_WIDTH * limit) * (SIGN_WIDTH * limit));
+    let sum = velocity * velocity + square;
+    square / (sum * sum.sqrt())
 }
 
 impl Objective for Problem<'_> {
     fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64 {
-        let n = self.joints();
-        self.place(x);
-        for list in &mut self.adjoint {
-            list.fill(0.0);
-        }
         // The only errors are those of lengths, which are the frame's own.
-        if self.fill_rows().is_err() {
+        let Ok(value) = self.objective(x) else {
             return f64::INFINITY;
+        };
+        let (n, block) = (self.joints(), self.block());
+        let mut sums = DMatrix::zeros(block - 1, n);
+        for order in 0..3 {
+            sums.gemm(
+                1.0,
+                &self.basis.transposed[order],
+                &self.adjoint[order],
+                1.0,
+            );
         }
-        let mut value = self.add_criterion();
-        let mut adjoint = core::mem::take(&mut self.adjoint);
-        let weight = self.weight;
-        let checked = self.constraints(&mut |number, c, s, slopes| {
-            let multiplier = self.multipliers[number];
-            let active = c + multiplier / weight;
-            value -= 0.5 * multiplier * multiplier / weight;
-            if active > 0.0 {
-                value += 0.5 * weight * active * active;
-                for (j, slope) in slopes.iter().enumerate() {
-                    for d in 0..3 {
-                        adjoint[d][s * n + j] += weight * active * slope[d];
-                    }
-                }
-            }
-        });
-        self.adjoint = adjoint;
-        if checked.is_err() {
-            return f64::INFINITY;
-        }
-        let block = self.block();
-        let samples = self.motion[0].len() / n;
         for j in 0..n {
-            let mut sums = DVector::zeros(block - 1);
-            for (order, table) in self.basis.tables.iter().enumerate() {
-                let pull = DVector::from_fn(samples, |s, _| self.adjoint[order][s * n + j]);
-                sums += table.tr_mul(&pull);
-            }
-            let base: f64 = (0..samples).map(|s| self.adjoint[0][s * n + j]).sum();
             gradient[j * block] = if self.frame.fixed.is_some() {
                 0.0
             } else {
-                base * self.unit(j, 0)
+                self.adjoint[0].column(j).sum() * self.unit(j, 0)
             };
             for c in 1..block {
-                gradient[j * block + c] = sums[c - 1] * self.unit(j, c);
+                gradient[j * block + c] = sums[(c - 1, j)] * self.unit(j, c);
             }
         }
         value
     }
 
-    fn update(&mut self, x: &DVector<f64>, next_weight: f64) {
+    fn update(&mut self, x: &DVector<f64>, next: &Round) {
         self.place(x);
         if self.weight > 0.0 {
-            let mut multipliers = core::mem::take(&mut self.multipliers);
-            let weight = self.weight;
             // An error leaves the multipliers as they were; `value` then reports it as not finite.
-            let _ = self.constraints(&mut |number, c, _, _| {
-                multipliers[number] = (multipliers[number] + weight * c).max(0.0);
-            });
-            self.multipliers = multipliers;
+            let _ = self.penalties(Pass::Renew);
         }
-        self.weight = next_weight;
+        self.weight = next.weight;
+        self.smoothing = next.smoothing;
     }
 }
 
@@ -511,6 +515,9 @@ impl Objective for Problem<'_> {
 impl Problem<'_> {
     /// Makes every constraint count, so that a test of the gradient sees all of them.
     pub(super) fn press(&mut self, multiplier: f64) {
-        self.multipliers.fill(multiplier);
+        for list in &mut self.multipliers {
+            list.fill([multiplier, 0.7 * multiplier]);
+        }
+        self.plane_multipliers.fill(multiplier);
     }
 }

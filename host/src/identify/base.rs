@@ -221,6 +221,19 @@ impl Base {
         })
     }
 
+    /// The base parameters whose own column satisfies `keep`.
+    #[must_use]
+    pub fn restricted(self, keep: impl Fn(usize) -> bool) -> Self {
+        let rows: Vec<usize> = (0..self.columns.len())
+            .filter(|&k| keep(self.columns[k]))
+            .collect();
+        Self {
+            columns: rows.iter().map(|&k| self.columns[k]).collect(),
+            combination: self.combination.select_rows(&rows),
+            kinds: self.kinds,
+        }
+    }
+
     /// Number of base parameters.
     pub fn len(&self) -> usize {
         self.columns.len()

@@ -7,6 +7,7 @@
 //! Leaves out: resampling of irregularly sampled recordings (they are refused), correction of a delay between
 //! torque and position.
 
+mod decimate;
 mod filter;
 mod motion;
 mod pieces;
@@ -14,6 +15,7 @@ mod spectrum;
 mod survey;
 mod treatment;
 
+pub use decimate::{Decimator, Stream};
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
 pub use motion::{JointMotion, Motion, each_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};

@@ -5,6 +5,7 @@
 
 use std::collections::HashSet;
 
+use super::workspace::check_workspace;
 use super::{Joint, JointKind, Robot};
 
 /// Names of effects beyond the standard model.
@@ -95,6 +96,7 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             f
         })?;
     }
+    check_workspace(robot)?;
     check_effects(robot)
 }
 

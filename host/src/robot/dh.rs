@@ -159,6 +159,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         name: chain.name.clone(),
         gravity: [0.0, 0.0, -GRAVITY],
         joints,
+        workspace: Vec::new(),
         effects: Vec::new(),
     };
     Converted { robot, base }

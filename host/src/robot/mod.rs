@@ -12,6 +12,7 @@ mod error;
 mod numbers;
 mod text;
 mod urdf;
+mod workspace;
 
 use std::fs::File;
 use std::io::Read;
@@ -21,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
 pub use error::{Place, RobotError};
+pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
 pub const MAX_BYTES: u64 = 16 << 20;
@@ -42,6 +44,9 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
+    /// Where points of the links must stay.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub workspace: Vec<Region>,
     /// Effects beyond the standard model, as `diagnose` adds them; kept as read.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<toml::Table>,

@@ -9,7 +9,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::check::{Step, check};
 use super::error::{Place, RobotError};
-use super::{Joint, JointKind, Robot};
+use super::{Joint, JointKind, Region, Robot};
 
 pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
     let robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
@@ -145,6 +145,9 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     for joint in &robot.joints {
         write_joint(&mut out, joint);
     }
+    for region in &robot.workspace {
+        write_region(&mut out, region);
+    }
     #[derive(Serialize)]
     struct Effects<'a> {
         effect: [&'a toml::Table; 1],
@@ -160,6 +163,43 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
         out.push_str(&text);
     }
     Ok(out)
+}
+
+fn write_region(out: &mut String, region: &Region) {
+    out.push_str("\n[[workspace]]\n");
+    line(
+        out,
+        "joint",
+        &quoted(&region.joint),
+        "whose link carries the point",
+    );
+    line(
+        out,
+        "point",
+        &list(&region.point),
+        "m, in that joint's frame",
+    );
+    for (key, value, comment) in [
+        ("min", region.min, "m, x y z in the base frame"),
+        ("max", region.max, "m"),
+        (
+            "normal",
+            region.normal,
+            "towards the allowed side of a plane",
+        ),
+    ] {
+        if let Some(value) = value {
+            line(out, key, &list(&value), comment);
+        }
+    }
+    if let Some(beyond) = region.beyond {
+        line(
+            out,
+            "beyond",
+            &float(beyond),
+            "m along the normal from the base frame's origin",
+        );
+    }
 }
 
 fn write_joint(out: &mut String, joint: &Joint) {

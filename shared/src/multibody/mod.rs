@@ -18,12 +18,15 @@
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
+mod adjoint;
+pub mod block;
 mod chain;
 mod coriolis;
 mod energy;
 mod forward;
 mod inertia_matrix;
 mod inverse;
+mod kinematics;
 mod parameters;
 mod regressor;
 mod spatial;
@@ -39,6 +42,7 @@ mod textbook;
 #[cfg(test)]
 mod timing;
 
+pub use adjoint::regressor_gradient;
 pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
 pub use coriolis::coriolis_matrix;
 pub use energy::{
@@ -48,6 +52,7 @@ pub use energy::{
 pub use forward::forward_dynamics;
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
+pub use kinematics::point_position;
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
 

@@ -30,6 +30,7 @@ fn robot(name: &str, joints: Vec<Joint>) -> Robot {
         name: name.into(),
         gravity: [0.0, 0.0, -9.81],
         joints,
+        workspace: Vec::new(),
         effects: Vec::new(),
     }
 }
