@@ -61,20 +61,24 @@ impl Memory {
     /// Integrated memory 1 + 2·Σρ in rows, summed while ρ stays above twice its standard error (the truncation
     /// of Geyer's initial sequence, 1992, with the noise of the estimate in mind); never below one.
     pub(super) fn length(&self) -> f64 {
-        let threshold = 2.0 / (self.seen.max(1) as f64).sqrt();
-        let sum: f64 = self
-            .correlation()
-            .iter()
-            .skip(1)
-            .take_while(|r| **r > threshold)
-            .sum();
-        1.0 + 2.0 * sum
+        memory_of(&self.correlation(), self.seen)
     }
 
     /// Residuals seen.
     pub(super) fn seen(&self) -> u64 {
         self.seen
     }
+}
+
+/// [`Memory::length`] of a given autocorrelation (lag 0 first) of `seen` residuals.
+pub(super) fn memory_of(correlation: &[f64], seen: u64) -> f64 {
+    let threshold = 2.0 / (seen.max(1) as f64).sqrt();
+    let sum: f64 = correlation
+        .iter()
+        .skip(1)
+        .take_while(|r| **r > threshold)
+        .sum();
+    1.0 + 2.0 * sum
 }
 
 /// Sums over stretches of time, in coordinates z in which Σ z·zᵀ over all rows is the identity.

@@ -2,6 +2,7 @@
 
 use super::base::{Base, chain_of, expression};
 use super::cache::RowCache;
+use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
@@ -262,6 +263,13 @@ pub fn identify(
             estimate: &estimate,
             full: &full,
             factors: &factors,
+            memory: match options.model {
+                ModelKind::Differential => train
+                    .iter()
+                    .map(|r| memory_of(&r.autocorrelation, r.rows))
+                    .collect(),
+                ModelKind::Integral => vec![estimate.memory_rows],
+            },
             parameters: &base_parameters,
         },
         holdout,
