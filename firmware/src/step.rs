@@ -27,6 +27,8 @@ pub struct Output {
     pub state: Option<(u64, StateSample)>,
     /// The on-line estimate, when one is due.
     pub estimate: Option<Estimate>,
+    /// This tick itself, as snapshot and capture keep it.
+    pub tick: SnapshotSample,
     /// A fault that has just latched.
     pub fault: Option<FaultRecord>,
 }
@@ -67,14 +69,15 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         torque,
         limits,
     };
-    state.snapshot.push(SnapshotSample {
+    output.tick = SnapshotSample {
         tick: state.tick,
         position: state.counts,
         current: readings.current,
         duty: state.duty,
         supply: readings.supply,
         reference: state.reference.position,
-    });
+    };
+    state.snapshot.push(output.tick);
     output.state = telemetry(config, state, &tick);
     output.estimate = estimate(config, state, &tick);
     output.command = Command {
@@ -187,7 +190,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         Mode::Running => {
             let elapsed = state.tick - start;
             match &state.trajectory {
-                Some(trajectory) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
+                Some((trajectory, _)) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
                     Reference {
                         position: base + offset.position,

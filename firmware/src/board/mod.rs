@@ -1,0 +1,13 @@
+//! Everything that knows the chip. `unsafe` stands only where hardware needs it, with the reason beside it.
+
+mod adc;
+mod clock;
+mod cycles;
+mod encoder;
+mod fault;
+mod link;
+mod pins;
+mod pwm;
+pub(crate) mod start;
+mod tick;
+mod watchdog;
