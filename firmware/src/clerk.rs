@@ -2,7 +2,7 @@
 
 use rig_shared::safety::SnapshotSample;
 use rig_shared::wire::Ledger;
-use rig_shared::wire::message::{Acknowledge, Health, Refusal, RequestBody};
+use rig_shared::wire::message::{Acknowledge, Refusal, RequestBody};
 
 use crate::capture::Capture;
 use crate::config::{Config, Settings};
@@ -41,6 +41,8 @@ pub struct Clerk {
     storing: Option<u16>,
     /// Telemetry windows that found no room since the last that did.
     missed: u32,
+    /// The same since power on.
+    dropped: u32,
 }
 
 impl Clerk {
@@ -112,6 +114,7 @@ impl Clerk {
             }
             RequestBody::Hello => Topic::Greeting,
             RequestBody::StartStream => {
+                // What found no room before the stream is nobody's.
                 self.missed = 0;
                 Topic::StreamStart(state.window_start())
             }
@@ -149,6 +152,7 @@ impl Clerk {
             self.missed = if notes.put(Note::Sample { sample, missed }) {
                 0
             } else {
+                self.dropped = self.dropped.saturating_add(1);
                 missed.saturating_add(1)
             };
         }
@@ -159,9 +163,9 @@ impl Clerk {
         }
     }
 
-    /// Notes how the board is.
-    pub fn health(&self, health: Health, notes: &mut impl Notes) {
-        notes.put(Note::Health(health));
+    /// Telemetry windows that found no room since power on.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
     }
 
     fn pass_snapshot(&mut self, state: &State, notes: &mut impl Notes) {

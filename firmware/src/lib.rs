@@ -24,6 +24,7 @@ pub mod sample;
 pub mod speaker;
 pub mod state;
 pub mod step;
+pub mod stored;
 pub mod window;
 
 /// Version of the firmware, as the greeting tells it.

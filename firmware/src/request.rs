@@ -195,7 +195,7 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
 }
 
 /// Whether values are physical; everything written so that NaN is refused.
-fn usable(settings: &Settings) -> Result<(), Refusal> {
+pub(crate) fn usable(settings: &Settings) -> Result<(), Refusal> {
     let good = settings.limits.is_valid()
         && settings.gains.usable()
         && settings.friction.check().is_ok()

@@ -42,7 +42,8 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         &state.settings.limits,
         &mut state.monitor,
         &readings,
-    );
+    )
+    .or_else(|| board_fault(&sample));
     state.cause_acting = found.is_some();
     let found = found
         .or_else(|| calibrate(config, state, sample))
@@ -117,6 +118,14 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         duty: state.duty,
         driving: state.mode.drives(),
     }
+}
+
+/// What the board has found wrong with itself and its encoder.
+fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
+    if let Some(counts) = sample.encoder_wrong {
+        return Some((Fault::EncoderSignal, counts as f32));
+    }
+    sample.stack_left.map(|left| (Fault::Stack, left as f32))
 }
 
 /// Measures the current offset while the bridge is off; a fault where it is implausible.

@@ -75,19 +75,20 @@ impl EncoderTimer {
     #[inline(always)]
     pub(crate) fn read(&mut self) -> Reading {
         let timer = TIM2;
-        let raw = timer.cnt().read();
+        let mut raw = timer.cnt().read();
         let flags = timer.sr().read();
         let mut wrong = None;
-        let mut step = raw.wrapping_sub(self.last) as i32;
         if flags.idxif() || flags.terrif() {
             // Written with zero a flag is cleared; the others are not used.
             timer.sr().write_value(Default::default());
             if flags.terrif() {
                 wrong = Some(0);
             }
+            // Again, as the index may have come between counter and flags.
+            raw = timer.cnt().read();
         }
+        let mut step = raw.wrapping_sub(self.last) as i32;
         if flags.idxif() {
-            // An index between the two reads of counter and flags is seen in the next tick, as a step of a turn.
             let half = self.counts_per_turn / 2;
             let within = (step % self.counts_per_turn + self.counts_per_turn + half)
                 % self.counts_per_turn

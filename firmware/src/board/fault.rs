@@ -6,6 +6,8 @@
 use core::arch::global_asm;
 use core::panic::PanicInfo;
 
+use embassy_stm32::pac::FLASH;
+
 use super::pwm;
 
 /// A program error. The rig starts again disarmed, and tells in its health report why.
@@ -35,6 +37,25 @@ global_asm!(
     "b {handler}",
     handler = sym fault,
 );
+
+/// A flash word of the stored settings that has two wrong bits, as a supply that failed while it was written
+/// leaves it, is read as it is: the check sum finds it. Every other non-maskable interrupt is a fault.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    let flag = FLASH.eccr().read();
+    if flag.eccd() && flag.bk_ecc() {
+        // Written with one it is cleared.
+        FLASH.eccr().modify(|w| w.set_eccd(true));
+    } else {
+        fault()
+    }
+}
+
+/// An exception that nobody has asked for.
+#[cortex_m_rt::exception]
+unsafe fn DefaultHandler(_number: i16) {
+    fault()
+}
 
 extern "C" fn fault() -> ! {
     pwm::off();

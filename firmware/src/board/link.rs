@@ -1,5 +1,7 @@
 //! LPUART1 to the ST-LINK's serial port: what comes in by a ring of DMA, what goes out by DMA.
 
+use core::sync::atomic::Ordering;
+
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, LPUART1};
 use embassy_stm32::usart::{
@@ -18,6 +20,7 @@ use rig_shared::wire::{MAX_FRAME, MessageDecoder};
 use static_cell::ConstStaticCell;
 
 use super::clock::LINK_PRIORITY;
+use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
 use super::watchdog::{Part, report};
 
@@ -106,10 +109,17 @@ pub(crate) async fn commands(mut line: Receiver, mut requests: Producer<'static,
             Err(_) => 0,
         };
         for &byte in bytes.iter().take(count) {
-            if let Some(Ok(request)) = decoder.push(byte)
-                && requests.enqueue(examine(request)).is_err()
-            {
-                defmt::warn!("more requests than can be served");
+            match decoder.push(byte) {
+                None => {}
+                // Unanswered, the host repeats it.
+                Some(Err(_)) => {
+                    BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
+                }
+                Some(Ok(request)) => {
+                    if requests.enqueue(examine(request)).is_err() {
+                        defmt::warn!("more requests than can be served");
+                    }
+                }
             }
         }
     }

@@ -2,23 +2,27 @@
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_stm32::interrupt;
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::capture::Capture;
 use rig_firmware::clerk::{Clerk, Notes};
-use rig_firmware::config::Config;
+use rig_firmware::config::{Config, Settings};
 use rig_firmware::examined::Examined;
 use rig_firmware::note::Note;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
 use rig_firmware::step::step;
+use rig_shared::wire::message::Refusal;
 
 use super::adc::Converter;
 use super::clock::CORE_HZ;
 use super::cycles;
 use super::encoder::EncoderTimer;
+use super::health::Checkup;
 use super::pwm::Bridge;
+use super::stack;
 use super::watchdog::{Part, report};
 
 /// Notes that the queue to the telemetry task holds.
@@ -42,6 +46,8 @@ pub(crate) struct Tick {
     pub(crate) period_cycles: u32,
     pub(crate) entered: u32,
     pub(crate) late: bool,
+    pub(crate) checkup: Checkup,
+    pub(crate) to_store: Producer<'static, Settings>,
 }
 
 /// The way to the telemetry task.
@@ -82,25 +88,68 @@ impl Tick {
             temperature: codes.temperature,
             driver_fault: self.bridge.broken(),
             overrun,
+            encoder_wrong: motion.wrong,
+            stack_left: stack::near_end(),
         };
         let output = step(self.config, self.state, sample);
         self.bridge.apply(output.command);
         self.clerk
             .report(self.state, self.capture, &output, &mut self.notes);
-        if self.notes.roomy()
-            && let Some(examined) = self.requests.dequeue()
-        {
-            let _to_store = self.clerk.serve(
-                self.config,
-                self.state,
-                self.capture,
-                &examined,
-                &mut self.notes,
-            );
-        }
+        self.serve();
         report(Part::Tick);
+        let cycles = cycles::now().wrapping_sub(entered);
+        let (tick, dropped) = (self.state.tick, self.clerk.dropped());
+        if let Some(health) = self.checkup.count(cycles, tick, dropped) {
+            self.notes.put(Note::Health(health));
+        }
         self.late = self.converter.is_waiting();
     }
+}
+
+impl Tick {
+    /// At most one request a tick.
+    #[inline(always)]
+    fn serve(&mut self) {
+        let outcome = match STORED.load(Ordering::Acquire) {
+            NOT_YET => None,
+            DONE => Some(Ok(())),
+            _ => Some(Err(Refusal::StorageFailed)),
+        };
+        if let Some(outcome) = outcome {
+            STORED.store(NOT_YET, Ordering::Relaxed);
+            self.clerk.stored(self.state, outcome, &mut self.notes);
+        }
+        if !self.notes.roomy() {
+            return;
+        }
+        let Some(examined) = self.requests.dequeue() else {
+            return;
+        };
+        let to_store = self.clerk.serve(
+            self.config,
+            self.state,
+            self.capture,
+            &examined,
+            &mut self.notes,
+        );
+        if let Some(settings) = to_store
+            && self.to_store.enqueue(settings).is_err()
+        {
+            let outcome = Err(Refusal::StorageFailed);
+            self.clerk.stored(self.state, outcome, &mut self.notes);
+        }
+    }
+}
+
+/// How storing ended, from the storage task to the tick.
+static STORED: AtomicU8 = AtomicU8::new(NOT_YET);
+const NOT_YET: u8 = 0;
+const DONE: u8 = 1;
+const FAILED: u8 = 2;
+
+/// Says how storing ended.
+pub(crate) fn stored(done: bool) {
+    STORED.store(if done { DONE } else { FAILED }, Ordering::Release);
 }
 
 /// The one [`Tick`], handed to the interrupt before it is enabled.
