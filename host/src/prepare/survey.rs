@@ -96,10 +96,19 @@ impl Survey {
     pub fn take(recording: &dyn Recording, joints: usize) -> Result<Self, PrepareError> {
         // Segments of 4096 rows resolve 0.25 Hz at 1 kHz; a short recording gets at least seven of them.
         let mut rows_total = 0u64;
+        let (mut last_time, mut span, mut steps) = (0.0, 0.0, 0u64);
         recording.each_block(1 << 16, &mut |b| {
-            rows_total += b.len() as u64;
+            for (k, t) in b.t.iter().enumerate() {
+                if rows_total > 0 && (k > 0 || b.continues) {
+                    span += t - last_time;
+                    steps += 1;
+                }
+                last_time = *t;
+                rows_total += 1;
+            }
             Ok(())
         })?;
+        let mean: f64 = span / steps.max(1) as f64;
         if rows_total < FEWEST_ROWS {
             return Err(PrepareError::TooShort {
                 label: recording.label(),
@@ -120,9 +129,10 @@ impl Survey {
             })
             .collect();
         let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
-        let (mut span, mut steps) = (0.0, 0u64);
-        let mut last_time = 0.0;
-        let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
+        last_time = 0.0;
+        // An uneven step waits for the next: a time stamp off the grid makes one too short and one too long.
+        let mut uneven: Option<(f64, u64)> = None;
+        let mut worst: Option<(f64, u64)> = None;
         recording.each_block(1 << 16, &mut |block| {
             if block.joints.len() != joints {
                 return Err(PrepareError::JointCount {
@@ -136,17 +146,23 @@ impl Survey {
                 let t = block.t[k];
                 if follows {
                     let step = t - last_time;
-                    span += step;
-                    steps += 1;
                     let line = block.first_line + k as u64;
-                    if step < shortest.0 {
-                        shortest = (step, line);
-                    }
-                    if step > widest.0 {
-                        widest = (step, line);
+                    let deviates = |step: f64, of: f64| {
+                        let deviation = (step / of - 1.0).abs();
+                        deviation > STEP_TOLERANCE || deviation.is_nan()
+                    };
+                    let made_up = uneven.take_if(|(before, _)| {
+                        (*before + step - 2.0 * mean).abs() <= STEP_TOLERANCE * mean
+                    });
+                    if made_up.is_none() {
+                        worst = worst.or(uneven.take());
+                        if deviates(step, mean) {
+                            uneven = Some((step, line));
+                        }
                     }
                     run += 1;
                 } else {
+                    worst = worst.or(uneven.take());
                     run = 1;
                 }
                 longest = longest.max(run);
@@ -169,17 +185,13 @@ impl Survey {
             }
             Ok(())
         })?;
-        let mean = span / steps.max(1) as f64;
-        for (step, line) in [shortest, widest] {
-            let deviation = (step / mean - 1.0).abs();
-            if deviation > STEP_TOLERANCE || deviation.is_nan() {
-                return Err(PrepareError::Irregular {
-                    label: recording.label(),
-                    line,
-                    step,
-                    mean,
-                });
-            }
+        if let Some((step, line)) = worst.or(uneven) {
+            return Err(PrepareError::Irregular {
+                label: recording.label(),
+                line,
+                step,
+                mean,
+            });
         }
         let sample_rate = 1.0 / mean;
         let joints = running
