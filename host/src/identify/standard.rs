@@ -5,7 +5,7 @@ use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
 use super::IdentifyError;
-use super::base::{Base, column_name, unit};
+use super::base::Base;
 use super::consistent::{Consistent, Quadratic, consistent};
 use super::factor::TriangularFactor;
 use super::least::triangle;
@@ -34,8 +34,8 @@ pub struct StandardParameter {
 pub struct StandardSet {
     /// Joint by joint, then those of coupled drives.
     pub parameters: Vec<StandardParameter>,
-    /// Per joint (one entry for the integral model), by how much more the residual's RMS is than with the estimate
-    /// alone, %.
+    /// Per joint (one entry for the integral model), by how much more the residual's RMS is than with the
+    /// weighted fit, which is free to give links that cannot exist, %.
     pub residual_increase_percent: Vec<f64>,
     /// Per link, smallest eigenvalue of the pseudo-inertia scaled to mass and radius of gyration one.
     pub least_eigenvalue: Vec<f64>,
@@ -142,9 +142,9 @@ pub(super) fn standard_set(
             .iter()
             .enumerate()
             .map(|(c, value)| StandardParameter {
-                name: column_name(c),
+                name: base.column_name(c),
                 value: *value,
-                unit: unit(c, &base.kinds).to_owned(),
+                unit: base.column_unit(c).to_owned(),
                 determined: alone(c),
             })
             .collect(),
