@@ -11,6 +11,9 @@ use super::spectrum::{PositionSpectrum, Welch};
 /// row, or a shift of the grid by more than a fifth of a step, does not.
 const STEP_TOLERANCE: f64 = 0.1;
 
+/// Steps that are this much alike count as equal: the first of them is named.
+const ROUNDING: f64 = 1e-9;
+
 /// Rows below which a spectrum says nothing.
 const FEWEST_ROWS: u64 = 256;
 
@@ -172,10 +175,10 @@ impl Survey {
                     let line = block.first_line + k as u64;
                     if run > 1 {
                         let pair = 0.5 * (t - before_last);
-                        if pair < shortest.0 {
+                        if pair < shortest.0 * (1.0 - ROUNDING) {
                             shortest = (pair, line);
                         }
-                        if pair > widest.0 {
+                        if pair > widest.0 * (1.0 + ROUNDING) {
                             widest = (pair, line);
                         }
                     }
