@@ -94,6 +94,16 @@ pub enum DataError {
         /// Time of this row, s.
         now: f64,
     },
+    /// Motor positions that no joint positions give.
+    #[error("{}:{line}: the motor positions (columns `qm<k>`) of this row belong to no joint position: {message} The description's drives (ratios, screw, zero) or the recording's signs or units are wrong.", path.display())]
+    Motors {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+        /// What cannot be turned to the joints, one sentence.
+        message: String,
+    },
     /// An MCAP file that is damaged or holds something else.
     #[error("{}: {message}", path.display())]
     Mcap {

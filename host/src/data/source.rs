@@ -8,6 +8,7 @@ use super::columns::{EffortNeed, Layout, Role, layout};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
 use super::mcap_rows::{MAGIC, McapRows};
+use super::motors::{MotorPass, MotorSide};
 use super::{Block, JointColumns};
 use crate::robot::Robot;
 
@@ -223,6 +224,7 @@ impl Source {
             warnings: Vec::new(),
             gaps: 0,
             named_extras: vec![false; self.layout.columns.len()],
+            motors: self.layout.motors.as_ref().map(MotorSide::pass),
         }
     }
 
@@ -268,6 +270,7 @@ pub struct Blocks<'a> {
     warnings: Vec<Warning>,
     gaps: u64,
     named_extras: Vec<bool>,
+    motors: Option<MotorPass>,
 }
 
 impl Blocks<'_> {
@@ -311,21 +314,29 @@ impl Blocks<'_> {
                 continue;
             };
             match c.role {
-                Role::Position(_) => joint.q = column(),
+                Role::Position(_) | Role::MotorPosition(_) => joint.q = column(),
                 Role::Effort(..) => joint.tau = column(),
                 Role::Velocity(_) => joint.qd = Some(column()),
                 Role::Acceleration(_) => joint.qdd = Some(column()),
                 Role::Reference(_) => joint.reference = Some(column()),
                 Role::Voltage(_) | Role::Duty(..) => joint.voltage = Some(column()),
                 Role::Temperature(_) => joint.temperature = Some(column()),
-                Role::Time | Role::None => {}
+                Role::Time | Role::None | Role::MotorEffort(..) => {}
+            }
+        }
+        if let Some(motors) = &layout.motors {
+            for (joint, turned) in block.joints.iter_mut().zip(&motors.torques) {
+                if *turned {
+                    joint.tau = column();
+                }
             }
         }
         block
     }
 
-    fn push_row(&mut self, block: &mut Block, line: u64) {
-        let layout = &self.source.layout;
+    fn push_row(&mut self, block: &mut Block, line: u64) -> Result<(), DataError> {
+        let source = self.source;
+        let layout = &source.layout;
         for (i, (c, &value)) in layout.columns.iter().zip(&self.values).enumerate() {
             if let Some((_, column)) = c.extra.and_then(|e| block.extra.get_mut(e)) {
                 column.push(value);
@@ -353,12 +364,41 @@ impl Blocks<'_> {
                 Role::Voltage(_) => (joint.voltage.as_mut(), value),
                 Role::Duty(_, supply) => (joint.voltage.as_mut(), value * self.values[supply]),
                 Role::Temperature(_) => (joint.temperature.as_mut(), value),
+                Role::MotorPosition(k) => {
+                    set(self.motors.as_mut().map(|m| &mut m.psi), k, value);
+                    (None, value)
+                }
+                Role::MotorEffort(k, factor) => {
+                    let torque = value * factor;
+                    set(self.motors.as_mut().map(|m| &mut m.tau_motor), k, torque);
+                    (None, value)
+                }
                 Role::Time | Role::None => (None, value),
             };
+            if let (Role::Position(k), Some(motors)) = (c.role, self.motors.as_mut()) {
+                set(Some(&mut motors.q), k, value);
+            }
             if let Some(column) = column {
                 column.push(value);
             }
         }
+        let (Some(side), Some(motors)) = (&layout.motors, self.motors.as_mut()) else {
+            return Ok(());
+        };
+        motors.turn(side).map_err(|error| DataError::Motors {
+            path: source.path.clone(),
+            line,
+            message: error.to_string(),
+        })?;
+        for (k, joint) in block.joints.iter_mut().enumerate() {
+            if side.positions {
+                joint.q.push(motors.q[k]);
+            }
+            if side.torques[k] {
+                joint.tau.push(motors.tau[k]);
+            }
+        }
+        Ok(())
     }
 
     /// The next row into `values`; its line.
@@ -444,7 +484,7 @@ impl Blocks<'_> {
                 Some(current) => current,
                 None => self.empty_block(line),
             };
-            self.push_row(&mut current, line);
+            self.push_row(&mut current, line)?;
             block = Some(current);
         }
     }
@@ -461,7 +501,15 @@ fn joint_of(role: Role) -> Option<usize> {
         | Role::Reference(k)
         | Role::Voltage(k)
         | Role::Duty(k, _)
+        | Role::MotorPosition(k)
+        | Role::MotorEffort(k, _)
         | Role::Temperature(k) => Some(k),
+    }
+}
+
+fn set(list: Option<&mut Vec<f64>>, k: usize, value: f64) {
+    if let Some(entry) = list.and_then(|l| l.get_mut(k)) {
+        *entry = value;
     }
 }
 
