@@ -94,11 +94,9 @@ impl Compare {
     fn list(self, bytes: u64) -> Vec<Estimator> {
         match self {
             Self::All => Estimator::ALL.to_vec(),
-            Self::Auto if bytes <= COMPARED_BYTES => vec![
-                Estimator::Weighted,
-                Estimator::Iv,
-                Estimator::Consistent,
-            ],
+            Self::Auto if bytes <= COMPARED_BYTES => {
+                vec![Estimator::Weighted, Estimator::Iv, Estimator::Consistent]
+            }
             Self::Auto | Self::None => Vec::new(),
         }
     }

@@ -78,13 +78,12 @@ impl Source {
         }
         let treatment = problem.plan.treatment;
         let cutoff = (SMOOTHING * treatment.motion_frequency).min(0.8 * treatment.cutoff);
-        let low_pass = LowPass::butterworth(4, cutoff, treatment.sample_rate).ok_or(
-            PrepareError::Cutoff {
+        let low_pass =
+            LowPass::butterworth(4, cutoff, treatment.sample_rate).ok_or(PrepareError::Cutoff {
                 cutoff,
                 rate: treatment.sample_rate,
                 nyquist: treatment.sample_rate / 2.0,
-            },
-        )?;
+            })?;
         Ok((
             Self::Smoothed(low_pass),
             format!(

@@ -229,7 +229,8 @@ pub(super) fn compare(
         .as_ref()
         .and_then(|iv| endogeneity(&weighted, iv, names));
     let weak = instrumental.as_ref().is_some_and(|iv| {
-        iv.warnings.iter().any(|w| w.contains("weak")) || iv.said.iter().any(|s| s.contains("low-pass"))
+        iv.warnings.iter().any(|w| w.contains("weak"))
+            || iv.said.iter().any(|s| s.contains("low-pass"))
     });
     let (recommended, recommendation) = recommend(&rows, endogeneity.as_ref(), weak);
     Ok(Comparison {

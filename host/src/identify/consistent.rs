@@ -111,20 +111,14 @@ fn barrier(prior: &Prior, pi: &[f64]) -> Option<f64> {
             Rule::Inertial(_) => 0.0,
             Rule::NotNegative if x > 0.0 => pull * (x / x0 - (x / x0).ln() - 1.0),
             Rule::NotNegative => return None,
-            Rule::Free => {
-                0.5 * OFFSET_PULL * ((x - x0) / prior.scale[c]).powi(2)
-            }
+            Rule::Free => 0.5 * OFFSET_PULL * ((x - x0) / prior.scale[c]).powi(2),
         };
     }
     sum.is_finite().then_some(sum)
 }
 
 /// Gradient of the pulls and their Hessian times `lift`.
-fn slopes(
-    prior: &Prior,
-    pi: &[f64],
-    lift: &DMatrix<f64>,
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let m = pi.len();
     let mut gradient = DVector::zeros(m);
     let mut bent = DMatrix::zeros(m, m);
@@ -144,8 +138,7 @@ fn slopes(
             Rule::Inertial(_) => {}
             Rule::NotNegative => {
                 gradient[c] = pull * (1.0 / x0 - 1.0 / x);
-                bent.row_mut(c)
-                    .copy_from(&(lift.row(c) * (pull / (x * x))));
+                bent.row_mut(c).copy_from(&(lift.row(c) * (pull / (x * x))));
             }
             Rule::Free => {
                 let bend = OFFSET_PULL / prior.scale[c].powi(2);
@@ -158,9 +151,7 @@ fn slopes(
 }
 
 /// Cholesky factor after scaling the diagonal to one, and the scales.
-fn scaled_cholesky(
-    mut h: DMatrix<f64>,
-) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
+fn scaled_cholesky(mut h: DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
     let m = h.nrows();
     let scale = DVector::from_fn(m, |k, _| 1.0 / h[(k, k)].sqrt());
     for c in 0..m {
@@ -222,8 +213,8 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
             let next_c = &c + length * &step;
             let next_pi = &space.lift * &next_c;
             // Close to the minimum rounding hides the descent; a full step is right there.
-            let least = before - 1e-4 * length * decrement * strength
-                + 1e-12 * (before.abs() + strength);
+            let least =
+                before - 1e-4 * length * decrement * strength + 1e-12 * (before.abs() + strength);
             if value(&next_c, &next_pi, strength).is_some_and(|v| v <= least) {
                 (c, pi) = (next_c, next_pi);
                 moved = true;

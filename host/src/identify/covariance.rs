@@ -16,6 +16,7 @@ pub(super) const LAGS: usize = 200;
 /// Autocovariance of a stream of residuals.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
+    /// The latest residuals from `next` on, newest first.
     ring: Vec<f64>,
     next: usize,
     seen: u64,
@@ -25,8 +26,8 @@ pub(super) struct Memory {
 impl Default for Memory {
     fn default() -> Self {
         Self {
-            ring: vec![0.0; LAGS + 1],
-            next: 0,
+            ring: vec![0.0; 8 * LAGS],
+            next: 7 * LAGS,
             seen: 0,
             sums: vec![0.0; LAGS + 1],
         }
@@ -36,12 +37,18 @@ impl Default for Memory {
 impl Memory {
     /// Takes the next residual.
     pub(super) fn push(&mut self, e: f64) {
-        let size = self.ring.len();
-        self.ring[self.next] = e;
-        for lag in 0..size.min(self.seen as usize + 1) {
-            self.sums[lag] += e * self.ring[(self.next + size - lag) % size];
+        // Written backwards, so that what came before lies in order behind it; zeros before the first.
+        if self.next == 0 {
+            self.next = self.ring.len() - LAGS;
+            let (start, end) = self.ring.split_at_mut(self.next);
+            end.copy_from_slice(&start[..LAGS]);
         }
-        self.next = (self.next + 1) % size;
+        self.next -= 1;
+        self.ring[self.next] = e;
+        let before = &self.ring[self.next..=self.next + LAGS];
+        for (sum, past) in self.sums.iter_mut().zip(before) {
+            *sum += e * past;
+        }
         self.seen += 1;
     }
 

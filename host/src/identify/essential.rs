@@ -59,11 +59,7 @@ pub(super) fn essential(
     let rows = factor.rows() as f64 / memory;
     let rest = {
         // What no parameter of the factor explains.
-        let solution = r
-            .clone()
-            .svd(true, true)
-            .solve(&z, 1e-12 * r.norm())
-            .ok()?;
+        let solution = r.clone().svd(true, true).solve(&z, 1e-12 * r.norm()).ok()?;
         factor.residual_squares(solution.as_slice()) - (&r * &solution - &z).norm_squared()
     };
     let fit = |active: &[usize]| -> Option<Fit> {
@@ -93,10 +89,13 @@ pub(super) fn essential(
     };
     let mut left_out = Vec::new();
     let ended = loop {
-        let worst = (0..active.len()).max_by(|&a, &b| {
-            current.relative[a].total_cmp(&current.relative[b])
-        })?;
-        let least = current.relative.iter().copied().fold(f64::INFINITY, f64::min);
+        let worst = (0..active.len())
+            .max_by(|&a, &b| current.relative[a].total_cmp(&current.relative[b]))?;
+        let least = current
+            .relative
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
         if current.relative[worst] <= RATIO * least {
             break format!(
                 "None is more than {RATIO} times as uncertain, relative to its value, as the best known one."

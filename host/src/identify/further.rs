@@ -117,8 +117,7 @@ pub(super) fn further(
         let found = match own.as_ref().and_then(|o| o.fitted.standard.as_ref()) {
             Some(standard) if estimator == Estimator::Consistent => Ok(standard.clone()),
             _ => {
-                let tempered =
-                    combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
+                let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
                 let problem = match estimator {
                     // Rows know a little of what counts as not excited, too.
                     Estimator::Ols | Estimator::Weighted => quadratic(&tempered, base),

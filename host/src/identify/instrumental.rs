@@ -39,12 +39,10 @@ pub(super) fn each_simulated(
             let model = model_of(problem.plan.chain, standard);
             let make = |r: usize| {
                 let period = 1.0 / problem.surveys[r].sample_rate;
-                Ok(Box::new(LoopMotion::new(
-                    problem.robot,
-                    controllers,
-                    &model,
-                    period,
-                )?) as Box<dyn Companion>)
+                Ok(
+                    Box::new(LoopMotion::new(problem.robot, controllers, &model, period)?)
+                        as Box<dyn Companion>,
+                )
             };
             each_pair(problem, &Twin::Made(&make), take)
         }
@@ -52,9 +50,7 @@ pub(super) fn each_simulated(
             let make = |_: usize| Ok(Box::new(ReferenceMotion) as Box<dyn Companion>);
             each_pair(problem, &Twin::Made(&make), take)
         }
-        Source::Smoothed(low_pass) => {
-            each_pair(problem, &Twin::Smoothed(low_pass.clone()), take)
-        }
+        Source::Smoothed(low_pass) => each_pair(problem, &Twin::Smoothed(low_pass.clone()), take),
     }
 }
 
@@ -124,8 +120,7 @@ pub(super) fn instrumental(
         let covariance = kept.covariance();
         let moved = (0..size)
             .map(|k| {
-                (kept.whole[k] - values[k]).abs()
-                    / covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
+                (kept.whole[k] - values[k]).abs() / covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE)
             })
             .fold(0.0, f64::max);
         values.clone_from(&kept.whole);

@@ -19,10 +19,7 @@ pub(super) fn least(
 }
 
 /// Least squares on factors whose rows are as they are to count.
-pub(super) fn from_factors(
-    problem: &Problem,
-    factors: &LeaveOut,
-) -> Result<Fitted, IdentifyError> {
+pub(super) fn from_factors(problem: &Problem, factors: &LeaveOut) -> Result<Fitted, IdentifyError> {
     let (data, base) = (problem.data, problem.base);
     let kept = factors.refit(&|factor| least_squares(factor, data, base))?;
     let (classical_std, _) = classical(&factors.whole, data, &kept.whole)?;

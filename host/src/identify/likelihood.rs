@@ -207,8 +207,7 @@ impl Whiteners {
         let correlation = &self.correlation;
         self.by_mask.entry(mask).or_insert_with(|| {
             let n = present.len();
-            let part =
-                DMatrix::from_fn(n, n, |i, j| correlation[(present[i], present[j])]);
+            let part = DMatrix::from_fn(n, n, |i, j| correlation[(present[i], present[j])]);
             // A part of a positive definite matrix is one.
             part.cholesky()
                 .and_then(|c| c.l().try_inverse())

@@ -47,21 +47,29 @@ pub(super) fn output_error(
         let mut factors = vec![TriangularFactor::new(p); PARTS];
         let mut index = 0;
         let mut drift = Drift::new(problem.robot.joints.len());
-        each_simulated(problem, &source, &standard, &mut |r, measured, simulated| {
-            drift.push(measured, simulated);
-            for i in 0..measured.t.len() {
-                let factor = &mut factors[part_of(index, problem.instants)];
-                for (k, (own, other)) in
-                    measured.equations.iter().zip(&simulated.equations).enumerate()
-                {
-                    if own.keep[i] {
-                        let weight = weights[r] * problem.weights[k];
-                        factor.push(&other.x[i * p..(i + 1) * p], own.y[i], weight);
+        each_simulated(
+            problem,
+            &source,
+            &standard,
+            &mut |r, measured, simulated| {
+                drift.push(measured, simulated);
+                for i in 0..measured.t.len() {
+                    let factor = &mut factors[part_of(index, problem.instants)];
+                    for (k, (own, other)) in measured
+                        .equations
+                        .iter()
+                        .zip(&simulated.equations)
+                        .enumerate()
+                    {
+                        if own.keep[i] {
+                            let weight = weights[r] * problem.weights[k];
+                            factor.push(&other.x[i * p..(i + 1) * p], own.y[i], weight);
+                        }
                     }
+                    index += 1;
                 }
-                index += 1;
-            }
-        })?;
+            },
+        )?;
         let all = LeaveOut::of(&joined(factors, parts.count));
         let mut fitted = from_factors(problem, &all)?;
         passes += 1;

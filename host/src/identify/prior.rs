@@ -99,7 +99,11 @@ impl Prior {
                     _ => 1.0,
                 }
                 .max(f64::MIN_POSITIVE);
-            let size = if size > 0.0 && size.is_finite() { size } else { 1.0 };
+            let size = if size > 0.0 && size.is_finite() {
+                size
+            } else {
+                1.0
+            };
             if place == column::OFFSET {
                 prior.rules[c] = Rule::Free;
                 prior.scale[c] = size;

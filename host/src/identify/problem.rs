@@ -135,9 +135,7 @@ fn assemble(
             .map(|k| [values[k] - quantile * std[k], values[k] + quantile * std[k]])
             .collect(),
         covariance: rows_of(&|i, j| covariance[(i, j)]),
-        correlation: rows_of(&|i, j| {
-            covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)
-        }),
+        correlation: rows_of(&|i, j| covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)),
         std,
         classical_std,
         degrees_of_freedom,

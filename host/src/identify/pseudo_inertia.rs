@@ -106,17 +106,13 @@ impl Divergence {
     pub(super) fn derivatives(
         &self,
         p: &[f64],
-    ) -> Option<(
-        SVector<f64, INERTIAL>,
-        SMatrix<f64, INERTIAL, INERTIAL>,
-    )> {
+    ) -> Option<(SVector<f64, INERTIAL>, SMatrix<f64, INERTIAL, INERTIAL>)> {
         let inverse = pseudo_inertia(p).cholesky()?.inverse();
         let products: [Matrix4<f64>; INERTIAL] =
             std::array::from_fn(|k| inverse * self.directions[k]);
         let gradient = SVector::from_fn(|k, _| self.linear[k] - products[k].trace());
-        let hessian = SMatrix::from_fn(|k, l| {
-            products[k].component_mul(&products[l].transpose()).sum()
-        });
+        let hessian =
+            SMatrix::from_fn(|k, l| products[k].component_mul(&products[l].transpose()).sum());
         Some((gradient, hessian))
     }
 }

@@ -86,7 +86,11 @@ pub(super) fn reweighted(
                     let e = equation.y[i] - product(x, full);
                     medians[k].push(e);
                     let weight = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
-                    factor.push(x, equation.y[i], options.row_weight(r) * weights[k] * weight.sqrt());
+                    factor.push(
+                        x,
+                        equation.y[i],
+                        options.row_weight(r) * weights[k] * weight.sqrt(),
+                    );
                 }
             }
             Ok(())
@@ -118,8 +122,7 @@ pub(super) fn robust(problem: &Problem, parts: &Parts) -> Result<Fitted, Identif
                             let e = equation.y[i] - product(x, &full);
                             medians[k].push(e);
                             let loss = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
-                            let weight =
-                                options.row_weight(r) * problem.weights[k] * loss.sqrt();
+                            let weight = options.row_weight(r) * problem.weights[k] * loss.sqrt();
                             factor.push(x, equation.y[i], weight);
                         }
                     }

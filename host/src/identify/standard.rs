@@ -5,7 +5,7 @@ use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
 use super::IdentifyError;
-use super::base::{Base, column_name, unit};
+use super::base::Base;
 use super::consistent::{Consistent, Quadratic, consistent};
 use super::factor::TriangularFactor;
 use super::least::triangle;
@@ -142,9 +142,9 @@ pub(super) fn standard_set(
             .iter()
             .enumerate()
             .map(|(c, value)| StandardParameter {
-                name: column_name(c),
+                name: base.column_name(c),
                 value: *value,
-                unit: unit(c, &base.kinds).to_owned(),
+                unit: base.column_unit(c).to_owned(),
                 determined: alone(c),
             })
             .collect(),

@@ -60,10 +60,7 @@ impl Companion for Disturbed {
 }
 
 /// What the columns' noise amounts to, equation by equation: factor of the differences, rows counted.
-fn column_noise(
-    problem: &Problem,
-    sigma: &[f64],
-) -> Result<Vec<TriangularFactor>, IdentifyError> {
+fn column_noise(problem: &Problem, sigma: &[f64]) -> Result<Vec<TriangularFactor>, IdentifyError> {
     let kept = &problem.data.kept;
     let p = problem.base.len();
     let factors = RefCell::new(vec![
@@ -73,29 +70,31 @@ fn column_noise(
     let make = |r: usize| {
         Ok(Box::new(Disturbed {
             sigma: sigma.to_vec(),
-            generator: rand_pcg::Pcg64::seed_from_u64(
-                problem.options.seed.wrapping_add(r as u64),
-            ),
+            generator: rand_pcg::Pcg64::seed_from_u64(problem.options.seed.wrapping_add(r as u64)),
         }) as Box<dyn Companion>)
     };
     let weights: Vec<f64> = problem.recording_weights().collect();
     let mut row = vec![0.0; kept.len()];
-    each_pair(problem, &Twin::Made(&make), &mut |r, measured, disturbed| {
-        let mut factors = factors.borrow_mut();
-        for (k, (own, other)) in measured
-            .equations
-            .iter()
-            .zip(&disturbed.equations)
-            .enumerate()
-        {
-            for i in (0..own.y.len()).filter(|&i| own.keep[i]) {
-                for (to, &c) in row.iter_mut().zip(kept) {
-                    *to = other.x[i * p + c] - own.x[i * p + c];
+    each_pair(
+        problem,
+        &Twin::Made(&make),
+        &mut |r, measured, disturbed| {
+            let mut factors = factors.borrow_mut();
+            for (k, (own, other)) in measured
+                .equations
+                .iter()
+                .zip(&disturbed.equations)
+                .enumerate()
+            {
+                for i in (0..own.y.len()).filter(|&i| own.keep[i]) {
+                    for (to, &c) in row.iter_mut().zip(kept) {
+                        *to = other.x[i * p + c] - own.x[i * p + c];
+                    }
+                    factors[k].push(&row, 0.0, weights[r]);
                 }
-                factors[k].push(&row, 0.0, weights[r]);
             }
-        }
-    })?;
+        },
+    )?;
     Ok(factors.into_inner())
 }
 
@@ -151,9 +150,7 @@ fn solve(
         let last = stacked.nrows() - 1;
         stacked[(last, size)] = right.sqrt();
         let svd = (stacked * &inverse).svd(false, true);
-        let v_t = svd
-            .v_t
-            .ok_or_else(|| singular("of [regressor | torque]"))?;
+        let v_t = svd.v_t.ok_or_else(|| singular("of [regressor | torque]"))?;
         let largest = svd.singular_values.imax();
         let v = &inverse * v_t.row(largest).transpose();
         let next: Vec<f64> = (0..size).map(|k| -v[k] / v[size]).collect();
@@ -231,7 +228,11 @@ pub(super) fn total(problem: &Problem, parts: &Parts) -> Result<Fitted, Identify
         .zip(&problem.robot.joints)
         .map(|(s, joint)| format!("{} {s:.3e}", joint.name))
         .collect();
-    let torques: Vec<String> = whole.torque.iter().map(|t| format!("{:.4}", t.sqrt())).collect();
+    let torques: Vec<String> = whole
+        .torque
+        .iter()
+        .map(|t| format!("{:.4}", t.sqrt()))
+        .collect();
     Ok(Fitted {
         full: kept.map(&|values| spread(values, &data.kept, problem.base.len())),
         kept,

@@ -54,7 +54,14 @@ pub(super) fn composite_bodies(
     for (i, frame) in frames.iter().enumerate().rev() {
         let body = &bodies[i];
         add(body, &mut composite);
-        start(frame.prismatic, body, &composite, &mut force, &mut moment, &mut out[lower(i, i)]);
+        start(
+            frame.prismatic,
+            body,
+            &composite,
+            &mut force,
+            &mut moment,
+            &mut out[lower(i, i)],
+        );
         for j in (0..i).rev() {
             let (joint, between) = (&work[j + 1], &frames[j + 1]);
             let entry = &mut out[lower(i, j)];
@@ -227,4 +234,3 @@ fn to_parent<const TWIST: u8, const A: bool, const D: bool, const ZZ: bool>(
         }
     }
 }
-

@@ -58,7 +58,15 @@ pub fn inverse_dynamics(
         let joint = &mut work[i];
         frame.angle(&q[i], &mut joint.sin, &mut joint.cos);
         if i == 0 && !frame.prismatic {
-            first_revolute(frame, gravity, &bodies[i], &qd[i], qdd(i), &mut motion, joint);
+            first_revolute(
+                frame,
+                gravity,
+                &bodies[i],
+                &qd[i],
+                qdd(i),
+                &mut motion,
+                joint,
+            );
         } else if frame.prismatic {
             outwards_prismatic(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
         } else {
@@ -133,7 +141,8 @@ fn outwards<const TWIST: u8, const A: bool, const D: bool>(
         let moment = Vector3([
             i.xx * ex - i.xy * u31 + i.xz * u21 + i.yz * (yy - zz) + i.zz * yz + my * vz,
             i.xx * xz + i.xy * u32 - i.yz * u12 + i.xz * (zz - xx) - i.zz * xz - mx * vz,
-            i.zz * ez - i.xz * u23 + i.yz * u13 + i.xy * (xx - yy) - i.xx * xy + (mx * vy - my * vx),
+            i.zz * ez - i.xz * u23 + i.yz * u13 + i.xy * (xx - yy) - i.xx * xy
+                + (mx * vy - my * vx),
         ]);
         set(&mut joint.force, k, force);
         set(&mut joint.moment, k, moment);

@@ -100,8 +100,16 @@ fn next_link<const TWIST: u8, const A: bool, const D: bool>(
         let (w, e, v) = (spin(s, c, w), spin(s, c, e), spin(s, c, v));
         let (turn, slide) = (turns * qd[k], slides * qd[k]);
         set(&mut motion.spin, k, w.plus_z(turn));
-        set(&mut motion.turning, k, (e + w.cross_z(turn)).plus_z(turns * qdd[k]));
-        set(&mut motion.proper, k, (v + w.cross_z(slide + slide)).plus_z(slides * qdd[k]));
+        set(
+            &mut motion.turning,
+            k,
+            (e + w.cross_z(turn)).plus_z(turns * qdd[k]),
+        );
+        set(
+            &mut motion.proper,
+            k,
+            (v + w.cross_z(slide + slide)).plus_z(slides * qdd[k]),
+        );
     }
 }
 
@@ -128,7 +136,13 @@ fn carried_axis<const TWIST: u8, const A: bool, const D: bool>(
         let field = Field::of(motion, k);
         let [vx, vy, vz] = field.proper;
         let Field {
-            xx, yy, zz, xy, xz, yz, ..
+            xx,
+            yy,
+            zz,
+            xy,
+            xz,
+            yz,
+            ..
         } = field;
         let [ex, ey, ez] = field.turning;
         m[k] = lx * vx + ly * vy + lz * vz;
@@ -302,4 +316,3 @@ fn link_energy<const TWIST: u8, const A: bool, const D: bool>(
         drive[k] = 0.5 * (qd[k] * qd[k]);
     }
 }
-
