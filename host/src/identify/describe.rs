@@ -43,11 +43,7 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
             joint.drive = Some(Drive {
                 gear_ratio: 1.0,
                 rotor_inertia: row[column::DRIVE_INERTIA],
-                torque_constant: 0.0,
-                resistance: None,
-                inductance: None,
-                encoder_counts_per_rev: None,
-                pole_pairs: None,
+                ..Default::default()
             });
         } else {
             // Without a drive there is no place for its inertia but the link's own.

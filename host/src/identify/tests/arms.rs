@@ -75,10 +75,7 @@ pub(super) fn arm(n: usize, seed: u64) -> Robot {
                 gear_ratio: 50.0,
                 rotor_inertia: scale * (1.0 + 0.5 * chance.even()) * 1e-4,
                 torque_constant: 0.05,
-                resistance: None,
-                inductance: None,
-                encoder_counts_per_rev: None,
-                pole_pairs: None,
+                ..Default::default()
             });
             // Poles of the joint with its own drive and some of its load.
             let bandwidth = 40.0;

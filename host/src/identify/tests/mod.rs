@@ -2,6 +2,7 @@
 
 mod arms;
 mod emps;
+mod judged;
 mod made;
 
 use super::*;
