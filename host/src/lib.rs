@@ -4,6 +4,7 @@
 //! [`robot`] is what is known beforehand, [`excite`] and [`simulate`] make motions, [`plant`] is the
 //! emulated rig that stands in for hardware, and [`commands`] are the program's verbs.
 
+pub mod batch;
 pub mod commands;
 pub mod data;
 pub mod demo;

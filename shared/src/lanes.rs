@@ -164,7 +164,7 @@ fn pick(mask: u64, yes: f64, no: f64) -> f64 {
 }
 
 #[inline(always)]
-fn sin_cos(x: f64) -> (f64, f64) {
+pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * core::f64::consts::FRAC_2_PI + ROUND;
     let count = rounded - ROUND;
     let quadrant = rounded.to_bits();

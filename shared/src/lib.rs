@@ -18,5 +18,6 @@ pub mod precompensation;
 pub mod safety;
 pub mod scalar;
 pub mod trajectory;
+pub mod transmission;
 pub mod units;
 pub mod wire;

@@ -140,6 +140,16 @@ pub enum Warning {
         /// Time missing beyond one sample period, s.
         lost: f64,
     },
+    /// An interval of a regular recording is too short or too long for its neighbours to be filtered together; a
+    /// new block begins.
+    Uneven {
+        /// Line of the row after it.
+        line: u64,
+        /// The interval, s.
+        step: f64,
+        /// The usual one, s.
+        period: f64,
+    },
     /// A column without meaning to the model holds something that is no number; it is NaN in
     /// [`super::Block::extra`].
     ExtraNotANumber {
@@ -162,6 +172,12 @@ impl fmt::Display for Warning {
                 write!(
                     f,
                     "line {line}: {lost:.6} s are missing after t = {from} s; the rows before and after are treated apart"
+                )
+            }
+            Self::Uneven { line, step, period } => {
+                write!(
+                    f,
+                    "line {line}: the time advances by {step:.6} s where {period:.6} s is usual; the rows before and after are treated apart"
                 )
             }
             Self::ExtraNotANumber { line, column } => {

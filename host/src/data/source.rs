@@ -25,6 +25,12 @@ const GAP: f64 = 1.5;
 /// The same for irregular recordings, whose intervals vary by nature.
 const IRREGULAR_GAP: f64 = 5.0;
 
+/// In a regular recording an interval that differs from the period by more than this share parts the rows before
+/// it from those after it: controllers whose clock settles over the first rows (KUKA LWR 3.4 and 6.5 ms instead
+/// of 5 ms, a micro-controller's 3.6 instead of 2 ms), a row sent twice. Time stamps in single precision and clocks
+/// that jitter stay well below.
+const UNEVEN: f64 = 0.2;
+
 /// Warnings that are kept; more are only counted, so that memory does not grow.
 const KEPT_WARNINGS: usize = 1000;
 
@@ -60,9 +66,32 @@ impl Sampling {
         }
     }
 
-    /// Longest interval within one block, s.
+    /// Longest interval that is not a gap, s.
     pub fn longest_interval(&self) -> f64 {
         self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
+    }
+
+    /// Whether rows so far apart in time belong to different blocks.
+    fn parts(&self, interval: f64) -> bool {
+        let uneven = !self.irregular && (interval - self.period).abs() > UNEVEN * self.period;
+        uneven || interval > self.longest_interval()
+    }
+
+    /// What is said of it.
+    fn parting(&self, line: u64, from: f64, now: f64) -> Warning {
+        if now - from > self.longest_interval() {
+            Warning::Gap {
+                line,
+                from,
+                lost: now - from - self.period,
+            }
+        } else {
+            Warning::Uneven {
+                line,
+                step: now - from,
+                period: self.period,
+            }
+        }
     }
 }
 
@@ -178,7 +207,7 @@ impl Source {
     }
 
     /// One pass over the recording in blocks of at most `rows_per_block` rows (at least 1); a block ends
-    /// early before a gap in time. After an error there are no further blocks.
+    /// early before a gap or an uneven step in time. After an error there are no further blocks.
     pub fn blocks(&self, rows_per_block: usize) -> Blocks<'_> {
         Blocks {
             source: self,
@@ -195,7 +224,7 @@ impl Source {
         }
     }
 
-    /// The whole recording, one block per stretch without a gap, and the warnings.
+    /// The whole recording, one block per evenly sampled stretch, and the warnings.
     pub fn read_all(&self) -> Result<(Vec<Block>, Vec<Warning>), DataError> {
         let mut blocks = self.blocks(usize::MAX);
         let mut all = Vec::new();
@@ -241,7 +270,7 @@ impl Blocks<'_> {
         &self.warnings
     }
 
-    /// Gaps in time so far.
+    /// Gaps and uneven steps in time so far.
     pub fn gaps(&self) -> u64 {
         self.gaps
     }
@@ -354,14 +383,10 @@ impl Blocks<'_> {
                     check_growth(&source.path, line, self.previous, now)?;
                     let before = self.previous.replace(now);
                     if let Some(from) = before
-                        && now - from > source.sampling.longest_interval()
+                        && source.sampling.parts(now - from)
                     {
                         self.gaps += 1;
-                        self.warn(Warning::Gap {
-                            line,
-                            from,
-                            lost: now - from - source.sampling.period,
-                        });
+                        self.warn(source.sampling.parting(line, from, now));
                         self.continues = false;
                         if block.is_some() {
                             self.pending = Some(line);

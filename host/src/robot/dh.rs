@@ -184,12 +184,7 @@ fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<
         friction: body.friction.clone(),
         drive: body.reduction.map(|gear_ratio| Drive {
             gear_ratio,
-            rotor_inertia: 0.0,
-            torque_constant: 0.0,
-            resistance: None,
-            inductance: None,
-            encoder_counts_per_rev: None,
-            pole_pairs: None,
+            ..Drive::default()
         }),
         controller: None,
     }

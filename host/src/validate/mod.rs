@@ -19,6 +19,7 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use motion::added_torque;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 

@@ -139,15 +139,15 @@ pub(super) fn check(
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Joint<T> {
     pub(super) kind: JointKind,
-    sin_alpha: T,
-    cos_alpha: T,
+    pub(super) sin_alpha: T,
+    pub(super) cos_alpha: T,
     /// Sine of the constant θ; used where prismatic.
-    sin_theta: T,
+    pub(super) sin_theta: T,
     /// Cosine of the constant θ; used where prismatic.
-    cos_theta: T,
-    a: T,
-    theta: T,
-    d: T,
+    pub(super) cos_theta: T,
+    pub(super) a: T,
+    pub(super) theta: T,
+    pub(super) d: T,
 }
 
 impl<T: Real> Joint<T> {

@@ -19,6 +19,7 @@
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
 mod adjoint;
+pub mod block;
 mod chain;
 mod coriolis;
 mod energy;

@@ -1,0 +1,28 @@
+//! Model mathematics over whole recordings: one call, many samples.
+//!
+//! The unit of work is a recording. Signals come as one column of samples a joint (`&[Vec<f64>]`, `&[&[f64]]`,
+//! `[[f64; N]; n]`, …, all columns of the same length N); results go into flat slices of the caller, column after
+//! column, each of N samples: entry `c` of sample `k` is `out[c * N + k]`. Nothing is allocated a sample.
+//!
+//! [`ModelBatch`] computes with the parameters of a robot, [`ChainBatch`] its regressors, which need the geometry
+//! alone. A written-out regressor is large (14·n² numbers a sample); where it is only going to be filtered,
+//! accumulated or multiplied, [`ChainBatch::each_differential_block`] hands it over in blocks of [`BLOCK`] samples
+//! that are still in the cache.
+//!
+//! Threads are the caller's business; [`over_threads`] cuts a recording into stretches.
+
+mod chain;
+mod error;
+mod model;
+mod signals;
+#[cfg(test)]
+mod tests;
+mod threads;
+
+pub use chain::{ChainBatch, RegressorBlock};
+pub use error::BatchError;
+pub use model::ModelBatch;
+pub use threads::over_threads;
+
+/// Samples in a full block of a regressor.
+pub const BLOCK: usize = 64;

@@ -1,0 +1,271 @@
+//! The batch against the functions of one sample.
+#![allow(clippy::unwrap_used)]
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rig_shared::multibody::{
+    COLUMNS, Chain, JointGeometry, JointKind, differential_regressor, energy_regressor,
+    forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
+};
+
+use super::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, over_threads};
+
+struct Made {
+    chain: Chain<f64>,
+    parameters: Vec<[f64; COLUMNS]>,
+    /// q, qd, qdd: columns.
+    signals: [Vec<Vec<f64>>; 3],
+}
+
+/// A random chain with quarter twists and zero lengths among its joints, as robots have, and `samples` of motion.
+fn made(n: usize, samples: usize, seed: u64) -> Made {
+    let mut rng = Pcg64::seed_from_u64(seed * 31 + n as u64);
+    let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+    let joints: Vec<JointGeometry> = (0..n)
+        .map(|_| {
+            let mut length = || match uniform(0.0, 2.0) {
+                x if x < 1.0 => 0.0,
+                x => x - 1.5,
+            };
+            let (a, d) = (length(), length());
+            JointGeometry {
+                kind: match uniform(0.0, 1.0) {
+                    x if x < 0.75 => JointKind::Revolute,
+                    _ => JointKind::Prismatic,
+                },
+                alpha: match uniform(0.0, 5.0) {
+                    x if x < 4.0 => std::f64::consts::FRAC_PI_2 * x.floor(),
+                    x => (x - 4.5) * 3.0,
+                },
+                a,
+                theta: uniform(-3.0, 3.0),
+                d,
+            }
+        })
+        .collect();
+    let gravity = [uniform(-9.0, 9.0), uniform(-9.0, 9.0), uniform(-9.0, 9.0)];
+    let parameters = (0..n)
+        .map(|_| {
+            // A box about a point, so a body that exists.
+            let m = uniform(0.5, 5.0);
+            let c = [uniform(-0.3, 0.3), uniform(-0.3, 0.3), uniform(-0.3, 0.3)];
+            let s = [uniform(0.01, 0.2), uniform(0.01, 0.2), uniform(0.01, 0.2)];
+            let second = |i: usize, j: usize| c[i] * c[j] + if i == j { s[i] * s[i] } else { 0.0 };
+            [
+                m,
+                m * c[0],
+                m * c[1],
+                m * c[2],
+                m * (second(1, 1) + second(2, 2)),
+                -m * second(0, 1),
+                -m * second(0, 2),
+                m * (second(0, 0) + second(2, 2)),
+                -m * second(1, 2),
+                m * (second(0, 0) + second(1, 1)),
+                uniform(0.0, 0.5),
+                uniform(0.0, 2.0),
+                uniform(0.0, 2.0),
+                uniform(-1.0, 1.0),
+            ]
+        })
+        .collect();
+    let mut signal = |range: f64| -> Vec<Vec<f64>> {
+        (0..n)
+            .map(|_| (0..samples).map(|_| uniform(-range, range)).collect())
+            .collect()
+    };
+    let signals = [signal(3.0), signal(3.0), signal(10.0)];
+    Made {
+        chain: Chain::new(&joints, gravity).unwrap(),
+        parameters,
+        signals,
+    }
+}
+
+fn at(columns: &[Vec<f64>], k: usize) -> Vec<f64> {
+    columns.iter().map(|c| c[k]).collect()
+}
+
+/// Entry by entry against one row of the expected, relative to the row's largest.
+fn compare(what: &str, out: &[f64], samples: usize, k: usize, expected: &[f64], tolerance: f64) {
+    let scale = expected.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+    for (c, value) in expected.iter().enumerate() {
+        let found = out[c * samples + k];
+        assert!(
+            (found - value).abs() <= tolerance * scale,
+            "{what}, sample {k}, entry {c}: {found} is not {value}"
+        );
+    }
+}
+
+const LENGTHS: [usize; 7] = [1, 2, 3, 6, 7, 9, 16];
+
+#[test]
+fn every_function_agrees_with_that_of_one_sample() {
+    for n in LENGTHS {
+        for seed in 0..6 {
+            // Full blocks, a part of one, and less than one.
+            let count = [2 * BLOCK + 17, BLOCK, 5, 1, 3, 2 * BLOCK][seed as usize];
+            let made = made(n, count, seed);
+            let (chain, p) = (&made.chain, &made.parameters);
+            let [q, qd, qdd] = &made.signals;
+            let model = ModelBatch::new(chain, p).unwrap();
+            let regressors = ChainBatch::new(chain);
+            let mut tau = vec![f64::NAN; n * count];
+            model.inverse_dynamics(q, qd, qdd, &mut tau).unwrap();
+            let mut gravity = vec![f64::NAN; n * count];
+            model.gravity(q, &mut gravity).unwrap();
+            let mut inertia = vec![f64::NAN; n * n * count];
+            model.inertia_matrix(q, &mut inertia).unwrap();
+            let torques: Vec<&[f64]> = tau.chunks_exact(count).collect();
+            let [q_, qd_] = [q, qd].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            let mut found = vec![f64::NAN; n * count];
+            model
+                .forward_dynamics(&q_, &qd_, &torques, &mut found)
+                .unwrap();
+            let width = n * COLUMNS;
+            let mut energy = vec![f64::NAN; width * count];
+            regressors.energy_regressor(q, qd, &mut energy).unwrap();
+            let mut matrix = vec![f64::NAN; n * width * count];
+            regressors
+                .differential_regressor(q, qd, qdd, &mut matrix)
+                .unwrap();
+            for k in 0..count {
+                let (a, b, c) = (at(q, k), at(qd, k), at(qdd, k));
+                let mut row = vec![0.0; n];
+                inverse_dynamics(chain, p, &a, &b, &c, &mut row).unwrap();
+                compare("torque", &tau, count, k, &row, 1e-13);
+                gravity_vector(chain, p, &a, &mut row).unwrap();
+                compare("gravity", &gravity, count, k, &row, 1e-13);
+                let t: Vec<f64> = torques.iter().map(|c| c[k]).collect();
+                forward_dynamics(chain, p, &a, &b, &t, &mut row).unwrap();
+                compare("acceleration", &found, count, k, &row, 1e-9);
+                let mut square = vec![0.0; n * n];
+                inertia_matrix(chain, p, &a, &mut square).unwrap();
+                compare("inertia", &inertia, count, k, &square, 1e-13);
+                let mut line = vec![0.0; width];
+                energy_regressor(chain, &a, &b, &mut line).unwrap();
+                compare("energy", &energy, count, k, &line, 1e-13);
+                let mut wide = vec![0.0; n * width];
+                differential_regressor(chain, &a, &b, &c, &mut wide).unwrap();
+                compare("regressor", &matrix, count, k, &wide, 1e-13);
+            }
+        }
+    }
+}
+
+#[test]
+fn blocks_cover_every_sample_once_and_say_which_columns_are_zero() {
+    let count = 3 * BLOCK + 5;
+    let made = made(5, count, 1);
+    let [q, qd, qdd] = &made.signals;
+    let batch = ChainBatch::new(&made.chain);
+    let mut block = batch.block();
+    let mut next = 0;
+    batch
+        .each_differential_block(q, qd, qdd, &mut block, |block| {
+            assert_eq!(block.start(), next);
+            assert!(!block.is_empty());
+            for joint in 0..5 {
+                for c in 0..5 * COLUMNS {
+                    let column = block.column(joint, c);
+                    assert_eq!(column.len(), block.len());
+                    if RegressorBlock::is_zero(joint, c) {
+                        assert!(column.iter().all(|x| *x == 0.0));
+                    }
+                }
+            }
+            next += block.len();
+            Ok::<(), BatchError>(())
+        })
+        .unwrap();
+    assert_eq!(next, count);
+}
+
+#[test]
+fn threads_change_nothing() {
+    let count = 7 * BLOCK + 11;
+    let made = made(6, count, 2);
+    let model = ModelBatch::new(&made.chain, &made.parameters).unwrap();
+    let work = |range: std::ops::Range<usize>| {
+        let [q, qd, qdd] = [0, 1, 2].map(|s| {
+            made.signals[s]
+                .iter()
+                .map(|c| &c[range.clone()])
+                .collect::<Vec<_>>()
+        });
+        let mut tau = vec![f64::NAN; 6 * range.len()];
+        model.inverse_dynamics(&q, &qd, &qdd, &mut tau).unwrap();
+        (range, tau)
+    };
+    let (_, whole) = work(0..count);
+    for threads in [1, 2, 3, 50] {
+        let mut next = 0;
+        for (range, part) in over_threads(count, threads, work) {
+            assert_eq!(range.start, next);
+            next = range.end;
+            for (joint, column) in part.chunks_exact(range.len()).enumerate() {
+                assert_eq!(
+                    column,
+                    &whole[joint * count + range.start..joint * count + range.end]
+                );
+            }
+        }
+        assert_eq!(next, count);
+    }
+    assert_eq!(over_threads(0, 4, |range| range.len()), [0]);
+}
+
+#[test]
+fn wrong_shapes_are_named() {
+    let made = made(2, 10, 3);
+    let [q, qd, qdd] = &made.signals;
+    let model = ModelBatch::new(&made.chain, &made.parameters).unwrap();
+    let mut out = vec![0.0; 20];
+    assert_eq!(
+        model.inverse_dynamics(q, &qd[..1], qdd, &mut out),
+        Err(BatchError::WrongColumns {
+            argument: "qd",
+            expected: 2,
+            found: 1
+        })
+    );
+    let short = vec![qdd[0].clone(), vec![0.0; 9]];
+    assert_eq!(
+        model.inverse_dynamics(q, qd, &short, &mut out),
+        Err(BatchError::WrongSamples {
+            argument: "qdd",
+            joint: 1,
+            expected: 10,
+            found: 9
+        })
+    );
+    assert_eq!(
+        model.inertia_matrix(q, &mut out),
+        Err(BatchError::WrongOutput {
+            columns: 4,
+            samples: 10,
+            found: 20
+        })
+    );
+    assert!(matches!(
+        ModelBatch::new(&made.chain, &made.parameters[..1]),
+        Err(BatchError::Multibody(_))
+    ));
+}
+
+#[test]
+fn the_first_sample_whose_inertia_matrix_is_not_positive_definite_is_named() {
+    let count = 2 * BLOCK;
+    let made = made(3, count, 4);
+    let [mut q, qd, tau] = made.signals;
+    let model = ModelBatch::new(&made.chain, &made.parameters).unwrap();
+    let mut out = vec![0.0; 3 * count];
+    model.forward_dynamics(&q, &qd, &tau, &mut out).unwrap();
+    q[2][BLOCK + 9] = f64::NAN;
+    q[2][BLOCK + 30] = f64::NAN;
+    assert!(matches!(
+        model.forward_dynamics(&q, &qd, &tau, &mut out),
+        Err(BatchError::NotPositiveDefinite { sample, .. }) if sample == BLOCK + 9
+    ));
+}

@@ -1,0 +1,112 @@
+//! Parameters gathered where they act alike.
+
+use super::super::chain::Chain;
+use super::super::parameters::{COLUMNS, column, inertia};
+use super::super::spatial::{Inertia, Symmetric3, Vector3};
+
+/// The parameters of a joint after gathering, and those of its drive and friction.
+///
+/// A thin rod along the axis of a revolute joint (mass m, first moment (0, 0, mz), inertia diag(Iyy, Iyy, 0)) does not
+/// notice the joint turning: it may as well belong to the link before. A body without mass and first moment does not
+/// notice a prismatic joint sliding. Handing these parts down from the tip to the base leaves every torque and the inertia
+/// matrix what they were, and takes three parameters out of every revolute joint, six out of every prismatic one
+/// (Gautier & Khalil 1990; the grouping of customised Newton–Euler, Khalil & Kleinfinger 1987).
+/// What arrives at the base acts on no joint.
+#[derive(Clone, Copy, Debug)]
+pub struct Body {
+    /// Zero where revolute.
+    pub(super) mass: f64,
+    /// z component zero where revolute.
+    pub(super) first_moment: [f64; 3],
+    /// Zero where prismatic; `yy` zero where revolute.
+    pub(super) inertia: Symmetric3<f64>,
+    pub(super) drive: f64,
+    pub(super) viscous: f64,
+    pub(super) coulomb: f64,
+    pub(super) offset: f64,
+}
+
+impl Body {
+    /// Gathers the `parameters`, one row a joint of `chain`, into `bodies` (both of the chain's length).
+    pub fn gather(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]], bodies: &mut [Self]) {
+        let nothing = Inertia {
+            mass: 0.0,
+            first_moment: Vector3([0.0; 3]),
+            inertia: Symmetric3 {
+                xx: 0.0,
+                xy: 0.0,
+                xz: 0.0,
+                yy: 0.0,
+                yz: 0.0,
+                zz: 0.0,
+            },
+        };
+        let mut handed = nothing;
+        for ((joint, row), body) in chain.joints.iter().zip(parameters).zip(bodies).rev() {
+            let own = inertia(row).plus(handed);
+            let Vector3([mx, my, mz]) = own.first_moment;
+            let i = own.inertia;
+            let (kept, handed_down) = match joint.kind {
+                super::super::chain::JointKind::Revolute => (
+                    Inertia {
+                        mass: 0.0,
+                        first_moment: Vector3([mx, my, 0.0]),
+                        inertia: Symmetric3 {
+                            xx: i.xx - i.yy,
+                            yy: 0.0,
+                            ..i
+                        },
+                    },
+                    Inertia {
+                        mass: own.mass,
+                        first_moment: Vector3([0.0, 0.0, mz]),
+                        inertia: Symmetric3 {
+                            xx: i.yy,
+                            yy: i.yy,
+                            ..nothing.inertia
+                        },
+                    },
+                ),
+                super::super::chain::JointKind::Prismatic => (
+                    Inertia {
+                        inertia: nothing.inertia,
+                        ..own
+                    },
+                    Inertia {
+                        inertia: i,
+                        ..nothing
+                    },
+                ),
+            };
+            *body = Self {
+                mass: kept.mass,
+                first_moment: kept.first_moment.0,
+                inertia: kept.inertia,
+                drive: row[column::DRIVE_INERTIA],
+                viscous: row[column::VISCOUS],
+                coulomb: row[column::COULOMB],
+                offset: row[column::OFFSET],
+            };
+            // Where the joint stands does not matter to what is handed down.
+            handed = joint.transform(0.0).inertia_to_parent(handed_down);
+        }
+    }
+
+    /// No body at all, to be overwritten.
+    pub const NOTHING: Self = Self {
+        mass: 0.0,
+        first_moment: [0.0; 3],
+        inertia: Symmetric3 {
+            xx: 0.0,
+            xy: 0.0,
+            xz: 0.0,
+            yy: 0.0,
+            yz: 0.0,
+            zz: 0.0,
+        },
+        drive: 0.0,
+        viscous: 0.0,
+        coulomb: 0.0,
+        offset: 0.0,
+    };
+}

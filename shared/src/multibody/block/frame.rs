@@ -1,0 +1,275 @@
+//! Joints prepared for blocks.
+
+use super::super::chain::{Chain, JointKind};
+use super::super::spatial::Vector3;
+use super::{LANES, Lane};
+use crate::lanes;
+
+/// A joint of the chain with what is known of it before any sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    pub(super) prismatic: bool,
+    pub(super) twist: Twist,
+    pub(super) sin_alpha: f64,
+    pub(super) cos_alpha: f64,
+    pub(super) a: f64,
+    pub(super) theta: f64,
+    pub(super) d: f64,
+    pub(super) sin_theta: f64,
+    pub(super) cos_theta: f64,
+}
+
+/// Kinds of twist α that have loop bodies of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Twist {
+    /// α = 0: parallel axes.
+    None,
+    /// α = π/2.
+    Quarter,
+    /// α = −π/2.
+    MinusQuarter,
+    /// Any other.
+    General,
+}
+
+impl Frame {
+    /// The joints of a chain, base first.
+    pub fn of(chain: &Chain<f64>) -> impl Iterator<Item = Self> {
+        chain.joints.iter().map(|joint| Self {
+            prismatic: joint.kind == JointKind::Prismatic,
+            twist: match (joint.sin_alpha, joint.cos_alpha) {
+                (0.0, 1.0) => Twist::None,
+                (1.0, 0.0) => Twist::Quarter,
+                (-1.0, 0.0) => Twist::MinusQuarter,
+                _ => Twist::General,
+            },
+            sin_alpha: joint.sin_alpha,
+            cos_alpha: joint.cos_alpha,
+            a: joint.a,
+            theta: joint.theta,
+            d: joint.d,
+            sin_theta: joint.sin_theta,
+            cos_theta: joint.cos_theta,
+        })
+    }
+
+    /// Sine and cosine of the angle about z.
+    #[inline(always)]
+    pub(super) fn angle(&self, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
+        if self.prismatic {
+            sin.fill(self.sin_theta);
+            cos.fill(self.cos_theta);
+            return;
+        }
+        // An integer, because a maximum of floats is not a vector operation where NaN may occur.
+        let mut beyond = 0;
+        for k in 0..LANES {
+            let angle = self.theta + q[k];
+            beyond |= u64::from(angle.abs() > lanes::ANGLE_LIMIT);
+            (sin[k], cos[k]) = lanes::sin_cos(angle);
+        }
+        if beyond != 0 {
+            large_angles(self.theta, q, sin, cos);
+        }
+    }
+}
+
+/// The same for any angle.
+#[cold]
+#[inline(never)]
+fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
+    for k in 0..LANES {
+        (sin[k], cos[k]) = libm::sincos(theta + q[k]);
+    }
+}
+
+/// The constant part of a joint's place, with the kinds of twist and the zeros known to the compiler.
+///
+/// Between frames i − 1 and i lies the frame that α alone has turned; the origin of frame i has there the
+/// coordinates (a, 0, d) whatever the twist, and offsets are therefore applied there.
+#[derive(Clone, Copy)]
+pub(super) struct Place<const TWIST: u8, const A: bool, const D: bool> {
+    pub(super) sin_alpha: f64,
+    pub(super) cos_alpha: f64,
+    pub(super) a: f64,
+    pub(super) d: f64,
+}
+
+pub(super) const NONE: u8 = 0;
+pub(super) const QUARTER: u8 = 1;
+pub(super) const MINUS_QUARTER: u8 = 2;
+pub(super) const GENERAL: u8 = 3;
+
+impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
+    #[inline(always)]
+    pub(super) fn new(frame: &Frame) -> Self {
+        Self {
+            sin_alpha: frame.sin_alpha,
+            cos_alpha: frame.cos_alpha,
+            a: frame.a,
+            d: frame.d,
+        }
+    }
+
+    /// A direction of frame i − 1 in the turned frame.
+    #[inline(always)]
+    pub(super) fn turn(&self, v: Vector3<f64>) -> Vector3<f64> {
+        let [x, y, z] = v.0;
+        let (s, c) = (self.sin_alpha, self.cos_alpha);
+        match TWIST {
+            NONE => v,
+            QUARTER => Vector3([x, z, -y]),
+            MINUS_QUARTER => Vector3([x, -z, y]),
+            _ => Vector3([x, c * y + s * z, c * z - s * y]),
+        }
+    }
+
+    /// A direction of the turned frame in frame i − 1.
+    #[inline(always)]
+    pub(super) fn turn_back(&self, v: Vector3<f64>) -> Vector3<f64> {
+        let [x, y, z] = v.0;
+        let (s, c) = (self.sin_alpha, self.cos_alpha);
+        match TWIST {
+            NONE => v,
+            QUARTER => Vector3([x, -z, y]),
+            MINUS_QUARTER => Vector3([x, z, -y]),
+            _ => Vector3([x, c * y - s * z, s * y + c * z]),
+        }
+    }
+
+    /// `v` plus the acceleration of the origin of frame i against that of frame i − 1 at angular velocity
+    /// `w` and acceleration `e`, all in the turned frame: ė × p + w × (w × p) with p = (a, 0, d).
+    #[inline(always)]
+    pub(super) fn carry(&self, v: Vector3<f64>, w: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
+        let ([mut x, mut y, mut z], [wx, wy, wz], [ex, ey, ez]) = (v.0, w.0, e.0);
+        if A {
+            x -= (wy * wy + wz * wz) * self.a;
+            y += (wx * wy + ez) * self.a;
+            z += (wx * wz - ey) * self.a;
+        }
+        if D {
+            x += (wx * wz + ey) * self.d;
+            y += (wy * wz - ex) * self.d;
+            z -= (wx * wx + wy * wy) * self.d;
+        }
+        Vector3([x, y, z])
+    }
+
+    /// `v` plus the velocity of the origin of frame i against that of frame i − 1 at angular velocity `w`: w × p.
+    #[inline(always)]
+    pub(super) fn sweep(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
+        let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);
+        if A {
+            y += wz * self.a;
+            z -= wy * self.a;
+        }
+        if D {
+            x += wy * self.d;
+            y -= wx * self.d;
+        }
+        Vector3([x, y, z])
+    }
+
+    /// A wrench after the turn about z, in frame i − 1.
+    #[inline(always)]
+    pub(super) fn wrench_back(
+        &self,
+        s: f64,
+        c: f64,
+        force: Vector3<f64>,
+        moment: Vector3<f64>,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let f = spin_back(s, c, force);
+        let m = self.lever(spin_back(s, c, moment), f);
+        (self.turn_back(f), self.turn_back(m))
+    }
+
+    /// `m` plus p × f with p = (a, 0, d).
+    #[inline(always)]
+    pub(super) fn lever(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
+        let ([mut x, mut y, mut z], [fx, fy, fz]) = (m.0, f.0);
+        if A {
+            y -= self.a * fz;
+            z += self.a * fy;
+        }
+        if D {
+            x -= self.d * fy;
+            y += self.d * fx;
+        }
+        Vector3([x, y, z])
+    }
+}
+
+/// The constant part of a prismatic joint's place at position `q`.
+#[inline(always)]
+pub(super) fn slid(frame: &Frame, q: f64) -> Place<GENERAL, true, true> {
+    Place {
+        d: frame.d + q,
+        ..Place::new(frame)
+    }
+}
+
+/// A direction before the turn about z, written after it.
+#[inline(always)]
+pub(super) fn spin(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+    let [x, y, z] = v.0;
+    Vector3([c * x + s * y, c * y - s * x, z])
+}
+
+/// A direction after the turn about z, written before it.
+#[inline(always)]
+pub(super) fn spin_back(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+    let [x, y, z] = v.0;
+    Vector3([c * x - s * y, s * x + c * y, z])
+}
+
+/// Runs an expression with a function that gives the [`Place`] of a joint at a lane, its kind of twist and zeros known to the
+/// compiler: one copy of the expression for each kind of revolute joint and one for prismatic joints, whose position is `q`.
+macro_rules! at_each_lane {
+    ($frame:expr, $q:expr, $place:ident => $body:expr) => {{
+        let frame: &$crate::multibody::block::Frame = $frame;
+        if frame.prismatic {
+            let q: &$crate::multibody::block::Lane = $q;
+            let $place = |k: usize| $crate::multibody::block::frame::slid(frame, q[k]);
+            $body
+        } else {
+            $crate::multibody::block::frame::placed!(frame, place => {
+                let $place = |_: usize| place;
+                $body
+            })
+        }
+    }};
+}
+pub(super) use at_each_lane;
+
+/// Runs an expression with the [`Place`] of a revolute joint whose kind of twist and zeros are known to the compiler.
+macro_rules! placed {
+    ($frame:expr, $place:ident => $body:expr) => {{
+        use $crate::multibody::block::frame::{
+            GENERAL, MINUS_QUARTER, NONE, Place, QUARTER, Twist,
+        };
+        let frame: &$crate::multibody::block::Frame = $frame;
+        macro_rules! run {
+            ($twist:ident, $a:literal, $d:literal) => {{
+                let $place = Place::<$twist, $a, $d>::new(frame);
+                $body
+            }};
+        }
+        match (frame.twist, frame.a != 0.0, frame.d != 0.0) {
+            (Twist::None, false, false) => run!(NONE, false, false),
+            (Twist::None, false, true) => run!(NONE, false, true),
+            (Twist::None, true, false) => run!(NONE, true, false),
+            (Twist::None, true, true) => run!(NONE, true, true),
+            (Twist::Quarter, false, false) => run!(QUARTER, false, false),
+            (Twist::Quarter, false, true) => run!(QUARTER, false, true),
+            (Twist::Quarter, true, false) => run!(QUARTER, true, false),
+            (Twist::Quarter, true, true) => run!(QUARTER, true, true),
+            (Twist::MinusQuarter, false, false) => run!(MINUS_QUARTER, false, false),
+            (Twist::MinusQuarter, false, true) => run!(MINUS_QUARTER, false, true),
+            (Twist::MinusQuarter, true, false) => run!(MINUS_QUARTER, true, false),
+            (Twist::MinusQuarter, true, true) => run!(MINUS_QUARTER, true, true),
+            (Twist::General, _, _) => run!(GENERAL, true, true),
+        }
+    }};
+}
+pub(super) use placed;

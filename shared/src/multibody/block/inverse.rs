@@ -1,0 +1,238 @@
+//! Inverse dynamics of a block.
+
+use super::super::spatial::Vector3;
+use super::frame::{GENERAL, Place, at_each_lane, placed, slid, spin};
+use super::{Body, Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use crate::scalar::Real;
+
+/// What the way outwards leaves at a joint for the way back.
+#[derive(Clone, Copy, Debug)]
+pub struct JointBlock {
+    pub(super) sin: Lane,
+    pub(super) cos: Lane,
+    /// Torques in of the inertial wrench of the link.
+    pub(super) force: Lane3,
+    pub(super) moment: Lane3,
+}
+
+impl JointBlock {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        sin: ZERO,
+        cos: ZERO,
+        force: ZERO3,
+        moment: ZERO3,
+    };
+}
+
+/// Angular velocity and acceleration of a link and the acceleration of its origin less gravity, in its frame.
+struct MotionBlock {
+    spin: Lane3,
+    turning: Lane3,
+    proper: Lane3,
+}
+
+/// Torques of the links and drives, friction and offsets: recursive Newton–Euler (Luh, Walker & Paul 1980) in its
+/// customised form (Khalil & Kleinfinger 1987).
+///
+/// `frames`, `bodies`, `work` and the signals have one entry a joint; without `qdd` the accelerations are zero.
+#[inline(always)]
+pub fn inverse_dynamics(
+    frames: &[Frame],
+    gravity: [f64; 3],
+    bodies: &[Body],
+    q: &[Lane],
+    qd: &[Lane],
+    qdd: Option<&[Lane]>,
+    work: &mut [JointBlock],
+    tau: &mut [Lane],
+) {
+    let still = ZERO;
+    let qdd = |i: usize| qdd.map_or(&still, |qdd| &qdd[i]);
+    let mut motion = MotionBlock {
+        spin: ZERO3,
+        turning: ZERO3,
+        proper: gravity.map(|g| [-g; LANES]),
+    };
+    for (i, frame) in frames.iter().enumerate() {
+        let joint = &mut work[i];
+        frame.angle(&q[i], &mut joint.sin, &mut joint.cos);
+        if i == 0 && !frame.prismatic {
+            first_revolute(
+                frame,
+                gravity,
+                &bodies[i],
+                &qd[i],
+                qdd(i),
+                &mut motion,
+                joint,
+            );
+        } else if frame.prismatic {
+            outwards_prismatic(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
+        } else {
+            placed!(frame, place => outwards(place, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
+        }
+    }
+    for (i, frame) in frames.iter().enumerate().rev() {
+        let body = &bodies[i];
+        let (before, joint) = work.split_at_mut(i);
+        let joint = &joint[0];
+        let along = if frame.prismatic {
+            &joint.force[2]
+        } else {
+            &joint.moment[2]
+        };
+        let qdd = qdd(i);
+        for k in 0..LANES {
+            tau[i][k] = along[k]
+                + body.drive * qdd[k]
+                + body.viscous * qd[i][k]
+                + body.coulomb * qd[i][k].sgn()
+                + body.offset;
+        }
+        if let Some(parent) = before.last_mut() {
+            if i == 1 && !frames[0].prismatic {
+                at_each_lane!(frame, &q[i], place => inwards_along_axis(place, joint, parent));
+            } else {
+                at_each_lane!(frame, &q[i], place => inwards(place, joint, parent));
+            }
+        }
+    }
+}
+
+/// Over a revolute joint to the next link outwards, and that link's inertial wrench.
+#[inline(always)]
+fn outwards<const TWIST: u8, const A: bool, const D: bool>(
+    place: Place<TWIST, A, D>,
+    body: &Body,
+    qd: &Lane,
+    qdd: &Lane,
+    motion: &mut MotionBlock,
+    joint: &mut JointBlock,
+) {
+    let [mx, my, _] = body.first_moment;
+    let i = body.inertia;
+    for k in 0..LANES {
+        let w = place.turn(get(&motion.spin, k));
+        let e = place.turn(get(&motion.turning, k));
+        let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
+        let (s, c) = (joint.sin[k], joint.cos[k]);
+        let [wx, wy, wz] = spin(s, c, w).0;
+        let [ex, ey, ez] = spin(s, c, e).0;
+        let v = spin(s, c, v);
+        let (ex, ey, ez) = (ex + wy * qd[k], ey - wx * qd[k], ez + qdd[k]);
+        let wz = wz + qd[k];
+        set(&mut motion.spin, k, Vector3([wx, wy, wz]));
+        set(&mut motion.turning, k, Vector3([ex, ey, ez]));
+        set(&mut motion.proper, k, v);
+        let [vx, vy, vz] = v.0;
+        let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
+        let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
+        // The matrix of the acceleration field, ė× + ω×ω×; its entries serve force and moment alike.
+        let (u21, u12) = (xy + ez, xy - ez);
+        let (u31, u13) = (xz - ey, xz + ey);
+        let (u32, u23) = (yz + ex, yz - ex);
+        let force = Vector3([
+            u12 * my - (yy + zz) * mx,
+            u21 * mx - (xx + zz) * my,
+            u31 * mx + u32 * my,
+        ]);
+        // ∫ r × (U·r) dm, and first moment × acceleration of the origin.
+        let moment = Vector3([
+            i.xx * ex - i.xy * u31 + i.xz * u21 + i.yz * (yy - zz) + i.zz * yz + my * vz,
+            i.xx * xz + i.xy * u32 - i.yz * u12 + i.xz * (zz - xx) - i.zz * xz - mx * vz,
+            i.zz * ez - i.xz * u23 + i.yz * u13 + i.xy * (xx - yy) - i.xx * xy
+                + (mx * vy - my * vx),
+        ]);
+        set(&mut joint.force, k, force);
+        set(&mut joint.moment, k, moment);
+    }
+}
+
+/// Over the first joint, where it is revolute: the base does not move, and of the link's wrench only the moment along
+/// the joint is ever asked for.
+#[inline(always)]
+fn first_revolute(
+    frame: &Frame,
+    gravity: [f64; 3],
+    body: &Body,
+    qd: &Lane,
+    qdd: &Lane,
+    motion: &mut MotionBlock,
+    joint: &mut JointBlock,
+) {
+    let [mx, my, _] = body.first_moment;
+    let up = Place::<GENERAL, true, true>::new(frame).turn(-Vector3(gravity));
+    for k in 0..LANES {
+        let v = spin(joint.sin[k], joint.cos[k], up);
+        set(&mut motion.spin, k, Vector3([0.0, 0.0, qd[k]]));
+        set(&mut motion.turning, k, Vector3([0.0, 0.0, qdd[k]]));
+        set(&mut motion.proper, k, v);
+        let [vx, vy, _] = v.0;
+        joint.moment[2][k] = body.inertia.zz * qdd[k] + (mx * vy - my * vx);
+    }
+}
+
+/// Over a prismatic joint likewise.
+#[inline(always)]
+fn outwards_prismatic(
+    frame: &Frame,
+    body: &Body,
+    q: &Lane,
+    qd: &Lane,
+    qdd: &Lane,
+    motion: &mut MotionBlock,
+    joint: &mut JointBlock,
+) {
+    let [mx, my, mz] = body.first_moment;
+    for k in 0..LANES {
+        let place = slid(frame, q[k]);
+        let w = place.turn(get(&motion.spin, k));
+        let e = place.turn(get(&motion.turning, k));
+        let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
+        let (s, c) = (joint.sin[k], joint.cos[k]);
+        let w = spin(s, c, w);
+        let e = spin(s, c, e);
+        let v = (spin(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
+        set(&mut motion.spin, k, w);
+        set(&mut motion.turning, k, e);
+        set(&mut motion.proper, k, v);
+        let m = Vector3([mx, my, mz]);
+        set(
+            &mut joint.force,
+            k,
+            v.scaled(body.mass) + e.cross(m) + w.cross(w.cross(m)),
+        );
+        set(&mut joint.moment, k, m.cross(v));
+    }
+}
+
+/// Adds a link's wrench to that of the link before.
+#[inline(always)]
+fn inwards<const TWIST: u8, const A: bool, const D: bool>(
+    place: impl Fn(usize) -> Place<TWIST, A, D>,
+    joint: &JointBlock,
+    parent: &mut JointBlock,
+) {
+    for k in 0..LANES {
+        let (s, c) = (joint.sin[k], joint.cos[k]);
+        let (f, m) = place(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
+        let (force, moment) = (get(&parent.force, k) + f, get(&parent.moment, k) + m);
+        set(&mut parent.force, k, force);
+        set(&mut parent.moment, k, moment);
+    }
+}
+
+/// Likewise, where only the moment along the parent's axis is asked for.
+#[inline(always)]
+fn inwards_along_axis<const TWIST: u8, const A: bool, const D: bool>(
+    place: impl Fn(usize) -> Place<TWIST, A, D>,
+    joint: &JointBlock,
+    parent: &mut JointBlock,
+) {
+    for k in 0..LANES {
+        let (s, c) = (joint.sin[k], joint.cos[k]);
+        let (_, m) = place(k).wrench_back(s, c, get(&joint.force, k), get(&joint.moment, k));
+        parent.moment[2][k] += m.z();
+    }
+}
