@@ -10,6 +10,7 @@ mod link;
 mod pins;
 mod pwm;
 pub(crate) mod start;
+mod queue;
 mod stack;
 mod storage;
 mod tick;
