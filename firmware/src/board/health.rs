@@ -57,7 +57,7 @@ impl Checkup {
             crystal: self.start.crystal,
             tick_cycles_max: self.max,
             // At 10 kHz the sum of a second is below 2³² by far: every tick is shorter than its period.
-            tick_cycles_mean: self.sum / self.ticks,
+            tick_cycles_mean: self.sum / self.ticks.max(1),
             stack_free: stack::free(),
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             dropped,

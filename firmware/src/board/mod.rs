@@ -8,6 +8,7 @@ mod fault;
 mod health;
 mod link;
 mod pins;
+mod probe;
 mod pwm;
 pub(crate) mod start;
 mod queue;

@@ -23,8 +23,7 @@ use super::storage::Storage;
 use super::queue::{Inlet, Outlet};
 use super::tick::{NOTES, REQUESTS, Tick};
 use super::watchdog::Watchdog;
-use super::{cycles, health, link, stack, tick};
-use defmt_rtt as _;
+use super::{cycles, health, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -38,6 +37,7 @@ static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Brings the board up and runs it.
 pub(crate) fn run() -> ! {
+    let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
     let crystal = clock::crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
@@ -92,8 +92,8 @@ pub(crate) fn run() -> ! {
     EXECUTOR.init(Executor::new()).run(|spawner| {
         // Each is spawned once, and its place is reserved at compile time.
         let placed = (
-            link::telemetry(config, sender, note_out),
-            link::commands(receiver, request_in),
+            link::telemetry(config, sender, probe_out, note_out),
+            link::commands(receiver, probe_in, request_in),
             indicator(watchdog, pins.led),
             keeper(storage, from_tick),
         );
