@@ -7,9 +7,7 @@
 
 use core::num::NonZeroU32;
 
-use embassy_stm32::pac::timer::vals::{
-    CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms,
-};
+use embassy_stm32::pac::timer::vals::{CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms};
 use embassy_stm32::pac::{RCC, TIM2};
 use rig_shared::units::EncoderCount;
 
