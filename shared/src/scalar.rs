@@ -214,7 +214,7 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        libm::sincosf(self)
+        crate::sincos::sincosf(self)
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

@@ -134,5 +134,10 @@ pub fn describe(refusal: Refusal) -> &'static str {
             "the trajectory would leave the limits; make it smaller or slower"
         }
         Refusal::NoTrajectory => "no trajectory is loaded; upload one first",
+        Refusal::Busy => "the settings are being stored; try again in a moment",
+        Refusal::NoStorage => "this rig has no memory that keeps settings",
+        Refusal::StorageFailed => {
+            "the memory did not take the settings; those stored before still stand"
+        }
     }
 }

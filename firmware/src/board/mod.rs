@@ -1,0 +1,17 @@
+//! Everything that knows the chip. `unsafe` stands only where hardware needs it, with the reason beside it.
+
+mod adc;
+mod clock;
+mod cycles;
+mod encoder;
+mod fault;
+mod health;
+mod link;
+mod pins;
+mod pwm;
+pub(crate) mod start;
+mod queue;
+mod stack;
+mod storage;
+mod tick;
+mod watchdog;
