@@ -153,7 +153,11 @@ impl Board {
     pub fn advance(&mut self, now: Instant) {
         self.integrate(now);
         let on = 2.0 * self.on_time >= self.period as f64;
-        let duty = if on { self.duty_time / self.on_time } else { 0.0 };
+        let duty = if on {
+            self.duty_time / self.on_time
+        } else {
+            0.0
+        };
         self.duty_time = 0.0;
         self.on_time = 0.0;
         let command = Command {
@@ -194,8 +198,8 @@ impl Board {
         let count = self.count(now);
         let before = self.true_count;
         self.true_count = count;
-        let index = (count.div_euclid(self.turn) != before.div_euclid(self.turn))
-            .then_some(count > before);
+        let index =
+            (count.div_euclid(self.turn) != before.div_euclid(self.turn)).then_some(count > before);
         // Quadrature: A is high in phases 1 and 2, B in phases 2 and 3.
         let seen = match (self.faults.channel_a_cut, self.faults.channel_b_cut) {
             (false, false) => return (count - before, index),

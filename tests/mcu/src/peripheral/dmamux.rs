@@ -34,7 +34,9 @@ impl Dmamux {
         }
         // NBREQ and SPOL say nothing while SE and EGE are clear.
         if value & 0x0001_0300 != 0 {
-            return told("synchronisation, events and overrun interrupts of the DMAMUX are not modelled");
+            return told(
+                "synchronisation, events and overrun interrupts of the DMAMUX are not modelled",
+            );
         }
         let slot = self
             .0
