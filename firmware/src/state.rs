@@ -5,7 +5,7 @@ use rig_shared::encoder;
 use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
-use rig_shared::trajectory::{Reference, Trajectory};
+use rig_shared::trajectory::{Extremes, Reference, Trajectory};
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
@@ -22,8 +22,10 @@ pub struct State {
     pub tick: u64,
     /// Mode.
     pub mode: Mode,
-    /// The loaded trajectory.
-    pub trajectory: Option<Trajectory<f32>>,
+    /// The loaded trajectory, and how far it goes.
+    pub trajectory: Option<(Trajectory<f32>, Extremes<f32>)>,
+    /// Settings are being stored: nothing but `Disarm` and the conversation is carried out meanwhile.
+    pub storing: bool,
     /// The first fault since the last clearing.
     pub latch: FaultLatch,
     /// The ticks around that fault.
@@ -112,6 +114,7 @@ impl State {
             tick: 0,
             mode: Mode::Calibrating,
             trajectory: None,
+            storing: false,
             latch: FaultLatch::default(),
             snapshot: Snapshot::default(),
             heard: 0,

@@ -150,6 +150,23 @@ pub enum Warning {
         /// Time missing beyond one sample period, s.
         lost: f64,
     },
+    /// An interval of a regular recording is too short or too long for its neighbours to be filtered together; a
+    /// new block begins.
+    Uneven {
+        /// Line of the row after it.
+        line: u64,
+        /// The interval, s.
+        step: f64,
+        /// The usual one, s.
+        period: f64,
+    },
+    /// One time stamp lies off the even grid, the rows before and after on it; the row is taken as evenly sampled.
+    Misplaced {
+        /// Line of the row.
+        line: u64,
+        /// How much later than the grid it is stamped, s.
+        off: f64,
+    },
     /// A column without meaning to the model holds something that is no number; it is NaN in
     /// [`super::Block::extra`].
     ExtraNotANumber {
@@ -172,6 +189,18 @@ impl fmt::Display for Warning {
                 write!(
                     f,
                     "line {line}: {lost:.6} s are missing after t = {from} s; the rows before and after are treated apart"
+                )
+            }
+            Self::Uneven { line, step, period } => {
+                write!(
+                    f,
+                    "line {line}: the time advances by {step:.6} s where {period:.6} s is usual; the rows before and after are treated apart"
+                )
+            }
+            Self::Misplaced { line, off } => {
+                write!(
+                    f,
+                    "line {line}: its time stamp lies {off:.6} s off the even grid that the rows around it keep; it is taken as evenly sampled"
                 )
             }
             Self::ExtraNotANumber { line, column } => {

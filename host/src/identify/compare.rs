@@ -178,7 +178,7 @@ pub(super) fn compare(
                 said: vec![e.to_string()],
             },
             Ok(fitted) => {
-                let far = distance(problem, &tempered, prior, &fitted.full.whole)?;
+                let far = distance(problem, &tempered, prior, &fitted.full.whole).ok();
                 let row = Compared {
                     estimator,
                     cross_validated_relative_error: Some(
@@ -199,10 +199,9 @@ pub(super) fn compare(
                             })
                             .collect()
                     }),
-                    distance_to_consistent: Some(far),
-                    physically_consistent: Some(
-                        far < AT_THE_SET || estimator == Estimator::Consistent,
-                    ),
+                    distance_to_consistent: far,
+                    physically_consistent: far
+                        .map(|far| far < AT_THE_SET || estimator == Estimator::Consistent),
                     largest_shift: Some(
                         (0..fitted.kept.whole.len())
                             .map(|k| {

@@ -25,6 +25,8 @@ const STAGE: f64 = 0.1;
 const MOST_STEPS: usize = 500;
 /// Squared Newton decrement at which a stage before the last ends, and the last.
 const SETTLED: [f64; 2] = [1e-2, 1e-13];
+/// The last stage also ends when a step would gain less than this of the squares: below it lies rounding.
+const NOTHING_TO_GAIN: f64 = 1e-11;
 /// Pull of an offset towards its prior: only decides where the data say nothing.
 const OFFSET_PULL: f64 = 1e-6;
 
@@ -109,7 +111,7 @@ fn barrier(prior: &Prior, pi: &[f64]) -> Option<f64> {
             Rule::Inertial(_) => 0.0,
             Rule::NotNegative if x > 0.0 => pull * (x / x0 - (x / x0).ln() - 1.0),
             Rule::NotNegative => return None,
-            Rule::Free => 0.5 * prior.strength * OFFSET_PULL * ((x - x0) / prior.scale[c]).powi(2),
+            Rule::Free => 0.5 * OFFSET_PULL * ((x - x0) / prior.scale[c]).powi(2),
         };
     }
     sum.is_finite().then_some(sum)
@@ -139,7 +141,7 @@ fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64
                 bent.row_mut(c).copy_from(&(lift.row(c) * (pull / (x * x))));
             }
             Rule::Free => {
-                let bend = prior.strength * OFFSET_PULL / prior.scale[c].powi(2);
+                let bend = OFFSET_PULL / prior.scale[c].powi(2);
                 gradient[c] = bend * (x - x0);
                 bent.row_mut(c).copy_from(&(lift.row(c) * bend));
             }
@@ -190,7 +192,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
             .component_mul(&scale);
         2.0 * gradient.dot(&cholesky.solve(&gradient)).max(0.0).sqrt()
     };
-    let mut strength = first.max(1.0);
+    let mut strength = first.max(prior.strength);
     for steps in 0..MOST_STEPS {
         let (slope, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
         let gradient = space.singular.component_mul(&space.misfit(&c))
@@ -220,8 +222,9 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
             }
             length *= 0.5;
         }
-        let last = strength <= 1.0;
-        if decrement <= SETTLED[usize::from(last)] || !moved {
+        let last = strength <= prior.strength;
+        let nothing = decrement * strength <= NOTHING_TO_GAIN * (1.0 + before.abs());
+        if decrement <= SETTLED[usize::from(last)] || nothing || !moved {
             if last {
                 return Ok(Consistent {
                     squares: space.misfit(&c).norm_squared(),
@@ -229,7 +232,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
                     steps: steps + 1,
                 });
             }
-            strength = (strength * STAGE).max(1.0);
+            strength = (strength * STAGE).max(prior.strength);
         }
     }
     Err(not_settled())

@@ -81,6 +81,8 @@ pub(super) struct Outcome<'a> {
     pub full: &'a [f64],
     /// By equation, rows unweighted.
     pub factors: &'a [TriangularFactor],
+    /// By equation, rows that the residual remembers.
+    pub memory: Vec<f64>,
     pub parameters: &'a [BaseParameter],
 }
 
@@ -94,10 +96,10 @@ pub(super) fn further(
     let Problem { base, data, .. } = *problem;
     let mut further = Further::default();
     let memory = result.estimate.memory_rows;
-    let combine = |scale: f64| {
+    let combine = |scale: &dyn Fn(usize) -> f64| {
         let mut all = TriangularFactor::new(base.len());
-        for (factor, weight) in result.factors.iter().zip(problem.weights) {
-            all.merge(factor, weight * scale);
+        for (k, (factor, weight)) in result.factors.iter().zip(problem.weights).enumerate() {
+            all.merge(factor, weight * scale(k));
         }
         all
     };
@@ -106,7 +108,7 @@ pub(super) fn further(
         .iter()
         .map(|p| (p.expression.clone(), p.unit.clone()))
         .collect();
-    further.essential = essential(&combine(1.0), &data.kept, memory, &names);
+    further.essential = essential(&combine(&|_| 1.0), &data.kept, memory, &names);
     let prior = prior(problem);
     let estimator = problem.options.estimator;
     let wanted = problem.robot.joints.len() > 1
@@ -115,7 +117,7 @@ pub(super) fn further(
         let found = match own.as_ref().and_then(|o| o.fitted.standard.as_ref()) {
             Some(standard) if estimator == Estimator::Consistent => Ok(standard.clone()),
             _ => {
-                let tempered = combine(1.0 / memory.sqrt());
+                let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
                 let problem = match estimator {
                     // Rows know a little of what counts as not excited, too.
                     Estimator::Ols | Estimator::Weighted => quadratic(&tempered, base),
@@ -133,7 +135,7 @@ pub(super) fn further(
                     &prior,
                     &found,
                     result.factors,
-                    result.full,
+                    &problem.start_full(),
                 ));
             }
             Err(e) => further.warnings.push(format!(

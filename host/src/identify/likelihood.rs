@@ -24,10 +24,13 @@ use super::problem::{Fitted, Problem};
 
 /// Highest order of the autoregression.
 const MOST_ORDER: usize = 20;
+/// White noise taken to be in every residual, as a share of its variance. Filters leave bands without power; an
+/// autoregression true to them would blow up what little is there, errors of the model above all.
+const WHITE_SHARE: f64 = 0.01;
 /// Settled when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 0.01;
 /// … or after this many passes; then a warning says so.
-const MOST_PASSES: usize = 15;
+const MOST_PASSES: usize = 30;
 
 /// Predictors of every order up to the chosen one.
 #[derive(Clone, Debug)]
@@ -157,7 +160,8 @@ fn autoregressions(problem: &Problem, full: &[f64]) -> Result<Vec<Predictors>, I
         .iter()
         .zip(&counts)
         .map(|(sum, &count)| {
-            let covariance: Vec<f64> = sum.iter().map(|s| s / count.max(1) as f64).collect();
+            let mut covariance: Vec<f64> = sum.iter().map(|s| s / count.max(1) as f64).collect();
+            covariance[0] *= 1.0 + WHITE_SHARE;
             levinson(&covariance, count)
         })
         .collect())

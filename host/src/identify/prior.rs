@@ -39,7 +39,7 @@ pub(super) struct Prior {
     pub rules: Vec<Rule>,
     /// One divergence a link.
     pub bodies: Vec<Divergence>,
-    /// Multiplies every pull.
+    /// Multiplies every pull: where the path of the solution ends.
     pub strength: f64,
     /// Sentences: what stands in for what.
     pub remarks: Vec<String>,
@@ -188,13 +188,12 @@ impl Prior {
     /// Size of the divergence's pull: the inverse square of the relative uncertainty, by standard column.
     pub(super) fn pull(&self, c: usize) -> f64 {
         let u = self.uncertainty[c];
-        let own = if u.is_finite() {
+        if u.is_finite() {
             1.0 / (u * u)
         } else {
             // Barrier only: keeps the value off zero by a share of its own uncertainty.
             0.1
-        };
-        own * self.strength
+        }
     }
 }
 

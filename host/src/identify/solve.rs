@@ -2,6 +2,7 @@
 
 use super::base::{Base, chain_of, expression};
 use super::cache::RowCache;
+use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
@@ -16,7 +17,7 @@ use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
-use crate::prepare::{Choice, Recording, Survey, Treatment};
+use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, threads};
 use crate::robot::Robot;
 
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
@@ -38,6 +39,9 @@ pub fn identify(
     let chain = chain_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
+    let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
+    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
+    let (training, holdout) = (training.as_slice(), holdout.as_slice());
     let survey = |list: &[&dyn Recording]| {
         list.iter()
             .map(|r| Survey::take(*r, joints))
@@ -83,9 +87,11 @@ pub fn identify(
     if options.prepare.speed_threshold == Choice::Auto {
         let by_noise = plan_with(&decided);
         let (speeds, reason) = speed_thresholds(training, &by_noise)?;
-        if speeds == decided.speed_threshold {
-            made = by_noise.cache;
-        }
+        made = if speeds == decided.speed_threshold {
+            by_noise.cache
+        } else {
+            RowCache::after(by_noise.cache)
+        };
         (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
     }
     let plan = Plan {
@@ -105,17 +111,20 @@ pub fn identify(
     for (r, recording) in training.iter().enumerate() {
         let weight = options.row_weight(r);
         let part = each_rows(*recording, &plan, options.model, &mut |rows| {
-            for (factor, equation) in factors.iter_mut().zip(&rows.equations) {
+            each_of(threads(treatment.threads), &mut factors, &|k, factor| {
+                let Some(equation) = rows.equations.get(k) else {
+                    return;
+                };
                 for (i, keep) in equation.keep.iter().enumerate() {
                     if *keep {
                         factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], weight);
                     }
                 }
-            }
+            });
             instants += rows.t.len() as u64;
             Ok(())
         })?;
-        add(&mut tally, &part);
+        tally.add(&part);
     }
     if tally.used < 2 * p as u64 {
         return Err(IdentifyError::NothingLeft {
@@ -254,6 +263,13 @@ pub fn identify(
             estimate: &estimate,
             full: &full,
             factors: &factors,
+            memory: match options.model {
+                ModelKind::Differential => train
+                    .iter()
+                    .map(|r| memory_of(&r.autocorrelation, r.rows))
+                    .collect(),
+                ModelKind::Integral => vec![estimate.memory_rows],
+            },
             parameters: &base_parameters,
         },
         holdout,
@@ -349,18 +365,8 @@ pub fn identify(
     })
 }
 
-fn add(total: &mut Tally, part: &Tally) {
-    total.used += part.used;
-    total.short += part.short;
-    for (list, more) in [
-        (&mut total.slow, &part.slow),
-        (&mut total.saturated, &part.saturated),
-    ] {
-        list.resize(list.len().max(more.len()), 0);
-        for (a, b) in list.iter_mut().zip(more) {
-            *a += b;
-        }
-    }
+fn as_recordings<'a>(spooled: &'a [Spooled<'a>]) -> Vec<&'a dyn Recording> {
+    spooled.iter().map(|s| s as &dyn Recording).collect()
 }
 
 /// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet

@@ -34,8 +34,8 @@ pub struct StandardParameter {
 pub struct StandardSet {
     /// Joint by joint, then those of coupled drives.
     pub parameters: Vec<StandardParameter>,
-    /// Per joint (one entry for the integral model), by how much more the residual's RMS is than with the estimate
-    /// alone, %.
+    /// Per joint (one entry for the integral model), by how much more the residual's RMS is than with the
+    /// weighted fit, which is free to give links that cannot exist, %.
     pub residual_increase_percent: Vec<f64>,
     /// Per link, smallest eigenvalue of the pseudo-inertia scaled to mass and radius of gyration one.
     pub least_eigenvalue: Vec<f64>,

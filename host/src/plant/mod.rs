@@ -241,6 +241,9 @@ impl Plant {
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
             driver_fault: faults.driver,
             overrun: faults.overrun,
+            // The plant has no board around it.
+            encoder_wrong: None,
+            stack_left: None,
         }
     }
 

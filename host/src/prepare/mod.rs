@@ -11,17 +11,22 @@ mod decimate;
 mod filter;
 mod motion;
 mod pieces;
+pub(crate) mod record;
 mod spectrum;
+mod spool;
 mod survey;
 mod treatment;
+mod workers;
 
 pub use decimate::{Decimator, Stream};
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
-pub use motion::{JointMotion, Motion, each_motion};
+pub use motion::{JointMotion, Motion, each_motion, worked_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
+pub use spool::Spooled;
 pub use survey::{JointSurvey, Survey};
 pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
+pub(crate) use workers::{each_of, threads};
 
 /// Why a recording cannot be prepared.
 #[derive(Debug, thiserror::Error)]

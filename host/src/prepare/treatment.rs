@@ -37,6 +37,8 @@ pub struct PrepareOptions {
     pub torque_lead: f64,
     /// Rows that are processed together; memory grows with it, results do not depend on it.
     pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has. Results do not depend on it, to the last bit.
+    pub threads: usize,
 }
 
 impl Default for PrepareOptions {
@@ -48,7 +50,8 @@ impl Default for PrepareOptions {
             speed_threshold: Choice::Auto,
             measured_derivatives: false,
             torque_lead: 0.0,
-            piece_rows: 1 << 17,
+            piece_rows: 1 << 16,
+            threads: 0,
         }
     }
 }
@@ -104,6 +107,9 @@ pub struct Treatment {
     /// Rows that one piece holds.
     #[serde(skip)]
     pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has.
+    #[serde(skip)]
+    pub threads: usize,
 }
 
 /// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
@@ -261,6 +267,7 @@ impl Treatment {
             spectra,
             motion_frequency: motion,
             piece_rows: options.piece_rows,
+            threads: options.threads,
         })
     }
 
