@@ -53,7 +53,8 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     let n = robot.joints.len();
     let motors = if transmission.is_simple() { 0 } else { 3 * n };
     let width = n * COLUMNS + motors;
-    let mut walk = Walk::new(&robot.geometry(), robot.gravity, width);
+    let geometry = robot.geometry();
+    let mut walk = Walk::new(&geometry, robot.gravity, width);
     for j in 0..n {
         walk.link(j);
     }
