@@ -36,7 +36,7 @@ const REPORT_SAMPLES: usize = 200;
 const fn round(weight: f64, power: i32, steps: usize) -> Round {
     Round {
         weight,
-        smoothing: Smoothing::Power(power),
+        smoothing: Smoothing(power),
         steps,
     }
 }
@@ -100,7 +100,7 @@ fn in_parallel<T: Send>(
 }
 
 /// A random motion within the limits of position, velocity and acceleration.
-fn random_motion(
+pub(super) fn random_motion(
     problem: &mut Problem<'_>,
     frame: &Frame,
     random: &mut rand_pcg::Pcg64,

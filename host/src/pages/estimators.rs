@@ -131,10 +131,7 @@ fn essential(set: &EssentialSet) -> Section {
         )));
     }
     section.with(Block::Table(Table {
-        caption: format!(
-            "{} essential parameters",
-            set.parameters.len()
-        ),
+        caption: format!("{} essential parameters", set.parameters.len()),
         columns: vec![
             Column::text("Parameter"),
             Column::text("Unit"),
@@ -176,7 +173,12 @@ fn standard(robot: &Robot, found: &Identification, set: &StandardSet) -> Section
                 p.name.clone(),
                 parts::unit(&p.unit),
                 format_significant(p.value, 4),
-                if p.determined { "data" } else { "data and prior" }.to_owned(),
+                if p.determined {
+                    "data"
+                } else {
+                    "data and prior"
+                }
+                .to_owned(),
             ]
         })
         .collect();

@@ -54,7 +54,11 @@ pub(super) fn arm(n: usize, seed: u64) -> Robot {
                 [right, -right, 0.0, right, -right, right, -right][i % 7],
             );
             j.name = format!("j{}", i + 1);
-            j.a = if i > 0 { 0.15 + 0.1 * chance.even() } else { 0.0 };
+            j.a = if i > 0 {
+                0.15 + 0.1 * chance.even()
+            } else {
+                0.0
+            };
             j.d = 0.2 * chance.even();
             let size = 0.25 / (1.0 + 0.3 * i as f64);
             let p = body(&mut chance, 4.0 / (1.0 + i as f64), size);
@@ -105,13 +109,7 @@ pub(super) struct Noise {
 
 /// Continuous control along sums of sines, fourth-order Runge–Kutta at a fraction of the sample; recorded every
 /// sample with its reference.
-pub(super) fn record(
-    robot: &Robot,
-    seconds: f64,
-    rate: f64,
-    noise: Noise,
-    seed: u64,
-) -> InMemory {
+pub(super) fn record(robot: &Robot, seconds: f64, rate: f64, noise: Noise, seed: u64) -> InMemory {
     let mut chance = Chance::new(seed);
     let n = robot.joints.len();
     let chain = chain_of(robot).unwrap();
@@ -121,14 +119,17 @@ pub(super) fn record(
             (0..5)
                 .map(|k| {
                     let w = 0.9 * (k as f64 + 1.0) + 0.35 * chance.even();
-                    [(0.5 + 0.3 * chance.even()) / (1.0 + 0.4 * k as f64), w, 3.0 * chance.even()]
+                    [
+                        (0.5 + 0.3 * chance.even()) / (1.0 + 0.4 * k as f64),
+                        w,
+                        3.0 * chance.even(),
+                    ]
                 })
                 .collect()
         })
         .collect();
-    let reference = |j: usize, t: f64| -> f64 {
-        terms[j].iter().map(|[a, w, p]| a * (w * t + p).sin()).sum()
-    };
+    let reference =
+        |j: usize, t: f64| -> f64 { terms[j].iter().map(|[a, w, p]| a * (w * t + p).sin()).sum() };
     let torque = |t: f64, x: &[f64]| -> Vec<f64> {
         (0..n)
             .map(|j| {
@@ -149,7 +150,10 @@ pub(super) fn record(
     };
     let fine = 4;
     let h = 1.0 / (rate * f64::from(fine));
-    let mut x: Vec<f64> = (0..n).map(|j| reference(j, 0.0)).chain(vec![0.0; n]).collect();
+    let mut x: Vec<f64> = (0..n)
+        .map(|j| reference(j, 0.0))
+        .chain(vec![0.0; n])
+        .collect();
     let mut block = Block {
         joints: vec![
             JointColumns {
@@ -169,7 +173,8 @@ pub(super) fn record(
         let shared = chance.normal();
         for j in 0..n {
             let [size, memory] = noise.coloured;
-            let drive = noise.common.sqrt() * shared + (1.0 - noise.common).sqrt() * chance.normal();
+            let drive =
+                noise.common.sqrt() * shared + (1.0 - noise.common).sqrt() * chance.normal();
             coloured[j] = memory * coloured[j] + (1.0 - memory * memory).sqrt() * size * drive;
             let column = &mut block.joints[j];
             column.q.push(x[j] + noise.position * chance.normal());

@@ -71,7 +71,10 @@ fn instruments_and_total_least_squares_undo_the_bias_of_noisy_positions() {
             100.0 * error(e)
         );
     }
-    assert!(mean(&errors[0]) < -0.1, "least squares is biased towards zero");
+    assert!(
+        mean(&errors[0]) < -0.1,
+        "least squares is biased towards zero"
+    );
     assert!(mean(&errors[1]).abs() < 3.0 * error(&errors[1]) + 1e-3);
     assert!(mean(&errors[2]).abs() < 0.15 * mean(&errors[0]).abs());
 }
@@ -282,12 +285,23 @@ fn ridge_goes_from_the_description_to_the_data() {
         let near = |found: &Identification| found.base_parameters[k].value;
         // Friction is not in the description: free in all of them.
         if !b.expression.starts_with(['f', 'o']) {
-            assert!((near(&bound) - prior[k]).abs() < 1e-3 * (1e-3 + prior[k].abs()), "{b:?}");
+            assert!(
+                (near(&bound) - prior[k]).abs() < 1e-3 * (1e-3 + prior[k].abs()),
+                "{b:?}"
+            );
         }
-        assert!((near(&free) - b.value).abs() < 0.7 * b.std + 1e-6, "{b:?} {}", near(&free));
+        assert!(
+            (near(&free) - b.value).abs() < 0.7 * b.std + 1e-6,
+            "{b:?} {}",
+            near(&free)
+        );
         // What the data know well they decide.
         if b.relative_std_percent < 1.0 {
-            assert!((near(&evident) - b.value).abs() < 3.0 * b.std, "{b:?} {}", near(&evident));
+            assert!(
+                (near(&evident) - b.value).abs() < 3.0 * b.std,
+                "{b:?} {}",
+                near(&evident)
+            );
         }
     }
 }
@@ -320,7 +334,10 @@ fn consistent_parameters_are_those_of_bodies_also_where_least_squares_is_not() {
         let set = found.standard_parameters.as_ref().unwrap();
         assert!(set.least_eigenvalue.iter().all(|e| *e > 1e-9), "{set:?}");
         for p in set.parameters.iter().filter(|p| {
-            ["Ia", "fv", "fc"].iter().any(|name| p.name.starts_with(name)) || p.name.starts_with('m') && p.name.len() == 2
+            ["Ia", "fv", "fc"]
+                .iter()
+                .any(|name| p.name.starts_with(name))
+                || p.name.starts_with('m') && p.name.len() == 2
         }) {
             assert!(p.value > 0.0, "{p:?}");
         }
@@ -334,7 +351,12 @@ fn consistent_parameters_are_those_of_bodies_also_where_least_squares_is_not() {
         );
         assert_eq!(rows[0].physically_consistent, Some(false));
         let total = |row: &Compared| -> f64 {
-            row.holdout_relative_error.as_ref().unwrap().iter().map(|e| e * e).sum()
+            row.holdout_relative_error
+                .as_ref()
+                .unwrap()
+                .iter()
+                .map(|e| e * e)
+                .sum()
         };
         gained += usize::from(total(&rows[1]) < total(&rows[0]));
         // The description written from it is a robot that can be simulated and read back.
@@ -386,7 +408,10 @@ fn a_recordings_weight_is_how_often_it_counts() {
         let almost = run(&[&first, &second], &[1e9, 1.0], estimator);
         for k in 0..alone.len() {
             let scale = alone[k].abs().max(0.1);
-            assert!((doubled[k] - twice[k]).abs() < 1e-4 * scale, "{estimator:?}");
+            assert!(
+                (doubled[k] - twice[k]).abs() < 1e-4 * scale,
+                "{estimator:?}"
+            );
             assert!((almost[k] - alone[k]).abs() < 1e-4 * scale, "{estimator:?}");
         }
     }
