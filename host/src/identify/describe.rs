@@ -2,10 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
-use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
 use super::Identification;
-use super::prior::{described, shares};
 use crate::robot::{Drive, Inertial, JointFriction, JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
@@ -18,7 +16,7 @@ use crate::robot::{Drive, Inertial, JointFriction, JointKind, Robot};
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let k = &identification.details.combination;
     let values = DVector::from_column_slice(&identification.details.estimate.values);
-    let mut pi = described(robot, k.ncols());
+    let mut pi = DVector::from_vec(robot.standard_parameters().concat());
     let mut remarks = Vec::new();
     let mut result = robot.clone();
     if let Some(set) = &identification.standard_parameters {
@@ -31,50 +29,25 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         pi += step;
         remarks.push("The split of the combinations over the links is the smallest change of the description; single masses and inertias need not be physical.".into());
     }
-    own_shares(robot, &mut pi);
-    let kinds = robot.drive_kinds();
-    let joints = robot.joints.len();
     for (j, joint) in result.joints.iter_mut().enumerate() {
         let row = &pi.as_slice()[j * COLUMNS..(j + 1) * COLUMNS];
-        let motor = pi
-            .as_slice()
-            .get(joints * COLUMNS + j * MOTOR_COLUMNS..)
-            .unwrap_or_default();
         let mut first_moment = [0.0; 3];
         first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
         let mut inertia = [0.0; 6];
         inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
-        match (&mut joint.drive, kinds[j]) {
-            // The joint's friction holds all that a drive on its own joint has.
-            (Some(drive), DriveKind::Simple) => {
-                drive.rotor_inertia =
-                    row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
-                (drive.viscous, drive.coulomb) = (0.0, 0.0);
-            }
-            (Some(drive), kind) => {
-                let ratio = if kind == DriveKind::Coupled {
-                    drive.gear_ratio.abs()
-                } else {
-                    1.0
-                };
-                let of = |c: usize| motor.get(c).copied().unwrap_or(0.0);
-                drive.rotor_inertia = of(motor_column::INERTIA) / (ratio * ratio);
-                drive.viscous = of(motor_column::VISCOUS) / (ratio * ratio);
-                drive.coulomb = of(motor_column::COULOMB) / ratio;
-            }
-            (None, _)
-                if identification.standard_parameters.is_some()
-                    && row[column::DRIVE_INERTIA] > 0.0 =>
-            {
-                // A rotor's inertia made part of the link would not be a body's.
-                joint.drive = Some(Drive {
-                    gear_ratio: 1.0,
-                    rotor_inertia: row[column::DRIVE_INERTIA],
-                    ..Default::default()
-                });
-            }
+        if let Some(drive) = &mut joint.drive {
+            drive.rotor_inertia =
+                row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
+        } else if identification.standard_parameters.is_some() && row[column::DRIVE_INERTIA] > 0.0 {
+            // A rotor's inertia made part of the link would not be a body's.
+            joint.drive = Some(Drive {
+                gear_ratio: 1.0,
+                rotor_inertia: row[column::DRIVE_INERTIA],
+                ..Default::default()
+            });
+        } else {
             // Without a drive there is no place for its inertia but the link's own.
-            (None, _) => inertia[5] += row[column::DRIVE_INERTIA],
+            inertia[5] += row[column::DRIVE_INERTIA];
         }
         joint.inertial = Some(Inertial {
             mass: row[column::MASS],
@@ -88,13 +61,6 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         });
     }
     (result, remarks)
-}
-
-/// Takes from each joint's columns what drives of other joints put there, so that the rest is its own.
-fn own_shares(robot: &Robot, pi: &mut DVector<f64>) {
-    if let Some(shares) = shares(robot, pi.len()) {
-        *pi = 2.0 * &*pi - shares * &*pi;
-    }
 }
 
 fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {

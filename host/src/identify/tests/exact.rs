@@ -111,7 +111,11 @@ fn impossible_data_lead_to_the_nearest_possible_set() {
             for (i, link) in super::arms::bodies(&mut chance, n).iter().enumerate() {
                 let share = 0.02 * (1.0 + chance.even());
                 for c in 0..COLUMNS {
-                    let target = if c < 10 { link[c] } else { other[i * COLUMNS + c] };
+                    let target = if c < 10 {
+                        link[c]
+                    } else {
+                        other[i * COLUMNS + c]
+                    };
                     mixed[i * COLUMNS + c] =
                         (1.0 - share) * mixed[i * COLUMNS + c] + share * target;
                 }
