@@ -120,6 +120,7 @@ pub(super) fn model_of(chain: &Chain<f64>, standard: &[f64]) -> Model {
             .take(chain.joint_count())
             .copied()
             .collect(),
+        motors: None,
     }
 }
 
