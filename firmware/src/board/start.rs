@@ -16,14 +16,14 @@ use static_cell::{ConstStaticCell, StaticCell};
 use super::adc::Converter;
 use super::clock::{self, LINK_PRIORITY};
 use super::encoder::EncoderTimer;
+use super::health::{Checkup, Start};
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::health::Checkup;
+use super::queue::{Inlet, Outlet};
 use super::storage::Storage;
-use super::tick::{NOTES, Queue, REQUESTS, Tick};
+use super::tick::{NOTES, REQUESTS, Tick};
 use super::watchdog::Watchdog;
-use super::{cycles, health, link, stack, tick};
-use defmt_rtt as _;
+use super::{cycles, health, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -37,9 +37,11 @@ static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Brings the board up and runs it.
 pub(crate) fn run() -> ! {
+    let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
+    let crystal = clock::crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
-    let peripherals = embassy_stm32::init(clock::config());
+    let peripherals = embassy_stm32::init(clock::config(crystal));
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
@@ -68,23 +70,30 @@ pub(crate) fn run() -> ! {
         state,
         capture: CAPTURE.take(),
         clerk: Clerk::new(),
-        requests: request_out,
-        notes: Queue(note_in),
+        requests: Outlet(request_out),
+        notes: Inlet(note_in),
         bridge,
         converter,
         encoder,
         period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         late: false,
-        checkup: Checkup::new(reset, found.origin, config.rates.control_hz),
-        to_store,
+        checkup: Checkup::new(
+            Start {
+                reset,
+                settings: found.origin,
+                crystal,
+            },
+            config.rates.control_hz,
+        ),
+        to_store: Inlet(to_store),
     });
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
     EXECUTOR.init(Executor::new()).run(|spawner| {
         // Each is spawned once, and its place is reserved at compile time.
         let placed = (
-            link::telemetry(config, sender, note_out),
-            link::commands(receiver, request_in),
+            link::telemetry(config, sender, probe_out, note_out),
+            link::commands(receiver, probe_in, request_in),
             indicator(watchdog, pins.led),
             keeper(storage, from_tick),
         );

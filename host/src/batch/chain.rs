@@ -1,26 +1,28 @@
 //! Regressors of many samples.
 
-use rig_shared::multibody::{COLUMNS, Chain, MAX_JOINTS, differential_regressor, energy_regressor};
+use rig_shared::multibody::block::{AxisBlock, Frame, LANES, Lane};
+use rig_shared::multibody::{COLUMNS, Chain, column};
 
-use super::signals::{output, row, samples};
-use super::{BLOCK, BatchError};
+use super::signals::{lanes, load, output, samples, stretches};
+use super::{BLOCK, BatchError, dispatch};
 
 /// A chain's geometry and gravity, prepared for batches of regressors.
 #[derive(Clone, Debug)]
 pub struct ChainBatch {
-    chain: Chain<f64>,
+    frames: Vec<Frame>,
+    gravity: [f64; 3],
 }
 
-/// The differential regressor of up to [`BLOCK`] samples, column by column.
-///
-/// Equation `joint` (from 0) of the torques, column `c` of the 14·n parameters: [`Self::column`].
+/// The differential regressor of up to [`BLOCK`] samples, column by column: [`Self::column`].
 #[derive(Clone, Debug)]
 pub struct RegressorBlock {
     width: usize,
     start: usize,
     len: usize,
+    /// Entry (joint, c) from `(joint * width + c) * BLOCK` on; nothing is ever written where it is zero.
     data: Vec<f64>,
-    zeros: [f64; BLOCK],
+    signals: [Vec<Lane>; 3],
+    axes: Vec<AxisBlock>,
 }
 
 impl RegressorBlock {
@@ -39,15 +41,12 @@ impl RegressorBlock {
         self.len == 0
     }
 
-    /// What multiplies parameter `c` in the torque of `joint`, sample by sample.
+    /// What multiplies parameter `c` (of the 14·n) in the torque of `joint` (from 0), sample by sample.
     ///
     /// # Panics
     /// Where `joint` or `c` is past the end.
     pub fn column(&self, joint: usize, c: usize) -> &[f64] {
         assert!(c < self.width, "column {c} of {}", self.width);
-        if Self::is_zero(joint, c) {
-            return &self.zeros[..self.len];
-        }
         let at = (joint * self.width + c) * BLOCK;
         &self.data[at..at + self.len]
     }
@@ -56,8 +55,7 @@ impl RegressorBlock {
     /// inertia, friction and offset of a joint load that joint alone.
     pub fn is_zero(joint: usize, c: usize) -> bool {
         let owner = c / COLUMNS;
-        owner < joint
-            || (owner > joint && c % COLUMNS >= rig_shared::multibody::column::DRIVE_INERTIA)
+        owner < joint || (owner > joint && c % COLUMNS >= column::DRIVE_INERTIA)
     }
 }
 
@@ -65,29 +63,32 @@ impl ChainBatch {
     /// Prepares a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
         Self {
-            chain: chain.clone(),
+            frames: Frame::of(chain).collect(),
+            gravity: chain.gravity(),
         }
     }
 
     /// Number of joints n.
     pub fn joint_count(&self) -> usize {
-        self.chain.joint_count()
+        self.frames.len()
     }
 
     /// An empty block for [`Self::each_differential_block`], to be used again and again.
     pub fn block(&self) -> RegressorBlock {
-        let (n, width) = (self.joint_count(), self.chain.parameter_count());
+        let n = self.joint_count();
+        let width = n * COLUMNS;
         RegressorBlock {
             width,
             start: 0,
             len: 0,
             data: vec![0.0; n * width * BLOCK],
-            zeros: [0.0; BLOCK],
+            signals: [lanes(n), lanes(n), lanes(n)],
+            axes: vec![AxisBlock::ZERO; n],
         }
     }
 
-    /// Computes [`differential_regressor`] block by block and calls `visit` with each in the order of time.
-    /// `block` comes from [`Self::block`] of the same chain and is overwritten.
+    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) block by block and calls
+    /// `visit` with each in the order of time. `block` comes from [`Self::block`] of the same chain and is overwritten.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong; what `visit` gives ends the walk.
@@ -99,31 +100,41 @@ impl ChainBatch {
         block: &mut RegressorBlock,
         mut visit: impl FnMut(&RegressorBlock) -> Result<(), E>,
     ) -> Result<(), E> {
-        let (n, width) = (self.joint_count(), self.chain.parameter_count());
+        let n = self.joint_count();
+        let width = n * COLUMNS;
         let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
         output(n * width, BLOCK, &block.data)?;
-        let [mut a, mut b, mut c] = [[0.0; MAX_JOINTS]; 3];
-        let mut matrix = vec![0.0; n * width];
         for start in (0..count).step_by(BLOCK) {
             block.start = start;
             block.len = BLOCK.min(count - start);
-            for k in 0..block.len {
-                row(q, start + k, &mut a);
-                row(qd, start + k, &mut b);
-                row(qdd, start + k, &mut c);
-                differential_regressor(&self.chain, &a[..n], &b[..n], &c[..n], &mut matrix)
-                    .map_err(BatchError::from)?;
-                for (entry, value) in matrix.iter().enumerate() {
-                    block.data[entry * BLOCK + k] = *value;
-                }
+            for range in stretches(start..start + block.len) {
+                let [a, b, c] = &mut block.signals;
+                load(q, &range, a);
+                load(qd, &range, b);
+                load(qdd, &range, c);
+                dispatch::differential_regressor(
+                    &self.frames,
+                    self.gravity,
+                    a,
+                    b,
+                    c,
+                    &mut block.axes,
+                    &mut block.data,
+                    width,
+                    BLOCK,
+                    range.start - start,
+                    // What a short stretch is filled up with goes to the unused end of the block.
+                    LANES,
+                );
             }
             visit(block)?;
         }
         Ok(())
     }
 
-    /// [`differential_regressor`] of every sample written out: `out` holds 14·n² columns, column
-    /// `joint * 14 * n + c` what multiplies parameter `c` in the torque of `joint`. Zeros are written too.
+    /// [`differential_regressor`](rig_shared::multibody::differential_regressor) of every sample written out: `out`
+    /// holds 14·n² columns, column `joint * 14 * n + c` what multiplies parameter `c` in the torque of `joint`. Zeros
+    /// are written too.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -134,20 +145,43 @@ impl ChainBatch {
         qdd: &[S],
         out: &mut [f64],
     ) -> Result<(), BatchError> {
-        let (n, width) = (self.joint_count(), self.chain.parameter_count());
+        let n = self.joint_count();
+        let width = n * COLUMNS;
         let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
         output(n * width, count, out)?;
-        let mut block = self.block();
-        self.each_differential_block(q, qd, qdd, &mut block, |block| {
-            for entry in 0..n * width {
-                let at = entry * count + block.start;
-                out[at..at + block.len].copy_from_slice(block.column(entry / width, entry % width));
+        if count == 0 {
+            return Ok(());
+        }
+        for (entry, column) in out.chunks_exact_mut(count).enumerate() {
+            if RegressorBlock::is_zero(entry / width, entry % width) {
+                column.fill(0.0);
             }
-            Ok(())
-        })
+        }
+        let [mut a, mut b, mut c] = [(); 3].map(|()| lanes(n));
+        let mut axes = vec![AxisBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            load(qdd, &range, &mut c);
+            dispatch::differential_regressor(
+                &self.frames,
+                self.gravity,
+                &a,
+                &b,
+                &c,
+                &mut axes,
+                out,
+                width,
+                count,
+                range.start,
+                range.len(),
+            );
+        }
+        Ok(())
     }
 
-    /// [`energy_regressor`] of every sample written out: `out` holds 14·n columns.
+    /// [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample written out: `out` holds 14·n
+    /// columns.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -157,18 +191,32 @@ impl ChainBatch {
         qd: &[S],
         out: &mut [f64],
     ) -> Result<(), BatchError> {
-        let (n, width) = (self.joint_count(), self.chain.parameter_count());
+        let n = self.joint_count();
+        let width = n * COLUMNS;
         let count = samples(n, &[("q", q), ("qd", qd)])?;
         output(width, count, out)?;
-        let [mut a, mut b] = [[0.0; MAX_JOINTS]; 2];
-        let mut line = vec![0.0; width];
-        for k in 0..count {
-            row(q, k, &mut a);
-            row(qd, k, &mut b);
-            energy_regressor(&self.chain, &a[..n], &b[..n], &mut line)?;
-            for (c, value) in line.iter().enumerate() {
-                out[c * count + k] = *value;
+        if count == 0 {
+            return Ok(());
+        }
+        for (c, column) in out.chunks_exact_mut(count).enumerate() {
+            if c % COLUMNS > column::DRIVE_INERTIA {
+                column.fill(0.0);
             }
+        }
+        let (mut a, mut b) = (lanes(n), lanes(n));
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            dispatch::energy_regressor(
+                &self.frames,
+                self.gravity,
+                &a,
+                &b,
+                out,
+                count,
+                range.start,
+                range.len(),
+            );
         }
         Ok(())
     }

@@ -12,6 +12,7 @@
 //! Threads are the caller's business; [`over_threads`] cuts a recording into stretches.
 
 mod chain;
+mod dispatch;
 mod error;
 mod model;
 mod signals;

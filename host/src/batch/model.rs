@@ -1,18 +1,19 @@
 //! Torques, accelerations and inertia matrices of many samples.
 
-use rig_shared::multibody::{
-    COLUMNS, Chain, MAX_JOINTS, MultibodyError, forward_dynamics, gravity_vector, inertia_matrix,
-    inverse_dynamics,
-};
+use rig_shared::multibody::block::{Body, Frame, JointBlock, lower};
+use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
-use super::BatchError;
-use super::signals::{output, row, samples};
+use super::signals::{lanes, load, output, samples, store, stretches};
+use super::{BatchError, dispatch};
 
 /// A chain with its parameters, prepared for batches.
 #[derive(Clone, Debug)]
 pub struct ModelBatch {
-    chain: Chain<f64>,
-    parameters: Vec<[f64; COLUMNS]>,
+    frames: Vec<Frame>,
+    gravity: [f64; 3],
+    bodies: Vec<Body>,
+    /// The same without drives, friction and offsets.
+    links: Vec<Body>,
 }
 
 impl ModelBatch {
@@ -22,27 +23,38 @@ impl ModelBatch {
     /// # Errors
     /// [`BatchError::Multibody`] where the number of rows is not that of the joints.
     pub fn new(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]]) -> Result<Self, BatchError> {
-        if parameters.len() != chain.joint_count() {
+        let n = chain.joint_count();
+        if parameters.len() != n {
             return Err(MultibodyError::WrongLength {
                 argument: "parameters",
-                expected: chain.joint_count(),
+                expected: n,
                 found: parameters.len(),
             }
             .into());
         }
+        let mut bodies = vec![Body::NOTHING; n];
+        Body::gather(chain, parameters, &mut bodies);
+        let mut bare = parameters.to_vec();
+        for row in &mut bare {
+            row[column::DRIVE_INERTIA..].fill(0.0);
+        }
+        let mut links = vec![Body::NOTHING; n];
+        Body::gather(chain, &bare, &mut links);
         Ok(Self {
-            chain: chain.clone(),
-            parameters: parameters.to_vec(),
+            frames: Frame::of(chain).collect(),
+            gravity: chain.gravity(),
+            bodies,
+            links,
         })
     }
 
     /// Number of joints n.
     pub fn joint_count(&self) -> usize {
-        self.chain.joint_count()
+        self.frames.len()
     }
 
     /// Torques that move the chain by `q`, `qd`, `qdd`, drives, friction and offsets included:
-    /// [`inverse_dynamics`] of every sample. `tau` holds n columns.
+    /// [`inverse_dynamics`](rig_shared::multibody::inverse_dynamics) of every sample. `tau` holds n columns.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -56,20 +68,30 @@ impl ModelBatch {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
         output(n, count, tau)?;
-        let [mut a, mut b, mut c, mut d] = [[0.0; MAX_JOINTS]; 4];
-        for k in 0..count {
-            row(q, k, &mut a);
-            row(qd, k, &mut b);
-            row(qdd, k, &mut c);
-            let (chain, p) = (&self.chain, &self.parameters);
-            inverse_dynamics(chain, p, &a[..n], &b[..n], &c[..n], &mut d[..n])?;
-            scatter(&d[..n], k, count, tau);
+        let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| lanes(n));
+        let mut work = vec![JointBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            load(qdd, &range, &mut c);
+            let (frames, bodies) = (&self.frames, &self.bodies);
+            dispatch::inverse_dynamics(
+                frames,
+                self.gravity,
+                bodies,
+                &a,
+                &b,
+                Some(&c),
+                &mut work,
+                &mut d,
+            );
+            store(&d, &range, count, tau);
         }
         Ok(())
     }
 
     /// Torques that hold the links still against gravity, without drives, friction and offsets:
-    /// [`gravity_vector`] of every sample. `out` holds n columns.
+    /// [`gravity_vector`](rig_shared::multibody::gravity_vector) of every sample. `out` holds n columns.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -77,17 +99,29 @@ impl ModelBatch {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
         output(n, count, out)?;
-        let [mut a, mut d] = [[0.0; MAX_JOINTS]; 2];
-        for k in 0..count {
-            row(q, k, &mut a);
-            gravity_vector(&self.chain, &self.parameters, &a[..n], &mut d[..n])?;
-            scatter(&d[..n], k, count, out);
+        let (mut a, still, mut d) = (lanes(n), lanes(n), lanes(n));
+        let mut work = vec![JointBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            let (frames, links) = (&self.frames, &self.links);
+            dispatch::inverse_dynamics(
+                frames,
+                self.gravity,
+                links,
+                &a,
+                &still,
+                None,
+                &mut work,
+                &mut d,
+            );
+            store(&d, &range, count, out);
         }
         Ok(())
     }
 
-    /// Inertia matrices, drive inertias on the diagonal included: [`inertia_matrix`] of every sample. `out` holds
-    /// n² columns, column `i * n + j` the entry (i, j).
+    /// Inertia matrices, drive inertias on the diagonal included:
+    /// [`inertia_matrix`](rig_shared::multibody::inertia_matrix) of every sample. `out` holds n² columns, column
+    /// `i * n + j` the entry (i, j).
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -99,16 +133,22 @@ impl ModelBatch {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
         output(n * n, count, out)?;
-        let (mut a, mut d) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS * MAX_JOINTS]);
-        for k in 0..count {
-            row(q, k, &mut a);
-            inertia_matrix(&self.chain, &self.parameters, &a[..n], &mut d[..n * n])?;
-            scatter(&d[..n * n], k, count, out);
+        let (mut a, mut matrix) = (lanes(n), lanes(lower(n, 0)));
+        let mut work = vec![JointBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            dispatch::inertia_matrix(&self.frames, &self.bodies, &a, &mut work, &mut matrix);
+            for (entry, column) in out.chunks_exact_mut(count).enumerate() {
+                let (i, j) = (entry / n, entry % n);
+                let lane = &matrix[lower(i.max(j), i.min(j))];
+                column[range.clone()].copy_from_slice(&lane[..range.len()]);
+            }
         }
         Ok(())
     }
 
-    /// Accelerations under the torques `tau`: [`forward_dynamics`] of every sample. `qdd` holds n columns.
+    /// Accelerations under the torques `tau`: [`forward_dynamics`](rig_shared::multibody::forward_dynamics) of every
+    /// sample. `qdd` holds n columns.
     ///
     /// # Errors
     /// [`BatchError::NotPositiveDefinite`] with the first sample where it happens; others where a length is wrong.
@@ -122,29 +162,32 @@ impl ModelBatch {
         let n = self.joint_count();
         let count = samples(n, &[("q", q), ("qd", qd), ("tau", tau)])?;
         output(n, count, qdd)?;
-        let [mut a, mut b, mut c, mut d] = [[0.0; MAX_JOINTS]; 4];
-        for k in 0..count {
-            row(q, k, &mut a);
-            row(qd, k, &mut b);
-            row(tau, k, &mut c);
-            let (chain, p) = (&self.chain, &self.parameters);
-            forward_dynamics(chain, p, &a[..n], &b[..n], &c[..n], &mut d[..n]).map_err(
-                |e| match e {
-                    MultibodyError::NotPositiveDefinite { joint } => {
-                        BatchError::NotPositiveDefinite { sample: k, joint }
-                    }
-                    other => other.into(),
-                },
-            )?;
-            scatter(&d[..n], k, count, qdd);
+        let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| lanes(n));
+        let mut matrix = lanes(lower(n, 0));
+        let mut work = vec![JointBlock::ZERO; n];
+        for range in stretches(0..count) {
+            load(q, &range, &mut a);
+            load(qd, &range, &mut b);
+            load(tau, &range, &mut c);
+            let (frames, bodies) = (&self.frames, &self.bodies);
+            dispatch::forward_dynamics(
+                frames,
+                self.gravity,
+                bodies,
+                &a,
+                &b,
+                &c,
+                &mut work,
+                &mut matrix,
+                &mut d,
+            )
+            .map_err(|e| BatchError::NotPositiveDefinite {
+                // What fills up a short stretch is its last sample, so it cannot fail first.
+                sample: range.start + e.lane,
+                joint: e.joint,
+            })?;
+            store(&d, &range, count, qdd);
         }
         Ok(())
-    }
-}
-
-/// Writes row `k` of a matrix of columns.
-fn scatter(row: &[f64], k: usize, samples: usize, out: &mut [f64]) {
-    for (c, value) in row.iter().enumerate() {
-        out[c * samples + k] = *value;
     }
 }

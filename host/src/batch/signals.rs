@@ -1,4 +1,8 @@
-//! Signals as they come in: one column of samples a joint.
+//! Signals as they come in, one column of samples a joint, and results as they go out.
+
+use std::ops::Range;
+
+use rig_shared::multibody::block::{LANES, Lane};
 
 use super::BatchError;
 
@@ -45,9 +49,35 @@ pub(super) fn output(columns: usize, samples: usize, out: &[f64]) -> Result<(), 
     }
 }
 
-/// Row `k` of the columns.
-pub(super) fn row<S: AsRef<[f64]>>(columns: &[S], k: usize, out: &mut [f64]) {
-    for (value, column) in out.iter_mut().zip(columns) {
-        *value = column.as_ref()[k];
+/// `range` cut into stretches of [`LANES`] samples, the last one perhaps shorter.
+pub(super) fn stretches(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = range.end;
+    range
+        .step_by(LANES)
+        .map(move |start| start..end.min(start + LANES))
+}
+
+/// Samples `range` (at most [`LANES`]) of every column; a shorter stretch is filled up with its last sample.
+pub(super) fn load<S: AsRef<[f64]>>(columns: &[S], range: &Range<usize>, lanes: &mut [Lane]) {
+    for (lane, column) in lanes.iter_mut().zip(columns) {
+        let part = &column.as_ref()[range.clone()];
+        if let Ok(full) = part.try_into() {
+            *lane = full;
+        } else {
+            lane.fill(part.last().copied().unwrap_or(0.0));
+            lane[..part.len()].copy_from_slice(part);
+        }
     }
+}
+
+/// Writes lanes to columns of `samples` samples, at `range`.
+pub(super) fn store(lanes: &[Lane], range: &Range<usize>, samples: usize, out: &mut [f64]) {
+    for (column, lane) in out.chunks_exact_mut(samples).zip(lanes) {
+        column[range.clone()].copy_from_slice(&lane[..range.len()]);
+    }
+}
+
+/// One lane a joint, all zero.
+pub(super) fn lanes(count: usize) -> Vec<Lane> {
+    vec![[0.0; LANES]; count]
 }

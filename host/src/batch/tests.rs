@@ -269,3 +269,76 @@ fn the_first_sample_whose_inertia_matrix_is_not_positive_definite_is_named() {
         Err(BatchError::NotPositiveDefinite { sample, .. }) if sample == BLOCK + 9
     ));
 }
+
+/// The version chosen for this machine does the same operations in the same order as the portable one.
+#[test]
+fn every_version_gives_the_same_bits() {
+    use super::dispatch::*;
+    use super::signals::{lanes, load};
+    use rig_shared::multibody::block::{AxisBlock, Body, Frame, JointBlock, LANES, lower};
+    for n in LENGTHS {
+        let made = made(n, LANES, 7);
+        let frames: Vec<Frame> = Frame::of(&made.chain).collect();
+        let mut bodies = vec![Body::NOTHING; n];
+        Body::gather(&made.chain, &made.parameters, &mut bodies);
+        let g = made.chain.gravity();
+        let [q, qd, qdd] = made.signals.each_ref().map(|columns| {
+            let mut block = lanes(n);
+            load(columns, &(0..LANES), &mut block);
+            block
+        });
+        let mut work = vec![JointBlock::ZERO; n];
+        let [mut a, mut b] = [(); 2].map(|()| lanes(n));
+        inverse_dynamics(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut a);
+        inverse_dynamics_portable(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut b);
+        assert_eq!(a, b);
+        let tau = a;
+        let [mut ma, mut mb] = [(); 2].map(|()| lanes(lower(n, 0)));
+        inertia_matrix(&frames, &bodies, &q, &mut work, &mut ma);
+        inertia_matrix_portable(&frames, &bodies, &q, &mut work, &mut mb);
+        assert_eq!(ma, mb);
+        let [mut a, mut b] = [(); 2].map(|()| lanes(n));
+        forward_dynamics(
+            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut ma, &mut a,
+        )
+        .unwrap();
+        forward_dynamics_portable(
+            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut mb, &mut b,
+        )
+        .unwrap();
+        assert_eq!(a, b);
+        let width = n * COLUMNS;
+        let mut axes = vec![AxisBlock::ZERO; n];
+        let [mut a, mut b] = [(); 2].map(|()| vec![0.0; n * width * LANES]);
+        differential_regressor(
+            &frames, g, &q, &qd, &qdd, &mut axes, &mut a, width, LANES, 0, LANES,
+        );
+        differential_regressor_portable(
+            &frames, g, &q, &qd, &qdd, &mut axes, &mut b, width, LANES, 0, LANES,
+        );
+        assert_eq!(a, b);
+        let [mut a, mut b] = [(); 2].map(|()| vec![0.0; width * LANES]);
+        energy_regressor(&frames, g, &q, &qd, &mut a, LANES, 0, LANES);
+        energy_regressor_portable(&frames, g, &q, &qd, &mut b, LANES, 0, LANES);
+        assert_eq!(a, b);
+    }
+}
+
+/// Beyond the range of the vectorised sine the batch takes the slow way and stays right.
+#[test]
+fn angles_of_many_turns_are_as_right_as_small_ones() {
+    let mut made = made(6, 40, 5);
+    for (k, x) in made.signals[0][2].iter_mut().enumerate() {
+        *x += 1.0e7 * k as f64;
+    }
+    let [q, qd, qdd] = &made.signals;
+    let model = ModelBatch::new(&made.chain, &made.parameters).unwrap();
+    let mut tau = vec![f64::NAN; 6 * 40];
+    model.inverse_dynamics(q, qd, qdd, &mut tau).unwrap();
+    for k in 0..40 {
+        let mut row = vec![0.0; 6];
+        let (a, b, c) = (at(q, k), at(qd, k), at(qdd, k));
+        inverse_dynamics(&made.chain, &made.parameters, &a, &b, &c, &mut row).unwrap();
+        compare("torque", &tau, 40, k, &row, 1e-13);
+    }
+}

@@ -247,7 +247,7 @@ mod tests {
                 0 => format!("{x:.7}"),
                 1 => format!("{x}"),
                 2 => format!("{x:.0}"),
-                _ => format!("{x:.*}", (k % 24) as usize),
+                _ => format!("{x:.digits$}", digits = (k % 24) as usize),
             };
             let (found, used) = decimal(text.as_bytes());
             if let Some(found) = found {

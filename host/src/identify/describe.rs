@@ -4,21 +4,25 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::Identification;
-use crate::robot::{Inertial, JointFriction, JointKind, Robot};
+use crate::robot::{Drive, Inertial, JointFriction, JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
 ///
-/// Only combinations are identified, so their split is a choice: the prior description is moved by the smallest
-/// step that gives the identified combinations (K⁺·(β − K·π₀)). A robot of one link is then made a body that can
-/// exist: positive mass, inertia no smaller than its centre of mass demands, the drive's share as given before.
-/// For several links physical consistency is not enforced; the second result lists what had to be said.
+/// Only combinations are identified, so their split is a choice: the physically consistent full set where there is
+/// one ([`super::StandardSet`]). A robot of one link is otherwise made a body that can exist: positive mass, inertia no
+/// smaller than its centre of mass demands, the drive's share as given before. Failing both, the prior description is
+/// moved by the smallest step that gives the identified combinations (K⁺·(β − K·π₀)). The second result lists what
+/// had to be said.
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let k = &identification.details.combination;
     let values = DVector::from_column_slice(&identification.details.estimate.values);
     let mut pi = DVector::from_vec(robot.standard_parameters().concat());
     let mut remarks = Vec::new();
     let mut result = robot.clone();
-    if robot.joints.len() == 1 {
+    if let Some(set) = &identification.standard_parameters {
+        pi = DVector::from_vec(set.values());
+        remarks.extend(set.prior.iter().cloned());
+    } else if robot.joints.len() == 1 {
         one_link(robot, identification, &mut pi, &mut remarks);
     } else if let Ok(inverse) = pseudo_inverse(k) {
         let step = inverse * (&values - k * &pi);
@@ -34,6 +38,13 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
         if let Some(drive) = &mut joint.drive {
             drive.rotor_inertia =
                 row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
+        } else if identification.standard_parameters.is_some() && row[column::DRIVE_INERTIA] > 0.0 {
+            // A rotor's inertia made part of the link would not be a body's.
+            joint.drive = Some(Drive {
+                gear_ratio: 1.0,
+                rotor_inertia: row[column::DRIVE_INERTIA],
+                ..Default::default()
+            });
         } else {
             // Without a drive there is no place for its inertia but the link's own.
             inertia[5] += row[column::DRIVE_INERTIA];

@@ -222,6 +222,23 @@ impl Robot {
         Some(range)
     }
 
+    /// Whether motor `motor` moves joint `joint` (both from 0) at some position.
+    pub fn moves(&self, motor: usize, joint: usize) -> bool {
+        let (Some(own), Some(moved)) = (self.joints.get(motor), self.joints.get(joint)) else {
+            return false;
+        };
+        let Some(drive) = &own.drive else {
+            return motor == joint;
+        };
+        let nonzero = |ratio: Option<&f64>| ratio.is_some_and(|r| *r != 0.0);
+        (motor == joint && drive.gear_ratio != 0.0)
+            || nonzero(drive.couples.get(&moved.name))
+            || drive
+                .screw
+                .as_ref()
+                .is_some_and(|s| nonzero(s.angle.get(&moved.name)))
+    }
+
     /// Limits on combinations of joint positions beyond the joints' own: for every crank with a range its weights (one
     /// a joint) and the lowest and highest value of Σ c_j·q_j.
     pub fn combined_limits(&self) -> Vec<(Vec<f64>, [f64; 2])> {

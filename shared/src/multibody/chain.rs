@@ -302,6 +302,11 @@ impl<T: Real> Chain<T> {
         }
     }
 
+    /// Gravitational acceleration in the base frame, m/s².
+    pub fn gravity(&self) -> [T; 3] {
+        self.gravity.0
+    }
+
     /// Number of joints n.
     #[inline(always)]
     pub fn joint_count(&self) -> usize {

@@ -5,7 +5,9 @@
 //! integrand; the window belongs to the caller.
 
 use super::chain::{Chain, MultibodyError, check};
+use super::inverse::LinkMotion;
 use super::parameters::{COLUMNS, column, inertia};
+use super::regressor::link_columns;
 use super::spatial::{Motion, Vector3};
 use crate::scalar::Real;
 
@@ -78,6 +80,44 @@ pub fn friction_power_regressor<T: Real>(
         block[column::VISCOUS] = speed.squared();
         block[column::COULOMB] = speed.abs();
         block[column::OFFSET] = speed;
+    }
+    Ok(())
+}
+
+/// Row of the power of the torques, length 14n: q̇ᵀτ = row·π, the power model (Gautier 1997): the rate of the energy, and what
+/// friction and the offsets take. It is q̇ᵀ·Y of [`super::differential_regressor`], made in O(n): every wrench of a link
+/// meets the link's own velocity.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`].
+pub fn power_regressor<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    qdd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    check("qdd", n, qdd.len())?;
+    check("out", chain.parameter_count(), out.len())?;
+    let mut velocity = Motion::ZERO;
+    let mut motion = LinkMotion::base(chain.gravity);
+    for (i, (joint, block)) in chain
+        .joints
+        .iter()
+        .zip(out.chunks_exact_mut(COLUMNS))
+        .enumerate()
+    {
+        let transform = joint.transform(q[i]);
+        velocity = joint.velocity(&transform, velocity, qd[i]);
+        motion = motion.next(joint, &transform, qd[i], qdd[i]);
+        link_columns(&motion, &velocity, block);
+        block[column::DRIVE_INERTIA] = qd[i] * qdd[i];
+        block[column::VISCOUS] = qd[i].squared();
+        block[column::COULOMB] = qd[i].abs();
+        block[column::OFFSET] = qd[i];
     }
     Ok(())
 }

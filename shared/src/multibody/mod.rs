@@ -19,14 +19,17 @@
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
 mod adjoint;
+mod articulated;
 pub mod block;
 mod chain;
+mod coefficients;
 mod coriolis;
 mod energy;
 mod forward;
 mod inertia_matrix;
 mod inverse;
 mod kinematics;
+mod momentum;
 mod parameters;
 mod regressor;
 mod spatial;
@@ -43,16 +46,19 @@ mod textbook;
 mod timing;
 
 pub use adjoint::regressor_gradient;
+pub use articulated::articulated_forward_dynamics;
 pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
+pub use coefficients::{pair_column, velocity_coefficients};
 pub use coriolis::coriolis_matrix;
 pub use energy::{
     energy_regressor, friction_power_regressor, kinetic_energy, kinetic_energy_regressor,
-    potential_energy, potential_energy_regressor,
+    potential_energy, potential_energy_regressor, power_regressor,
 };
 pub use forward::forward_dynamics;
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
 pub use kinematics::point_position;
+pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
 

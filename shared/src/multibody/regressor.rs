@@ -65,7 +65,7 @@ fn regressor<T: Real, const CAPACITY: usize>(
 
 /// Power of each of the ten unit wrenches of a link along one joint axis written in the link's frame.
 #[inline(always)]
-fn link_columns<T: Real>(motion: &LinkMotion<T>, axis: &Motion<T>, block: &mut [T]) {
+pub(super) fn link_columns<T: Real>(motion: &LinkMotion<T>, axis: &Motion<T>, block: &mut [T]) {
     let (spin, turning, proper) = (motion.velocity, motion.acceleration, motion.proper);
     let Vector3([hx, hy, hz]) = proper.cross(axis.angular) - turning.cross(axis.linear)
         + spin.cross(spin.cross(axis.linear));

@@ -99,6 +99,39 @@ pub(super) struct Symmetric3<T> {
 }
 
 impl<T: Real> Symmetric3<T> {
+    pub(super) const ZERO: Self = Self {
+        xx: T::ZERO,
+        xy: T::ZERO,
+        xz: T::ZERO,
+        yy: T::ZERO,
+        yz: T::ZERO,
+        zz: T::ZERO,
+    };
+
+    /// Its rows, which are its columns too.
+    #[inline(always)]
+    pub(super) fn rows(self) -> [Vector3<T>; 3] {
+        [
+            Vector3([self.xx, self.xy, self.xz]),
+            Vector3([self.xy, self.yy, self.yz]),
+            Vector3([self.xz, self.yz, self.zz]),
+        ]
+    }
+
+    /// Less a·bᵀ, where that is symmetric.
+    #[inline(always)]
+    pub(super) fn minus_outer(self, a: Vector3<T>, b: Vector3<T>) -> Self {
+        let ([ax, ay, az], [bx, by, bz]) = (a.0, b.0);
+        Self {
+            xx: self.xx - ax * bx,
+            xy: self.xy - ax * by,
+            xz: self.xz - ax * bz,
+            yy: self.yy - ay * by,
+            yz: self.yz - ay * bz,
+            zz: self.zz - az * bz,
+        }
+    }
+
     #[inline(always)]
     pub(super) fn times(self, v: Vector3<T>) -> Vector3<T> {
         Vector3([
@@ -109,7 +142,7 @@ impl<T: Real> Symmetric3<T> {
     }
 
     #[inline(always)]
-    fn plus(self, other: Self) -> Self {
+    pub(super) fn plus(self, other: Self) -> Self {
         Self {
             xx: self.xx + other.xx,
             xy: self.xy + other.xy,
@@ -314,25 +347,29 @@ impl<T: Real> Transform<T> {
         }
     }
 
-    /// An inertia of frame i, about the origin of frame i − 1 and written in it.
+    /// A symmetric tensor of frame i, written in frame i − 1.
     #[inline(always)]
-    pub(super) fn inertia_to_parent(&self, body: Inertia<T>) -> Inertia<T> {
-        let s = body.inertia;
-        // R·I·Rᵀ: the rows of I are turned, then the columns of what came out.
-        let Vector3([ax, bx, cx]) = self.direction_to_parent(Vector3([s.xx, s.xy, s.xz]));
-        let Vector3([ay, by, cy]) = self.direction_to_parent(Vector3([s.xy, s.yy, s.yz]));
-        let Vector3([az, bz, cz]) = self.direction_to_parent(Vector3([s.xz, s.yz, s.zz]));
+    pub(super) fn symmetric_to_parent(&self, s: Symmetric3<T>) -> Symmetric3<T> {
+        // R·S·Rᵀ: the rows of S are turned, then the columns of what came out.
+        let [x, y, z] = s.rows().map(|row| self.direction_to_parent(row));
+        let ([ax, bx, cx], [ay, by, cy], [az, bz, cz]) = (x.0, y.0, z.0);
         let Vector3([xx, _, _]) = self.direction_to_parent(Vector3([ax, ay, az]));
         let Vector3([xy, yy, _]) = self.direction_to_parent(Vector3([bx, by, bz]));
         let Vector3([xz, yz, zz]) = self.direction_to_parent(Vector3([cx, cy, cz]));
-        let rotated = Symmetric3 {
+        Symmetric3 {
             xx,
             xy,
             xz,
             yy,
             yz,
             zz,
-        };
+        }
+    }
+
+    /// An inertia of frame i, about the origin of frame i − 1 and written in it.
+    #[inline(always)]
+    pub(super) fn inertia_to_parent(&self, body: Inertia<T>) -> Inertia<T> {
+        let rotated = self.symmetric_to_parent(body.inertia);
         let moment = self.direction_to_parent(body.first_moment);
         let shift = self.origin.scaled(body.mass);
         // Parallel axes with r = p + s: the mixed term of p with m·c + m·p/2.

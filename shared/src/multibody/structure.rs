@@ -9,6 +9,7 @@ use proptest::prelude::*;
 
 use super::samples::{Sample, relative_difference};
 use super::*;
+use crate::dual::Dual;
 
 fn torque(sample: &Sample, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
     let mut tau = vec![f64::NAN; sample.n()];
@@ -47,6 +48,57 @@ fn derivative(f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
         }
     }
     total
+}
+
+/// A chain of dual numbers with its parameters.
+fn dual(s: &Sample) -> (Chain<Dual<f64, 1>>, Vec<[Dual<f64, 1>; COLUMNS]>) {
+    let parameters = s.parameters.iter().map(|row| row.map(Dual::constant));
+    (
+        Chain::new(&s.geometry, s.gravity).unwrap(),
+        parameters.collect(),
+    )
+}
+
+/// Values with their derivatives in one direction.
+fn with_slope(values: &[f64], slope: &[f64]) -> Vec<Dual<f64, 1>> {
+    let pairs = values.iter().zip(slope);
+    pairs
+        .map(|(&value, &s)| Dual {
+            value,
+            derivative: [s],
+        })
+        .collect()
+}
+
+/// Exact derivatives of the inertia matrix: by every joint's position, and by time.
+fn slopes(s: &Sample) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let (chain, parameters) = dual(s);
+    let n = s.n();
+    let along = |direction: &[f64]| -> Vec<f64> {
+        let mut out = vec![Dual::constant(f64::NAN); n * n];
+        inertia_matrix(&chain, &parameters, &with_slope(&s.q, direction), &mut out).unwrap();
+        out.iter().map(|x| x.derivative[0]).collect()
+    };
+    let by_joint = (0..n)
+        .map(|k| {
+            let mut unit = vec![0.0; n];
+            unit[k] = 1.0;
+            along(&unit)
+        })
+        .collect();
+    (by_joint, along(&s.qd))
+}
+
+/// Exact rate of a function of q and q̇ along the motion.
+fn along_motion(
+    s: &Sample,
+    f: impl Fn(&Chain<Dual<f64, 1>>, &[Dual<f64, 1>], &[Dual<f64, 1>], &mut [Dual<f64, 1>]),
+    length: usize,
+) -> Vec<f64> {
+    let mut out = vec![Dual::constant(f64::NAN); length];
+    let (q, qd) = (with_slope(&s.q, &s.qd), with_slope(&s.qd, &s.qdd));
+    f(&dual(s).0, &q, &qd, &mut out);
+    out.iter().map(|x| x.derivative[0]).collect()
 }
 
 fn moved(q: &[f64], direction: &[f64], by: f64) -> Vec<f64> {
@@ -201,6 +253,127 @@ proptest! {
     }
 
     #[test]
+    fn articulated_bodies_give_the_accelerations_of_composite_bodies(s in sample()) {
+        let tau = torque(&s, &s.q, &s.qd, &s.qdd);
+        let mut found = vec![f64::NAN; s.n()];
+        articulated_forward_dynamics(&s.chain(), &s.parameters, &s.q, &s.qd, &tau, &mut found).unwrap();
+        prop_assert!(relative_difference(&torque(&s, &s.q, &s.qd, &found), &tau) < 1e-10);
+        let mut composite = vec![f64::NAN; s.n()];
+        forward_dynamics(&s.chain(), &s.parameters, &s.q, &s.qd, &tau, &mut composite).unwrap();
+        prop_assert!(relative_difference(&found, &composite) < 1e-7);
+        prop_assert!(relative_difference(&found, &s.qdd) < 1e-7);
+    }
+
+    #[test]
+    fn velocity_coefficients_are_the_derivatives_of_the_inertia_matrix(s in sample()) {
+        // The element formulas, with exact derivatives of A by dual numbers, one direction a joint.
+        let n = s.n();
+        let (slope, _) = slopes(&s);
+        let pairs = n * (n - 1) / 2;
+        let (mut b, mut c) = (vec![f64::NAN; n * pairs], vec![f64::NAN; n * n]);
+        velocity_coefficients(&s.chain(), &s.parameters, &s.q, &mut b, &mut c).unwrap();
+        let a = |i: usize, j: usize, by: usize| slope[by][i * n + j];
+        let (mut expected_b, mut expected_c) = (Vec::new(), Vec::new());
+        for i in 0..n {
+            for j in 0..n {
+                expected_c.push(a(i, j, j) - 0.5 * a(j, j, i));
+                for k in j + 1..n {
+                    prop_assert_eq!(pair_column(n, j, k), expected_b.len() - i * pairs);
+                    expected_b.push(a(i, j, k) + a(i, k, j) - a(j, k, i));
+                }
+            }
+        }
+        prop_assert!(relative_difference(&b, &expected_b) < 1e-12);
+        prop_assert!(relative_difference(&c, &expected_c) < 1e-12);
+        // And they make the torque of the Coriolis matrix.
+        let products: Vec<f64> = (0..n)
+            .flat_map(|j| (j + 1..n).map(move |k| (j, k)))
+            .map(|(j, k)| s.qd[j] * s.qd[k])
+            .collect();
+        let squares: Vec<f64> = s.qd.iter().map(|w| w * w).collect();
+        let found: Vec<f64> = (0..n)
+            .map(|i| {
+                let dot = |m: &[f64], x: &[f64]| m.iter().zip(x).map(|(m, x)| m * x).sum::<f64>();
+                dot(&b[i * pairs..(i + 1) * pairs], &products) + dot(&c[i * n..(i + 1) * n], &squares)
+            })
+            .collect();
+        prop_assert!(relative_difference(&found, &times(&coriolis(&s, &s.qd), &s.qd)) < 1e-12);
+    }
+
+    #[test]
+    fn rate_of_inertia_less_twice_coriolis_is_skew_to_rounding(s in sample()) {
+        let n = s.n();
+        let (_, rate) = slopes(&s);
+        let c = coriolis(&s, &s.qd);
+        let scale = rate.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        for j in 0..n {
+            for k in 0..n {
+                let skew = rate[j * n + k] - 2.0 * c[j * n + k];
+                let mirror = rate[k * n + j] - 2.0 * c[k * n + j];
+                prop_assert!((skew + mirror).abs() < 1e-12 * scale, "{:e}", (skew + mirror) / scale);
+            }
+        }
+    }
+
+    #[test]
+    fn power_regressor_is_the_power_of_the_torques(s in sample()) {
+        let chain = s.chain();
+        let width = chain.parameter_count();
+        let mut row = vec![f64::NAN; width];
+        power_regressor(&chain, &s.q, &s.qd, &s.qdd, &mut row).unwrap();
+        let mut y = vec![f64::NAN; s.n() * width];
+        differential_regressor(&chain, &s.q, &s.qd, &s.qdd, &mut y).unwrap();
+        let expected: Vec<f64> = (0..width)
+            .map(|c| (0..s.n()).map(|j| s.qd[j] * y[j * width + c]).sum())
+            .collect();
+        prop_assert!(relative_difference(&row, &expected) < 1e-13);
+        // The exact rate of the energy's row, by dual numbers, and the friction's.
+        let rate = along_motion(&s, |chain, q, qd, out| energy_regressor(chain, q, qd, out).unwrap(), width);
+        let mut friction = vec![f64::NAN; width];
+        friction_power_regressor(&chain, &s.qd, &mut friction).unwrap();
+        let total: Vec<f64> = rate.iter().zip(&friction).map(|(r, f)| r + f).collect();
+        prop_assert!(relative_difference(&row, &total) < 1e-12);
+    }
+
+    #[test]
+    fn rate_of_momentum_and_losses_make_the_differential_regressor(s in sample()) {
+        let (chain, n) = (s.chain(), s.n());
+        let length = n * chain.parameter_count();
+        let rate = along_motion(&s, |chain, q, qd, out| momentum_regressor(chain, q, qd, out).unwrap(), length);
+        let mut rest = vec![f64::NAN; length];
+        momentum_loss_regressor(&chain, &s.q, &s.qd, &mut rest).unwrap();
+        let mut y = vec![f64::NAN; length];
+        differential_regressor(&chain, &s.q, &s.qd, &s.qdd, &mut y).unwrap();
+        let total: Vec<f64> = rate.iter().zip(&rest).map(|(r, l)| r + l).collect();
+        prop_assert!(relative_difference(&total, &y) < 1e-12);
+        // And the momentum is that of the inertia matrix.
+        let mut p = vec![f64::NAN; length];
+        momentum_regressor(&chain, &s.q, &s.qd, &mut p).unwrap();
+        let momentum = times(&p, s.parameters.as_flattened());
+        prop_assert!(relative_difference(&momentum, &times(&matrix(&s, &s.q), &s.qd)) < 1e-12);
+    }
+
+    #[test]
+    fn a_tilted_base_is_a_turned_gravity(s in sample()) {
+        // A motionless joint before the first one that turns the whole arm by β about x, gravity as before, against the arm
+        // itself under gravity turned by −β.
+        let beta = 0.7;
+        let mut long = s.clone();
+        long.geometry.insert(0, JointGeometry { kind: JointKind::Prismatic, alpha: beta, a: 0.3, theta: 0.0, d: -0.2 });
+        long.parameters.insert(0, [0.0; COLUMNS]);
+        for signal in [&mut long.q, &mut long.qd, &mut long.qdd] {
+            signal.insert(0, 0.0);
+        }
+        let expected = torque(&long, &long.q, &long.qd, &long.qdd);
+        let [x, y, z] = s.gravity;
+        let (sin, cos) = beta.sin_cos();
+        let turned = [x, cos * y + sin * z, cos * z - sin * y];
+        let mut found = vec![f64::NAN; s.n()];
+        inverse_dynamics(&s.chain().with_gravity(turned), &s.parameters, &s.q, &s.qd, &s.qdd, &mut found).unwrap();
+        prop_assert!(relative_difference(&found, &expected[1..]) < 1e-12);
+    }
+
+    #[test]
     fn power_of_the_torques_feeds_energy_and_friction(s in sample()) {
         // dH/dt = q̇ᵀτ − friction power along q(t) = q + q̇·t + ½·q̈·t², by the rows of the integral model.
         let chain = s.chain();
@@ -244,6 +417,8 @@ fn the_longest_chain_works() {
     let tau = torque(&s, &s.q, &s.qd, &s.qdd);
     let mut found = vec![f64::NAN; s.n()];
     forward_dynamics(&s.chain(), &s.parameters, &s.q, &s.qd, &tau, &mut found).unwrap();
+    assert!(relative_difference(&torque(&s, &s.q, &s.qd, &found), &tau) < 1e-10);
+    articulated_forward_dynamics(&s.chain(), &s.parameters, &s.q, &s.qd, &tau, &mut found).unwrap();
     assert!(relative_difference(&torque(&s, &s.q, &s.qd, &found), &tau) < 1e-10);
     let mut y = vec![f64::NAN; s.n() * s.n() * COLUMNS];
     differential_regressor(&s.chain(), &s.q, &s.qd, &s.qdd, &mut y).unwrap();

@@ -1,6 +1,8 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod arms;
 mod emps;
+mod judged;
 mod made;
 
 use super::*;

@@ -1,0 +1,87 @@
+//! The kernels, compiled for the vector instructions of the machine and chosen when the program runs.
+//!
+//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 besides runs nearly twice as fast where
+//! there is AVX2. Both versions are the same source without fused operations and give the same bits (tested). Processors of other kinds take
+//! the portable version, which for 64-bit Arm already is a vector one.
+
+use multiversion::multiversion;
+use rig_shared::multibody::block::{
+    self, AxisBlock, Body, Frame, JointBlock, LANES, Lane, NotPositive,
+};
+
+/// Makes a function that takes the best version for the machine, and the portable version for comparison in tests.
+macro_rules! versions {
+    ($(#[$doc:meta])* $name:ident, $portable:ident ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block) => {
+        $(#[$doc])*
+        #[multiversion(targets("x86_64+avx2"))]
+        pub(super) fn $name($($argument: $type),*) $(-> $result)? $body
+
+        #[cfg(test)]
+        pub(super) fn $portable($($argument: $type),*) $(-> $result)? $body
+    };
+}
+
+versions! {
+    /// [`block::inverse_dynamics`].
+    inverse_dynamics, inverse_dynamics_portable(
+        frames: &[Frame], gravity: [f64; 3], bodies: &[Body], q: &[Lane], qd: &[Lane], qdd: Option<&[Lane]>,
+        work: &mut [JointBlock], tau: &mut [Lane],
+    ) {
+        block::inverse_dynamics(frames, gravity, bodies, q, qd, qdd, work, tau);
+    }
+}
+
+versions! {
+    /// [`block::inertia_matrix`].
+    inertia_matrix, inertia_matrix_portable(
+        frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock], out: &mut [Lane],
+    ) {
+        block::inertia_matrix(frames, bodies, q, work, out);
+    }
+}
+
+versions! {
+    /// [`block::forward_dynamics`].
+    forward_dynamics, forward_dynamics_portable(
+        frames: &[Frame], gravity: [f64; 3], bodies: &[Body], q: &[Lane], qd: &[Lane], tau: &[Lane],
+        work: &mut [JointBlock], matrix: &mut [Lane], qdd: &mut [Lane],
+    ) -> Result<(), NotPositive> {
+        block::forward_dynamics(frames, gravity, bodies, q, qd, tau, work, matrix, qdd)
+    }
+}
+
+versions! {
+    /// [`block::differential_regressor`]: the first `len` samples of entry (joint, c) go to
+    /// `out[(joint * width + c) * stride + at..]`.
+    differential_regressor, differential_regressor_portable(
+        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], qdd: &[Lane], axes: &mut [AxisBlock],
+        out: &mut [f64], width: usize, stride: usize, at: usize, len: usize,
+    ) {
+        block::differential_regressor(frames, gravity, q, qd, qdd, axes, &mut |joint, c, lane| {
+            store(lane, out, (joint * width + c) * stride + at, len);
+        });
+    }
+}
+
+versions! {
+    /// [`block::energy_regressor`]: the first `len` samples of column c go to `out[c * stride + at..]`.
+    energy_regressor, energy_regressor_portable(
+        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane],
+        out: &mut [f64], stride: usize, at: usize, len: usize,
+    ) {
+        block::energy_regressor(frames, gravity, q, qd, &mut |c, lane| {
+            store(lane, out, c * stride + at, len);
+        });
+    }
+}
+
+/// Writes the first `len` samples of a lane.
+#[inline(always)]
+fn store(lane: &Lane, out: &mut [f64], at: usize, len: usize) {
+    if len == LANES {
+        // Its length known to the compiler.
+        out[at..at + LANES].copy_from_slice(lane);
+    } else {
+        out[at..at + len].copy_from_slice(&lane[..len]);
+    }
+}

@@ -1,0 +1,138 @@
+//! The differential model without acceleration: momentum and what changes it.
+//!
+//! Lagrange's equations read d/dt (A(q)·q̇) = τ + ∂T/∂q − g(q) − friction. Both momentum and the rest are linear in the parameters, so
+//!
+//! τ = d/dt (P(q, q̇))·π + R(q, q̇)·π
+//!
+//! and any low-pass F(s) on both sides leaves F(τ) = (s·F(P) + F(R))·π, where s·F is what the filter's own state gives: a regressor of
+//! the differential model that needs no q̈ (Hsu, Bodson, Sastry & Paden 1987; Slotine & Li 1991, sec. 9.2). The filter
+//! belongs to the caller; it must be the same for torque, P and R.
+
+use super::chain::{Chain, MultibodyError, check};
+use super::inverse::LinkMotion;
+use super::parameters::{COLUMNS, column};
+use super::regressor::link_columns;
+use super::spatial::{Motion, Vector3};
+use super::with_capacity;
+use crate::scalar::Real;
+
+/// Regressor P of the momentum, A(q)·q̇ = P·π with the drives' Ia·q̇, n × 14n row-major like
+/// [`super::differential_regressor`]; its friction and offset columns are 0.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`].
+pub fn momentum_regressor<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    check("out", n * chain.parameter_count(), out.len())?;
+    with_capacity!(n, momentum(chain, q, qd, out));
+    Ok(())
+}
+
+/// Regressor R of what the torque does beside changing the momentum: g(q) − ∂T/∂q + fv·q̇ + fc·sgn q̇ + off = R·π,
+/// n × 14n row-major.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`].
+pub fn momentum_loss_regressor<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    qd: &[T],
+    out: &mut [T],
+) -> Result<(), MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("qd", n, qd.len())?;
+    check("out", n * chain.parameter_count(), out.len())?;
+    with_capacity!(n, loss(chain, q, qd, out));
+    Ok(())
+}
+
+/// The chain has at most `CAPACITY` joints.
+fn momentum<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T], out: &mut [T]) {
+    let width = chain.parameter_count();
+    let mut axes = [Motion::ZERO; CAPACITY];
+    let mut velocity = Motion::ZERO;
+    out.fill(T::ZERO);
+    for (i, joint) in chain.joints.iter().enumerate() {
+        let transform = joint.transform(q[i]);
+        velocity = joint.velocity(&transform, velocity, qd[i]);
+        // The momentum is the inertial wrench of starting from rest with the velocity as acceleration.
+        let start = LinkMotion {
+            velocity: Vector3::ZERO,
+            acceleration: velocity.angular,
+            proper: velocity.linear,
+        };
+        for axis in &mut axes[..i] {
+            *axis = transform.motion_to_child(*axis);
+        }
+        axes[i] = joint.axis();
+        for (j, axis) in axes[..=i].iter().enumerate() {
+            let at = j * width + i * COLUMNS;
+            link_columns(&start, axis, &mut out[at..at + COLUMNS]);
+        }
+        out[i * width + i * COLUMNS + column::DRIVE_INERTIA] = qd[i];
+    }
+}
+
+/// The chain has at most `CAPACITY` joints.
+fn loss<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T], out: &mut [T]) {
+    let width = chain.parameter_count();
+    let mut axes = [Motion::ZERO; CAPACITY];
+    // Velocity of the link before joint j, carried along like the axes.
+    let mut before = [Motion::ZERO; CAPACITY];
+    let mut velocity = Motion::ZERO;
+    let mut gravity = chain.gravity;
+    out.fill(T::ZERO);
+    for (i, joint) in chain.joints.iter().enumerate() {
+        let transform = joint.transform(q[i]);
+        for (axis, motion) in axes[..i].iter_mut().zip(&mut before[..i]) {
+            *axis = transform.motion_to_child(*axis);
+            *motion = transform.motion_to_child(*motion);
+        }
+        axes[i] = joint.axis();
+        before[i] = transform.motion_to_child(velocity);
+        velocity = joint.velocity(&transform, velocity, qd[i]);
+        gravity = transform.direction_to_child(gravity);
+        let rest = LinkMotion {
+            velocity: Vector3::ZERO,
+            acceleration: Vector3::ZERO,
+            proper: -gravity,
+        };
+        for j in 0..=i {
+            let at = j * width + i * COLUMNS;
+            let block = &mut out[at..at + COLUMNS];
+            link_columns(&rest, &axes[j], block);
+            // Seen from link i, moving joint j turns back what the joints before j do: ∂v/∂q_j = v_before × s_j.
+            let slope = before[j].cross(axes[j]);
+            let Vector3([hx, hy, hz]) =
+                slope.linear.cross(velocity.angular) + velocity.linear.cross(slope.angular);
+            let ([dx, dy, dz], [wx, wy, wz]) = (slope.angular.0, velocity.angular.0);
+            let values = [
+                slope.linear.dot(velocity.linear),
+                hx,
+                hy,
+                hz,
+                dx * wx,
+                dx * wy + dy * wx,
+                dx * wz + dz * wx,
+                dy * wy,
+                dy * wz + dz * wy,
+                dz * wz,
+            ];
+            for (entry, value) in block.iter_mut().zip(values) {
+                *entry -= value;
+            }
+        }
+        let own = i * width + i * COLUMNS;
+        out[own + column::VISCOUS] = qd[i];
+        out[own + column::COULOMB] = qd[i].sgn();
+        out[own + column::OFFSET] = T::ONE;
+    }
+}
