@@ -150,7 +150,7 @@ pub fn recorded(line: &mut Line, experiment: &Experiment) -> Recording {
             ),
             Event::Estimate(estimate) => out.estimates.push(*estimate),
             Event::Fault(fault) => out.faults.push(*fault),
-            Event::Gap { .. } | Event::Snapshot(_) => {}
+            Event::Gap { .. } | Event::Snapshot(_) | Event::Capture(_) | Event::Health(_) => {}
         }
         ControlFlow::Continue(())
     })

@@ -11,6 +11,7 @@ use rig_firmware::examined::Examined;
 use rig_firmware::nameplate;
 use rig_firmware::note::Note;
 use rig_firmware::state::State;
+use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
@@ -52,11 +53,7 @@ pub(crate) fn run() -> ! {
     let (storage, found) = Storage::open(config);
     let settings = found.settings.unwrap_or(own);
     let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
-    let state = match State::new(config, settings) {
-        Ok(state) => STATE.init(state),
-        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
-        Err(_) => unreachable!(),
-    };
+    let state = state(config, settings);
     let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
@@ -106,6 +103,16 @@ pub(crate) fn run() -> ! {
         spawner.spawn(indicator);
         spawner.spawn(keeper);
     })
+}
+
+/// The state at power on, made in its place: it is half as large as the stack.
+#[inline(never)]
+fn state(config: &Config, settings: Settings) -> &'static mut State {
+    match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
+        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        Err(_) => unreachable!(),
+    }
 }
 
 /// Feeds the watchdog and blinks: a light that stands still is a program that does.
