@@ -150,7 +150,7 @@ pub fn recorded<P: Port>(line: &mut Session<P>, experiment: &Experiment) -> Reco
             ),
             Event::Estimate(estimate) => out.estimates.push(*estimate),
             Event::Fault(fault) => out.faults.push(*fault),
-            Event::Gap { .. } | Event::Snapshot(_) => {}
+            Event::Gap { .. } | Event::Snapshot(_) | Event::Capture(_) | Event::Health(_) => {}
         }
         ControlFlow::Continue(())
     })

@@ -72,7 +72,7 @@ pub(crate) fn config(crystal: bool) -> Config {
         divr: Some(PllRDiv::DIV2),
     });
     rcc.sys = Sysclk::PLL1_R;
-    // Range 1 boost mode, needed above 150 MHz (RM0440 section 6.1.5).
+    // Range 1 boost mode, needed above 150 MHz (RM0440, PWR, "Dynamic voltage scaling management").
     rcc.boost = true;
     rcc.apb1_pre = APBPrescaler::DIV1;
     rcc.apb2_pre = APBPrescaler::DIV1;

@@ -57,7 +57,7 @@ impl Checkup {
             crystal: self.start.crystal,
             tick_cycles_max: self.max,
             // At 10 kHz the sum of a second is below 2³² by far: every tick is shorter than its period.
-            tick_cycles_mean: self.sum / self.ticks,
+            tick_cycles_mean: self.sum / self.ticks.max(1),
             stack_free: stack::free(),
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
             dropped,
@@ -71,7 +71,7 @@ impl Checkup {
 pub(crate) fn reset_cause() -> ResetCause {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440 section 7.1.2).
+    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440, RCC, "System reset").
     if flags.iwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {

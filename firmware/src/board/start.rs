@@ -11,20 +11,20 @@ use rig_firmware::examined::Examined;
 use rig_firmware::nameplate;
 use rig_firmware::note::Note;
 use rig_firmware::state::State;
+use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
 use super::clock::{self, LINK_PRIORITY};
 use super::encoder::EncoderTimer;
+use super::health::{Checkup, Start};
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::health::{Checkup, Start};
-use super::storage::Storage;
 use super::queue::{Inlet, Outlet};
+use super::storage::Storage;
 use super::tick::{NOTES, REQUESTS, Tick};
 use super::watchdog::Watchdog;
-use super::{cycles, health, link, stack, tick};
-use defmt_rtt as _;
+use super::{cycles, health, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -38,6 +38,7 @@ static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Brings the board up and runs it.
 pub(crate) fn run() -> ! {
+    let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
     let crystal = clock::crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
@@ -52,11 +53,7 @@ pub(crate) fn run() -> ! {
     let (storage, found) = Storage::open(config);
     let settings = found.settings.unwrap_or(own);
     let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
-    let state = match State::new(config, settings) {
-        Ok(state) => STATE.init(state),
-        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
-        Err(_) => unreachable!(),
-    };
+    let state = state(config, settings);
     let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
@@ -93,8 +90,8 @@ pub(crate) fn run() -> ! {
     EXECUTOR.init(Executor::new()).run(|spawner| {
         // Each is spawned once, and its place is reserved at compile time.
         let placed = (
-            link::telemetry(config, sender, note_out),
-            link::commands(receiver, request_in),
+            link::telemetry(config, sender, probe_out, note_out),
+            link::commands(receiver, probe_in, request_in),
             indicator(watchdog, pins.led),
             keeper(storage, from_tick),
         );
@@ -106,6 +103,16 @@ pub(crate) fn run() -> ! {
         spawner.spawn(indicator);
         spawner.spawn(keeper);
     })
+}
+
+/// The state at power on, made in its place: it is half as large as the stack.
+#[inline(never)]
+fn state(config: &Config, settings: Settings) -> &'static mut State {
+    match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
+        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        Err(_) => unreachable!(),
+    }
 }
 
 /// Feeds the watchdog and blinks: a light that stands still is a program that does.

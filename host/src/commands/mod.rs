@@ -4,6 +4,7 @@ mod base;
 mod demo;
 mod error;
 mod excite;
+mod flash;
 mod friction_map;
 mod identify;
 mod init;
@@ -33,6 +34,7 @@ enum Command {
     Demo(demo::Args),
     Init(init::Args),
     Record(record::Args),
+    Flash(flash::Args),
     Excite(excite::Args),
     Simulate(simulate::Args),
     Base(base::Args),
@@ -53,6 +55,7 @@ impl Cli {
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Excite(args)) => excite::run(&args, &ui),
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),

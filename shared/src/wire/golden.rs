@@ -133,11 +133,7 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             RequestBody::Capture(300),
             "0a820214ac02484d04bc00"
         ),
-        (
-            "GetCapture",
-            RequestBody::GetCapture,
-            "08820215a965c6a600"
-        ),
+        ("GetCapture", RequestBody::GetCapture, "08820215a965c6a600"),
     ]
 }
 
@@ -282,7 +278,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 bad_requests: 1,
                 dropped: 8
             }),
-            ""
+            "1808904e030380fd8751018827b817a09c0101089e59a71d00"
         ),
     ]
 }
