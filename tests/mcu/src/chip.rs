@@ -206,6 +206,16 @@ impl Chip {
         self.gpio[1].set_outside(12, fault);
     }
 
+    /// The processor has locked up: an input of the break where it is let through (SYSCFG_CFGR2.CLL).
+    pub fn lock_up(&mut self) {
+        if self.syscfg.breaks_on_lockup() {
+            self.tim[0].trip();
+            if let Err(refusal) = self.update_bridge(self.work.now) {
+                self.fail(ChipError::Hardware(refusal));
+            }
+        }
+    }
+
     /// A timer by its number.
     pub fn timer(&mut self, number: u8) -> &mut Tim {
         &mut self.tim[timer_index(number)]
@@ -563,7 +573,13 @@ impl Chip {
         let now = self.work.now;
         let (peripheral, base) = self.place(address)?;
         let offset = address - base;
-        if size != 4 && !matches!(peripheral, Peripheral::Scs | Peripheral::Lpuart) {
+        // Timers may be accessed by half-words (RM0440 section 28.6); the line takes single bytes.
+        let narrow = match peripheral {
+            Peripheral::Scs | Peripheral::Lpuart => true,
+            Peripheral::Tim(_) => size == 2,
+            _ => false,
+        };
+        if size != 4 && !(narrow && (offset.is_multiple_of(4) || peripheral == Peripheral::Scs)) {
             return told(format!("a store of {size} bytes is not modelled there"));
         }
         match peripheral {

@@ -210,7 +210,9 @@ impl<C: Cpu<Chip>> Emulation<C> {
             .unwrap_or(map::RAM.start);
         let mut bytes = vec![0; (top - bottom) as usize];
         self.cpu.load(bottom, &mut bytes);
-        let untouched = bytes.iter().take_while(|byte| **byte == PAINT).count();
+        // cortex-m-rt may have painted it anew before the program began (its feature `paint-stack`).
+        let painted = |byte: &&u8| matches!(**byte, PAINT | 0xCC);
+        let untouched = bytes.iter().take_while(painted).count();
         (top - bottom - untouched as u32, top - bottom)
     }
 
@@ -370,13 +372,18 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let masks = self.cpu.masks();
         let in_fault = self.cpu.bus().nvic.running() == Some(HARD_FAULT);
         if in_fault || masks.faultmask {
-            self.locked = true;
+            self.lock_up();
             return Ok(());
         }
         let mut chip = self.cpu.bus();
         chip.nvic.fault(status, address);
         chip.nvic.pend(HARD_FAULT);
         Ok(())
+    }
+
+    fn lock_up(&mut self) {
+        self.locked = true;
+        self.cpu.bus().lock_up();
     }
 
     fn enter(&mut self, exception: u16) -> Result<(), EmulationError> {
@@ -413,7 +420,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
                     function: self.name(pc),
                 });
             }
-            self.locked = true;
+            self.lock_up();
             return Ok(());
         }
         let nested = self.cpu.bus().nvic.depth() > 0;

@@ -20,6 +20,17 @@ use crate::cost;
 use crate::cpu::{Block, Bus, Cpu, Masks, Memory, Register, Stop};
 use crate::map;
 
+/// The engine cannot be set up, or lacks what is asked of it.
+#[derive(Debug, thiserror::Error)]
+#[error("the processor's engine fails ({0:?}): is unicorn 2.1.5 what was built?")]
+pub struct EngineError(uc_error);
+
+impl From<uc_error> for EngineError {
+    fn from(error: uc_error) -> Self {
+        Self(error)
+    }
+}
+
 /// An address at which no code can lie: the engine runs "until" it.
 const NOWHERE: u64 = 0x3000_0000;
 
@@ -68,7 +79,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
     ///
     /// # Errors
     /// What the engine says.
-    pub fn new(bus: B) -> Result<Self, uc_error> {
+    pub fn new(bus: B) -> Result<Self, EngineError> {
         let mut engine = Unicorn::new(Arch::ARM, Mode::MCLASS)?;
         engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
         engine.mem_map(

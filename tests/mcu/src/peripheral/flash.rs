@@ -41,7 +41,7 @@ const REGISTERS: &[Register] = &[
     Register(0x10, "FLASH_SR", 0, 0x0000_C3FB),
     // PG, PER, PNB, BKER, STRT, interrupts, LOCK. OPTLOCK stays set.
     Register(0x14, "FLASH_CR", 0xC000_0000, 0x8301_0BFB),
-    Register(0x18, "FLASH_ECCR", 0, 0),
+    Register(0x18, "FLASH_ECCR", 0, 0x0100_0000),
     // DBANK set: two banks of 64-bit words.
     Register(0x20, "FLASH_OPTR", 0xFFEF_F8AA, 0),
 ];

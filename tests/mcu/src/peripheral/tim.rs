@@ -334,7 +334,8 @@ impl Tim {
         }
     }
 
-    fn trip(&mut self) {
+    /// A break from inside the chip.
+    pub fn trip(&mut self) {
         let bdtr = self.bank.get(BDTR) & !MOE;
         self.bank.put(BDTR, bdtr);
         self.flag(BIF);
