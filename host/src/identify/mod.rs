@@ -27,6 +27,7 @@ mod excitation;
 mod factor;
 mod friction_map;
 mod further;
+mod grouping;
 mod instrumental;
 mod integral;
 mod least;
@@ -48,12 +49,15 @@ mod total;
 mod twin;
 
 #[cfg(test)]
+mod rows_test;
+#[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
 
 pub use base::{
-    Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference,
+    transmission_of, unit,
 };
 pub use cache::RowCache;
 pub use compare::{Compared, Comparison, Endogeneity};
@@ -63,6 +67,7 @@ pub use essential::{Essential, EssentialSet};
 pub(crate) use evaluate::torque_residuals;
 pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
+pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
 pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};

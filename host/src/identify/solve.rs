@@ -1,6 +1,6 @@
 //! The way from recordings to an [`Identification`].
 
-use super::base::{Base, chain_of, expression};
+use super::base::{Base, chain_of, expression, transmission_of};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
@@ -37,8 +37,11 @@ pub fn identify(
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
     let chain = chain_of(robot)?;
+    let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
+    // What is spooled has no references any more.
+    let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
     let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
     let (training, holdout) = (training.as_slice(), holdout.as_slice());
@@ -75,6 +78,7 @@ pub fn identify(
         .collect();
     let plan_with = |treatment| Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &base.columns,
         treatment,
         window,
@@ -210,6 +214,7 @@ pub fn identify(
     let problem = Problem {
         robot,
         training,
+        sources,
         surveys: &surveys,
         plan: &plan,
         options,

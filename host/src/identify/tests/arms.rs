@@ -293,3 +293,8 @@ fn arms_of_two_to_seven_joints_by_every_estimator() {
         }
     }
 }
+
+/// Random links.
+pub(super) fn bodies(chance: &mut Chance, n: usize) -> Vec<[f64; 10]> {
+    (0..n).map(|_| body(chance, 2.0, 0.2)).collect()
+}

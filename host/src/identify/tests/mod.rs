@@ -2,6 +2,7 @@
 
 mod arms;
 mod emps;
+mod exact;
 mod judged;
 mod made;
 
