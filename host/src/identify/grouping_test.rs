@@ -173,7 +173,7 @@ fn the_rules_print_the_published_expressions_too() {
 #[test]
 fn rules_and_rank_agree_on_random_chains_with_special_angles() {
     let mut rng = Pcg64::seed_from_u64(41);
-    for draw in 0..240 {
+    for draw in 0..180 {
         let n = 1 + draw % 12;
         // The first joints decide over the special rules: there, slides and special angles are likely.
         let special = |rng: &mut Pcg64, share: f64, values: &[f64], range: f64| {
