@@ -5,9 +5,7 @@
 //! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
 //! moved is counts that were lost or made up on the way.
 
-use embassy_stm32::pac::timer::vals::{
-    CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms,
-};
+use embassy_stm32::pac::timer::vals::{CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms};
 use embassy_stm32::pac::{RCC, TIM2};
 use rig_shared::units::EncoderCount;
 

@@ -137,5 +137,7 @@ impl Bridge {
 #[inline(always)]
 pub(crate) fn off() {
     TIM1.bdtr().modify(|w| w.set_moe(false));
-    embassy_stm32::pac::GPIOB.bsrr().write(|w| w.set_br(5, true));
+    embassy_stm32::pac::GPIOB
+        .bsrr()
+        .write(|w| w.set_br(5, true));
 }

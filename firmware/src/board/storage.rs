@@ -106,7 +106,10 @@ impl Storage {
         for (index, word) in bytes.chunks_exact(8).enumerate() {
             FLASH.cr().modify(|w| w.set_pg(true));
             for (half, chunk) in word.chunks_exact(4).enumerate() {
-                let value = chunk.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
+                let value = chunk
+                    .iter()
+                    .rev()
+                    .fold(0, |sum, &byte| sum << 8 | u32::from(byte));
                 // Inside the page just erased: an image is shorter than a page.
                 #[allow(unsafe_code)]
                 unsafe {

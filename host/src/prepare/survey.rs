@@ -47,6 +47,8 @@ pub struct Survey {
     pub sample_rate: f64,
     /// One entry a joint.
     pub joints: Vec<JointSurvey>,
+    /// What was done to its time stamps, a sentence; none where nothing was.
+    pub note: Option<String>,
 }
 
 struct Extreme {
@@ -213,6 +215,7 @@ impl Survey {
                     line,
                     step,
                     mean,
+                    longest: widest.0,
                 });
             }
         }
@@ -252,6 +255,7 @@ impl Survey {
             longest,
             sample_rate,
             joints,
+            note: None,
         })
     }
 }
