@@ -166,6 +166,13 @@ pub enum Warning {
         /// The usual one, s.
         period: f64,
     },
+    /// One time stamp lies off the even grid, the rows before and after on it; the row is taken as evenly sampled.
+    Misplaced {
+        /// Line of the row.
+        line: u64,
+        /// How much later than the grid it is stamped, s.
+        off: f64,
+    },
     /// A column without meaning to the model holds something that is no number; it is NaN in
     /// [`super::Block::extra`].
     ExtraNotANumber {
@@ -194,6 +201,12 @@ impl fmt::Display for Warning {
                 write!(
                     f,
                     "line {line}: the time advances by {step:.6} s where {period:.6} s is usual; the rows before and after are treated apart"
+                )
+            }
+            Self::Misplaced { line, off } => {
+                write!(
+                    f,
+                    "line {line}: its time stamp lies {off:.6} s off the even grid that the rows around it keep; it is taken as evenly sampled"
                 )
             }
             Self::ExtraNotANumber { line, column } => {

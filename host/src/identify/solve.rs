@@ -40,6 +40,8 @@ pub fn identify(
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
+    // What is spooled has no references any more.
+    let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
     let (surveys, training) = surveyed(&training, joints)?;
     if surveys.is_empty() {
@@ -207,6 +209,7 @@ pub fn identify(
     let problem = Problem {
         robot,
         training,
+        sources,
         surveys: &surveys,
         plan: &plan,
         options,

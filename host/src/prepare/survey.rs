@@ -6,9 +6,13 @@ use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
 
-/// Steps may differ from the mean by this share: time stamps written with single precision or by a jittery
-/// clock pass, a lost or doubled row does not.
-const STEP_TOLERANCE: f64 = 0.2;
+/// Two neighbouring steps together may differ from twice the mean by this share: time stamps written with single
+/// precision or by a jittery clock pass, and one stamp off the grid between rows that are on it; a lost or doubled
+/// row, or a shift of the grid by more than a fifth of a step, does not.
+const STEP_TOLERANCE: f64 = 0.1;
+
+/// Steps that are this much alike count as equal: the first of them is named.
+const ROUNDING: f64 = 1e-9;
 
 /// Rows below which a spectrum says nothing.
 const FEWEST_ROWS: u64 = 256;
@@ -153,7 +157,7 @@ impl Survey {
             .collect();
         let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
         let (mut span, mut steps) = (0.0, 0u64);
-        let mut last_time = 0.0;
+        let (mut before_last, mut last_time) = (0.0, 0.0);
         let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
         recording.each_block(1 << 16, &mut |block| {
             if block.joints.len() != joints {
@@ -171,18 +175,21 @@ impl Survey {
                     span += step;
                     steps += 1;
                     let line = block.first_line + k as u64;
-                    if step < shortest.0 {
-                        shortest = (step, line);
-                    }
-                    if step > widest.0 {
-                        widest = (step, line);
+                    if run > 1 {
+                        let pair = 0.5 * (t - before_last);
+                        if pair < shortest.0 * (1.0 - ROUNDING) {
+                            shortest = (pair, line);
+                        }
+                        if pair > widest.0 * (1.0 + ROUNDING) {
+                            widest = (pair, line);
+                        }
                     }
                     run += 1;
                 } else {
                     run = 1;
                 }
                 longest = longest.max(run);
-                last_time = t;
+                (before_last, last_time) = (last_time, t);
                 rows += 1;
                 for (r, column) in running.iter_mut().zip(&block.joints) {
                     let (q, tau) = (column.q[k], column.tau[k]);
