@@ -17,7 +17,7 @@ use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
-use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, threads};
+use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
 use crate::robot::Robot;
 
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
@@ -43,18 +43,13 @@ pub fn identify(
     // What is spooled has no references any more.
     let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
-    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
-    let (training, holdout) = (training.as_slice(), holdout.as_slice());
-    let survey = |list: &[&dyn Recording]| {
-        list.iter()
-            .map(|r| Survey::take(*r, joints))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let surveys = survey(training)?;
+    let (surveys, training) = surveyed(&training, joints)?;
     if surveys.is_empty() {
         return Err(IdentifyError::NoRecording);
     }
-    let holdout_surveys = survey(holdout)?;
+    let (holdout_surveys, holdout) = surveyed(&holdout, joints)?;
+    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
+    let (training, holdout) = (training.as_slice(), holdout.as_slice());
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
         return Err(IdentifyError::NoTorque { joint: j + 1 });
     }
@@ -280,6 +275,12 @@ pub fn identify(
         holdout,
     )?;
     let mut warnings = beyond.warnings;
+    warnings.extend(
+        surveys
+            .iter()
+            .chain(&holdout_surveys)
+            .filter_map(|survey| survey.note.clone()),
+    );
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -370,8 +371,8 @@ pub fn identify(
     })
 }
 
-fn as_recordings<'a>(spooled: &'a [Spooled<'a>]) -> Vec<&'a dyn Recording> {
-    spooled.iter().map(|s| s as &dyn Recording).collect()
+fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
+    list.iter().map(AsRef::as_ref).collect()
 }
 
 /// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
