@@ -13,6 +13,7 @@
 //!
 //! Leaves out: estimation of the friction law's form (see [`friction_map()`]); noise models that change with the motion.
 
+mod band;
 mod base;
 mod cache;
 mod closed;
@@ -33,6 +34,7 @@ mod least;
 mod likelihood;
 mod linear;
 mod model;
+mod momentum;
 mod output_error;
 mod parts;
 mod prior;
@@ -48,12 +50,15 @@ mod total;
 mod twin;
 
 #[cfg(test)]
+mod rows_test;
+#[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
 
 pub use base::{
-    Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference,
+    transmission_of, unit,
 };
 pub use cache::RowCache;
 pub use compare::{Compared, Comparison, Endogeneity};
@@ -78,7 +83,8 @@ pub enum ModelKind {
     /// Torque against acceleration, velocity and position.
     #[default]
     Differential,
-    /// Work against change of energy over windows; needs no acceleration.
+    /// One joint: work against change of energy over windows. Several: impulse against change of momentum, one equation a
+    /// joint. Needs no acceleration.
     Integral,
 }
 

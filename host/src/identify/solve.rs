@@ -1,6 +1,7 @@
 //! The way from recordings to an [`Identification`].
 
-use super::base::{Base, chain_of, expression};
+use super::band::explained_band;
+use super::base::{Base, chain_of, expression, transmission_of};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
@@ -20,6 +21,8 @@ use super::{
 use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, threads};
 use crate::robot::Robot;
 
+/// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
+const ROWS_A_PARAMETER: usize = 10;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -37,6 +40,7 @@ pub fn identify(
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
     let chain = chain_of(robot)?;
+    let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
@@ -75,12 +79,25 @@ pub fn identify(
         .collect();
     let plan_with = |treatment| Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &base.columns,
         treatment,
         window,
         stride: (window / 4).max(1),
         loudness: loudness.clone(),
         cache: RowCache::default(),
+    };
+    let wide = decided;
+    let explained = match options.prepare.decimation {
+        Choice::Auto => explained_band(training, &plan_with(&wide))?,
+        Choice::Fixed(_) => None,
+    };
+    let decided = match explained {
+        Some(band) => {
+            let rows = (ROWS_A_PARAMETER * base.len()).div_ceil(joints) as u64;
+            wide.narrowed(band, rows, &surveys, &options.prepare, &limits)?
+        }
+        None => wide.clone(),
     };
     let mut treatment = decided.clone();
     let mut made = RowCache::default();
@@ -101,10 +118,7 @@ pub fn identify(
     let p = base.len();
 
     // First fit: everything into one factor an equation.
-    let equations = match options.model {
-        ModelKind::Differential => joints,
-        ModelKind::Integral => 1,
-    };
+    let equations = joints;
     let mut factors = vec![TriangularFactor::new(p); equations];
     let mut instants = 0u64;
     let mut tally = Tally::default();
@@ -350,7 +364,7 @@ pub fn identify(
         comparison: beyond.comparison,
         procedure: beyond.procedure,
         details: Details {
-            masked: tally.masked(options.model),
+            masked: tally.masked(),
             training: surveys.clone(),
             holdout: holdout_surveys,
             estimate,

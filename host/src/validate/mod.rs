@@ -240,6 +240,8 @@ pub fn validate(
         });
     }
     let joints = robot.joints.len();
+    let spooled = crate::prepare::Spooled::all(recordings);
+    let recordings: Vec<&dyn Recording> = spooled.iter().map(|s| s as &dyn Recording).collect();
     let surveys = recordings
         .iter()
         .map(|r| Survey::take(*r, joints))
@@ -250,8 +252,10 @@ pub fn validate(
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
     let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &columns,
         treatment: &treatment,
         window: 0,
