@@ -68,7 +68,11 @@ fn batch(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(SAMPLES as u64));
         group.bench_function("inverse dynamics", |b| {
             let out = &mut out[..n * SAMPLES];
-            b.iter(|| model.inverse_dynamics(black_box(&q), &qd, &qdd, out).unwrap());
+            b.iter(|| {
+                model
+                    .inverse_dynamics(black_box(&q), &qd, &qdd, out)
+                    .unwrap()
+            });
         });
         group.bench_function("gravity", |b| {
             let out = &mut out[..n * SAMPLES];
@@ -80,7 +84,11 @@ fn batch(criterion: &mut Criterion) {
         });
         group.bench_function("forward dynamics", |b| {
             let out = &mut out[..n * SAMPLES];
-            b.iter(|| model.forward_dynamics(black_box(&q), &qd, &qdd, out).unwrap());
+            b.iter(|| {
+                model
+                    .forward_dynamics(black_box(&q), &qd, &qdd, out)
+                    .unwrap()
+            });
         });
         group.bench_function("differential regressor, written out", |b| {
             b.iter(|| {

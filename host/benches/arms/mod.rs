@@ -79,14 +79,16 @@ pub fn ur5e() -> Arm {
     ];
     let parameters = bodies
         .iter()
-        .map(|&(mass, centre, length, axis): &(f64, [f64; 3], f64, usize)| {
-            let radius: f64 = 0.06;
-            let along = 0.5 * mass * radius.powi(2);
-            let across = mass * (3.0 * radius.powi(2) + length.powi(2)) / 12.0;
-            let mut inertia = [across, 0.0, 0.0, across, 0.0, across];
-            inertia[[0, 3, 5][axis]] = along;
-            link(mass, centre, inertia)
-        })
+        .map(
+            |&(mass, centre, length, axis): &(f64, [f64; 3], f64, usize)| {
+                let radius: f64 = 0.06;
+                let along = 0.5 * mass * radius.powi(2);
+                let across = mass * (3.0 * radius.powi(2) + length.powi(2)) / 12.0;
+                let mut inertia = [across, 0.0, 0.0, across, 0.0, across];
+                inertia[[0, 3, 5][axis]] = along;
+                link(mass, centre, inertia)
+            },
+        )
         .collect();
     Arm {
         name: "UR5e",
@@ -142,7 +144,9 @@ pub fn panda() -> Arm {
         link(
             0.735522,
             [0.010517, -0.004252, 0.061597],
-            [0.012516, -0.000428, -0.001196, 0.010027, -0.000741, 0.004815],
+            [
+                0.012516, -0.000428, -0.001196, 0.010027, -0.000741, 0.004815,
+            ],
         ),
     ];
     Arm {
