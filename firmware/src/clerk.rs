@@ -175,7 +175,11 @@ impl Clerk {
         if faulty && !state.snapshot.is_frozen() {
             return;
         }
-        let total = if faulty { state.snapshot.len() as u16 } else { 0 };
+        let total = if faulty {
+            state.snapshot.len() as u16
+        } else {
+            0
+        };
         let sample = state.snapshot.get(usize::from(index)).copied();
         let kept = kept(index, total, sample);
         if notes.put(Note::Snapshot(kept)) {

@@ -216,11 +216,7 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
 
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
 /// about which point it will run. Written so that NaN is refused.
-fn fits(
-    extremes: &Extremes<f32>,
-    limits: &Limits<f32>,
-    base: Option<f32>,
-) -> Result<(), Refusal> {
+fn fits(extremes: &Extremes<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
     // Rounding of the peak itself must not refuse a motion designed to touch its limit.
     const SLACK: f32 = 1.0 + 1e-6;
     let moves = extremes.velocity <= limits.velocity * SLACK

@@ -365,7 +365,8 @@ fn estimate_report(state: &State) -> Estimate {
     // The current offset was measured from finitely many samples; its error is a constant torque that no motion
     // shows, and goes into `off` alone.
     let measured = state.calibration.std * state.derived.torque_per_ampere;
-    estimate.std[OFFSET] = libm::hypotf(estimate.std[OFFSET], measured);
+    estimate.std[OFFSET] =
+        libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);
     estimate.trusted = report.trusted;
     estimate
 }

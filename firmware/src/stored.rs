@@ -222,7 +222,8 @@ mod tests {
             place[bit / 8] ^= 1 << (bit % 8);
             // Beyond the check sum there is only padding.
             let found = read(&place);
-            let padding = matches!(found, Copy::Whole { number: 7, .. }) && bit / 8 + 8 > bytes.len();
+            let padding =
+                matches!(found, Copy::Whole { number: 7, .. }) && bit / 8 + 8 > bytes.len();
             assert!(found == Copy::Damaged || padding, "{bit}");
         }
     }
@@ -238,7 +239,10 @@ mod tests {
         assert_eq!(found.settings, Some(settings(2.0)));
         places.0[1][40] ^= 1;
         let found = places.find();
-        assert_eq!((found.settings, found.origin), (None, SettingsOrigin::Damaged));
+        assert_eq!(
+            (found.settings, found.origin),
+            (None, SettingsOrigin::Damaged)
+        );
     }
 
     #[test]
@@ -246,6 +250,9 @@ mod tests {
         let mut places = Places([[0xff; IMAGE]; 2]);
         places.store(&settings(-1.0), usize::MAX / 8);
         let found = places.find();
-        assert_eq!((found.settings, found.origin), (None, SettingsOrigin::Unusable));
+        assert_eq!(
+            (found.settings, found.origin),
+            (None, SettingsOrigin::Unusable)
+        );
     }
 }

@@ -1,13 +1,13 @@
 //! TIM2: the motor's quadrature encoder, with input filter and index.
 //!
 //! The counter runs freely over 32 bits and wraps. Where the index is wired it sets the counter to 0 counting
-//! up, to its top counting down (RM0440 section 29.4.23); between two index pulses lie whole turns, so that the
+//! up, to its top counting down (RM0440, TIM2, "Encoder index"); between two index pulses lie whole turns, so that the
 //! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
 //! moved is counts that were lost or made up on the way.
 
-use embassy_stm32::pac::timer::vals::{
-    CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms,
-};
+use core::num::NonZeroU32;
+
+use embassy_stm32::pac::timer::vals::{CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms};
 use embassy_stm32::pac::{RCC, TIM2};
 use rig_shared::units::EncoderCount;
 
@@ -15,7 +15,7 @@ use super::pins::EncoderPins;
 
 /// How far the step of a tick may be from that of the tick before, besides half of that step, counts: four times
 /// the hardest acceleration that the limits allow (60 rad/s² at the joint are 0.04 counts in a tick squared).
-const SLACK: i32 = 4;
+const SLACK: u32 = 4;
 
 /// What the counter says in one tick.
 pub(crate) struct Reading {
@@ -24,9 +24,24 @@ pub(crate) struct Reading {
     pub(crate) wrong: Option<i32>,
 }
 
+/// The step that is the same modulo a turn and the shortest.
+fn within_half_a_turn(step: i32, turn: NonZeroU32) -> i32 {
+    let rest = step.unsigned_abs() % turn;
+    let shortest = if rest > turn.get() / 2 {
+        (rest as i32).wrapping_sub(turn.get() as i32)
+    } else {
+        rest as i32
+    };
+    if step < 0 {
+        shortest.wrapping_neg()
+    } else {
+        shortest
+    }
+}
+
 /// The counter, made into one that no index resets.
 pub(crate) struct EncoderTimer {
-    counts_per_turn: i32,
+    counts_per_turn: NonZeroU32,
     last: u32,
     step: i32,
     count: u16,
@@ -63,7 +78,7 @@ impl EncoderTimer {
         timer.sr().write_value(Default::default());
         timer.cr1().modify(|w| w.set_cen(true));
         Self {
-            counts_per_turn: counts_per_turn as i32,
+            counts_per_turn: NonZeroU32::new(counts_per_turn).unwrap_or(NonZeroU32::MIN),
             last: timer.cnt().read(),
             step: 0,
             count: 0,
@@ -89,18 +104,15 @@ impl EncoderTimer {
         }
         let mut step = raw.wrapping_sub(self.last) as i32;
         if flags.idxif() {
-            let half = self.counts_per_turn / 2;
-            let within = (step % self.counts_per_turn + self.counts_per_turn + half)
-                % self.counts_per_turn
-                - half;
-            let beside = within - self.step;
+            let within = within_half_a_turn(step, self.counts_per_turn);
+            let beside = within.wrapping_sub(self.step);
             if !self.indexed {
                 // The first one only says where the turn begins: the motion goes on as it was.
                 self.indexed = true;
                 step = self.step;
             } else {
                 step = within;
-                if beside.abs() > SLACK + self.step.abs() / 2 {
+                if beside.unsigned_abs() > SLACK + self.step.unsigned_abs() / 2 {
                     wrong = Some(beside);
                 }
             }

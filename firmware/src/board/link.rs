@@ -16,12 +16,13 @@ use rig_firmware::desk::Desk;
 use rig_firmware::examined::{Examined, examine};
 use rig_firmware::note::Note;
 use rig_shared::wire::message::Request;
-use rig_shared::wire::{MAX_FRAME, MessageDecoder};
+use rig_shared::wire::{DecodeError, MAX_FRAME, MessageDecoder};
 use static_cell::ConstStaticCell;
 
 use super::clock::LINK_PRIORITY;
 use super::health::BAD_REQUESTS;
 use super::pins::LinkPins;
+use super::probe;
 use super::watchdog::{Part, report};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
@@ -70,6 +71,7 @@ pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
 pub(crate) async fn telemetry(
     config: &'static Config,
     mut line: Sender,
+    mut probe: probe::Outgoing,
     mut notes: Consumer<'static, Note>,
 ) -> ! {
     let mut desk = Desk::new();
@@ -86,16 +88,45 @@ pub(crate) async fn telemetry(
                 bytes.extend_from_slice(frame).is_ok()
             });
         }
-        if !bytes.is_empty() && line.write(bytes).await.is_err() {
+        if bytes.is_empty() {
+            continue;
+        }
+        // All of it or nothing: the buffer is longer, so that frames stay whole.
+        let _taken = probe.write(bytes);
+        if line.write(bytes).await.is_err() {
             defmt::warn!("the serial line did not take {} bytes", bytes.len());
+        }
+    }
+}
+
+/// Passes a request on to the tick.
+fn hand_over(
+    decoded: Option<Result<Request, DecodeError>>,
+    requests: &mut Producer<'static, Examined>,
+) {
+    match decoded {
+        None => {}
+        // Unanswered, the host repeats it.
+        Some(Err(_)) => {
+            BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
+        }
+        Some(Ok(request)) => {
+            if requests.enqueue(examine(request)).is_err() {
+                defmt::warn!("more requests than can be served");
+            }
         }
     }
 }
 
 /// Takes bytes from the host, makes requests of them and hands these to the tick.
 #[embassy_executor::task]
-pub(crate) async fn commands(mut line: Receiver, mut requests: Producer<'static, Examined>) -> ! {
-    let mut decoder = MessageDecoder::<Request>::default();
+pub(crate) async fn commands(
+    mut line: Receiver,
+    mut probe: probe::Incoming,
+    mut requests: Producer<'static, Examined>,
+) -> ! {
+    let mut from_line = MessageDecoder::<Request>::default();
+    let mut from_probe = MessageDecoder::<Request>::default();
     let mut bytes = [0; 64];
     loop {
         report(Part::Commands);
@@ -109,18 +140,11 @@ pub(crate) async fn commands(mut line: Receiver, mut requests: Producer<'static,
             Err(_) => 0,
         };
         for &byte in bytes.iter().take(count) {
-            match decoder.push(byte) {
-                None => {}
-                // Unanswered, the host repeats it.
-                Some(Err(_)) => {
-                    BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
-                }
-                Some(Ok(request)) => {
-                    if requests.enqueue(examine(request)).is_err() {
-                        defmt::warn!("more requests than can be served");
-                    }
-                }
-            }
+            hand_over(from_line.push(byte), &mut requests);
+        }
+        let count = probe.read(&mut bytes);
+        for &byte in bytes.iter().take(count) {
+            hand_over(from_probe.push(byte), &mut requests);
         }
     }
 }

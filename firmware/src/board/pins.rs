@@ -2,11 +2,12 @@
 
 use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::peripherals::{
-    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB5, PB12, PC0, PC1, PC2,
+    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB5, PB12, PC0,
+    PC1, PC2,
 };
 use embassy_stm32::{Peri, Peripherals};
 
-/// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, table 13).
+/// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, "Alternate function").
 const AF_TIM1: u8 = 6;
 /// TIM2 channels 1 and 2 on PA0 and PA1.
 const AF_TIM2: u8 = 1;
@@ -113,7 +114,11 @@ impl EncoderPins {
         // A wire that is off rests at a level instead of counting noise.
         keep(Flex::new(self.a), AF_TIM2, AfType::input(Pull::Up));
         keep(Flex::new(self.b), AF_TIM2, AfType::input(Pull::Up));
-        keep(Flex::new(self.index), AF_TIM2_ETR, AfType::input(Pull::Down));
+        keep(
+            Flex::new(self.index),
+            AF_TIM2_ETR,
+            AfType::input(Pull::Down),
+        );
     }
 }
 

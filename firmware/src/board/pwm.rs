@@ -36,7 +36,7 @@ impl Bridge {
             w.set_syscfgen(true);
         });
         // A processor that has locked up, a flash word beyond repair or a supply that breaks down act on the
-        // break input too (RM0440 section 10.2.8: CLL, ECCL, PVDL; writable once after a reset).
+        // break input too (RM0440, SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).
         SYSCFG.cfgr2().modify(|w| {
             w.set_cll(true);
             w.set_eccl(true);
@@ -137,5 +137,7 @@ impl Bridge {
 #[inline(always)]
 pub(crate) fn off() {
     TIM1.bdtr().modify(|w| w.set_moe(false));
-    embassy_stm32::pac::GPIOB.bsrr().write(|w| w.set_br(5, true));
+    embassy_stm32::pac::GPIOB
+        .bsrr()
+        .write(|w| w.set_br(5, true));
 }

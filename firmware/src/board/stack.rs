@@ -32,7 +32,8 @@ fn untouched(word: usize) -> bool {
 pub(crate) fn near_end() -> Option<u32> {
     let word = GUARD / 4;
     // Four words: a frame may skip one that it does not write.
-    let clean = untouched(word) && untouched(word + 1) && untouched(word + 2) && untouched(word + 3);
+    let clean =
+        untouched(word) && untouched(word + 1) && untouched(word + 2) && untouched(word + 3);
     (!clean).then_some(GUARD as u32)
 }
 

@@ -11,19 +11,20 @@ use rig_firmware::examined::Examined;
 use rig_firmware::nameplate;
 use rig_firmware::note::Note;
 use rig_firmware::state::State;
+use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
 use super::clock::{self, LINK_PRIORITY};
 use super::encoder::EncoderTimer;
+use super::health::{Checkup, Start};
 use super::pins::Pins;
 use super::pwm::Bridge;
-use super::health::Checkup;
+use super::queue::{Inlet, Outlet};
 use super::storage::Storage;
-use super::tick::{NOTES, Queue, REQUESTS, Tick};
+use super::tick::{NOTES, REQUESTS, Tick};
 use super::watchdog::Watchdog;
-use super::{cycles, health, link, stack, tick};
-use defmt_rtt as _;
+use super::{cycles, health, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -37,9 +38,12 @@ static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Brings the board up and runs it.
 pub(crate) fn run() -> ! {
+    let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
+    let crystal = clock::crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
-    let peripherals = embassy_stm32::init(clock::config());
+    clock::boost();
+    let peripherals = embassy_stm32::init(clock::config(crystal));
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
@@ -49,11 +53,7 @@ pub(crate) fn run() -> ! {
     let (storage, found) = Storage::open(config);
     let settings = found.settings.unwrap_or(own);
     let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
-    let state = match State::new(config, settings) {
-        Ok(state) => STATE.init(state),
-        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
-        Err(_) => unreachable!(),
-    };
+    let state = state(config, settings);
     let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
@@ -68,23 +68,30 @@ pub(crate) fn run() -> ! {
         state,
         capture: CAPTURE.take(),
         clerk: Clerk::new(),
-        requests: request_out,
-        notes: Queue(note_in),
+        requests: Outlet(request_out),
+        notes: Inlet(note_in),
         bridge,
         converter,
         encoder,
         period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         late: false,
-        checkup: Checkup::new(reset, found.origin, config.rates.control_hz),
-        to_store,
+        checkup: Checkup::new(
+            Start {
+                reset,
+                settings: found.origin,
+                crystal,
+            },
+            config.rates.control_hz,
+        ),
+        to_store: Inlet(to_store),
     });
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
     EXECUTOR.init(Executor::new()).run(|spawner| {
         // Each is spawned once, and its place is reserved at compile time.
         let placed = (
-            link::telemetry(config, sender, note_out),
-            link::commands(receiver, request_in),
+            link::telemetry(config, sender, probe_out, note_out),
+            link::commands(receiver, probe_in, request_in),
             indicator(watchdog, pins.led),
             keeper(storage, from_tick),
         );
@@ -96,6 +103,16 @@ pub(crate) fn run() -> ! {
         spawner.spawn(indicator);
         spawner.spawn(keeper);
     })
+}
+
+/// The state at power on, made in its place: it is half as large as the stack.
+#[inline(never)]
+fn state(config: &Config, settings: Settings) -> &'static mut State {
+    match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
+        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        Err(_) => unreachable!(),
+    }
 }
 
 /// Feeds the watchdog and blinks: a light that stands still is a program that does.

@@ -5,9 +5,8 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_stm32::interrupt;
-use heapless::spsc::{Consumer, Producer};
 use rig_firmware::capture::Capture;
-use rig_firmware::clerk::{Clerk, Notes};
+use rig_firmware::clerk::{Clerk, Notes as _};
 use rig_firmware::config::{Config, Settings};
 use rig_firmware::examined::Examined;
 use rig_firmware::note::Note;
@@ -22,6 +21,7 @@ use super::cycles;
 use super::encoder::EncoderTimer;
 use super::health::Checkup;
 use super::pwm::Bridge;
+use super::queue::{Inlet, Outlet};
 use super::stack;
 use super::watchdog::{Part, report};
 
@@ -29,8 +29,6 @@ use super::watchdog::{Part, report};
 pub(crate) const NOTES: usize = 64;
 /// Requests that the queue from the command task holds.
 pub(crate) const REQUESTS: usize = 4;
-/// Free places below which no snapshot goes into the queue of notes, and no request is served.
-const RESERVE: usize = NOTES / 2;
 
 /// Everything the interrupt owns.
 pub(crate) struct Tick {
@@ -38,8 +36,8 @@ pub(crate) struct Tick {
     pub(crate) state: &'static mut State,
     pub(crate) capture: &'static mut Capture,
     pub(crate) clerk: Clerk,
-    pub(crate) requests: Consumer<'static, Examined>,
-    pub(crate) notes: Queue,
+    pub(crate) requests: Outlet<Examined>,
+    pub(crate) notes: Inlet<Note>,
     pub(crate) bridge: Bridge,
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
@@ -47,22 +45,7 @@ pub(crate) struct Tick {
     pub(crate) entered: u32,
     pub(crate) late: bool,
     pub(crate) checkup: Checkup,
-    pub(crate) to_store: Producer<'static, Settings>,
-}
-
-/// The way to the telemetry task.
-pub(crate) struct Queue(pub(crate) Producer<'static, Note>);
-
-impl Notes for Queue {
-    #[inline(always)]
-    fn put(&mut self, note: Note) -> bool {
-        self.0.enqueue(note).is_ok()
-    }
-
-    #[inline(always)]
-    fn roomy(&self) -> bool {
-        self.0.len() < RESERVE
-    }
+    pub(crate) to_store: Inlet<Settings>,
 }
 
 impl Tick {
@@ -122,7 +105,7 @@ impl Tick {
         if !self.notes.roomy() {
             return;
         }
-        let Some(examined) = self.requests.dequeue() else {
+        let Some(examined) = self.requests.take() else {
             return;
         };
         let to_store = self.clerk.serve(
@@ -133,7 +116,7 @@ impl Tick {
             &mut self.notes,
         );
         if let Some(settings) = to_store
-            && self.to_store.enqueue(settings).is_err()
+            && !self.to_store.put(settings)
         {
             let outcome = Err(Refusal::StorageFailed);
             self.clerk.stored(self.state, outcome, &mut self.notes);

@@ -232,6 +232,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
+    // A full set of parameters is a body each; combinations alone would not be.
+    if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
+        let urdf = identified.to_urdf()?;
+        write_whole(&args.out.join("identified.urdf"), urdf.text.as_bytes())?;
+    }
     write_whole(
         &args.out.join("identification.json"),
         (json + "\n").as_bytes(),

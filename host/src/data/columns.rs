@@ -232,7 +232,16 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
         return Ok(false);
     };
     let Some(&first_motor) = motor.first() else {
-        return Ok(true);
+        return match robot.joints.iter().position(|j| j.drive.is_none()) {
+            None => Ok(true),
+            Some(k) => Err(format!(
+                "there is no column `q{}`, and column `qm{}` is a motor position, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio (and couples, zero) to the robot",
+                first,
+                k + 1,
+                robot.joints[k].name,
+                robot.name
+            )),
+        };
     };
     let name = &robot.joints[first - 1].name;
     Err(if motor.len() == joints {
@@ -282,7 +291,15 @@ fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts,
     // Torque of motor m from its column, with the factor that makes it N·m.
     let source = |m: usize| -> Result<Option<(String, f64)>, String> {
         if let Some(name) = has(format!("taum{}", m + 1)) {
-            return Ok(Some((name, 1.0)));
+            return match &robot.joints[m].drive {
+                Some(_) => Ok(Some((name, 1.0))),
+                None => Err(format!(
+                    "column `{name}` is a motor torque, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio to the robot, or record `tau{}`",
+                    robot.joints[m].name,
+                    robot.name,
+                    m + 1
+                )),
+            };
         }
         let Some(name) = has(format!("i{}", m + 1)) else {
             return Ok(None);

@@ -88,4 +88,6 @@ pub fn data_dir() -> Option<std::path::PathBuf> {
 }
 
 #[cfg(test)]
+mod motors_test;
+#[cfg(test)]
 mod tests;

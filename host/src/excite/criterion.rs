@@ -65,15 +65,12 @@ pub struct Values {
     pub si_condition_number: f64,
 }
 
-/// How the extreme singular values enter while a motion is optimised.
+/// How the extreme singular values enter while a motion is optimised: the largest eigenvalue λ of the information by
+/// the norm (Σ λᵏ)^(1/k) of all of them, with this k, and the inverse of the smallest likewise. Eigenvalues coincide at
+/// an optimum, where the extreme ones have kinks and the norm has none; it is no less than the value itself and no more
+/// than p^(1/k) times it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Smoothing {
-    /// As they are: the value has kinks where they coincide, as they do at an optimum.
-    None,
-    /// By the norm (Σ λᵏ)^(1/k) of all eigenvalues in place of the largest, and of their inverses in place of the
-    /// smallest: smooth, no less than the value itself, and no more than p^(1/k) times it.
-    Power(i32),
-}
+pub(super) struct Smoothing(pub i32);
 
 /// The criterion's value at an information matrix, as a logarithm to be minimised, and its derivative by the
 /// matrix's entries. Not finite where the matrix is not.
@@ -96,20 +93,15 @@ pub(super) fn criterion_of(
     let mut slopes = vec![0.0; p];
     let mut sum = 0.0;
     // ½·ln of the largest of factor·λ^sign, smoothed.
-    let mut extreme = |sign: i32, at: usize| match smoothing {
-        Smoothing::None => {
-            sum += 0.5 * f64::from(sign) * value(at).ln();
-            slopes[at] += 0.5 * f64::from(sign) / value(at);
-        }
-        Smoothing::Power(k) => {
-            let shares: Vec<f64> = (0..p)
-                .map(|i| (value(i) / value(at)).powi(sign * k))
-                .collect();
-            let total: f64 = shares.iter().sum();
-            sum += 0.5 * (f64::from(sign) * value(at).ln() + total.ln() / f64::from(k));
-            for (i, share) in shares.iter().enumerate() {
-                slopes[i] += 0.5 * f64::from(sign) * share / (total * value(i));
-            }
+    let Smoothing(k) = smoothing;
+    let mut extreme = |sign: i32, at: usize| {
+        let shares: Vec<f64> = (0..p)
+            .map(|i| (value(i) / value(at)).powi(sign * k))
+            .collect();
+        let total: f64 = shares.iter().sum();
+        sum += 0.5 * (f64::from(sign) * value(at).ln() + total.ln() / f64::from(k));
+        for (i, share) in shares.iter().enumerate() {
+            slopes[i] += 0.5 * f64::from(sign) * share / (total * value(i));
         }
     };
     match criterion {
@@ -148,7 +140,7 @@ mod tests {
             Criterion::SmallestSingularValue,
             Criterion::Determinant,
         ] {
-            for smoothing in [Smoothing::None, Smoothing::Power(2), Smoothing::Power(8)] {
+            for smoothing in [Smoothing(1), Smoothing(2), Smoothing(8)] {
                 let (value, slope) = criterion_of(&information, criterion, smoothing);
                 for (i, j) in [(0, 0), (1, 3), (4, 2)] {
                     let moved = |by: f64| {
@@ -175,11 +167,10 @@ mod tests {
     fn smoothing_lies_above_and_closes_in() {
         let information = DMatrix::from_diagonal(&nalgebra::dvector![1.0, 1.1, 4.0, 4.1]);
         let at = |s| criterion_of(&information, Criterion::ConditionNumber, s).0;
-        let exact = at(Smoothing::None);
-        assert!((exact - 0.5 * 4.1_f64.ln()).abs() < 1e-12);
+        let exact = 0.5 * 4.1_f64.ln();
         let mut before = f64::INFINITY;
         for k in [2, 4, 16, 64] {
-            let value = at(Smoothing::Power(k));
+            let value = at(Smoothing(k));
             assert!(exact <= value && value < before);
             assert!(value - exact <= 4.0_f64.ln() / f64::from(k) + 1e-12);
             before = value;

@@ -170,7 +170,7 @@ mod tests {
         };
         let rounds = [1e1, 1e2, 1e3, 1e3, 3e3, 3e3].map(|weight| Round {
             weight,
-            smoothing: Smoothing::None,
+            smoothing: Smoothing(1),
             steps: 200,
         });
         let x = minimise(

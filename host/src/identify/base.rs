@@ -462,3 +462,7 @@ pub fn unit(c: usize, kinds: &[robot::JointKind], drives: &[DriveKind]) -> &'sta
         (_, false) => "N",
     }
 }
+
+#[cfg(test)]
+#[path = "base_test.rs"]
+mod tests;

@@ -37,7 +37,7 @@ impl Source {
     pub(super) fn of(problem: &Problem) -> Result<(Self, String), IdentifyError> {
         let n = problem.robot.joints.len();
         let mut referenced = true;
-        for recording in problem.training {
+        for recording in problem.sources {
             // One block decides: columns do not change within a recording.
             let mut looked = false;
             recording.each_block(1 << 10, &mut |block| {
@@ -120,6 +120,7 @@ pub(super) fn model_of(chain: &Chain<f64>, standard: &[f64]) -> Model {
             .take(chain.joint_count())
             .copied()
             .collect(),
+        motors: None,
     }
 }
 

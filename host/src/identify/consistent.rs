@@ -174,7 +174,13 @@ fn not_settled() -> IdentifyError {
 /// # Errors
 /// [`IdentifyError::Unsettled`].
 pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, IdentifyError> {
-    let space = Coordinates::new(data, prior);
+    let space = Coordinates::new(
+        &Quadratic {
+            matrix: prior.own(&data.matrix),
+            right: data.right.clone(),
+        },
+        prior,
+    );
     let m = prior.centre.len();
     let mut pi = DVector::from_column_slice(&prior.centre);
     let mut c = space.lower(&prior.centre, &prior.scale);
@@ -228,7 +234,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
             if last {
                 return Ok(Consistent {
                     squares: space.misfit(&c).norm_squared(),
-                    parameters: pi.as_slice().to_vec(),
+                    parameters: prior.standard(&pi),
                     steps: steps + 1,
                 });
             }

@@ -13,6 +13,9 @@ use super::standard::{StandardSet, prior_of, quadratic, quadratic_about, standar
 use super::{BaseParameter, Estimator, IdentifyError, Options};
 use crate::prepare::Recording;
 
+/// A residual that is so many times that of the weighted fit calls for a warning.
+const MUCH_MORE: f64 = 1.2;
+
 /// Refuses settings that mean nothing.
 pub(super) fn check(options: &Options) -> Result<(), IdentifyError> {
     if let Some(&weight) = options
@@ -163,6 +166,23 @@ pub(super) fn further(
         )?);
     }
     if let Some(own) = own {
+        let plain = problem.start_full();
+        let squares = |full: &[f64]| -> Vec<f64> {
+            result
+                .factors
+                .iter()
+                .map(|f| f.residual_squares(full).sqrt())
+                .collect()
+        };
+        for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
+            if *own > MUCH_MORE * plain {
+                further.warnings.push(format!(
+                    "Equation {}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
+                    k + 1,
+                    own / plain
+                ));
+            }
+        }
         further.procedure = own.fitted.said;
         further.warnings.extend(own.fitted.warnings);
     }

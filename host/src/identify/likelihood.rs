@@ -30,7 +30,7 @@ const WHITE_SHARE: f64 = 0.01;
 /// Settled when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 0.01;
 /// … or after this many passes; then a warning says so.
-const MOST_PASSES: usize = 15;
+const MOST_PASSES: usize = 30;
 
 /// Predictors of every order up to the chosen one.
 #[derive(Clone, Debug)]

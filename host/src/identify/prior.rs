@@ -1,7 +1,8 @@
 //! What is known of a robot before its data: the description's inertial values, or a plausible body in their place.
 
-use nalgebra::Matrix4;
+use nalgebra::{DMatrix, DVector, Matrix4};
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
 use super::pseudo_inertia::{Divergence, INERTIAL, parameters_of};
 use crate::robot::Robot;
@@ -37,6 +38,9 @@ pub(super) struct Prior {
     pub uncertainty: Vec<f64>,
     /// Rules.
     pub rules: Vec<Rule>,
+    /// What each joint's own columns hold of drives that move it from another joint: π = shares·π', π' the values
+    /// here. Absent where every drive moves its own joint only.
+    pub shares: Option<DMatrix<f64>>,
     /// One divergence a link.
     pub bodies: Vec<Divergence>,
     /// Multiplies every pull: where the path of the solution ends.
@@ -63,13 +67,19 @@ impl Prior {
     /// From the description; `given` is the relative uncertainty stated for its values (1 where none is).
     pub(super) fn of(robot: &Robot, columns: usize, hints: &Hints, given: f64) -> Self {
         let n = robot.joints.len();
-        let mut described = robot.standard_parameters().concat();
-        described.resize(columns, 0.0);
+        let shares = shares(robot, columns);
+        let mut described = described(robot, columns);
+        if let Some(shares) = &shares {
+            // Triangular with ones on the diagonal.
+            described = 2.0 * &described - shares * &described;
+        }
+        let described = described.as_slice().to_vec();
         let mut prior = Self {
             centre: described.clone(),
             scale: vec![1.0; columns],
             uncertainty: vec![given; columns],
             rules: vec![Rule::NotNegative; columns],
+            shares,
             bodies: Vec::with_capacity(n),
             strength: 1.0,
             remarks: Vec::new(),
@@ -84,10 +94,12 @@ impl Prior {
                 (c / COLUMNS, c % COLUMNS)
             } else {
                 let after = c - n * COLUMNS;
-                (
-                    (after / 3).min(n - 1),
-                    [column::DRIVE_INERTIA, column::VISCOUS, column::COULOMB][after % 3],
-                )
+                let place = match after % MOTOR_COLUMNS {
+                    motor_column::INERTIA => column::DRIVE_INERTIA,
+                    motor_column::VISCOUS => column::VISCOUS,
+                    _ => column::COULOMB,
+                };
+                ((after / MOTOR_COLUMNS).min(n - 1), place)
             };
             if place < INERTIAL {
                 continue;
@@ -185,6 +197,22 @@ impl Prior {
         }
     }
 
+    /// A matrix over the standard columns as one over the values here.
+    pub(super) fn own(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        match &self.shares {
+            Some(shares) => matrix * shares,
+            None => matrix.clone(),
+        }
+    }
+
+    /// Values here as standard parameters.
+    pub(super) fn standard(&self, own: &DVector<f64>) -> Vec<f64> {
+        match &self.shares {
+            Some(shares) => (shares * own).as_slice().to_vec(),
+            None => own.as_slice().to_vec(),
+        }
+    }
+
     /// Size of the divergence's pull: the inverse square of the relative uncertainty, by standard column.
     pub(super) fn pull(&self, c: usize) -> f64 {
         let u = self.uncertainty[c];
@@ -195,6 +223,43 @@ impl Prior {
             0.1
         }
     }
+}
+
+/// The description's standard parameters, those of motors behind them where there are columns for them.
+pub(super) fn described(robot: &Robot, columns: usize) -> DVector<f64> {
+    let mut all = robot.standard_parameters().concat();
+    all.extend(robot.motor_parameters().concat());
+    all.truncate(columns);
+    DVector::from_vec(all)
+}
+
+/// Where a drive moves other joints too, their columns hold its inertia and viscous friction by the square of the
+/// ratio; see [`rig_shared::transmission`].
+pub(super) fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
+    let n = robot.joints.len();
+    if columns <= n * COLUMNS {
+        return None;
+    }
+    let mut shares = DMatrix::identity(columns, columns);
+    for (k, kind) in robot.drive_kinds().into_iter().enumerate() {
+        let (DriveKind::Coupled, Some(drive)) = (kind, &robot.joints[k].drive) else {
+            continue;
+        };
+        let motor = n * COLUMNS + k * MOTOR_COLUMNS;
+        for (i, joint) in robot.joints.iter().enumerate() {
+            let ratio = if i == k {
+                1.0
+            } else {
+                drive.couples.get(&joint.name).copied().unwrap_or(0.0) / drive.gear_ratio
+            };
+            let at = i * COLUMNS;
+            if i != k {
+                shares[(at + column::DRIVE_INERTIA, motor + motor_column::INERTIA)] = ratio * ratio;
+            }
+            shares[(at + column::VISCOUS, motor + motor_column::VISCOUS)] = ratio * ratio;
+        }
+    }
+    Some(shares)
 }
 
 /// A uniform block from the link's frame to the next one's (half as far again as wide at the end of the chain).

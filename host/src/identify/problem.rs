@@ -15,6 +15,8 @@ use crate::robot::Robot;
 pub(super) struct Problem<'a> {
     pub robot: &'a Robot,
     pub training: &'a [&'a dyn Recording],
+    /// The same with all their columns.
+    pub sources: &'a [&'a dyn Recording],
     pub surveys: &'a [Survey],
     pub plan: &'a Plan<'a>,
     pub options: &'a Options,

@@ -91,7 +91,7 @@ pub(super) fn ridge(
     prior: &Prior,
 ) -> Result<Fitted, IdentifyError> {
     let all = LeaveOut::of(&parts.weighted(&problem.tempered(parts)));
-    let combination = &problem.base.combination;
+    let combination = &prior.own(&problem.base.combination);
     let (s, why) = match problem.options.prior_uncertainty {
         Some(s) => (s, "as given".to_owned()),
         None => {
@@ -137,7 +137,7 @@ pub(super) fn ridge(
         classical_std: (0..kept.whole.len())
             .map(|c| covariance[(c, c)].max(0.0).sqrt())
             .collect(),
-        standard: Some(standard.whole.clone()),
+        standard: Some(prior.standard(&DVector::from_column_slice(&standard.whole))),
         full,
         kept,
         covariance: Some(covariance),

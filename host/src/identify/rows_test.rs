@@ -81,7 +81,7 @@ fn recording(robot: &Robot, seconds: f64, gap: usize) -> InMemory {
             let range = robot.joints[j]
                 .limits
                 .as_ref()
-                .and_then(|l| l.position)
+                .map(|l| l.position)
                 .unwrap_or([-1.5, 1.5]);
             let size = 0.35 * (range[1] - range[0]).min(3.0) / 2.0;
             (q[j], qd[j], qdd[j]) = (0.5 * (range[0] + range[1]), 0.0, 0.0);

@@ -43,6 +43,8 @@ pub fn identify(
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
+    // What is spooled has no references any more.
+    let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
     let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
     let (training, holdout) = (training.as_slice(), holdout.as_slice());
@@ -224,6 +226,7 @@ pub fn identify(
     let problem = Problem {
         robot,
         training,
+        sources,
         surveys: &surveys,
         plan: &plan,
         options,

@@ -70,7 +70,7 @@ pub(super) fn each_pair(
         ModelKind::Differential => 0,
         ModelKind::Integral => plan.window,
     };
-    for (r, recording) in problem.training.iter().enumerate() {
+    for (r, recording) in problem.sources.iter().enumerate() {
         let mut tally = Tally::default();
         let mut both = |measured: &Motion, other: &Motion| {
             let first = rows_of(measured, plan, model, &mut tally)?;

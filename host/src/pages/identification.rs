@@ -24,6 +24,7 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
     sections.push(parameters(found));
     sections.push(not_excited(found));
     sections.push(fit(robot, found));
+    sections.extend(super::estimators::sections(robot, found));
     sections.push(confidence(found));
     sections.push(data(robot, found));
     sections.push(residuals(robot, found));

@@ -303,6 +303,13 @@ fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
             drive.rotor_inertia,
         ),
         (
+            "joint_inertia",
+            "drive inertia seen at the joint",
+            "kg·m² (kg where prismatic)",
+            Finite,
+            drive.joint_inertia,
+        ),
+        (
             "coulomb",
             "Coulomb friction of the motor",
             "N·m, on the motor side",

@@ -13,7 +13,7 @@ use super::{Drive, Inertial, Joint, Robot};
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
 /// base link, the customary rounded value that robot descriptions and simulators are used with.
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 
 /// Axes closer to parallel than this are parallel, rad. Files give π/2 with about 11 digits, and
 /// common normals of axes that meet at a smaller angle lie meaninglessly far away.

@@ -157,6 +157,7 @@ impl Robot {
             let Some(drive) = &self.joints[k].drive else {
                 continue;
             };
+            rows[k][column::DRIVE_INERTIA] += drive.joint_inertia;
             match kind {
                 DriveKind::Simple => {
                     let square = drive.gear_ratio * drive.gear_ratio;
@@ -176,6 +177,111 @@ impl Robot {
                 DriveKind::Varying => {}
             }
         }
+    }
+
+    /// The description with other values: the inverse of [`Self::standard_parameters`] and [`Self::motor_parameters`], one
+    /// row a joint and a motor. A rotor takes what its joint's `Ia` has left beside the motors coupled to it; friction
+    /// stands at the joints, save that of coupled motors and screws. A joint without a drive gets one of ratio 1 for its
+    /// drive inertia.
+    ///
+    /// The second result says which values no description can hold (friction or rotor inertia below zero) and were put to
+    /// zero.
+    #[must_use]
+    pub fn with_parameters(
+        &self,
+        rows: &[[f64; COLUMNS]],
+        motors: &[[f64; MOTOR_COLUMNS]],
+    ) -> (Self, Vec<String>) {
+        let mut robot = self.clone();
+        let mut remarks = Vec::new();
+        let mut at_least_zero = |name: &str, k: usize, value: f64| {
+            if value < 0.0 {
+                remarks.push(format!(
+                    "{name} of joint {} came out as {value}, which feeds energy in; 0 stands in the description.",
+                    self.joints[k].name
+                ));
+                0.0
+            } else {
+                value
+            }
+        };
+        let kinds = self.drive_kinds();
+        // What the coupled motors put on the diagonals.
+        let mut shares = vec![[0.0; 2]; self.joints.len()];
+        for (k, kind) in kinds.iter().enumerate() {
+            let (Some(drive), Some(own)) = (&mut robot.joints[k].drive, motors.get(k)) else {
+                continue;
+            };
+            (drive.coulomb, drive.viscous) = (0.0, 0.0);
+            let scale = match kind {
+                DriveKind::Simple => continue,
+                DriveKind::Coupled => drive.gear_ratio.abs(),
+                DriveKind::Varying => 1.0,
+            };
+            drive.rotor_inertia = at_least_zero(
+                "Inertia of the motor",
+                k,
+                own[motor_column::INERTIA] / (scale * scale),
+            );
+            drive.viscous = at_least_zero(
+                "Viscous friction of the motor",
+                k,
+                own[motor_column::VISCOUS] / (scale * scale),
+            );
+            drive.coulomb = at_least_zero(
+                "Coulomb friction of the motor",
+                k,
+                own[motor_column::COULOMB] / scale,
+            );
+            if *kind == DriveKind::Coupled {
+                let (rotor, viscous) = (drive.rotor_inertia, drive.viscous);
+                for (i, ratio) in self.numbers(k).ratios.into_iter().enumerate() {
+                    shares[i][0] += if i == k { 0.0 } else { rotor * ratio * ratio };
+                    shares[i][1] += viscous * ratio * ratio;
+                }
+            }
+        }
+        for (k, (joint, row)) in robot.joints.iter_mut().zip(rows).enumerate() {
+            let mut first_moment = [0.0; 3];
+            first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
+            let mut inertia = [0.0; 6];
+            inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
+            let rest = row[column::DRIVE_INERTIA] - shares[k][0];
+            if joint.drive.is_none() && rest != 0.0 {
+                // A rotor's inertia made part of the link would be no body's.
+                joint.drive = Some(super::Drive {
+                    gear_ratio: 1.0,
+                    ..Default::default()
+                });
+            }
+            if let Some(drive) = &mut joint.drive {
+                if kinds[k] == DriveKind::Simple && rest >= 0.0 {
+                    let kept = drive.joint_inertia.clamp(0.0, rest);
+                    drive.joint_inertia = kept;
+                    drive.rotor_inertia = (rest - kept) / (drive.gear_ratio * drive.gear_ratio);
+                } else {
+                    drive.joint_inertia = without_rounding(rest, row[column::DRIVE_INERTIA]);
+                    if kinds[k] == DriveKind::Simple {
+                        drive.rotor_inertia = 0.0;
+                    }
+                }
+            }
+            joint.inertial = Some(super::Inertial {
+                mass: row[column::MASS],
+                first_moment,
+                inertia,
+            });
+            joint.friction = Some(super::JointFriction {
+                coulomb: at_least_zero("Coulomb friction", k, row[column::COULOMB]),
+                viscous: at_least_zero(
+                    "Viscous friction",
+                    k,
+                    without_rounding(row[column::VISCOUS] - shares[k][1], row[column::VISCOUS]),
+                ),
+                offset: row[column::OFFSET],
+            });
+        }
+        (robot, remarks)
     }
 
     /// A position in the middle of the joints' limits with every crank within its range: where the way from motors to
@@ -265,6 +371,15 @@ impl Robot {
             (_, false) => "N*m",
             (_, true) => "N",
         }
+    }
+}
+
+/// A difference that is only rounding of its parts is zero.
+fn without_rounding(difference: f64, part: f64) -> f64 {
+    if difference.abs() < 1e-12 * part.abs() {
+        0.0
+    } else {
+        difference
     }
 }
 

@@ -220,3 +220,53 @@ fn motors_that_turn_alike_are_refused_with_the_joint_at_fault() {
         "{said}"
     );
 }
+
+#[test]
+fn a_description_takes_its_own_parameters_back() {
+    for text in [ONE_LINK_TEMPLATE, IRP6_TEMPLATE, TX40, EDDA_TEMPLATE] {
+        let robot = load(text).unwrap();
+        let (mut rows, mut motors) = (robot.standard_parameters(), robot.motor_parameters());
+        let t = robot.transmission().unwrap();
+        for (k, row) in rows.iter_mut().enumerate() {
+            row[0] += 1.0;
+            row[column::OFFSET] = 0.1;
+            row[column::COULOMB] += 0.5;
+            row[column::VISCOUS] += 1.5;
+            // More than the other motors put there, or less.
+            let more = if t.has_joint_inertia(k) {
+                0.7 - 0.3 * k as f64
+            } else {
+                0.0
+            };
+            row[column::DRIVE_INERTIA] += more;
+        }
+        for (k, motor) in motors.iter_mut().enumerate() {
+            if t.kind(k) != Some(DriveKind::Simple) {
+                motor[motor_column::INERTIA] *= 1.1;
+                motor[motor_column::COULOMB] += 0.01;
+            }
+        }
+        let (changed, remarks) = robot.with_parameters(&rows, &motors);
+        assert!(remarks.is_empty(), "{remarks:?}");
+        let same = |a: &[f64], b: &[f64]| {
+            for (x, y) in a.iter().zip(b) {
+                assert!((x - y).abs() < 1e-12 * x.abs().max(1.0), "{a:?} {b:?}");
+            }
+        };
+        same(
+            changed.standard_parameters().as_flattened(),
+            rows.as_flattened(),
+        );
+        same(
+            changed.motor_parameters().as_flattened(),
+            motors.as_flattened(),
+        );
+        assert_eq!(load(&changed.to_toml().unwrap()).unwrap(), changed);
+    }
+    let robot = load(TX40).unwrap();
+    let mut rows = robot.standard_parameters();
+    rows[1][column::COULOMB] = -0.2;
+    let (changed, remarks) = robot.with_parameters(&rows, &robot.motor_parameters());
+    assert!(remarks[0].contains("Coulomb friction of joint joint_2 came out as -0.2"));
+    assert_eq!(changed.joints[1].friction.as_ref().unwrap().coulomb, 0.0);
+}

@@ -14,6 +14,7 @@ mod error;
 mod numbers;
 mod text;
 mod urdf;
+mod urdf_out;
 mod workspace;
 
 use std::collections::BTreeMap;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
 pub use error::{Place, RobotError};
+pub use urdf_out::Urdf;
 pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
@@ -165,6 +167,10 @@ pub struct Drive {
     /// kg·m², on the motor side
     #[serde(default)]
     pub rotor_inertia: f64,
+    /// Inertia of gear and shaft seen at the joint beside the rotors', kg·m² (kg where prismatic); identified, a small
+    /// one may come out negative.
+    #[serde(default)]
+    pub joint_inertia: f64,
     /// Coulomb friction on the motor side, N·m
     #[serde(default)]
     pub coulomb: f64,

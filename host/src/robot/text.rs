@@ -335,6 +335,11 @@ fn write_drive(out: &mut String, d: &Drive) {
             d.zero,
             "rad, motor position where all joints are at zero (beyond the screw's)",
         ),
+        (
+            "joint_inertia",
+            d.joint_inertia,
+            "kg*m^2 (kg where prismatic), seen at the joint beside the rotors",
+        ),
         ("coulomb", d.coulomb, "N*m, on the motor side"),
         ("viscous", d.viscous, "N*m*s/rad, on the motor side"),
     ];

@@ -119,3 +119,68 @@ fn list(values: &[f64; 3]) -> String {
     let [x, y, z] = values;
     format!("[{x}, {y}, {z}]")
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::path::Path;
+
+    use super::*;
+    use crate::robot::ONE_LINK_TEMPLATE;
+
+    fn read(region: &str) -> Result<Robot, String> {
+        let text = format!("{ONE_LINK_TEMPLATE}\n[[workspace]]\n{region}\n");
+        Robot::from_toml(&text, Path::new("r.toml")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn regions_survive_the_file() {
+        for region in [
+            "joint = \"link\"\nmin = [-inf, -1.0, 0.0]",
+            "joint = \"link\"\npoint = [0.3, 0.0, 0.1]\nmin = [-1.0, -1.0, 0.0]\nmax = [1.0, inf, 2.0]",
+            "joint = \"link\"\nnormal = [0.0, 1.0, 1.0]\nbeyond = -0.4",
+        ] {
+            let robot = read(region).unwrap();
+            assert_eq!(robot.workspace.len(), 1);
+            let text = robot.to_toml().unwrap();
+            assert_eq!(Robot::from_toml(&text, Path::new("r.toml")).unwrap(), robot);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_a_region_is_named_with_its_place() {
+        let line = ONE_LINK_TEMPLATE.lines().count() + 3;
+        for (region, said) in [
+            ("joint = \"elbow\"\nmin = [0.0, 0.0, 0.0]", "`elbow`"),
+            ("joint = \"link\"", "neither a box nor a plane"),
+            (
+                "joint = \"link\"\nmin = [0.0, 0.0, 1.0]\nmax = [1.0, 1.0, 1.0]",
+                "1 to 1",
+            ),
+            ("joint = \"link\"\nmin = [0.0, nan, 1.0]", "NaN"),
+            (
+                "joint = \"link\"\nnormal = [0.0, 0.0, 1.0]",
+                "also needs `beyond`",
+            ),
+            ("joint = \"link\"\nbeyond = 1.0", "also needs `normal`"),
+            (
+                "joint = \"link\"\nnormal = [0.0, 0.0, 0.0]\nbeyond = 1.0",
+                "not all 0",
+            ),
+            (
+                "joint = \"link\"\nnormal = [0.0, 0.0, 1.0]\nbeyond = inf",
+                "finite",
+            ),
+            (
+                "joint = \"link\"\npoint = [0.0, inf, 0.0]\nmin = [0.0, 0.0, 0.0]",
+                "finite",
+            ),
+            ("joint = \"link\"\nmim = [0.0, 0.0, 0.0]", "mim"),
+        ] {
+            let message = read(region).unwrap_err();
+            assert!(message.contains(said), "{message}");
+            let number: usize = message.split(':').nth(1).unwrap().parse().unwrap();
+            assert!((line - 1..line + 4).contains(&number), "{message}");
+        }
+    }
+}

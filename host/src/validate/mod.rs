@@ -225,11 +225,17 @@ pub fn validate(
     }
     let chain = chain_of(robot)?;
     let model = Model::from_robot(robot)?;
+    // Those of coupled drives follow the joints'.
+    let motors = model
+        .motors
+        .as_ref()
+        .map_or(&[][..], |m| m.parameters.as_flattened());
     // Parameters that are zero add nothing to the torque: their columns are not formed.
     let (columns, values): (Vec<usize>, Vec<f64>) = model
         .parameters
         .iter()
         .flatten()
+        .chain(motors)
         .copied()
         .enumerate()
         .filter(|(_, value)| *value != 0.0)

@@ -127,9 +127,13 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             RequestBody::SetPosition(-1.5),
             "048202120107c0bf5151085200"
         ),
-        ("Store", RequestBody::Store, ""),
-        ("Capture", RequestBody::Capture(300), ""),
-        ("GetCapture", RequestBody::GetCapture, ""),
+        ("Store", RequestBody::Store, "088202134182678000"),
+        (
+            "Capture",
+            RequestBody::Capture(300),
+            "0a820214ac02484d04bc00"
+        ),
+        ("GetCapture", RequestBody::GetCapture, "08820215a965c6a600"),
     ]
 }
 
@@ -241,7 +245,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 id: 302,
                 result: Err(Refusal::StorageFailed)
             }),
-            ""
+            "0a01ae0201080c27f31c00"
         ),
         (
             "Capture",
@@ -258,7 +262,7 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 })
                 .collect()
             }),
-            ""
+            "0a07f80f8010015b990101030841010380be0103bc410101063ee3b84a6400"
         ),
         (
             "Health",
@@ -267,13 +271,14 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
                 reset: ResetCause::Watchdog,
                 settings: SettingsOrigin::Damaged,
                 clock_hz: 170_000_000,
+                crystal: true,
                 tick_cycles_max: 5000,
                 tick_cycles_mean: 3000,
                 stack_free: 20_000,
                 bad_requests: 1,
                 dropped: 8
             }),
-            ""
+            "1808904e030380fd8751018827b817a09c0101089e59a71d00"
         ),
     ]
 }

@@ -274,6 +274,8 @@ pub struct Health {
     pub settings: SettingsOrigin,
     /// Processor cycles in a second.
     pub clock_hz: u32,
+    /// A crystal sets the pace (some 50 ppm); else the chip's own oscillator (1 %), and every time is so wrong.
+    pub crystal: bool,
     /// Processor cycles that the longest control tick took since the last report, interrupt entry excluded.
     pub tick_cycles_max: u32,
     /// Processor cycles that a control tick took on average since the last report.

@@ -1,6 +1,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod arms;
 mod emps;
+mod exact;
+mod judged;
 mod made;
 
 use super::*;
