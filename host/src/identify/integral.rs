@@ -4,8 +4,8 @@ use rig_shared::multibody::{COLUMNS, column, energy_regressor};
 use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use super::momentum::momentum_rows;
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::momentum::momentum_rows;
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// What forms the rows of one recording.

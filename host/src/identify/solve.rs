@@ -23,6 +23,8 @@ use crate::robot::Robot;
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
 const ROWS_A_PARAMETER: usize = 10;
+/// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
+const HALF_POWER: f64 = 0.443;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -70,7 +72,6 @@ pub fn identify(
     for s in &holdout_surveys {
         decided.admits(s)?;
     }
-    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let loudness: Vec<f64> = (0..joints)
         .map(|j| {
             surveys
@@ -79,7 +80,7 @@ pub fn identify(
                 .fold(0.0, f64::max)
         })
         .collect();
-    let plan_with = |treatment| Plan {
+    let plan_with = |treatment, window: usize| Plan {
         chain: &chain,
         transmission: &transmission,
         columns: &base.columns,
@@ -91,7 +92,7 @@ pub fn identify(
     };
     let wide = decided;
     let explained = match options.prepare.decimation {
-        Choice::Auto => explained_band(training, &plan_with(&wide))?,
+        Choice::Auto => explained_band(training, &plan_with(&wide, 1))?,
         Choice::Fixed(_) => None,
     };
     let decided = match explained {
@@ -101,10 +102,11 @@ pub fn identify(
         }
         None => wide.clone(),
     };
+    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let mut treatment = decided.clone();
     let mut made = RowCache::default();
     if options.prepare.speed_threshold == Choice::Auto {
-        let by_noise = plan_with(&decided);
+        let by_noise = plan_with(&decided, window);
         let (speeds, reason) = speed_thresholds(training, &by_noise)?;
         made = if speeds == decided.speed_threshold {
             by_noise.cache
@@ -115,7 +117,7 @@ pub fn identify(
     }
     let plan = Plan {
         cache: made,
-        ..plan_with(&treatment)
+        ..plan_with(&treatment, window)
     };
     let p = base.len();
 
@@ -386,7 +388,7 @@ fn as_recordings<'a>(spooled: &'a [Spooled<'a>]) -> Vec<&'a dyn Recording> {
     spooled.iter().map(|s| s as &dyn Recording).collect()
 }
 
-/// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
+/// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
 /// short enough that speeding up and slowing down fall into different windows. On EMPS, where friction is not
 /// quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
 fn choose_window(
@@ -400,13 +402,27 @@ fn choose_window(
     let (seconds, reason) = match options.window {
         Some(seconds) => (seconds, format!("{seconds} s, as given.")),
         None => {
-            let seconds = (0.0625 / treatment.motion_frequency).clamp(least, most.max(least));
+            let several = surveys.iter().any(|s| s.joints.len() > 1);
+            let wish = if several {
+                HALF_POWER / treatment.parallel_edge
+            } else {
+                0.0625 / treatment.motion_frequency
+            };
+            let seconds = wish.clamp(least, most.max(least));
+            let why = if several {
+                format!(
+                    "over which a mean passes up to the {:.3} Hz that the differential model's low-pass does",
+                    treatment.parallel_edge
+                )
+            } else {
+                format!(
+                    "a sixteenth of the period of the fastest motion ({:.3} Hz)",
+                    treatment.motion_frequency
+                )
+            };
             (
                 seconds,
-                format!(
-                    "{seconds:.4} s, a sixteenth of the period of the fastest motion ({:.3} Hz); windows start every quarter of that.",
-                    treatment.motion_frequency
-                ),
+                format!("{seconds:.4} s, {why}; windows start every quarter of that."),
             )
         }
     };

@@ -42,7 +42,9 @@ pub fn reach(image: &Image, root: &str) -> Option<Reach> {
     let mut reach = Reach::default();
     let mut seen = BTreeSet::from([start.address]);
     let mut queue = VecDeque::from([start.clone()]);
-    reach.functions.insert(start.name.clone(), start.name.clone());
+    reach
+        .functions
+        .insert(start.name.clone(), start.name.clone());
     while let Some(function) = queue.pop_front() {
         for (address, jump) in jumps(image, function.address, function.size) {
             match jump {
@@ -54,9 +56,7 @@ pub fn reach(image: &Image, root: &str) -> Option<Reach> {
                         continue;
                     }
                     let Some(next) = image.function_at(target) else {
-                        reach
-                            .strange
-                            .push((function.name.clone(), address, target));
+                        reach.strange.push((function.name.clone(), address, target));
                         continue;
                     };
                     if seen.insert(next.address) {
@@ -89,7 +89,9 @@ fn jumps(image: &Image, start: u32, size: u32) -> Vec<(u32, Jump)> {
             at = end;
             continue;
         }
-        let Some(&[a, b]) = image.code(at, 2) else { break };
+        let Some(&[a, b]) = image.code(at, 2) else {
+            break;
+        };
         let first = u16::from_le_bytes([a, b]);
         let bytes = length(first) as u32;
         let second = match image.code(at + 2, 2) {
@@ -167,11 +169,27 @@ mod test {
     fn branches_are_decoded() {
         assert_eq!(decode(0x100, 0xE7FE, 0), Some(Jump::To(0x100)), "b .");
         assert_eq!(decode(0x100, 0xD001, 0), Some(Jump::To(0x106)), "beq");
-        assert_eq!(decode(0x100, 0xF000, 0xF801), Some(Jump::To(0x106)), "bl +2");
+        assert_eq!(
+            decode(0x100, 0xF000, 0xF801),
+            Some(Jump::To(0x106)),
+            "bl +2"
+        );
         assert_eq!(decode(0x100, 0xF7FF, 0xFFFE), Some(Jump::To(0x100)), "bl .");
-        assert_eq!(decode(0x100, 0xF000, 0xB801), Some(Jump::To(0x106)), "b.w +2");
-        assert_eq!(decode(0x100, 0xF43F, 0xAFFE), Some(Jump::To(0x100)), "beq.w .");
-        assert_eq!(decode(0x100, 0xB108, 0), Some(Jump::To(0x106)), "cbz r0, +2");
+        assert_eq!(
+            decode(0x100, 0xF000, 0xB801),
+            Some(Jump::To(0x106)),
+            "b.w +2"
+        );
+        assert_eq!(
+            decode(0x100, 0xF43F, 0xAFFE),
+            Some(Jump::To(0x100)),
+            "beq.w ."
+        );
+        assert_eq!(
+            decode(0x100, 0xB108, 0),
+            Some(Jump::To(0x106)),
+            "cbz r0, +2"
+        );
         assert_eq!(decode(0x100, 0x4770, 0), None, "bx lr");
         assert_eq!(decode(0x100, 0x4798, 0), Some(Jump::Indirect), "blx r3");
         assert_eq!(decode(0x100, 0xDEFE, 0), Some(Jump::Abort), "udf");

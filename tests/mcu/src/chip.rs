@@ -459,8 +459,7 @@ impl Chip {
     /// The encoder's edges up to now, into the timer that counts them: PA0 and PA1 by alternate function 1.
     fn count_edges(&mut self) {
         let (counts, index) = self.board.edges(self.work.now);
-        let wired =
-            (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
+        let wired = (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
         if wired {
             let tim = &mut self.tim[1];
             tim.quadrature(counts);
@@ -613,9 +612,10 @@ impl Chip {
             Peripheral::Adc12 => {
                 let (system, kernel) = (self.period, self.rcc.adc_period());
                 let codes = self.codes();
-                self.adc.write(now, offset, value, system, kernel, &|channel| {
-                    code_of(&codes, channel)
-                })?;
+                self.adc
+                    .write(now, offset, value, system, kernel, &|channel| {
+                        code_of(&codes, channel)
+                    })?;
             }
             Peripheral::Dwt => match offset {
                 0 => {

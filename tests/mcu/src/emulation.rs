@@ -262,13 +262,19 @@ impl<C: Cpu<Chip>> Emulation<C> {
                 Stop::ExceptionReturn(value) => self.leave(value)?,
                 Stop::SupervisorCall => self.cpu.bus().nvic.pend(SV_CALL),
                 Stop::Memory { address, write } => {
-                    let access = if write { "a store to" } else { "a load or fetch from" };
+                    let access = if write {
+                        "a store to"
+                    } else {
+                        "a load or fetch from"
+                    };
                     // PRECISERR with BFARVALID.
                     self.fault(0x8200, address, format!("{access} {}", map::name(address)))?;
                 }
                 // UNDEFINSTR.
                 Stop::Undefined => self.fault(1 << 16, 0, "an undefined instruction".to_owned())?,
-                Stop::Breakpoint => self.fault(0, 0, "a breakpoint without a debugger".to_owned())?,
+                Stop::Breakpoint => {
+                    self.fault(0, 0, "a breakpoint without a debugger".to_owned())?
+                }
             }
         }
     }
@@ -396,11 +402,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let mut words: Vec<u32> = [0, 1, 2, 3, 12]
             .map(|n| self.cpu.get(Register::General(n)))
             .to_vec();
-        words.extend([
-            self.cpu.get(Register::Lr),
-            self.cpu.get(Register::Pc),
-            xpsr,
-        ]);
+        words.extend([self.cpu.get(Register::Lr), self.cpu.get(Register::Pc), xpsr]);
         if float {
             words.extend((0..16).map(|n| self.cpu.get(Register::Single(n))));
             words.extend([self.cpu.get(Register::Fpscr), 0]);
@@ -476,15 +478,15 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let padding = 4 * (xpsr >> 9 & 1);
         if float {
             for n in 0..16 {
-                self.cpu
-                    .set(Register::Single(n), word(8 + usize::from(n)));
+                self.cpu.set(Register::Single(n), word(8 + usize::from(n)));
             }
             self.cpu.set(Register::Fpscr, word(24));
         }
         let control = self.cpu.get(Register::Control) & !4 | u32::from(float) << 2;
         self.cpu.set(Register::Xpsr, xpsr & !(1 << 9));
         self.cpu.set(Register::Control, control);
-        self.cpu.set(Register::Sp, frame + 4 * size as u32 + padding);
+        self.cpu
+            .set(Register::Sp, frame + 4 * size as u32 + padding);
         self.cpu.set(Register::Pc, word(6));
         let mut chip = self.cpu.bus();
         chip.event = true;

@@ -108,7 +108,9 @@ impl Image {
         let mut ram_used = 0;
         for section in file.sections() {
             let allocated = match section.flags() {
-                SectionFlags::Elf { sh_flags, .. } => sh_flags & u64::from(object::elf::SHF_ALLOC) != 0,
+                SectionFlags::Elf { sh_flags, .. } => {
+                    sh_flags & u64::from(object::elf::SHF_ALLOC) != 0
+                }
                 _ => false,
             };
             if allocated && map::RAM.contains(&(section.address() as u32)) {

@@ -20,8 +20,8 @@ pub mod image;
 pub mod map;
 pub mod nvic;
 pub mod peripheral;
-pub mod time;
 #[cfg(feature = "unicorn")]
 pub mod rig;
+pub mod time;
 #[cfg(feature = "unicorn")]
 pub mod unicorn;

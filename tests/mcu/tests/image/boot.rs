@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use rig_host::link::{EmulatedPort, Session, SessionSettings};
 use rig_mcu::rig::Line;
-use rig_shared::wire::message::{ResetCause, RequestBody, SettingsOrigin};
+use rig_shared::wire::message::{RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, wait};
 
 use crate::{bench, board, greeted, health, powered};
@@ -66,7 +66,11 @@ fn a_minute_at_rest() {
     assert!((after - before).abs() < 2e-3, "{before} to {after} rad");
     let report = health(&mut line);
     assert_eq!((report.bad_requests, report.dropped), (0, 0));
-    assert!(line.next_report(Duration::from_millis(100)).unwrap().is_some());
+    assert!(
+        line.next_report(Duration::from_millis(100))
+            .unwrap()
+            .is_some()
+    );
     assert_eq!(line.frames().bad_crc + line.frames().bad_cobs, 0);
     assert_eq!(board(&mut line).resets, []);
     let longest = board(&mut line).with_chip(|chip| chip.iwdg.longest());
