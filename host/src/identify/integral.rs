@@ -1,10 +1,11 @@
-//! Rows of the integral (energy) model.
+//! Rows of the integral (energy) model; those of several joints are in [`super::momentum`].
 
 use rig_shared::multibody::{COLUMNS, column, energy_regressor};
 use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::momentum::momentum_rows;
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// What forms the rows of one recording.
@@ -24,6 +25,9 @@ impl<'a> Integral<'a> {
 
     /// The rows of one piece.
     pub(super) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
+        if motion.joints.len() > 1 {
+            return momentum_rows(motion, self.plan, &self.low_pass, tally);
+        }
         integral_rows(motion, self.plan, &self.low_pass, tally)
     }
 }

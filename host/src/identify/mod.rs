@@ -13,6 +13,7 @@
 //!
 //! Leaves out: estimation of the friction law's form (see [`friction_map()`]); noise models that change with the motion.
 
+mod band;
 mod base;
 mod cache;
 mod closed;
@@ -34,6 +35,7 @@ mod least;
 mod likelihood;
 mod linear;
 mod model;
+mod momentum;
 mod output_error;
 mod parts;
 mod prior;
@@ -83,7 +85,8 @@ pub enum ModelKind {
     /// Torque against acceleration, velocity and position.
     #[default]
     Differential,
-    /// Work against change of energy over windows; needs no acceleration.
+    /// One joint: work against change of energy over windows. Several: impulse against change of momentum, one equation a
+    /// joint. Needs no acceleration.
     Integral,
 }
 

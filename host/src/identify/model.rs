@@ -122,17 +122,13 @@ impl Tally {
     }
 
     /// As entries for a report.
-    pub fn masked(&self, model: ModelKind) -> Vec<Masked> {
-        let joint = |k: usize| match model {
-            ModelKind::Differential => k + 1,
-            ModelKind::Integral => 0,
-        };
+    pub fn masked(&self) -> Vec<Masked> {
         let entries = |list: &[u64], why: &str| {
             list.iter()
                 .enumerate()
                 .filter(|(_, rows)| **rows > 0)
                 .map(|(k, rows)| Masked {
-                    joint: joint(k),
+                    joint: k + 1,
                     rows: *rows,
                     why: why.to_owned(),
                 })

@@ -237,10 +237,7 @@ fn sorted(
     total: u64,
 ) -> Result<(Vec<Vec<TriangularFactor>>, Vec<Memory>), IdentifyError> {
     let p = problem.base.len();
-    let equations = match model {
-        ModelKind::Differential => problem.robot.joints.len(),
-        ModelKind::Integral => 1,
-    };
+    let equations = problem.robot.joints.len();
     let mut parts = vec![vec![TriangularFactor::new(p); equations]; PARTS];
     let mut memories = vec![Memory::default(); equations];
     let mut index = 0;

@@ -1,5 +1,6 @@
 //! The way from recordings to an [`Identification`].
 
+use super::band::explained_band;
 use super::base::{Base, chain_of, expression, transmission_of};
 use super::cache::RowCache;
 use super::covariance::memory_of;
@@ -20,6 +21,10 @@ use super::{
 use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
 use crate::robot::Robot;
 
+/// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
+const ROWS_A_PARAMETER: usize = 10;
+/// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
+const HALF_POWER: f64 = 0.443;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -62,7 +67,6 @@ pub fn identify(
     for s in &holdout_surveys {
         decided.admits(s)?;
     }
-    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let loudness: Vec<f64> = (0..joints)
         .map(|j| {
             surveys
@@ -71,7 +75,7 @@ pub fn identify(
                 .fold(0.0, f64::max)
         })
         .collect();
-    let plan_with = |treatment| Plan {
+    let plan_with = |treatment, window: usize| Plan {
         chain: &chain,
         transmission: &transmission,
         columns: &base.columns,
@@ -81,10 +85,23 @@ pub fn identify(
         loudness: loudness.clone(),
         cache: RowCache::default(),
     };
+    let wide = decided;
+    let explained = match options.prepare.decimation {
+        Choice::Auto => explained_band(training, &plan_with(&wide, 1))?,
+        Choice::Fixed(_) => None,
+    };
+    let decided = match explained {
+        Some(band) => {
+            let rows = (ROWS_A_PARAMETER * base.len()).div_ceil(joints) as u64;
+            wide.narrowed(band, rows, &surveys, &options.prepare, &limits)?
+        }
+        None => wide.clone(),
+    };
+    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let mut treatment = decided.clone();
     let mut made = RowCache::default();
     if options.prepare.speed_threshold == Choice::Auto {
-        let by_noise = plan_with(&decided);
+        let by_noise = plan_with(&decided, window);
         let (speeds, reason) = speed_thresholds(training, &by_noise)?;
         made = if speeds == decided.speed_threshold {
             by_noise.cache
@@ -95,15 +112,12 @@ pub fn identify(
     }
     let plan = Plan {
         cache: made,
-        ..plan_with(&treatment)
+        ..plan_with(&treatment, window)
     };
     let p = base.len();
 
     // First fit: everything into one factor an equation.
-    let equations = match options.model {
-        ModelKind::Differential => joints,
-        ModelKind::Integral => 1,
-    };
+    let equations = joints;
     let mut factors = vec![TriangularFactor::new(p); equations];
     let mut instants = 0u64;
     let mut tally = Tally::default();
@@ -356,7 +370,7 @@ pub fn identify(
         comparison: beyond.comparison,
         procedure: beyond.procedure,
         details: Details {
-            masked: tally.masked(options.model),
+            masked: tally.masked(),
             training: surveys.clone(),
             holdout: holdout_surveys,
             estimate,
@@ -375,7 +389,7 @@ fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recordi
     list.iter().map(AsRef::as_ref).collect()
 }
 
-/// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
+/// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
 /// short enough that speeding up and slowing down fall into different windows. On EMPS, where friction is not
 /// quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
 fn choose_window(
@@ -389,13 +403,27 @@ fn choose_window(
     let (seconds, reason) = match options.window {
         Some(seconds) => (seconds, format!("{seconds} s, as given.")),
         None => {
-            let seconds = (0.0625 / treatment.motion_frequency).clamp(least, most.max(least));
+            let several = surveys.iter().any(|s| s.joints.len() > 1);
+            let wish = if several {
+                HALF_POWER / treatment.parallel_edge
+            } else {
+                0.0625 / treatment.motion_frequency
+            };
+            let seconds = wish.clamp(least, most.max(least));
+            let why = if several {
+                format!(
+                    "over which a mean passes up to the {:.3} Hz that the differential model's low-pass does",
+                    treatment.parallel_edge
+                )
+            } else {
+                format!(
+                    "a sixteenth of the period of the fastest motion ({:.3} Hz)",
+                    treatment.motion_frequency
+                )
+            };
             (
                 seconds,
-                format!(
-                    "{seconds:.4} s, a sixteenth of the period of the fastest motion ({:.3} Hz); windows start every quarter of that.",
-                    treatment.motion_frequency
-                ),
+                format!("{seconds:.4} s, {why}; windows start every quarter of that."),
             )
         }
     };

@@ -6,10 +6,13 @@ use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
 
-/// Two neighbouring steps together may differ from twice the mean by this share: time stamps written with single
-/// precision or by a jittery clock pass, and one stamp off the grid between rows that are on it; a lost or doubled
-/// row, or a shift of the grid by more than a fifth of a step, does not.
-const STEP_TOLERANCE: f64 = 0.1;
+/// Over up to [`STEPS_TOGETHER`] rows the time may run off the even grid by this share of a step: time stamps written
+/// with single precision or by a jittery clock pass, and a stamp off the grid between rows that are on it; a lost or
+/// doubled row does not.
+const STEP_TOLERANCE: f64 = 0.4;
+
+/// Rows over which the grid is watched.
+const STEPS_TOGETHER: usize = 8;
 
 /// Steps that are this much alike count as equal: the first of them is named.
 const ROUNDING: f64 = 1e-9;
@@ -157,7 +160,8 @@ impl Survey {
             .collect();
         let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
         let (mut span, mut steps) = (0.0, 0u64);
-        let (mut before_last, mut last_time) = (0.0, 0.0);
+        let mut last_time = 0.0;
+        let mut recent = [0.0; STEPS_TOGETHER];
         let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
         recording.each_block(1 << 16, &mut |block| {
             if block.joints.len() != joints {
@@ -175,13 +179,13 @@ impl Survey {
                     span += step;
                     steps += 1;
                     let line = block.first_line + k as u64;
-                    if run > 1 {
-                        let pair = 0.5 * (t - before_last);
-                        if pair < shortest.0 * (1.0 - ROUNDING) {
-                            shortest = (pair, line);
+                    if run >= STEPS_TOGETHER as u64 {
+                        let together = t - recent[rows as usize % STEPS_TOGETHER];
+                        if together < shortest.0 * (1.0 - ROUNDING) {
+                            shortest = (together, line);
                         }
-                        if pair > widest.0 * (1.0 + ROUNDING) {
-                            widest = (pair, line);
+                        if together > widest.0 * (1.0 + ROUNDING) {
+                            widest = (together, line);
                         }
                     }
                     run += 1;
@@ -189,7 +193,8 @@ impl Survey {
                     run = 1;
                 }
                 longest = longest.max(run);
-                (before_last, last_time) = (last_time, t);
+                recent[rows as usize % STEPS_TOGETHER] = t;
+                last_time = t;
                 rows += 1;
                 for (r, column) in running.iter_mut().zip(&block.joints) {
                     let (q, tau) = (column.q[k], column.tau[k]);
@@ -214,7 +219,13 @@ impl Survey {
             });
         }
         let mean = span / steps.max(1) as f64;
-        for (step, line) in [shortest, widest] {
+        for (together, line) in [shortest, widest] {
+            // No stretch was long enough to be watched where there is none of them.
+            if !together.is_finite() || line == 0 {
+                continue;
+            }
+            // The step that the row would have made alone.
+            let step = together - (STEPS_TOGETHER - 1) as f64 * mean;
             let deviation = (step / mean - 1.0).abs();
             if deviation > STEP_TOLERANCE || deviation.is_nan() {
                 return Err(PrepareError::Irregular {

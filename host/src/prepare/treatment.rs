@@ -271,6 +271,38 @@ impl Treatment {
         })
     }
 
+    /// The same with fewer rows: the low-pass before decimation passes only what the model explains, up to `band` in Hz,
+    /// as long as `rows` of the shortest recording are left; unchanged where that keeps as many rows, or where the
+    /// decimation was given.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn narrowed(
+        &self,
+        band: f64,
+        rows: u64,
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+        let most = (shortest / rows.max(FEWEST_KEPT)).max(1);
+        let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, most) as usize;
+        if options.decimation != Choice::Auto || n <= self.decimation {
+            return Ok(self.clone());
+        }
+        let fixed = PrepareOptions {
+            decimation: Choice::Fixed(n),
+            ..options.clone()
+        };
+        let mut narrow = Self::decide(surveys, &fixed, torque_limits)?;
+        narrow.decimation_reason = format!(
+            "One row in {n}: the low-pass before it passes up to {:.3} Hz; beyond {band:.3} Hz more than half of the power of every joint's torque is nothing that the model explains.",
+            narrow.parallel_edge
+        );
+        Ok(narrow)
+    }
+
     /// Checks that a further recording (a hold-out) can be treated the same way.
     ///
     /// # Errors
