@@ -36,7 +36,7 @@ pub(super) fn each_simulated(
 ) -> Result<(), IdentifyError> {
     match source {
         Source::Loop(controllers) => {
-            let model = model_of(problem.plan.chain, standard);
+            let model = model_of(problem.robot, problem.plan.chain, standard)?;
             let make = |r: usize| {
                 let period = 1.0 / problem.surveys[r].sample_rate;
                 Ok(
