@@ -109,8 +109,15 @@ impl State {
     /// # Errors
     /// What is wrong with the estimator's settings.
     pub fn new(config: &Config, settings: Settings) -> Result<Self, SettingsFault> {
+        let estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
+        Ok(Self::with(config, settings, estimator))
+    }
+
+    /// The state at power on with an estimator of these settings. Apart from [`State::new`] so that it can be
+    /// made where it is to lie: it is too large to be passed about on a chip's stack.
+    pub fn with(config: &Config, settings: Settings, estimator: OneLinkEstimator<f32>) -> Self {
         let derived = Derived::new(config, &settings);
-        Ok(Self {
+        Self {
             tick: 0,
             mode: Mode::Calibrating,
             trajectory: None,
@@ -123,7 +130,7 @@ impl State {
             reference: Reference::default(),
             limits: LimitSet::default(),
             cause_acting: false,
-            estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?,
+            estimator,
             settings,
             derived,
             calibration: Calibration {
@@ -142,7 +149,7 @@ impl State {
             updates_since_report: 0,
             duty: 0.0,
             run: Run::default(),
-        })
+        }
     }
 
     /// What the host may replace, as it is now.

@@ -1,8 +1,8 @@
 //! ADC1: current, supply and temperature, triggered by TIM1 and by nothing else.
 //!
-//! An injected sequence of three; each conversion is the mean of four (hardware oversampling, RM0440 section
-//! 21.4.30), taken within 3.5 µs: with 12-bit codes as before, white noise is halved, and the middle of the
-//! current's four samples lies 1.5 µs behind the trigger.
+//! An injected sequence of three; each conversion is the mean of four (RM0440, ADC,
+//! "Oversampler"), taken within 3.5 µs: with 12-bit codes as before, white noise is halved, and the middle of the
+//! current's four samples lies 1.6 µs behind the trigger.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
@@ -13,7 +13,7 @@ use rig_shared::units::AdcCode;
 use super::clock::{CORE_HZ, TICK_PRIORITY};
 use super::pins::{AnalogPins, CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANNEL};
 
-/// TIM1_TRGO2 among the injected triggers of ADC1 (RM0440 table 164).
+/// TIM1_TRGO2 among the injected triggers of ADC1 (RM0440, table "ADC1/2 - External triggers for injected channels").
 const TRIGGER: u8 = 8;
 /// Start-up time of the voltage regulator, µs (DS12288, t_ADCVREG_STUP).
 const REGULATOR_US: u32 = 20;
@@ -47,7 +47,7 @@ impl Converter {
         adc.cr().modify(|w| w.set_adcaldif(Adcaldif::SINGLE_ENDED));
         adc.cr().modify(|w| w.set_adcal(true));
         while adc.cr().read().adcal() {}
-        // ADEN may not be set within four converter clocks of the calibration's end (RM0440 section 21.4.8).
+        // ADEN may not be set within four converter clocks of the calibration's end (RM0440, ADC, "ADC on-off control").
         cortex_m::asm::delay(64);
         adc.isr().write(|w| w.set_adrdy(true));
         adc.cr().modify(|w| w.set_aden(true));

@@ -3,7 +3,7 @@
 
 use embassy_stm32::Config;
 use embassy_stm32::interrupt::Priority;
-use embassy_stm32::pac::RCC;
+use embassy_stm32::pac::{PWR, RCC};
 use embassy_stm32::rcc::{
     APBPrescaler, Hse, HseMode, LsConfig, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux,
 };
@@ -37,6 +37,14 @@ pub(crate) fn crystal() -> bool {
     false
 }
 
+/// Raises the core's voltage for clocks above 150 MHz (range 1 boost mode, RM0440 section 6.1.5): PWR_CR5.R1MODE,
+/// bit 8, cleared. The register description behind [`embassy_stm32::init`] (stm32-metapac 21.0.0) has it in bit 0,
+/// so that what is asked for there never comes.
+pub(crate) fn boost() {
+    RCC.apb1enr1().modify(|w| w.set_pwren(true));
+    PWR.cr5().modify(|w| w.0 &= !(1 << 8));
+}
+
 /// What the chip's start is told.
 pub(crate) fn config(crystal: bool) -> Config {
     let mut config = Config::default();
@@ -64,7 +72,7 @@ pub(crate) fn config(crystal: bool) -> Config {
         divr: Some(PllRDiv::DIV2),
     });
     rcc.sys = Sysclk::PLL1_R;
-    // Range 1 boost mode, needed above 150 MHz (RM0440 section 6.1.5).
+    // Range 1 boost mode, needed above 150 MHz (RM0440, PWR, "Dynamic voltage scaling management").
     rcc.boost = true;
     rcc.apb1_pre = APBPrescaler::DIV1;
     rcc.apb2_pre = APBPrescaler::DIV1;

@@ -1,7 +1,7 @@
 //! TIM2: the motor's quadrature encoder, with input filter and index.
 //!
 //! The counter runs freely over 32 bits and wraps. Where the index is wired it sets the counter to 0 counting
-//! up, to its top counting down (RM0440 section 29.4.23); between two index pulses lie whole turns, so that the
+//! up, to its top counting down (RM0440, TIM2, "Encoder index"); between two index pulses lie whole turns, so that the
 //! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
 //! moved is counts that were lost or made up on the way.
 

@@ -71,7 +71,7 @@ impl Checkup {
 pub(crate) fn reset_cause() -> ResetCause {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440 section 7.1.2).
+    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440, RCC, "System reset").
     if flags.iwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {

@@ -7,7 +7,7 @@ use embassy_stm32::peripherals::{
 };
 use embassy_stm32::{Peri, Peripherals};
 
-/// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, table 13).
+/// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, "Alternate function").
 const AF_TIM1: u8 = 6;
 /// TIM2 channels 1 and 2 on PA0 and PA1.
 const AF_TIM2: u8 = 1;

@@ -36,7 +36,7 @@ impl Bridge {
             w.set_syscfgen(true);
         });
         // A processor that has locked up, a flash word beyond repair or a supply that breaks down act on the
-        // break input too (RM0440 section 10.2.8: CLL, ECCL, PVDL; writable once after a reset).
+        // break input too (RM0440, SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).
         SYSCFG.cfgr2().modify(|w| {
             w.set_cll(true);
             w.set_eccl(true);

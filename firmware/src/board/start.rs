@@ -11,6 +11,7 @@ use rig_firmware::examined::Examined;
 use rig_firmware::nameplate;
 use rig_firmware::note::Note;
 use rig_firmware::state::State;
+use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
@@ -41,6 +42,7 @@ pub(crate) fn run() -> ! {
     let reset = health::reset_cause();
     let crystal = clock::crystal();
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
+    clock::boost();
     let peripherals = embassy_stm32::init(clock::config(crystal));
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
@@ -51,11 +53,7 @@ pub(crate) fn run() -> ! {
     let (storage, found) = Storage::open(config);
     let settings = found.settings.unwrap_or(own);
     let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
-    let state = match State::new(config, settings) {
-        Ok(state) => STATE.init(state),
-        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
-        Err(_) => unreachable!(),
-    };
+    let state = state(config, settings);
     let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
@@ -105,6 +103,16 @@ pub(crate) fn run() -> ! {
         spawner.spawn(indicator);
         spawner.spawn(keeper);
     })
+}
+
+/// The state at power on, made in its place: it is half as large as the stack.
+#[inline(never)]
+fn state(config: &Config, settings: Settings) -> &'static mut State {
+    match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
+        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        Err(_) => unreachable!(),
+    }
 }
 
 /// Feeds the watchdog and blinks: a light that stands still is a program that does.

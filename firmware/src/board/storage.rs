@@ -1,6 +1,6 @@
 //! Settings in the last two pages of flash bank 2. The program runs from bank 1, which can be read meanwhile.
 //!
-//! Registers and sequences: RM0440 sections 3.3.6 to 3.3.8 (page erase, standard programming of 64-bit words).
+//! Registers and sequences: RM0440, embedded flash memory, "Erase and program operations" (page erase, standard programming of 64-bit words).
 
 use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Sr;
@@ -12,7 +12,7 @@ use rig_firmware::stored::{self, Copy, Found, IMAGE};
 const PAGE: usize = 2048;
 /// Pages of a bank.
 const PAGES: u8 = 128;
-/// A page erase takes at most 25 ms, a word 0.13 ms (DS12288, table 53).
+/// A page erase takes at most 25 ms, a word 0.13 ms (DS12288, "Flash memory characteristics").
 const PATIENCE: Duration = Duration::from_millis(100);
 
 // Symbols of memory.x; only their addresses are used.

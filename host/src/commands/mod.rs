@@ -12,6 +12,7 @@ mod input;
 mod record;
 mod simulate;
 mod ui;
+mod urdf;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -38,6 +39,7 @@ enum Command {
     Excite(excite::Args),
     Simulate(simulate::Args),
     Base(base::Args),
+    Urdf(urdf::Args),
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
@@ -59,6 +61,7 @@ impl Cli {
             Some(Command::Excite(args)) => excite::run(&args, &ui),
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
+            Some(Command::Urdf(args)) => urdf::run(&args, &ui),
             Some(Command::Identify(args)) => identify::run(&args, &ui),
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),

@@ -20,6 +20,12 @@ pub enum DataError {
         /// The directory.
         path: PathBuf,
     },
+    /// The path is a pipe or a device.
+    #[error("{} is a pipe or a device, but a recording is gone through from its start more than once; save it as a .csv or .mcap file and give that", path.display())]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+    },
     /// No byte, or nothing but empty lines.
     #[error("{} is empty, but a recording has a header line such as `t,q1,tau1` and one row per sample", path.display())]
     Empty {

@@ -154,6 +154,10 @@ impl Source {
         if metadata.is_dir() {
             return Err(DataError::Directory { path: path.into() });
         }
+        // Opening a pipe that nobody writes to would wait for ever.
+        if !metadata.is_file() {
+            return Err(DataError::NotAFile { path: path.into() });
+        }
         let mut start = Vec::new();
         let mut head = File::open(path).map_err(failed)?.take(MAGIC.len() as u64);
         head.read_to_end(&mut start).map_err(failed)?;

@@ -364,11 +364,19 @@ pub(super) fn frame_of(
             named(&unlimited)
         ));
     }
+    let own = robot.joints.len() * COLUMNS;
     let mut base = Base::structural(robot, ModelKind::Differential, SIZE_SEED)?;
     if options.parameters == Parameters::Links {
         // Of a link's own columns and its drive's, the link's are preferred as representatives, so that what is
         // left without the drives' is a base of the links alone.
-        base = base.restricted(|c| c % COLUMNS < column::DRIVE_INERTIA);
+        base = base.restricted(|c| c < own && c % COLUMNS < column::DRIVE_INERTIA);
+    }
+    if base.columns.iter().any(|c| *c >= own) {
+        notes.push(
+            "The parameters of the coupled motors themselves (Iam, fvm, fcm) are not among those that the motion is optimal for, and their part of the torque was not checked against its limit."
+                .into(),
+        );
+        base = base.restricted(|c| c < own);
     }
     let weights = weights_of(robot, options, &bounds)?;
     let fastest = schedule.omega() * options.harmonics as f64;

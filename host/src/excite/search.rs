@@ -42,14 +42,14 @@ const fn round(weight: f64, power: i32, steps: usize) -> Round {
 }
 
 /// The first improvement: far from the optimum a smooth mean of the singular values leads there faster.
-const FIRST: [Round; 3] = [round(1e1, 2, 40), round(1e2, 4, 40), round(1e2, 8, 40)];
+const FIRST: [Round; 3] = [round(1e1, 2, 60), round(1e2, 4, 60), round(1e2, 8, 60)];
 /// The refinement.
 const LAST: [Round; 5] = [
-    round(1e2, 8, 60),
-    round(1e3, 16, 60),
-    round(1e3, 32, 60),
-    round(3e3, 64, 60),
-    round(3e3, 128, 60),
+    round(1e2, 8, 160),
+    round(1e3, 16, 160),
+    round(1e3, 32, 160),
+    round(3e3, 64, 160),
+    round(3e3, 128, 160),
 ];
 
 /// One motion that passed the proof.

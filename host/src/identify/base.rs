@@ -28,6 +28,16 @@ pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
     Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
+/// The drives of a robot description.
+///
+/// # Errors
+/// [`IdentifyError::Model`] where they cannot be.
+pub fn transmission_of(robot: &Robot) -> Result<Transmission<f64>, IdentifyError> {
+    robot
+        .transmission()
+        .map_err(|e| IdentifyError::Model(e.to_string()))
+}
+
 /// Independent columns of a matrix and how the others follow from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Independent {

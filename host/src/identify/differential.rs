@@ -6,8 +6,9 @@
 //! never formed.
 
 use rig_shared::multibody::COLUMNS;
+use rig_shared::transmission::MOTOR_COLUMNS;
 
-use super::model::{Equation, Plan, Rows, Tally, failed};
+use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use crate::batch::{BatchError, ChainBatch, RegressorBlock};
 use crate::prepare::{Decimator, JointMotion, Motion, PrepareError};
 
@@ -18,6 +19,8 @@ const STRETCH: usize = 192;
 enum Signal {
     /// Column of the regressor: joint whose torque it is part of, standard column, place in the row.
     Regressor(usize, usize, usize),
+    /// Column of a motor: joint whose torque it is part of, column behind the standard ones, place in the row.
+    Motor(usize, usize, usize),
     /// Torque of a joint.
     Torque(usize),
 }
@@ -51,8 +54,12 @@ impl<'a> Differential<'a> {
         let mut signals: Vec<Signal> = (0..n).map(Signal::Torque).collect();
         for j in 0..n {
             for (place, &c) in plan.columns.iter().enumerate() {
-                if c < n * COLUMNS && !RegressorBlock::is_zero(j, c) {
-                    signals.push(Signal::Regressor(j, c, place));
+                match plan.belongs(c) {
+                    Belongs::Joint(c) if !RegressorBlock::is_zero(j, c) => {
+                        signals.push(Signal::Regressor(j, c, place));
+                    }
+                    Belongs::Motor(..) => signals.push(Signal::Motor(j, c - n * COLUMNS, place)),
+                    Belongs::Joint(_) | Belongs::Nothing => {}
                 }
             }
         }
@@ -90,6 +97,7 @@ impl<'a> Differential<'a> {
                 }
             }
         }
+        self.motors_at(&q, &qd, &qdd, stride, out)?;
         self.batch
             .each_differential_block(&q, &qd, &qdd, block, |part| {
                 for (s, signal) in self.signals.iter().enumerate() {
@@ -101,6 +109,41 @@ impl<'a> Differential<'a> {
                 Ok::<(), BatchError>(())
             })
             .map_err(failed)
+    }
+
+    /// The part of the motors.
+    fn motors_at(
+        &self,
+        q: &[Vec<f64>],
+        qd: &[Vec<f64>],
+        qdd: &[Vec<f64>],
+        stride: usize,
+        out: &mut [f64],
+    ) -> Result<(), PrepareError> {
+        if self.plan.transmission.is_simple() {
+            return Ok(());
+        }
+        let n = q.len();
+        let width = n * MOTOR_COLUMNS;
+        let mut columns = vec![0.0; n * width];
+        let mut state = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for row in 0..q.first().map_or(0, Vec::len) {
+            for (now, lists) in state.iter_mut().zip([q, qd, qdd]) {
+                now.iter_mut()
+                    .zip(lists)
+                    .for_each(|(to, list)| *to = list[row]);
+            }
+            self.plan
+                .transmission
+                .motor_columns(&state[0], &state[1], &state[2], &mut columns)
+                .map_err(failed)?;
+            for (s, signal) in self.signals.iter().enumerate() {
+                if let Signal::Motor(j, c, _) = signal {
+                    out[s * stride + row] = columns[j * width + c];
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Rows of a piece that are kept.
@@ -190,7 +233,7 @@ impl<'a> Differential<'a> {
                 };
                 match self.signals[s] {
                     Signal::Torque(j) => result.equations[j].y[row] = *value,
-                    Signal::Regressor(j, _, place) => {
+                    Signal::Regressor(j, _, place) | Signal::Motor(j, _, place) => {
                         result.equations[j].x[row * p + place] = *value;
                     }
                 }

@@ -1,8 +1,10 @@
 //! Rows of the integral (energy) model.
 
 use rig_shared::multibody::{COLUMNS, column, energy_regressor};
+use rig_shared::scalar::Real;
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
-use super::model::{Equation, Plan, Rows, Tally, failed};
+use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// What forms the rows of one recording.
@@ -41,7 +43,8 @@ fn integral_rows(
 ) -> Result<Rows, PrepareError> {
     let n = motion.joints.len();
     let (rows, p) = (motion.t.len(), plan.columns.len());
-    let width = n * COLUMNS;
+    let standard = n * COLUMNS;
+    let width = standard + n * MOTOR_COLUMNS;
     let dt = plan.treatment.dt();
     let cumulative = |power: &dyn Fn(usize) -> f64| {
         let mut sum = 0.0;
@@ -69,10 +72,7 @@ fn integral_rows(
     for (j, joint) in motion.joints.iter().enumerate() {
         let qd = &joint.qd;
         let torque = low_pass.zero_phase(&joint.tau);
-        let sign: Vec<f64> = qd
-            .iter()
-            .map(|v| rig_shared::scalar::Real::sgn(*v))
-            .collect();
+        let sign: Vec<f64> = qd.iter().map(|v| v.sgn()).collect();
         let sign = low_pass.zero_phase(&sign);
         let squares = cumulative(&|k| qd[k] * qd[k]);
         for (sum, part) in work.iter_mut().zip(cumulative(&|k| torque[k] * qd[k])) {
@@ -90,6 +90,7 @@ fn integral_rows(
             cumulative(&|k| qd[k]),
         ]);
     }
+    let motors = motor_friction(motion, plan, low_pass, &cumulative)?;
     let duration = plan.window as f64 * dt;
     let mut result = Rows {
         equations: vec![Equation::default()],
@@ -108,7 +109,12 @@ fn integral_rows(
         for (k, out) in [(start, &mut before), (end, &mut after)] {
             let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
             let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
-            energy_regressor(plan.chain, &q, &qd, out).map_err(failed)?;
+            energy_regressor(plan.chain, &q, &qd, &mut out[..standard]).map_err(failed)?;
+            if !plan.transmission.is_simple() {
+                plan.transmission
+                    .motor_energy_columns(&q, &qd, &mut out[standard..])
+                    .map_err(failed)?;
+            }
         }
         let moved = activity[end] - activity[start];
         let scale = 1.0
@@ -117,17 +123,20 @@ fn integral_rows(
                 .max(f64::MIN_POSITIVE);
         let equation = &mut result.equations[0];
         for &c in plan.columns.iter().take(p) {
-            let joint = &friction[c / COLUMNS];
             let over = |f: &[f64]| f[end] - f[start];
-            equation.x.push(
-                scale
-                    * match c % COLUMNS {
-                        column::VISCOUS => over(&joint[0]),
-                        column::COULOMB => over(&joint[1]),
-                        column::OFFSET => over(&joint[2]),
-                        _ => after[c] - before[c],
-                    },
-            );
+            let value = match plan.belongs(c) {
+                Belongs::Joint(c) => match c % COLUMNS {
+                    column::VISCOUS => over(&friction[c / COLUMNS][0]),
+                    column::COULOMB => over(&friction[c / COLUMNS][1]),
+                    column::OFFSET => over(&friction[c / COLUMNS][2]),
+                    _ => after[c] - before[c],
+                },
+                Belongs::Motor(k, motor_column::VISCOUS) => over(&motors[k][0]),
+                Belongs::Motor(k, motor_column::COULOMB) => over(&motors[k][1]),
+                Belongs::Motor(..) => after[c] - before[c],
+                Belongs::Nothing => 0.0,
+            };
+            equation.x.push(scale * value);
         }
         equation.y.push(scale * (work[end] - work[start]));
         let still = moved <= least_activity;
@@ -150,4 +159,46 @@ fn integral_rows(
         }
     }
     Ok(result)
+}
+
+/// Per motor the work of its friction from the first row on, for unit coefficients: viscous, Coulomb (its sign behind
+/// the position's filter, as the torque is). Empty where no drive is coupled.
+fn motor_friction(
+    motion: &Motion,
+    plan: &Plan,
+    low_pass: &LowPass,
+    cumulative: &dyn Fn(&dyn Fn(usize) -> f64) -> Vec<f64>,
+) -> Result<Vec<[Vec<f64>; 2]>, PrepareError> {
+    if plan.transmission.is_simple() {
+        return Ok(Vec::new());
+    }
+    let (n, rows) = (motion.joints.len(), motion.t.len());
+    let mut speeds = vec![vec![0.0; rows]; n];
+    let mut powers = vec![vec![0.0; rows]; n];
+    let (mut q, mut qd, mut now) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut power = vec![0.0; n * MOTOR_COLUMNS];
+    for row in 0..rows {
+        for (j, joint) in motion.joints.iter().enumerate() {
+            (q[j], qd[j]) = (joint.q[row], joint.qd[row]);
+        }
+        plan.transmission
+            .motor_speeds(&q, &qd, &mut now)
+            .map_err(failed)?;
+        plan.transmission
+            .motor_power_columns(&q, &qd, &mut power)
+            .map_err(failed)?;
+        for k in 0..n {
+            speeds[k][row] = now[k];
+            powers[k][row] = power[k * MOTOR_COLUMNS + motor_column::VISCOUS];
+        }
+    }
+    let of = |(speed, power): (&Vec<f64>, &Vec<f64>)| {
+        let sign: Vec<f64> = speed.iter().map(|v| v.sgn()).collect();
+        let sign = low_pass.zero_phase(&sign);
+        [
+            cumulative(&|k| power[k]),
+            cumulative(&|k| sign[k] * speed[k]),
+        ]
+    };
+    Ok(speeds.iter().zip(&powers).map(of).collect())
 }

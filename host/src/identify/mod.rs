@@ -49,12 +49,15 @@ mod total;
 mod twin;
 
 #[cfg(test)]
+mod rows_test;
+#[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
 
 pub use base::{
-    Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference,
+    transmission_of, unit,
 };
 pub use cache::RowCache;
 pub use compare::{Compared, Comparison, Endogeneity};

@@ -1,6 +1,7 @@
 //! Rows of the two models, streamed from a recording.
 
-use rig_shared::multibody::Chain;
+use rig_shared::multibody::{COLUMNS, Chain, column};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission};
 
 use super::cache::RowCache;
 use super::differential::Differential;
@@ -12,7 +13,9 @@ use crate::prepare::{Masked, Motion, PrepareError, Recording, Treatment, worked_
 pub struct Plan<'a> {
     /// Geometry.
     pub chain: &'a Chain<f64>,
-    /// Columns of the standard regressor that are wanted (the base parameters').
+    /// Drives.
+    pub transmission: &'a Transmission<f64>,
+    /// Columns that are wanted (the base parameters'): 14 a joint, behind them 3 a motor.
     pub columns: &'a [usize],
     /// What is done to the recordings.
     pub treatment: &'a Treatment,
@@ -24,6 +27,38 @@ pub struct Plan<'a> {
     pub loudness: Vec<f64>,
     /// Rows made so far.
     pub cache: RowCache,
+}
+
+/// What a column of the regressor belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Belongs {
+    /// Column of [`Chain`]'s regressors: all of them, 14 a joint.
+    Joint(usize),
+    /// Column of [`Transmission`]'s: motor, and which of its three.
+    Motor(usize, usize),
+    /// Zero for these drives.
+    Nothing,
+}
+
+impl Plan<'_> {
+    /// What column `c` belongs to.
+    pub(super) fn belongs(&self, c: usize) -> Belongs {
+        let standard = self.chain.parameter_count();
+        if let Some(motor) = c.checked_sub(standard) {
+            let (k, which) = (motor / MOTOR_COLUMNS, motor % MOTOR_COLUMNS);
+            return match self.transmission.kind(k) {
+                Some(DriveKind::Coupled | DriveKind::Varying) => Belongs::Motor(k, which),
+                _ => Belongs::Nothing,
+            };
+        }
+        // Where the motor's own column states the inertia of the drive, the joint's does not.
+        let drive = c % COLUMNS == column::DRIVE_INERTIA;
+        if drive && !self.transmission.has_joint_inertia(c / COLUMNS) {
+            Belongs::Nothing
+        } else {
+            Belongs::Joint(c)
+        }
+    }
 }
 
 /// One equation at many instants: x·β = y.

@@ -1,6 +1,6 @@
 //! The way from recordings to an [`Identification`].
 
-use super::base::{Base, chain_of, expression};
+use super::base::{Base, chain_of, expression, transmission_of};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
@@ -37,6 +37,7 @@ pub fn identify(
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
     let chain = chain_of(robot)?;
+    let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
     // What is spooled has no references any more.
@@ -77,6 +78,7 @@ pub fn identify(
         .collect();
     let plan_with = |treatment| Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &base.columns,
         treatment,
         window,

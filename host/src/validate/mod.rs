@@ -225,11 +225,17 @@ pub fn validate(
     }
     let chain = chain_of(robot)?;
     let model = Model::from_robot(robot)?;
+    // Those of coupled drives follow the joints'.
+    let motors = model
+        .motors
+        .as_ref()
+        .map_or(&[][..], |m| m.parameters.as_flattened());
     // Parameters that are zero add nothing to the torque: their columns are not formed.
     let (columns, values): (Vec<usize>, Vec<f64>) = model
         .parameters
         .iter()
         .flatten()
+        .chain(motors)
         .copied()
         .enumerate()
         .filter(|(_, value)| *value != 0.0)
@@ -240,6 +246,8 @@ pub fn validate(
         });
     }
     let joints = robot.joints.len();
+    let spooled = crate::prepare::Spooled::all(recordings);
+    let recordings: Vec<&dyn Recording> = spooled.iter().map(|s| s as &dyn Recording).collect();
     let surveys = recordings
         .iter()
         .map(|r| Survey::take(*r, joints))
@@ -250,8 +258,10 @@ pub fn validate(
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
     let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &columns,
         treatment: &treatment,
         window: 0,

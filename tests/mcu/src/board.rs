@@ -26,6 +26,8 @@ pub struct BoardFaults {
     pub channel_a_cut: bool,
     /// Channel B likewise.
     pub channel_b_cut: bool,
+    /// The index likewise.
+    pub index_cut: bool,
     /// Codes that the converter gives whatever is on its pins: current, supply, temperature.
     pub stuck: [Option<u16>; 3],
     /// The driver reports a fault: its output pulls the break input low and its bridge is off.
@@ -153,11 +155,7 @@ impl Board {
     pub fn advance(&mut self, now: Instant) {
         self.integrate(now);
         let on = 2.0 * self.on_time >= self.period as f64;
-        let duty = if on {
-            self.duty_time / self.on_time
-        } else {
-            0.0
-        };
+        let duty = if on { self.duty_time / self.on_time } else { 0.0 };
         self.duty_time = 0.0;
         self.on_time = 0.0;
         let command = Command {
@@ -198,8 +196,8 @@ impl Board {
         let count = self.count(now);
         let before = self.true_count;
         self.true_count = count;
-        let index =
-            (count.div_euclid(self.turn) != before.div_euclid(self.turn)).then_some(count > before);
+        let passed = count.div_euclid(self.turn) != before.div_euclid(self.turn);
+        let index = (passed && !self.faults.index_cut).then_some(count > before);
         // Quadrature: A is high in phases 1 and 2, B in phases 2 and 3.
         let seen = match (self.faults.channel_a_cut, self.faults.channel_b_cut) {
             (false, false) => return (count - before, index),

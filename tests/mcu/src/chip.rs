@@ -206,6 +206,16 @@ impl Chip {
         self.gpio[1].set_outside(12, fault);
     }
 
+    /// The processor has locked up: an input of the break where it is let through (SYSCFG_CFGR2.CLL).
+    pub fn lock_up(&mut self) {
+        if self.syscfg.breaks_on_lockup() {
+            self.tim[0].trip();
+            if let Err(refusal) = self.update_bridge(self.work.now) {
+                self.fail(ChipError::Hardware(refusal));
+            }
+        }
+    }
+
     /// A timer by its number.
     pub fn timer(&mut self, number: u8) -> &mut Tim {
         &mut self.tim[timer_index(number)]
@@ -449,7 +459,8 @@ impl Chip {
     /// The encoder's edges up to now, into the timer that counts them: PA0 and PA1 by alternate function 1.
     fn count_edges(&mut self) {
         let (counts, index) = self.board.edges(self.work.now);
-        let wired = (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
+        let wired =
+            (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
         if wired {
             let tim = &mut self.tim[1];
             tim.quadrature(counts);
@@ -563,7 +574,13 @@ impl Chip {
         let now = self.work.now;
         let (peripheral, base) = self.place(address)?;
         let offset = address - base;
-        if size != 4 && !matches!(peripheral, Peripheral::Scs | Peripheral::Lpuart) {
+        // Timers may be accessed by half-words (RM0440 section 28.6); the line takes single bytes.
+        let narrow = match peripheral {
+            Peripheral::Scs | Peripheral::Lpuart => true,
+            Peripheral::Tim(_) => size == 2,
+            _ => false,
+        };
+        if size != 4 && !(narrow && (offset.is_multiple_of(4) || peripheral == Peripheral::Scs)) {
             return told(format!("a store of {size} bytes is not modelled there"));
         }
         match peripheral {
@@ -596,10 +613,9 @@ impl Chip {
             Peripheral::Adc12 => {
                 let (system, kernel) = (self.period, self.rcc.adc_period());
                 let codes = self.codes();
-                self.adc
-                    .write(now, offset, value, system, kernel, &|channel| {
-                        code_of(&codes, channel)
-                    })?;
+                self.adc.write(now, offset, value, system, kernel, &|channel| {
+                    code_of(&codes, channel)
+                })?;
             }
             Peripheral::Dwt => match offset {
                 0 => {

@@ -210,7 +210,9 @@ impl<C: Cpu<Chip>> Emulation<C> {
             .unwrap_or(map::RAM.start);
         let mut bytes = vec![0; (top - bottom) as usize];
         self.cpu.load(bottom, &mut bytes);
-        let untouched = bytes.iter().take_while(|byte| **byte == PAINT).count();
+        // cortex-m-rt may have painted it anew before the program began (its feature `paint-stack`).
+        let painted = |byte: &&u8| matches!(**byte, PAINT | 0xCC);
+        let untouched = bytes.iter().take_while(painted).count();
         (top - bottom - untouched as u32, top - bottom)
     }
 
@@ -260,19 +262,13 @@ impl<C: Cpu<Chip>> Emulation<C> {
                 Stop::ExceptionReturn(value) => self.leave(value)?,
                 Stop::SupervisorCall => self.cpu.bus().nvic.pend(SV_CALL),
                 Stop::Memory { address, write } => {
-                    let access = if write {
-                        "a store to"
-                    } else {
-                        "a load or fetch from"
-                    };
+                    let access = if write { "a store to" } else { "a load or fetch from" };
                     // PRECISERR with BFARVALID.
                     self.fault(0x8200, address, format!("{access} {}", map::name(address)))?;
                 }
                 // UNDEFINSTR.
                 Stop::Undefined => self.fault(1 << 16, 0, "an undefined instruction".to_owned())?,
-                Stop::Breakpoint => {
-                    self.fault(0, 0, "a breakpoint without a debugger".to_owned())?
-                }
+                Stop::Breakpoint => self.fault(0, 0, "a breakpoint without a debugger".to_owned())?,
             }
         }
     }
@@ -370,13 +366,18 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let masks = self.cpu.masks();
         let in_fault = self.cpu.bus().nvic.running() == Some(HARD_FAULT);
         if in_fault || masks.faultmask {
-            self.locked = true;
+            self.lock_up();
             return Ok(());
         }
         let mut chip = self.cpu.bus();
         chip.nvic.fault(status, address);
         chip.nvic.pend(HARD_FAULT);
         Ok(())
+    }
+
+    fn lock_up(&mut self) {
+        self.locked = true;
+        self.cpu.bus().lock_up();
     }
 
     fn enter(&mut self, exception: u16) -> Result<(), EmulationError> {
@@ -395,7 +396,11 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let mut words: Vec<u32> = [0, 1, 2, 3, 12]
             .map(|n| self.cpu.get(Register::General(n)))
             .to_vec();
-        words.extend([self.cpu.get(Register::Lr), self.cpu.get(Register::Pc), xpsr]);
+        words.extend([
+            self.cpu.get(Register::Lr),
+            self.cpu.get(Register::Pc),
+            xpsr,
+        ]);
         if float {
             words.extend((0..16).map(|n| self.cpu.get(Register::Single(n))));
             words.extend([self.cpu.get(Register::Fpscr), 0]);
@@ -413,7 +418,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
                     function: self.name(pc),
                 });
             }
-            self.locked = true;
+            self.lock_up();
             return Ok(());
         }
         let nested = self.cpu.bus().nvic.depth() > 0;
@@ -471,15 +476,15 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let padding = 4 * (xpsr >> 9 & 1);
         if float {
             for n in 0..16 {
-                self.cpu.set(Register::Single(n), word(8 + usize::from(n)));
+                self.cpu
+                    .set(Register::Single(n), word(8 + usize::from(n)));
             }
             self.cpu.set(Register::Fpscr, word(24));
         }
         let control = self.cpu.get(Register::Control) & !4 | u32::from(float) << 2;
         self.cpu.set(Register::Xpsr, xpsr & !(1 << 9));
         self.cpu.set(Register::Control, control);
-        self.cpu
-            .set(Register::Sp, frame + 4 * size as u32 + padding);
+        self.cpu.set(Register::Sp, frame + 4 * size as u32 + padding);
         self.cpu.set(Register::Pc, word(6));
         let mut chip = self.cpu.bus();
         chip.event = true;

@@ -64,6 +64,8 @@ pub struct Image {
     /// Bytes of RAM that statics take.
     pub ram_used: usize,
     functions: Vec<Function>,
+    /// Where code and where data begins, by the mapping symbols: true for code.
+    mapping: BTreeMap<u32, bool>,
     symbols: BTreeMap<String, (u32, u32)>,
 }
 
@@ -106,9 +108,7 @@ impl Image {
         let mut ram_used = 0;
         for section in file.sections() {
             let allocated = match section.flags() {
-                SectionFlags::Elf { sh_flags, .. } => {
-                    sh_flags & u64::from(object::elf::SHF_ALLOC) != 0
-                }
+                SectionFlags::Elf { sh_flags, .. } => sh_flags & u64::from(object::elf::SHF_ALLOC) != 0,
                 _ => false,
             };
             if allocated && map::RAM.contains(&(section.address() as u32)) {
@@ -117,6 +117,7 @@ impl Image {
         }
         let mut functions = Vec::new();
         let mut symbols = BTreeMap::new();
+        let mut mapping = BTreeMap::new();
         for symbol in file.symbols() {
             let Ok(name) = symbol.name() else { continue };
             let (address, size) = (symbol.address() as u32, symbol.size() as u32);
@@ -127,6 +128,10 @@ impl Image {
                     size,
                 });
             }
+            if name.starts_with("$t") || name.starts_with("$d") {
+                mapping.insert(address & !1, name.starts_with("$t"));
+                continue;
+            }
             symbols.insert(name.to_owned(), (address, size));
         }
         functions.sort_by_key(|f| (f.address, core::cmp::Reverse(f.size)));
@@ -135,8 +140,21 @@ impl Image {
             flash_used,
             ram_used,
             functions,
+            mapping,
             symbols,
         })
+    }
+
+    /// Where the data ends that lies at an address among the code; none where it is code.
+    pub fn data_until(&self, address: u32) -> Option<u32> {
+        let (_, code) = self.mapping.range(..=address).next_back()?;
+        if *code {
+            return None;
+        }
+        self.mapping
+            .range(address + 1..)
+            .find(|(_, code)| **code)
+            .map(|(at, _)| *at)
     }
 
     /// Functions by address.

@@ -11,6 +11,7 @@
 
 pub mod accelerator;
 pub mod board;
+pub mod callgraph;
 pub mod chip;
 pub mod cost;
 pub mod cpu;
@@ -20,5 +21,7 @@ pub mod map;
 pub mod nvic;
 pub mod peripheral;
 pub mod time;
+#[cfg(feature = "unicorn")]
+pub mod rig;
 #[cfg(feature = "unicorn")]
 pub mod unicorn;

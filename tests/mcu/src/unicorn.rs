@@ -20,6 +20,17 @@ use crate::cost;
 use crate::cpu::{Block, Bus, Cpu, Masks, Memory, Register, Stop};
 use crate::map;
 
+/// The engine cannot be set up, or lacks what is asked of it.
+#[derive(Debug, thiserror::Error)]
+#[error("the processor's engine fails ({0:?}): is unicorn 2.1.5 what was built?")]
+pub struct EngineError(uc_error);
+
+impl From<uc_error> for EngineError {
+    fn from(error: uc_error) -> Self {
+        Self(error)
+    }
+}
+
 /// An address at which no code can lie: the engine runs "until" it.
 const NOWHERE: u64 = 0x3000_0000;
 
@@ -68,7 +79,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
     ///
     /// # Errors
     /// What the engine says.
-    pub fn new(bus: B) -> Result<Self, uc_error> {
+    pub fn new(bus: B) -> Result<Self, EngineError> {
         let mut engine = Unicorn::new(Arch::ARM, Mode::MCLASS)?;
         engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
         engine.mem_map(
@@ -92,9 +103,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             stop: Rc::default(),
             blocks: Rc::new(RefCell::new(vec![
                 Block::default();
-                (map::FLASH.end - map::FLASH.start)
-                    as usize
-                    / 2
+                (map::FLASH.end - map::FLASH.start) as usize / 2
             ])),
         };
         for region in [map::PERIPHERALS, map::CORE] {
@@ -131,42 +140,41 @@ impl<B: Bus + 'static> UnicornCpu<B> {
     fn hook_blocks(&mut self) -> Result<(), uc_error> {
         let (bus, stop, blocks) = (self.bus.clone(), self.stop.clone(), self.blocks.clone());
         // An empty range of addresses means all of them.
-        self.engine
-            .add_block_hook(1, 0, move |engine, address, size| {
-                let address = address as u32;
-                let mut blocks = blocks.borrow_mut();
-                let place = address.wrapping_sub(map::FLASH.start) as usize / 2;
-                let read = |engine: &Unicorn<'_, ()>| {
-                    let mut code = vec![0; size as usize];
-                    match engine.mem_read(address.into(), &mut code) {
-                        Ok(()) => cost::of_block(address, &code),
-                        Err(_) => Block::default(),
-                    }
-                };
-                let block = match blocks.get_mut(place) {
-                    Some(known) => {
-                        if u32::from(known.size) != size {
-                            *known = read(engine);
-                        }
-                        *known
-                    }
-                    None => read(engine),
-                };
-                let go = {
-                    let engine = &*engine;
-                    let masks = || Masks {
-                        primask: mask(engine, Register::Primask) & 1 != 0,
-                        faultmask: mask(engine, Register::Faultmask) & 1 != 0,
-                        basepri: mask(engine, Register::Basepri) as u8,
-                    };
-                    bus.borrow_mut().block(&block, &masks)
-                };
-                if !go {
-                    stop.set(Some(Stop::Attention));
-                    // Fails only when nothing runs.
-                    let _ = engine.emu_stop();
+        self.engine.add_block_hook(1, 0, move |engine, address, size| {
+            let address = address as u32;
+            let mut blocks = blocks.borrow_mut();
+            let place = address.wrapping_sub(map::FLASH.start) as usize / 2;
+            let read = |engine: &Unicorn<'_, ()>| {
+                let mut code = vec![0; size as usize];
+                match engine.mem_read(address.into(), &mut code) {
+                    Ok(()) => cost::of_block(address, &code),
+                    Err(_) => Block::default(),
                 }
-            })?;
+            };
+            let block = match blocks.get_mut(place) {
+                Some(known) => {
+                    if u32::from(known.size) != size {
+                        *known = read(engine);
+                    }
+                    *known
+                }
+                None => read(engine),
+            };
+            let go = {
+                let engine = &*engine;
+                let masks = || Masks {
+                    primask: mask(engine, Register::Primask) & 1 != 0,
+                    faultmask: mask(engine, Register::Faultmask) & 1 != 0,
+                    basepri: mask(engine, Register::Basepri) as u8,
+                };
+                bus.borrow_mut().block(&block, &masks)
+            };
+            if !go {
+                stop.set(Some(Stop::Attention));
+                // Fails only when nothing runs.
+                let _ = engine.emu_stop();
+            }
+        })?;
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::spatial::Vector3;
 use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
-use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO3, get, set};
 
 /// The links from one joint outwards as one body in that joint's frame; its mass does not depend on the sample.
 struct Composite {
@@ -45,135 +45,138 @@ pub(super) fn composite_bodies(
     work: &[JointBlock],
     out: &mut [Lane],
 ) {
+    let Some(tip) = bodies.last() else {
+        return;
+    };
     let mut composite = Composite {
-        mass: 0.0,
-        first_moment: ZERO3,
-        inertia: [ZERO; 6],
+        mass: tip.mass,
+        first_moment: tip.first_moment.map(|x| [x; LANES]),
+        inertia: six(tip).map(|x| [x; LANES]),
     };
     let (mut force, mut moment) = (ZERO3, ZERO3);
     for (i, frame) in frames.iter().enumerate().rev() {
-        let body = &bodies[i];
-        add(body, &mut composite);
-        start(
+        diagonal(
             frame.prismatic,
-            body,
+            &bodies[i],
             &composite,
-            &mut force,
-            &mut moment,
             &mut out[lower(i, i)],
         );
-        for j in (0..i).rev() {
-            let (joint, between) = (&work[j + 1], &frames[j + 1]);
+        if i == 0 {
+            break;
+        }
+        let (joint, slides) = (&work[i], frames[i - 1].prismatic);
+        let entry = &mut out[lower(i, i - 1)];
+        if i == 1 {
+            at_each_lane!(frame, &q[i], place => begin::<_, _, _, true>(
+                place, frame.prismatic, slides, joint, &composite, &mut force, &mut moment, entry));
+        } else {
+            at_each_lane!(frame, &q[i], place => begin::<_, _, _, false>(
+                place, frame.prismatic, slides, joint, &composite, &mut force, &mut moment, entry));
+        }
+        for j in (0..i - 1).rev() {
+            let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
             let entry = &mut out[lower(i, j)];
-            match (j, frames[j].prismatic) {
-                (0, false) => at_each_lane!(between, &q[j + 1], place =>
-                    end::<_, _, _, false>(place, joint, &force, &moment, entry)),
-                (0, true) => at_each_lane!(between, &q[j + 1], place =>
-                    end::<_, _, _, true>(place, joint, &force, &moment, entry)),
-                (_, prismatic) => {
-                    at_each_lane!(between, &q[j + 1], place => inwards(place, joint, &mut force, &mut moment));
-                    *entry = if prismatic { force[2] } else { moment[2] };
-                }
+            if j == 0 {
+                at_each_lane!(between, &q[j + 1], place =>
+                    onwards::<_, _, _, true>(place, slides, joint, &mut force, &mut moment, entry));
+            } else {
+                at_each_lane!(between, &q[j + 1], place =>
+                    onwards::<_, _, _, false>(place, slides, joint, &mut force, &mut moment, entry));
             }
         }
-        match i {
-            0 => {}
-            // Of the whole arm as one body the turn about the first axis is all that is asked for.
-            1 if !frames[0].prismatic => at_each_lane!(frame, &q[i], place =>
-                to_parent::<_, _, _, true>(place, &work[i], &mut composite)),
-            _ => at_each_lane!(frame, &q[i], place =>
-                to_parent::<_, _, _, false>(place, &work[i], &mut composite)),
+        // Of the whole arm as one body the turn about the first axis is all that is asked for.
+        if i == 1 && !frames[0].prismatic {
+            at_each_lane!(frame, &q[i], place =>
+                to_parent::<_, _, _, true>(place, joint, &bodies[i - 1], &mut composite));
+        } else {
+            at_each_lane!(frame, &q[i], place =>
+                to_parent::<_, _, _, false>(place, joint, &bodies[i - 1], &mut composite));
         }
     }
 }
 
+/// The inertia of a body, entry by entry.
 #[inline(always)]
-fn add(body: &Body, composite: &mut Composite) {
+fn six(body: &Body) -> [f64; 6] {
     let i = body.inertia;
-    composite.mass += body.mass;
-    for (lane, own) in composite.first_moment.iter_mut().zip(body.first_moment) {
+    [i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
+}
+
+/// The entry on the diagonal.
+#[inline(always)]
+fn diagonal(prismatic: bool, body: &Body, composite: &Composite, entry: &mut Lane) {
+    if prismatic {
+        entry.fill(composite.mass + body.drive);
+    } else {
         for k in 0..LANES {
-            lane[k] += own;
-        }
-    }
-    for (lane, own) in composite
-        .inertia
-        .iter_mut()
-        .zip([i.xx, i.xy, i.xz, i.yy, i.yz, i.zz])
-    {
-        for k in 0..LANES {
-            lane[k] += own;
+            entry[k] = composite.inertia[5][k] + body.drive;
         }
     }
 }
 
-/// Wrench of the composite body at unit acceleration along its joint, and the entry on the diagonal.
+/// Wrench of the composite body at unit acceleration along its joint, in the frame before, and its part along that
+/// frame's joint; that part alone where it is the `LAST`.
 #[inline(always)]
-fn start(
+fn begin<const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
+    place: impl Fn(usize) -> Place<TWIST, A, D>,
     prismatic: bool,
-    body: &Body,
+    slides: bool,
+    joint: &JointBlock,
     composite: &Composite,
     force: &mut Lane3,
     moment: &mut Lane3,
     entry: &mut Lane,
 ) {
     let [hx, hy, _] = &composite.first_moment;
-    if prismatic {
-        *force = [ZERO, ZERO, [composite.mass; LANES]];
-        for k in 0..LANES {
-            set(moment, k, Vector3([hy[k], -hx[k], 0.0]));
-            entry[k] = composite.mass + body.drive;
-        }
-    } else {
-        let [_, _, xz, _, yz, zz] = &composite.inertia;
-        for k in 0..LANES {
-            set(force, k, Vector3([-hy[k], hx[k], 0.0]));
-            set(moment, k, Vector3([xz[k], yz[k], zz[k]]));
-            entry[k] = zz[k] + body.drive;
+    let [_, _, xz, _, yz, zz] = &composite.inertia;
+    for k in 0..LANES {
+        let (f, m) = if prismatic {
+            ([0.0, 0.0, composite.mass], [hy[k], -hx[k], 0.0])
+        } else {
+            ([-hy[k], hx[k], 0.0], [xz[k], yz[k], zz[k]])
+        };
+        let (s, c) = (joint.sin[k], joint.cos[k]);
+        let (f, m) = place(k).wrench_back(s, c, Vector3(f), Vector3(m));
+        entry[k] = if slides { f.z() } else { m.z() };
+        if !LAST {
+            set(force, k, f);
+            set(moment, k, m);
         }
     }
 }
 
-/// The wrench in the frame before.
+/// The wrench one frame further.
 #[inline(always)]
-fn inwards<const TWIST: u8, const A: bool, const D: bool>(
+fn onwards<const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
     place: impl Fn(usize) -> Place<TWIST, A, D>,
+    slides: bool,
     joint: &JointBlock,
     force: &mut Lane3,
     moment: &mut Lane3,
-) {
-    for k in 0..LANES {
-        let (s, c) = (joint.sin[k], joint.cos[k]);
-        let (f, m) = place(k).wrench_back(s, c, get(force, k), get(moment, k));
-        set(force, k, f);
-        set(moment, k, m);
-    }
-}
-
-/// The wrench's part along the first joint.
-#[inline(always)]
-fn end<const TWIST: u8, const A: bool, const D: bool, const PRISMATIC: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
-    joint: &JointBlock,
-    force: &Lane3,
-    moment: &Lane3,
     entry: &mut Lane,
 ) {
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
         let (f, m) = place(k).wrench_back(s, c, get(force, k), get(moment, k));
-        entry[k] = if PRISMATIC { f.z() } else { m.z() };
+        entry[k] = if slides { f.z() } else { m.z() };
+        if !LAST {
+            set(force, k, f);
+            set(moment, k, m);
+        }
     }
 }
 
-/// The composite body in the frame before; of it, no more than the inertia about z where `ZZ`.
+/// The composite body in the frame before, with that frame's own; of it, no more than the inertia about z where `ZZ`.
 #[inline(always)]
 fn to_parent<const TWIST: u8, const A: bool, const D: bool, const ZZ: bool>(
     place: impl Fn(usize) -> Place<TWIST, A, D>,
     joint: &JointBlock,
+    own: &Body,
     composite: &mut Composite,
 ) {
     let mass = composite.mass;
+    let (first_moment, inertia) = (own.first_moment, six(own));
+    composite.mass += own.mass;
     let [h, i] = [&mut composite.first_moment[..], &mut composite.inertia[..]];
     let ([hx, hy, hz], [xx, xy, xz, yy, yz, zz]) = (h, i) else {
         return;
@@ -227,10 +230,17 @@ fn to_parent<const TWIST: u8, const A: bool, const D: bool, const ZZ: bool>(
                 ]
             }
         };
-        zz[k] = turned[5];
+        zz[k] = turned[5] + inertia[5];
         if !ZZ {
-            [hx[k], hy[k], hz[k]] = moved.0;
-            [xx[k], xy[k], xz[k], yy[k], yz[k], _] = turned;
+            let [x, y, z] = moved.0;
+            hx[k] = x + first_moment[0];
+            hy[k] = y + first_moment[1];
+            hz[k] = z + first_moment[2];
+            xx[k] = turned[0] + inertia[0];
+            xy[k] = turned[1] + inertia[1];
+            xz[k] = turned[2] + inertia[2];
+            yy[k] = turned[3] + inertia[3];
+            yz[k] = turned[4] + inertia[4];
         }
     }
 }

@@ -32,11 +32,10 @@ impl Dmamux {
         if offset == 0x84 {
             return Ok(());
         }
-        // NBREQ and SPOL say nothing while SE and EGE are clear.
-        if value & 0x0001_0300 != 0 {
-            return told(
-                "synchronisation, events and overrun interrupts of the DMAMUX are not modelled",
-            );
+        // Events (EGE) go to the request generators, which nothing listens to; SOIE, NBREQ and SPOL say nothing
+        // without synchronisation.
+        if value & 0x0001_0000 != 0 {
+            return told(format!("synchronised requests are not modelled (written {value:#x})"));
         }
         let slot = self
             .0

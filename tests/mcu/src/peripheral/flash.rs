@@ -41,7 +41,7 @@ const REGISTERS: &[Register] = &[
     Register(0x10, "FLASH_SR", 0, 0x0000_C3FB),
     // PG, PER, PNB, BKER, STRT, interrupts, LOCK. OPTLOCK stays set.
     Register(0x14, "FLASH_CR", 0xC000_0000, 0x8301_0BFB),
-    Register(0x18, "FLASH_ECCR", 0, 0),
+    Register(0x18, "FLASH_ECCR", 0, 0x0100_0000),
     // DBANK set: two banks of 64-bit words.
     Register(0x20, "FLASH_OPTR", 0xFFEF_F8AA, 0),
 ];
@@ -112,11 +112,7 @@ impl Flash {
         let (_, job) = self.job.take()?;
         let status = self.bank.get(SR) & !BSY;
         // EOP is set only where its interrupt is enabled (section 3.7.5).
-        let end = if self.bank.get(CR) & EOPIE != 0 {
-            EOP
-        } else {
-            0
-        };
+        let end = if self.bank.get(CR) & EOPIE != 0 { EOP } else { 0 };
         self.bank.put(SR, status | end);
         match job {
             Job::Erase(address) => {
