@@ -228,10 +228,7 @@ pub(super) fn compare(
     let endogeneity = instrumental
         .as_ref()
         .and_then(|iv| endogeneity(&weighted, iv, names));
-    let weak = instrumental.as_ref().is_some_and(|iv| {
-        iv.warnings.iter().any(|w| w.contains("weak"))
-            || iv.said.iter().any(|s| s.contains("low-pass"))
-    });
+    let weak = instrumental.as_ref().is_some_and(|iv| iv.doubtful);
     let (recommended, recommendation) = recommend(&rows, endogeneity.as_ref(), weak);
     Ok(Comparison {
         folds: parts.count,
