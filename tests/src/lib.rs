@@ -67,8 +67,7 @@ pub fn calibrated<P: Port>(line: &mut Session<P>) {
 
 /// Lets emulated time pass; what comes meanwhile is dropped.
 pub fn wait<P: Port>(line: &mut Session<P>, seconds: f64) {
-    let until =
-        line.port().now() + std::time::Duration::from_secs_f64(seconds);
+    let until = line.port().now() + std::time::Duration::from_secs_f64(seconds);
     loop {
         let left = until.saturating_sub(line.port().now());
         if left.is_zero() {

@@ -155,7 +155,11 @@ impl Board {
     pub fn advance(&mut self, now: Instant) {
         self.integrate(now);
         let on = 2.0 * self.on_time >= self.period as f64;
-        let duty = if on { self.duty_time / self.on_time } else { 0.0 };
+        let duty = if on {
+            self.duty_time / self.on_time
+        } else {
+            0.0
+        };
         self.duty_time = 0.0;
         self.on_time = 0.0;
         let command = Command {

@@ -107,8 +107,8 @@ pub struct Chip {
     pub bitten: bool,
     /// Stores into the flash memory that wait for the controller.
     stores: Vec<(u32, u32, u32)>,
-    /// Code has changed in the flash memory.
-    pub code_changed: bool,
+    /// What has changed in the flash memory: first address and bytes, the emulation's to collect.
+    pub changed: Vec<(u32, u32)>,
     /// Converter triggers by the timer so far.
     pub triggers: u64,
     /// What surrounds the chip.
@@ -164,7 +164,7 @@ impl Chip {
             debug_unit: [0; 4],
             bitten: false,
             stores: Vec::new(),
-            code_changed: false,
+            changed: Vec::new(),
             triggers: 0,
             board,
             readings: None,
@@ -319,10 +319,9 @@ impl Chip {
         self.serve_dma(at, memory)?;
         self.nvic.advance(at);
         if self.flash.due() <= at
-            && let Some((address, _)) = self.flash.finish(memory)
+            && let Some(changed) = self.flash.finish(memory)
         {
-            let _ = address;
-            self.code_changed = true;
+            self.changed.push(changed);
         }
         if self.iwdg.bites() <= at {
             self.bitten = true;
@@ -459,8 +458,7 @@ impl Chip {
     /// The encoder's edges up to now, into the timer that counts them: PA0 and PA1 by alternate function 1.
     fn count_edges(&mut self) {
         let (counts, index) = self.board.edges(self.work.now);
-        let wired =
-            (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
+        let wired = (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
         if wired {
             let tim = &mut self.tim[1];
             tim.quadrature(counts);
@@ -613,9 +611,10 @@ impl Chip {
             Peripheral::Adc12 => {
                 let (system, kernel) = (self.period, self.rcc.adc_period());
                 let codes = self.codes();
-                self.adc.write(now, offset, value, system, kernel, &|channel| {
-                    code_of(&codes, channel)
-                })?;
+                self.adc
+                    .write(now, offset, value, system, kernel, &|channel| {
+                        code_of(&codes, channel)
+                    })?;
             }
             Peripheral::Dwt => match offset {
                 0 => {

@@ -134,14 +134,12 @@ impl<C: Cpu<Chip>> Emulation<C> {
 
     /// Resets the chip. The flash memory and the RAM keep what they hold.
     pub fn reset(&mut self, cause: Cause) {
-        {
+        let now = {
             let mut chip = self.cpu.bus();
             chip.reset(cause);
-            let now = chip.work.now;
-            drop(chip);
-            self.resets.push((now, cause));
-        }
-        self.cpu.forget_code();
+            chip.work.now
+        };
+        self.resets.push((now, cause));
         self.start();
     }
 
@@ -262,13 +260,19 @@ impl<C: Cpu<Chip>> Emulation<C> {
                 Stop::ExceptionReturn(value) => self.leave(value)?,
                 Stop::SupervisorCall => self.cpu.bus().nvic.pend(SV_CALL),
                 Stop::Memory { address, write } => {
-                    let access = if write { "a store to" } else { "a load or fetch from" };
+                    let access = if write {
+                        "a store to"
+                    } else {
+                        "a load or fetch from"
+                    };
                     // PRECISERR with BFARVALID.
                     self.fault(0x8200, address, format!("{access} {}", map::name(address)))?;
                 }
                 // UNDEFINSTR.
                 Stop::Undefined => self.fault(1 << 16, 0, "an undefined instruction".to_owned())?,
-                Stop::Breakpoint => self.fault(0, 0, "a breakpoint without a debugger".to_owned())?,
+                Stop::Breakpoint => {
+                    self.fault(0, 0, "a breakpoint without a debugger".to_owned())?
+                }
             }
         }
     }
@@ -279,7 +283,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
             chip.settle(memory);
             (
                 chip.failure.clone(),
-                core::mem::take(&mut chip.code_changed),
+                core::mem::take(&mut chip.changed),
                 chip.bitten,
                 chip.nvic.reset_requested,
             )
@@ -291,8 +295,8 @@ impl<C: Cpu<Chip>> Emulation<C> {
                 error,
             });
         }
-        if changed {
-            self.cpu.forget_code();
+        for (address, size) in changed {
+            self.cpu.forget_code(address, size);
         }
         if bitten {
             self.reset(Cause::Watchdog);
@@ -321,8 +325,12 @@ impl<C: Cpu<Chip>> Emulation<C> {
     }
 
     fn sleep(&mut self, for_event: bool, until: Instant) -> Result<(), EmulationError> {
+        let resets = self.resets.len();
         loop {
             self.settle()?;
+            if self.resets.len() > resets {
+                return Ok(());
+            }
             let masks = self.cpu.masks();
             let mut chip = self.cpu.bus();
             let awake = if for_event {
@@ -346,10 +354,6 @@ impl<C: Cpu<Chip>> Emulation<C> {
             }
             let next = chip.next_event().min(until);
             chip.skip_to(next);
-            drop(chip);
-            if self.resets.last().is_some_and(|(at, _)| *at == next) {
-                return Ok(());
-            }
         }
     }
 
@@ -396,11 +400,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let mut words: Vec<u32> = [0, 1, 2, 3, 12]
             .map(|n| self.cpu.get(Register::General(n)))
             .to_vec();
-        words.extend([
-            self.cpu.get(Register::Lr),
-            self.cpu.get(Register::Pc),
-            xpsr,
-        ]);
+        words.extend([self.cpu.get(Register::Lr), self.cpu.get(Register::Pc), xpsr]);
         if float {
             words.extend((0..16).map(|n| self.cpu.get(Register::Single(n))));
             words.extend([self.cpu.get(Register::Fpscr), 0]);
@@ -476,15 +476,15 @@ impl<C: Cpu<Chip>> Emulation<C> {
         let padding = 4 * (xpsr >> 9 & 1);
         if float {
             for n in 0..16 {
-                self.cpu
-                    .set(Register::Single(n), word(8 + usize::from(n)));
+                self.cpu.set(Register::Single(n), word(8 + usize::from(n)));
             }
             self.cpu.set(Register::Fpscr, word(24));
         }
         let control = self.cpu.get(Register::Control) & !4 | u32::from(float) << 2;
         self.cpu.set(Register::Xpsr, xpsr & !(1 << 9));
         self.cpu.set(Register::Control, control);
-        self.cpu.set(Register::Sp, frame + 4 * size as u32 + padding);
+        self.cpu
+            .set(Register::Sp, frame + 4 * size as u32 + padding);
         self.cpu.set(Register::Pc, word(6));
         let mut chip = self.cpu.bus();
         chip.event = true;

@@ -11,7 +11,6 @@
 
 pub mod accelerator;
 pub mod board;
-pub mod callgraph;
 pub mod chip;
 pub mod cost;
 pub mod cpu;
@@ -20,8 +19,8 @@ pub mod image;
 pub mod map;
 pub mod nvic;
 pub mod peripheral;
-pub mod time;
 #[cfg(feature = "unicorn")]
 pub mod rig;
+pub mod time;
 #[cfg(feature = "unicorn")]
 pub mod unicorn;

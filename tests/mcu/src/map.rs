@@ -141,7 +141,10 @@ pub fn name(address: u32) -> String {
         .filter(|(base, _)| *base <= address && address - base < 0x2000)
         .max_by_key(|(base, _)| *base);
     match below {
-        Some((base, name)) => format!("{name}+{:#x} (a peripheral without a model)", address - base),
+        Some((base, name)) => format!(
+            "{name}+{:#x} (a peripheral without a model)",
+            address - base
+        ),
         None => format!("{address:#010x} (nothing known there)"),
     }
 }

@@ -228,9 +228,8 @@ impl Nvic {
 
     /// Whether an exception is pending that could preempt what runs, were nothing masked.
     pub fn is_interested(&self) -> bool {
-        self.candidate.is_some_and(|(_, priority)| {
-            self.running_priority(Masks::default()) > priority
-        })
+        self.candidate
+            .is_some_and(|(_, priority)| self.running_priority(Masks::default()) > priority)
     }
 
     /// The exception to take now, if any.
@@ -330,16 +329,20 @@ impl Nvic {
             0x180..=0x19C => word(&self.enabled, 0x180).unwrap_or(0),
             0x200..=0x21C | 0x280..=0x29C => {
                 let index = (offset as usize & 0x7F) / 4;
-                if index < WORDS { self.effective(index) } else { 0 }
+                if index < WORDS {
+                    self.effective(index)
+                } else {
+                    0
+                }
             }
             0x300..=0x31C => {
                 let index = (offset - 0x300) / 4;
-                self.active.iter().fold(0, |all, e| {
-                    match e.checked_sub(16) {
+                self.active
+                    .iter()
+                    .fold(0, |all, e| match e.checked_sub(16) {
                         Some(irq) if u32::from(irq / 32) == index => all | 1 << (irq % 32),
                         _ => all,
-                    }
-                })
+                    })
             }
             0x400..=0x4EC => self.priorities(16 + (offset as usize - 0x400)),
             0xD00 => 0x410F_C241,
@@ -507,8 +510,10 @@ mod test {
     fn with(priorities: &[(u32, u8)]) -> Nvic {
         let mut nvic = Nvic::default();
         for (irq, priority) in priorities {
-            nvic.write(0, 24, 0x400 + irq, 1, u32::from(*priority)).unwrap();
-            nvic.write(0, 24, 0x100 + 4 * (irq / 32), 4, 1 << (irq % 32)).unwrap();
+            nvic.write(0, 24, 0x400 + irq, 1, u32::from(*priority))
+                .unwrap();
+            nvic.write(0, 24, 0x100 + 4 * (irq / 32), 4, 1 << (irq % 32))
+                .unwrap();
         }
         nvic
     }

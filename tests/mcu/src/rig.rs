@@ -18,11 +18,7 @@ pub type EmulatedBoard = Emulation<UnicornCpu<Chip>>;
 ///
 /// # Errors
 /// What the engine says.
-pub fn power_on(
-    image: Image,
-    plant: PlantConfig,
-    seed: u64,
-) -> Result<EmulatedBoard, EngineError> {
+pub fn power_on(image: Image, plant: PlantConfig, seed: u64) -> Result<EmulatedBoard, EngineError> {
     let cpu = UnicornCpu::new(Chip::new(Board::new(plant, seed)))?;
     Ok(Emulation::new(cpu, image))
 }

@@ -103,7 +103,9 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             stop: Rc::default(),
             blocks: Rc::new(RefCell::new(vec![
                 Block::default();
-                (map::FLASH.end - map::FLASH.start) as usize / 2
+                (map::FLASH.end - map::FLASH.start)
+                    as usize
+                    / 2
             ])),
         };
         for region in [map::PERIPHERALS, map::CORE] {
@@ -140,41 +142,42 @@ impl<B: Bus + 'static> UnicornCpu<B> {
     fn hook_blocks(&mut self) -> Result<(), uc_error> {
         let (bus, stop, blocks) = (self.bus.clone(), self.stop.clone(), self.blocks.clone());
         // An empty range of addresses means all of them.
-        self.engine.add_block_hook(1, 0, move |engine, address, size| {
-            let address = address as u32;
-            let mut blocks = blocks.borrow_mut();
-            let place = address.wrapping_sub(map::FLASH.start) as usize / 2;
-            let read = |engine: &Unicorn<'_, ()>| {
-                let mut code = vec![0; size as usize];
-                match engine.mem_read(address.into(), &mut code) {
-                    Ok(()) => cost::of_block(address, &code),
-                    Err(_) => Block::default(),
-                }
-            };
-            let block = match blocks.get_mut(place) {
-                Some(known) => {
-                    if u32::from(known.size) != size {
-                        *known = read(engine);
+        self.engine
+            .add_block_hook(1, 0, move |engine, address, size| {
+                let address = address as u32;
+                let mut blocks = blocks.borrow_mut();
+                let place = address.wrapping_sub(map::FLASH.start) as usize / 2;
+                let read = |engine: &Unicorn<'_, ()>| {
+                    let mut code = vec![0; size as usize];
+                    match engine.mem_read(address.into(), &mut code) {
+                        Ok(()) => cost::of_block(address, &code),
+                        Err(_) => Block::default(),
                     }
-                    *known
-                }
-                None => read(engine),
-            };
-            let go = {
-                let engine = &*engine;
-                let masks = || Masks {
-                    primask: mask(engine, Register::Primask) & 1 != 0,
-                    faultmask: mask(engine, Register::Faultmask) & 1 != 0,
-                    basepri: mask(engine, Register::Basepri) as u8,
                 };
-                bus.borrow_mut().block(&block, &masks)
-            };
-            if !go {
-                stop.set(Some(Stop::Attention));
-                // Fails only when nothing runs.
-                let _ = engine.emu_stop();
-            }
-        })?;
+                let block = match blocks.get_mut(place) {
+                    Some(known) => {
+                        if u32::from(known.size) != size {
+                            *known = read(engine);
+                        }
+                        *known
+                    }
+                    None => read(engine),
+                };
+                let go = {
+                    let engine = &*engine;
+                    let masks = || Masks {
+                        primask: mask(engine, Register::Primask) & 1 != 0,
+                        faultmask: mask(engine, Register::Faultmask) & 1 != 0,
+                        basepri: mask(engine, Register::Basepri) as u8,
+                    };
+                    bus.borrow_mut().block(&block, &masks)
+                };
+                if !go {
+                    stop.set(Some(Stop::Attention));
+                    // Fails only when nothing runs.
+                    let _ = engine.emu_stop();
+                }
+            })?;
         Ok(())
     }
 
@@ -281,8 +284,16 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
         act(&mut self.bus.borrow_mut(), &mut Ram(&mut self.engine))
     }
 
-    fn forget_code(&mut self) {
-        self.blocks.borrow_mut().fill(Block::default());
-        let _ = self.engine.ctl_flush_tb();
+    fn forget_code(&mut self, address: u32, size: u32) {
+        let from = address.wrapping_sub(map::FLASH.start) as usize / 2;
+        let mut blocks = self.blocks.borrow_mut();
+        let ran = blocks
+            .get(from..from + size as usize / 2)
+            .is_some_and(|part| part.iter().any(|block| block.size != 0));
+        if ran {
+            blocks.fill(Block::default());
+            // Fails only where there is no translator.
+            let _ = self.engine.ctl_flush_tb();
+        }
     }
 }

@@ -163,9 +163,7 @@ impl Adc {
     /// Whether the hardware trigger `source` starts the injected sequence.
     pub fn listens_to(&self, source: u32) -> bool {
         let jsqr = self.bank.get(JSQR);
-        self.bank.get(CR) & JADSTART != 0
-            && jsqr >> 7 & 3 != 0
-            && jsqr >> 2 & 0x1F == source
+        self.bank.get(CR) & JADSTART != 0 && jsqr >> 7 & 3 != 0 && jsqr >> 2 & 0x1F == source
     }
 
     /// Starts the injected sequence.
@@ -254,7 +252,11 @@ impl Adc {
                 }
                 None => {
                     self.bank.put(DR, conversion.value);
-                    let overrun = if self.bank.get(ISR) & EOC != 0 { OVR } else { 0 };
+                    let overrun = if self.bank.get(ISR) & EOC != 0 {
+                        OVR
+                    } else {
+                        0
+                    };
                     self.flag(EOC | EOS | overrun);
                     let control = self.bank.get(CR) & !ADSTART;
                     self.bank.put(CR, control);
@@ -429,7 +431,13 @@ mod test {
         assert!(adc.read(t + 116 * 96, CR).unwrap() & ADCAL == 0);
         write(&mut adc, t, CR, ADVREGEN | ADEN).unwrap();
         write(&mut adc, t, SMPR1, 2 << 18 | 2 << 21 | 2 << 24).unwrap();
-        write(&mut adc, t, JSQR, 2 | 8 << 2 | 1 << 7 | 6 << 9 | 7 << 15 | 8 << 21).unwrap();
+        write(
+            &mut adc,
+            t,
+            JSQR,
+            2 | 8 << 2 | 1 << 7 | 6 << 9 | 7 << 15 | 8 << 21,
+        )
+        .unwrap();
         write(&mut adc, t, CR, ADVREGEN | ADEN | JADSTART).unwrap();
         assert!(adc.listens_to(8) && !adc.listens_to(0));
         adc.start_injected(t, 24, Ok(24), &code).unwrap();

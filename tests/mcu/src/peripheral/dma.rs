@@ -143,7 +143,10 @@ impl Dma {
         match register {
             0 => {
                 if value & MEM2MEM != 0 || value >> 15 != 0 {
-                    return told(format!("DMA_CCR{} has bits without a model: {value:#x}", number + 1));
+                    return told(format!(
+                        "DMA_CCR{} has bits without a model: {value:#x}",
+                        number + 1
+                    ));
                 }
                 if value & EN != 0 && !running {
                     channel.length = channel.count;
@@ -191,10 +194,17 @@ mod test {
         let mut seen = Vec::new();
         for _ in 0..5 {
             let item = dma.serve(0).unwrap().unwrap();
-            seen.push((item.memory - 0x2000_0100, dma.read(0).unwrap(), dma.read(0x0C).unwrap()));
+            seen.push((
+                item.memory - 0x2000_0100,
+                dma.read(0).unwrap(),
+                dma.read(0x0C).unwrap(),
+            ));
             dma.write(4, 0xF).unwrap();
         }
-        assert_eq!(seen, [(0, 0, 3), (1, 5, 2), (2, 0, 1), (3, 3, 4), (0, 0, 3)]);
+        assert_eq!(
+            seen,
+            [(0, 0, 3), (1, 5, 2), (2, 0, 1), (3, 3, 4), (0, 0, 3)]
+        );
         assert!(dma.write(0x0C, 1).is_err(), "count while running");
     }
 }

@@ -35,7 +35,9 @@ impl Dmamux {
         // Events (EGE) go to the request generators, which nothing listens to; SOIE, NBREQ and SPOL say nothing
         // without synchronisation.
         if value & 0x0001_0000 != 0 {
-            return told(format!("synchronised requests are not modelled (written {value:#x})"));
+            return told(format!(
+                "synchronised requests are not modelled (written {value:#x})"
+            ));
         }
         let slot = self
             .0

@@ -112,7 +112,11 @@ impl Flash {
         let (_, job) = self.job.take()?;
         let status = self.bank.get(SR) & !BSY;
         // EOP is set only where its interrupt is enabled (section 3.7.5).
-        let end = if self.bank.get(CR) & EOPIE != 0 { EOP } else { 0 };
+        let end = if self.bank.get(CR) & EOPIE != 0 {
+            EOP
+        } else {
+            0
+        };
         self.bank.put(SR, status | end);
         match job {
             Job::Erase(address) => {

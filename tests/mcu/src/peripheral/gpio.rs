@@ -114,7 +114,9 @@ impl Gpio {
     pub fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
         let out = self.bank.get(0x14);
         match offset {
-            0x18 => self.bank.put(0x14, (out & !(value >> 16)) | (value & 0xFFFF)),
+            0x18 => self
+                .bank
+                .put(0x14, (out & !(value >> 16)) | (value & 0xFFFF)),
             0x28 => self.bank.put(0x14, out & !value),
             _ => {
                 self.bank.write(offset, value)?;

@@ -110,7 +110,11 @@ impl Lpuart {
     }
 
     fn depth(&self) -> usize {
-        if self.bank.get(CR1) & FIFOEN != 0 { 8 } else { 1 }
+        if self.bank.get(CR1) & FIFOEN != 0 {
+            8
+        } else {
+            1
+        }
     }
 
     /// Bytes that the host puts on the line at `now`.

@@ -113,8 +113,7 @@ impl Bank {
     /// [`Refusal::NoRegister`], [`Refusal::Bits`].
     pub fn write(&mut self, offset: u32, value: u32) -> Result<u32, Refusal> {
         let place = self.place(offset).ok_or(Refusal::NoRegister)?;
-        let (Some(register), Some(slot)) =
-            (self.registers.get(place), self.values.get_mut(place))
+        let (Some(register), Some(slot)) = (self.registers.get(place), self.values.get_mut(place))
         else {
             return Err(Refusal::NoRegister);
         };

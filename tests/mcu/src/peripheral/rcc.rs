@@ -101,9 +101,7 @@ impl Rcc {
         let value = self.bank.read(offset)?;
         Ok(match offset {
             // HSIRDY, HSERDY, PLLRDY follow their switches.
-            CR => {
-                (value & !0x0202_0400) | (value & 0x100) << 2 | (value & 0x0101_0000) << 1
-            }
+            CR => (value & !0x0202_0400) | (value & 0x100) << 2 | (value & 0x0101_0000) << 1,
             CFGR => (value & !0xC) | (value & 3) << 2,
             // LSERDY, LSIRDY, HSI48RDY.
             BDCR | CSR | CRRCR => (value & !2) | (value & 1) << 1,
@@ -172,7 +170,11 @@ impl Rcc {
             1 if on & 0x100 != 0 => 16_000_000,
             2 if on & 0x1_0000 != 0 => 24_000_000,
             3 if on & 0x100_0000 != 0 => self.pll()?,
-            source => return told(format!("the system clock source {source} is off or reserved")),
+            source => {
+                return told(format!(
+                    "the system clock source {source} is off or reserved"
+                ));
+            }
         };
         let divided = match self.bank.get(CFGR) >> 4 & 0xF {
             n @ 0..=7 => {

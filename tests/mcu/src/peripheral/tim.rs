@@ -379,7 +379,11 @@ impl Tim {
                 ));
             }
         };
-        Ok(Some(if enable & 2 != 0 { 1.0 - active } else { active }))
+        Ok(Some(if enable & 2 != 0 {
+            1.0 - active
+        } else {
+            active
+        }))
     }
 
     /// Interrupt lines: break, update, trigger, compare.
@@ -427,7 +431,11 @@ impl Tim {
             }
             EGR => return self.generate(now, value),
             CNT => {
-                let limited = if self.is_wide() { value } else { value & 0xFFFF };
+                let limited = if self.is_wide() {
+                    value
+                } else {
+                    value & 0xFFFF
+                };
                 self.rebase(now, limited);
                 return Ok(());
             }
@@ -548,7 +556,11 @@ mod test {
         tim.advance(1000 + period - 1);
         assert_eq!(tim.take_trgo2(), None);
         assert_eq!(tim.output(0).unwrap(), Some(0.0));
-        assert_eq!(tim.read(1000 + period / 4, CNT).unwrap(), 0, "last run down, at its end");
+        assert_eq!(
+            tim.read(1000 + period / 4, CNT).unwrap(),
+            0,
+            "last run down, at its end"
+        );
         tim.advance(1000 + period);
         assert_eq!(tim.take_trgo2(), Some(1000 + period));
         assert_eq!(tim.output(0).unwrap(), Some(0.5));

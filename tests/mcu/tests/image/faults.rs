@@ -1,11 +1,11 @@
 //! Faults injected at the hardware: the bridge is off in time, the right fault is latched, its snapshot can be had.
 
+use rig_host::link::LinkError;
 use rig_mcu::board::BoardFaults;
 use rig_mcu::chip::Chip;
 use rig_mcu::cpu::{Cpu, Memory, Register};
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{NEVER, from_seconds, to_seconds};
-use rig_host::link::LinkError;
 use rig_shared::safety::Fault;
 use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
 use rig_tests::wait;
@@ -48,7 +48,12 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
     type Injury = fn(&mut Chip);
     // What is done, what must be latched, seconds until the bridge must be off.
     let cases: [(&str, Injury, &[Fault], f64); 10] = [
-        ("encoder's cable cut", |c| cut(&mut c.board.faults), &[Fault::EncoderLost], 1.0),
+        (
+            "encoder's cable cut",
+            |c| cut(&mut c.board.faults),
+            &[Fault::EncoderLost],
+            1.0,
+        ),
         (
             "encoder's channel A cut",
             |c| c.board.faults.channel_a_cut = true,
@@ -100,7 +105,12 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
         (
             "external torque",
             |c| c.board.plant_mut().faults_mut().external_torque = 60.0,
-            &[Fault::OverSpeed, Fault::Position, Fault::EncoderJump, Fault::OverCurrent],
+            &[
+                Fault::OverSpeed,
+                Fault::Position,
+                Fault::EncoderJump,
+                Fault::OverCurrent,
+            ],
             0.5,
         ),
     ];
@@ -114,15 +124,26 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
             continue;
         };
         let (record, ticks) = snapshot(&mut line);
-        text += &format!("{name:<32} {:?} after {:.2} ms\n", record.fault, 1e3 * after);
+        text += &format!(
+            "{name:<32} {:?} after {:.2} ms\n",
+            record.fault,
+            1e3 * after
+        );
         if !expected.contains(&record.fault) {
             wrong.push(format!("{name}: {record:?}"));
         }
         let place = ticks.iter().position(|tick| *tick == record.tick);
         if !ticks.windows(2).all(|pair| pair[1] == pair[0] + 1) || place.is_none_or(|p| p < 400) {
-            wrong.push(format!("{name}: snapshot of {} ticks, fault at {place:?}", ticks.len()));
+            wrong.push(format!(
+                "{name}: snapshot of {} ticks, fault at {place:?}",
+                ticks.len()
+            ));
         }
-        assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched, "{name}");
+        assert_eq!(
+            refused(&mut line, RequestBody::Arm),
+            Refusal::FaultLatched,
+            "{name}"
+        );
     }
     println!("{text}");
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
@@ -137,11 +158,16 @@ fn the_break_input_acts_without_the_processor() {
         chip.held_until = chip.work.now + from_seconds(1e-3);
         chip.work.now
     });
-    board(&mut line).run_until(off + from_seconds(2e-4)).unwrap();
+    board(&mut line)
+        .run_until(off + from_seconds(2e-4))
+        .unwrap();
     assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
     wait(&mut line, 0.01);
     let (record, _) = snapshot(&mut line);
-    assert!(matches!(record.fault, Fault::Driver | Fault::Deadline), "{record:?}");
+    assert!(
+        matches!(record.fault, Fault::Driver | Fault::Deadline),
+        "{record:?}"
+    );
 }
 
 #[test]
@@ -187,12 +213,13 @@ fn a_stack_past_its_end_resets_the_chip_with_the_bridge_off() {
     board_.run_until(from + step).unwrap();
     let (resets, faults) = (board_.resets.clone(), board_.faults.clone());
     assert!(!faults.is_empty());
-    let off = board_.with_chip(|chip| {
-        !chip.timer(1).main_output() || !chip.board.bridge().enabled
-    });
+    let off = board_.with_chip(|chip| !chip.timer(1).main_output() || !chip.board.bridge().enabled);
     assert!(off, "after 0.1 ms: {resets:?} {faults:?}");
     board_.run_for(3.0).unwrap();
-    assert!(!board_.resets.is_empty(), "neither the firmware nor the watchdog started it anew");
+    assert!(
+        !board_.resets.is_empty(),
+        "neither the firmware nor the watchdog started it anew"
+    );
     assert!(!board_.with_board(|b| b.bridge().enabled));
 }
 
@@ -203,7 +230,10 @@ fn a_processor_that_hangs_is_reset_by_the_watchdog() {
     let after = off_after(&mut line, 3.0).unwrap();
     println!("bridge off {after:.3} s after the processor stopped");
     board(&mut line).with_chip(|chip| chip.held_until = 0);
-    assert!(matches!(board(&mut line).resets[..], [(_, Cause::Watchdog)]));
+    assert!(matches!(
+        board(&mut line).resets[..],
+        [(_, Cause::Watchdog)]
+    ));
     board(&mut line).run_for(0.1).unwrap();
     assert_eq!(health(&mut line).reset, ResetCause::Watchdog);
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));

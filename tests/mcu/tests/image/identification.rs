@@ -10,6 +10,7 @@ use rig_firmware::state::State;
 use rig_firmware::step::step;
 use rig_host::data::{Block, JointColumns};
 use rig_host::identify::{Options, identify};
+use rig_host::link::experiment::Experiment;
 use rig_host::prepare::InMemory;
 use rig_mcu::board::BoardFaults;
 use rig_mcu::time::from_seconds;
@@ -20,7 +21,6 @@ use rig_shared::trajectory::{SlowReversals, Trajectory};
 use rig_shared::units::{AdcCode, EncoderCount};
 use rig_shared::wire::message::{Estimate, Request, RequestBody};
 use rig_tests::{Recording, calibrated, driven, excitation, recorded, robot};
-use rig_host::link::experiment::Experiment;
 
 use crate::{BoardSession, bench, board, greeted, place, powered};
 
@@ -56,14 +56,24 @@ fn an_excitation_recorded_over_the_wire_gives_the_rig_s_parameters() {
     let recording = as_recording(&run, torque_per_ampere);
     let found = identify(&robot(), &[&recording], &[], &Options::default()).unwrap();
     let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
-    let truth = [cos / GRAVITY, -sin / GRAVITY, inertia, viscous, coulomb, offset];
+    let truth = [
+        cos / GRAVITY,
+        -sin / GRAVITY,
+        inertia,
+        viscous,
+        coulomb,
+        offset,
+    ];
     let mut text = String::new();
     let mut fair = true;
     for (base, truth) in found.base_parameters.iter().zip(truth) {
         let inside = (base.interval[0]..=base.interval[1]).contains(&truth);
         text += &format!(
             "{:<12} {:>9.5} in {:>9.5}..{:<9.5} truth {truth:>9.5} {}\n",
-            base.expression, base.value, base.interval[0], base.interval[1],
+            base.expression,
+            base.value,
+            base.interval[0],
+            base.interval[1],
             if inside { "" } else { "OUTSIDE" }
         );
         fair &= inside;
@@ -71,7 +81,10 @@ fn an_excitation_recorded_over_the_wire_gives_the_rig_s_parameters() {
     let estimate = run.estimate();
     for (k, truth) in plant.equivalent().to_array().into_iter().enumerate() {
         let z = (f64::from(estimate.value[k]) - truth) / f64::from(estimate.std[k]);
-        text += &format!("on line {:<8} {:>9.5} z {z:.2}\n", PARAMETER_NAMES[k], estimate.value[k]);
+        text += &format!(
+            "on line {:<8} {:>9.5} z {z:.2}\n",
+            PARAMETER_NAMES[k], estimate.value[k]
+        );
         fair &= z.abs() <= 3.0;
     }
     println!("{text}");
@@ -142,7 +155,16 @@ fn on_line_estimates_equal_the_desktop_s_bit_for_bit() {
 
     // Arming shows in the first tick after the request: which of the ticks around the edge that is, is tried.
     let tried: Vec<usize> = (0..3_u64)
-        .map(|back| replay(&samples, tick_at(armed) - back, tick_at(disarmed), at, &motion, &sent))
+        .map(|back| {
+            replay(
+                &samples,
+                tick_at(armed) - back,
+                tick_at(disarmed),
+                at,
+                &motion,
+                &sent,
+            )
+        })
         .collect();
     let best = tried.iter().max().copied().unwrap_or(0);
     println!("{} estimates, equal bit for bit: {tried:?}", sent.len());
@@ -217,6 +239,10 @@ fn what_was_learnt_and_uploaded_makes_slow_reversals_follow_better() {
     assert!(without.faults.is_empty() && with.faults.is_empty());
     let rms = |run: &Recording| run.tracking_rms(0.0, f64::MAX);
     let (before, after) = (rms(&without), rms(&with));
-    println!("RMS {:.3} mrad without, {:.3} with", 1e3 * before, 1e3 * after);
+    println!(
+        "RMS {:.3} mrad without, {:.3} with",
+        1e3 * before,
+        1e3 * after
+    );
     assert!(after < before / 3.0, "{before} to {after} rad");
 }

@@ -35,8 +35,7 @@ fn image() -> Image {
         },
         PathBuf::from,
     );
-    Image::read(&path)
-        .unwrap_or_else(|error| panic!("{error} Build it with firmware/build first."))
+    Image::read(&path).unwrap_or_else(|error| panic!("{error} Build it with firmware/build first."))
 }
 
 /// A laboratory rig whose torque constant the firmware knows: no motion of the rig could show an error in it.
@@ -116,7 +115,11 @@ fn snapshot(line: &mut BoardSession) -> (FaultRecord, Vec<u64>) {
     line.request(RequestBody::GetSnapshot).unwrap();
     let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
     while ticks.len() < total {
-        match line.next_report(Duration::from_millis(500)).unwrap().unwrap() {
+        match line
+            .next_report(Duration::from_millis(500))
+            .unwrap()
+            .unwrap()
+        {
             Report::Fault(found) => record = Some(found),
             Report::Snapshot(part) => {
                 assert_eq!(usize::from(part.first), ticks.len());

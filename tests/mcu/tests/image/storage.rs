@@ -1,10 +1,10 @@
 //! Settings that survive a power cycle, and flash that does not.
 
+use rig_host::link::LinkError;
+use rig_mcu::cpu::Memory;
 use rig_mcu::map;
 use rig_mcu::peripheral::rcc::Cause;
-use rig_mcu::cpu::Memory;
 use rig_shared::wire::message::{Refusal, RequestBody, ResetCause, SettingsOrigin};
-use rig_host::link::LinkError;
 use rig_tests::{calibrated, wait};
 
 use crate::{BoardSession, bench, board, health};
@@ -38,7 +38,10 @@ fn stored_settings_come_back_and_damaged_ones_do_not() {
     line.request(RequestBody::Store).unwrap();
     // Page erase and programming took place, the tick went on meanwhile.
     let (pages, words) = board(&mut line).with_chip(|chip| chip.flash.work);
-    assert!(pages == 1 && words > 10, "{pages} pages, {words} double words");
+    assert!(
+        pages == 1 && words > 10,
+        "{pages} pages, {words} double words"
+    );
     assert_eq!(board(&mut line).with_chip(|chip| chip.adc.missed), 0);
 
     let mut line = again(line, Cause::PowerOn);
