@@ -462,8 +462,8 @@ impl Chip {
         if wired {
             let tim = &mut self.tim[1];
             tim.quadrature(counts);
-            if let Some(upwards) = index {
-                tim.index(upwards);
+            if let Some(index) = index {
+                tim.index(index.upwards, index.since);
             }
         }
     }
