@@ -104,7 +104,7 @@ fn wide_cycles(a: u16, b: u16) -> (u64, bool) {
             }
         }
         3 => {
-            if a & 0xFF70 == 0xFB90 || a & 0xFF70 == 0xFBB0 {
+            if a & 0xFFF0 == 0xFB90 || a & 0xFFF0 == 0xFBB0 {
                 // SDIV, UDIV.
                 12
             } else if a & 0xFF00 == 0xFB00 {

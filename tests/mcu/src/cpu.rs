@@ -116,8 +116,8 @@ pub trait Cpu<B: Bus>: Memory {
     fn run(&mut self) -> Stop;
     /// Has the bus act on memory from outside a run.
     fn with_memory<T>(&mut self, act: impl FnOnce(&mut B, &mut dyn Memory) -> T) -> T;
-    /// Code has changed: whatever was derived from it is forgotten.
-    fn forget_code(&mut self);
+    /// So many bytes from an address on have changed: whatever was derived from code there is forgotten.
+    fn forget_code(&mut self, address: u32, size: u32);
     /// The mask registers.
     fn masks(&self) -> Masks {
         Masks {

@@ -284,8 +284,16 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
         act(&mut self.bus.borrow_mut(), &mut Ram(&mut self.engine))
     }
 
-    fn forget_code(&mut self) {
-        self.blocks.borrow_mut().fill(Block::default());
-        let _ = self.engine.ctl_flush_tb();
+    fn forget_code(&mut self, address: u32, size: u32) {
+        let from = address.wrapping_sub(map::FLASH.start) as usize / 2;
+        let mut blocks = self.blocks.borrow_mut();
+        let ran = blocks
+            .get(from..from + size as usize / 2)
+            .is_some_and(|part| part.iter().any(|block| block.size != 0));
+        if ran {
+            blocks.fill(Block::default());
+            // Fails only where there is no translator.
+            let _ = self.engine.ctl_flush_tb();
+        }
     }
 }
