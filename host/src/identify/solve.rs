@@ -55,6 +55,12 @@ pub fn identify(
     let (holdout_surveys, holdout) = surveyed(&holdout, joints)?;
     let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
     let (training, holdout) = (training.as_slice(), holdout.as_slice());
+    // References do not line up with rows that were interpolated: what needs them then says that they are missing.
+    let sources = if surveys.iter().any(|survey| survey.note.is_some()) {
+        training
+    } else {
+        sources
+    };
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
         return Err(IdentifyError::NoTorque { joint: j + 1 });
     }
