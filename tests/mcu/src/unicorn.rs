@@ -92,6 +92,12 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             u64::from(map::RAM.end - map::RAM.start),
             Prot::ALL,
         )?;
+        // Its alias behind SRAM2 is other memory here: no image uses both.
+        engine.mem_map(
+            map::CCM.start.into(),
+            u64::from(map::CCM.end - map::CCM.start),
+            Prot::ALL,
+        )?;
         engine.mem_map(
             map::SYSTEM.start.into(),
             u64::from(map::SYSTEM.end - map::SYSTEM.start),
