@@ -746,7 +746,13 @@ impl Bus for Chip {
         }
         if self.waits && map::FLASH.contains(&block.address) {
             cycles += if self.flash.caches() {
-                self.accelerator.fetch(block.address, block.size.into())
+                self.accelerator.fetch(
+                    block.address,
+                    block.size.into(),
+                    block.cycles.into(),
+                    self.flash.prefetches(),
+                    block.address == self.expected,
+                )
             } else {
                 u64::from(block.size).div_ceil(8) * WAIT_STATES
             };
