@@ -695,6 +695,7 @@ impl Chip {
     fn charge_bridge(&mut self, address: u32) {
         if address < 0xE000_0000 {
             self.work.cycles += BRIDGE;
+            self.work.bridge += BRIDGE;
             self.work.now += BRIDGE * self.period;
         }
     }
@@ -743,13 +744,22 @@ impl Bus for Chip {
         let mut cycles = u64::from(block.cycles);
         if block.address != self.expected {
             cycles += REFILL;
+            self.work.refills += REFILL;
         }
         if self.waits && map::FLASH.contains(&block.address) {
-            cycles += if self.flash.caches() {
-                self.accelerator.fetch(block.address, block.size.into())
+            let lost = if self.flash.caches() {
+                self.accelerator.fetch(
+                    block.address,
+                    block.size.into(),
+                    block.cycles.into(),
+                    self.flash.prefetches(),
+                    block.address == self.expected,
+                )
             } else {
                 u64::from(block.size).div_ceil(8) * WAIT_STATES
             };
+            cycles += lost;
+            self.work.fetches += lost;
         }
         self.expected = block.address + u32::from(block.size);
         self.block = block.address;

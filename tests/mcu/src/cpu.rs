@@ -137,4 +137,10 @@ pub struct Work {
     pub instructions: u64,
     /// Cycles, estimated, without sleep.
     pub cycles: u64,
+    /// Of these, lost to refills of the pipeline after branches.
+    pub refills: u64,
+    /// Of these, lost to waits for code from the flash memory.
+    pub fetches: u64,
+    /// Of these, lost on the way to peripherals.
+    pub bridge: u64,
 }

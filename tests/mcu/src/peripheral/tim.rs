@@ -462,21 +462,17 @@ impl Tim {
                     self.checked = now.saturating_sub(1);
                 }
             }
-            SMCR => {
-                if value & 7 != 0 && !self.is_encoder() {
-                    return told(format!(
-                        "TIM{} slave mode {:#x} is not modelled",
-                        self.number,
-                        value & 0x1_0007
-                    ));
-                }
+            SMCR if value & 7 != 0 && !self.is_encoder() => {
+                return told(format!(
+                    "TIM{} slave mode {:#x} is not modelled",
+                    self.number,
+                    value & 0x1_0007
+                ));
             }
             PSC => {}
-            ARR => {
-                if self.bank.get(CR1) & ARPE == 0 {
-                    self.active.reload = self.bank.get(ARR);
-                    self.rebase(now, count.min(self.active.reload));
-                }
+            ARR if self.bank.get(CR1) & ARPE == 0 => {
+                self.active.reload = self.bank.get(ARR);
+                self.rebase(now, count.min(self.active.reload));
             }
             0x34..=0x40 => {
                 let k = (offset - CCR1) as usize / 4;

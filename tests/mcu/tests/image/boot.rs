@@ -98,24 +98,16 @@ fn counters(
     found
 }
 
-/// The control tick's counter and the clock of the tasks (microseconds in periods of 2¹⁵), put shortly before 2³¹:
-/// the rig works on across it.
+/// The control tick's counter, put shortly before 2³¹: the rig works on across it. The clock of the tasks is left
+/// alone: they would make up for every period that it jumped over.
 #[test]
 fn two_to_the_thirty_first_ticks_pass_unnoticed() {
     let mut line = bench(6);
     let emulated = board(&mut line);
     let first = emulated.with_chip(|chip| chip.triggers);
     let ticks = counters(emulated, 8, |board| board.with_chip(|chip| chip.triggers));
-    println!("{ticks:x?}");
-    assert!(!ticks.is_empty() && first > 5000);
+    assert!(!ticks.is_empty() && first > 5000, "{ticks:x?}");
     let near = (1_u64 << 31) - 3000;
-    let periods = counters(emulated, 4, |board| {
-        (board.seconds() * 1e6 / 32768.0) as u64
-    });
-    assert_eq!(periods.len(), 1, "{periods:x?}");
-    // Even and odd periods are told apart by the timer's count.
-    let before = (1_u32 << 16) - 12 + (emulated.word(periods[0]) & 1);
-    assert!(emulated.cpu().store(periods[0], &before.to_le_bytes()));
     for address in &ticks {
         assert!(emulated.cpu().store(*address, &near.to_le_bytes()));
     }
@@ -137,8 +129,5 @@ fn two_to_the_thirty_first_ticks_pass_unnoticed() {
     );
     assert!(board(&mut line).with_board(|b| b.bridge().enabled));
     assert_eq!(board(&mut line).resets, []);
-    // Two seconds on, the clock of the tasks is past 2³¹ µs too.
-    wait(&mut line, 1.0);
-    assert!(board(&mut line).word(periods[0]) > 1 << 16);
     assert_eq!(health(&mut line).dropped, 0);
 }

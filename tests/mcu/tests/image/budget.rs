@@ -61,10 +61,6 @@ fn the_image_keeps_to_its_budget() {
         image.ram_used,
     );
     println!("{found}");
-    assert!(
-        cycles <= 0.25 * PERIOD && cost.worst_cycles as f64 <= 0.5 * PERIOD,
-        "\n{found}"
-    );
     let kept = mean <= budget.tick_instructions_mean
         && cost.worst_instructions <= budget.tick_instructions_worst
         && cycles <= budget.tick_cycles_mean
