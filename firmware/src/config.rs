@@ -8,6 +8,7 @@ use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::safety::monitor::MonitorConfig;
+use serde::{Deserialize, Serialize};
 
 use crate::sample::Scaling;
 
@@ -81,7 +82,7 @@ pub struct Config {
 }
 
 /// What the host may replace while the rig stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Control law.
     pub control: ControlKind,

@@ -8,15 +8,23 @@
 //!
 //! Nothing here knows a pin, a clock or a buffer; nothing allocates, blocks or panics.
 #![no_std]
+#![forbid(unsafe_code)]
 
+pub mod capture;
+pub mod clerk;
 pub mod config;
 pub mod derived;
+pub mod desk;
+pub mod examined;
+pub mod nameplate;
+pub mod note;
 pub mod reference;
 pub mod request;
 pub mod sample;
 pub mod speaker;
 pub mod state;
 pub mod step;
+pub mod stored;
 pub mod window;
 
 /// Version of the firmware, as the greeting tells it.

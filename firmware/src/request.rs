@@ -3,34 +3,41 @@
 use rig_shared::control::{adaptive, current};
 use rig_shared::link::LinkParameters;
 use rig_shared::safety::{Fault, Limits, Mode};
-use rig_shared::trajectory::{Trajectory, TrajectoryError};
+use rig_shared::trajectory::Extremes;
 use rig_shared::wire::message::{Refusal, RequestBody};
 
 use crate::config::{Config, Settings};
+use crate::examined::Examined;
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
 
 /// Carries out a request, or says why not; nothing has changed then.
 ///
-/// Requests about the conversation itself (`Hello`, streams, the snapshot) are the
-/// [`Speaker`](crate::speaker::Speaker)'s and are accepted here without effect.
+/// Requests about the conversation itself (`Hello`, streams, snapshot, capture) are the
+/// [`Clerk`](crate::clerk::Clerk)'s and are accepted here without effect.
 ///
 /// # Errors
 /// The [`Refusal`] that goes back to the host.
-pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Result<(), Refusal> {
+pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Result<(), Refusal> {
+    let body = &examined.request.body;
     match body {
         RequestBody::Hello
         | RequestBody::KeepAlive
         | RequestBody::StartStream
         | RequestBody::StopStream
-        | RequestBody::GetSnapshot => Ok(()),
-        RequestBody::Arm => arm(state),
+        | RequestBody::GetSnapshot
+        | RequestBody::Capture(_)
+        | RequestBody::GetCapture => Ok(()),
         RequestBody::Disarm => {
             if state.mode.drives() {
                 state.mode = Mode::Disarmed;
             }
             Ok(())
         }
+        // While the flash is being written nothing may start that depends on every tick.
+        _ if state.storing => Err(Refusal::Busy),
+        RequestBody::Store => store(state),
+        RequestBody::Arm => arm(state),
         RequestBody::Start => start(state),
         RequestBody::Stop => match state.mode {
             Mode::Running => {
@@ -44,8 +51,9 @@ pub fn carry_out(config: &Config, state: &mut State, body: &RequestBody) -> Resu
         RequestBody::SetPosition(position) => set_position(config, state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
-            fits(trajectory, &state.settings.limits, None)?;
-            state.trajectory = Some(trajectory.clone());
+            let extremes = examined.extremes.ok_or(Refusal::BadValue)?;
+            fits(&extremes, &state.settings.limits, None)?;
+            state.trajectory = Some((trajectory.clone(), extremes));
             Ok(())
         }
         _ => {
@@ -91,6 +99,15 @@ fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
     }
 }
 
+/// Only while the bridge is off and nothing moves.
+fn store(state: &mut State) -> Result<(), Refusal> {
+    if state.mode != Mode::Disarmed {
+        return Err(Refusal::WrongMode);
+    }
+    state.storing = true;
+    Ok(())
+}
+
 fn arm(state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
@@ -114,8 +131,8 @@ fn start(state: &mut State) -> Result<(), Refusal> {
         Mode::Fault => return Err(Refusal::FaultLatched),
         _ => return Err(Refusal::WrongMode),
     }
-    let trajectory = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
-    fits(trajectory, &state.settings.limits, Some(state.run.base))?;
+    let (_, extremes) = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
+    fits(extremes, &state.settings.limits, Some(state.run.base))?;
     state.run.start = state.tick;
     state.mode = Mode::Running;
     Ok(())
@@ -178,7 +195,7 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
 }
 
 /// Whether values are physical; everything written so that NaN is refused.
-fn usable(settings: &Settings) -> Result<(), Refusal> {
+pub(crate) fn usable(settings: &Settings) -> Result<(), Refusal> {
     let good = settings.limits.is_valid()
         && settings.gains.usable()
         && settings.friction.check().is_ok()
@@ -198,24 +215,19 @@ fn model_is_usable(model: &LinkParameters<f32>) -> bool {
 }
 
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
-/// about which point it will run.
-fn fits(
-    trajectory: &Trajectory<f32>,
-    limits: &Limits<f32>,
-    base: Option<f32>,
-) -> Result<(), Refusal> {
-    let anywhere = Limits {
-        position_low: -f32::MAX,
-        position_high: f32::MAX,
-        ..*limits
-    };
-    let checked = match base {
-        Some(base) => trajectory.check(limits, base),
-        None => trajectory.check(&anywhere, 0.0),
-    };
-    match checked {
-        Ok(_) => Ok(()),
-        Err(TrajectoryError::BadValue(_)) => Err(Refusal::BadValue),
-        Err(_) => Err(Refusal::OutsideLimits),
+/// about which point it will run. Written so that NaN is refused.
+fn fits(extremes: &Extremes<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
+    // Rounding of the peak itself must not refuse a motion designed to touch its limit.
+    const SLACK: f32 = 1.0 + 1e-6;
+    let moves = extremes.velocity <= limits.velocity * SLACK
+        && extremes.acceleration <= limits.acceleration * SLACK;
+    let stays = base.is_none_or(|base| {
+        limits.position_low <= base + extremes.lowest
+            && base + extremes.highest <= limits.position_high
+    });
+    if moves && stays {
+        Ok(())
+    } else {
+        Err(Refusal::OutsideLimits)
     }
 }

@@ -17,6 +17,11 @@ pub struct Sample {
     pub driver_fault: bool,
     /// The previous tick had not finished when this one was due.
     pub overrun: bool,
+    /// The encoder's signals contradict each other: by how many counts its index is off, 0 where both channels
+    /// changed at once.
+    pub encoder_wrong: Option<i32>,
+    /// The stack has come near its end: bytes that are left.
+    pub stack_left: Option<u32>,
 }
 
 /// What one control tick orders. It takes effect at the next tick's sampling instant (preloaded PWM).

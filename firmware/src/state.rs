@@ -5,7 +5,7 @@ use rig_shared::encoder;
 use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
-use rig_shared::trajectory::{Reference, Trajectory};
+use rig_shared::trajectory::{Extremes, Reference, Trajectory};
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
@@ -22,8 +22,10 @@ pub struct State {
     pub tick: u64,
     /// Mode.
     pub mode: Mode,
-    /// The loaded trajectory.
-    pub trajectory: Option<Trajectory<f32>>,
+    /// The loaded trajectory, and how far it goes.
+    pub trajectory: Option<(Trajectory<f32>, Extremes<f32>)>,
+    /// Settings are being stored: nothing but `Disarm` and the conversation is carried out meanwhile.
+    pub storing: bool,
     /// The first fault since the last clearing.
     pub latch: FaultLatch,
     /// The ticks around that fault.
@@ -107,11 +109,19 @@ impl State {
     /// # Errors
     /// What is wrong with the estimator's settings.
     pub fn new(config: &Config, settings: Settings) -> Result<Self, SettingsFault> {
+        let estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
+        Ok(Self::with(config, settings, estimator))
+    }
+
+    /// The state at power on with an estimator of these settings. Apart from [`State::new`] so that it can be
+    /// made where it is to lie: it is too large to be passed about on a chip's stack.
+    pub fn with(config: &Config, settings: Settings, estimator: OneLinkEstimator<f32>) -> Self {
         let derived = Derived::new(config, &settings);
-        Ok(Self {
+        Self {
             tick: 0,
             mode: Mode::Calibrating,
             trajectory: None,
+            storing: false,
             latch: FaultLatch::default(),
             snapshot: Snapshot::default(),
             heard: 0,
@@ -120,7 +130,7 @@ impl State {
             reference: Reference::default(),
             limits: LimitSet::default(),
             cause_acting: false,
-            estimator: OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?,
+            estimator,
             settings,
             derived,
             calibration: Calibration {
@@ -139,7 +149,7 @@ impl State {
             updates_since_report: 0,
             duty: 0.0,
             run: Run::default(),
-        })
+        }
     }
 
     /// What the host may replace, as it is now.

@@ -27,6 +27,8 @@ pub struct Output {
     pub state: Option<(u64, StateSample)>,
     /// The on-line estimate, when one is due.
     pub estimate: Option<Estimate>,
+    /// This tick itself, as snapshot and capture keep it.
+    pub tick: SnapshotSample,
     /// A fault that has just latched.
     pub fault: Option<FaultRecord>,
 }
@@ -40,7 +42,8 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         &state.settings.limits,
         &mut state.monitor,
         &readings,
-    );
+    )
+    .or_else(|| board_fault(&sample));
     state.cause_acting = found.is_some();
     let found = found
         .or_else(|| calibrate(config, state, sample))
@@ -67,14 +70,15 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         torque,
         limits,
     };
-    state.snapshot.push(SnapshotSample {
+    output.tick = SnapshotSample {
         tick: state.tick,
         position: state.counts,
         current: readings.current,
         duty: state.duty,
         supply: readings.supply,
         reference: state.reference.position,
-    });
+    };
+    state.snapshot.push(output.tick);
     output.state = telemetry(config, state, &tick);
     output.estimate = estimate(config, state, &tick);
     output.command = Command {
@@ -114,6 +118,14 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         duty: state.duty,
         driving: state.mode.drives(),
     }
+}
+
+/// What the board has found wrong with itself and its encoder.
+fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
+    if let Some(counts) = sample.encoder_wrong {
+        return Some((Fault::EncoderSignal, counts as f32));
+    }
+    sample.stack_left.map(|left| (Fault::Stack, left as f32))
 }
 
 /// Measures the current offset while the bridge is off; a fault where it is implausible.
@@ -187,7 +199,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         Mode::Running => {
             let elapsed = state.tick - start;
             match &state.trajectory {
-                Some(trajectory) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
+                Some((trajectory, _)) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
                     Reference {
                         position: base + offset.position,
@@ -353,7 +365,8 @@ fn estimate_report(state: &State) -> Estimate {
     // The current offset was measured from finitely many samples; its error is a constant torque that no motion
     // shows, and goes into `off` alone.
     let measured = state.calibration.std * state.derived.torque_per_ampere;
-    estimate.std[OFFSET] = libm::hypotf(estimate.std[OFFSET], measured);
+    estimate.std[OFFSET] =
+        libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);
     estimate.trusted = report.trusted;
     estimate
 }

@@ -17,6 +17,8 @@ pub mod multibody;
 pub mod precompensation;
 pub mod safety;
 pub mod scalar;
+mod sincos;
 pub mod trajectory;
+pub mod transmission;
 pub mod units;
 pub mod wire;

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 use rig_host::emulated::{EmulatedRig, Nameplate};
 use rig_host::link::experiment::{Experiment, run};
 use rig_host::link::{
-    Converter, EmulatedPort, Event, LinkError, LossReport, Row, Session, SessionSettings,
+    Converter, EmulatedPort, Event, LinkError, LossReport, Port, Row, Session, SessionSettings,
 };
 use rig_host::plant::PlantConfig;
 use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
@@ -51,7 +51,7 @@ pub fn bench(seed: u64) -> (Line, PlantConfig) {
 }
 
 /// Waits until the rig has measured its current offset.
-pub fn calibrated(line: &mut Line) {
+pub fn calibrated<P: Port>(line: &mut Session<P>) {
     for _ in 0..100 {
         match line.request(RequestBody::SetPosition(0.0)) {
             Ok(()) => return,
@@ -66,11 +66,10 @@ pub fn calibrated(line: &mut Line) {
 }
 
 /// Lets emulated time pass; what comes meanwhile is dropped.
-pub fn wait(line: &mut Line, seconds: f64) {
-    let until =
-        rig_host::link::Port::now(line.port()) + std::time::Duration::from_secs_f64(seconds);
+pub fn wait<P: Port>(line: &mut Session<P>, seconds: f64) {
+    let until = line.port().now() + std::time::Duration::from_secs_f64(seconds);
     loop {
-        let left = until.saturating_sub(rig_host::link::Port::now(line.port()));
+        let left = until.saturating_sub(line.port().now());
         if left.is_zero() {
             return;
         }
@@ -134,7 +133,7 @@ impl Recording {
 }
 
 /// Runs an experiment and keeps everything.
-pub fn recorded(line: &mut Line, experiment: &Experiment) -> Recording {
+pub fn recorded<P: Port>(line: &mut Session<P>, experiment: &Experiment) -> Recording {
     let converter = Converter::new(line.greeting());
     let mut out = Recording::default();
     out.losses = run(line, experiment, |event| {
@@ -150,7 +149,7 @@ pub fn recorded(line: &mut Line, experiment: &Experiment) -> Recording {
             ),
             Event::Estimate(estimate) => out.estimates.push(*estimate),
             Event::Fault(fault) => out.faults.push(*fault),
-            Event::Gap { .. } | Event::Snapshot(_) => {}
+            Event::Gap { .. } | Event::Snapshot(_) | Event::Capture(_) | Event::Health(_) => {}
         }
         ControlFlow::Continue(())
     })
@@ -159,8 +158,8 @@ pub fn recorded(line: &mut Line, experiment: &Experiment) -> Recording {
 }
 
 /// Runs a trajectory from where the link stands, with these settings; `rest` seconds of holding are kept too.
-pub fn driven(
-    line: &mut Line,
+pub fn driven<P: Port>(
+    line: &mut Session<P>,
     settings: Vec<RequestBody>,
     trajectory: Trajectory<f32>,
     rest: f64,

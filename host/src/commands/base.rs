@@ -6,7 +6,7 @@ use super::error::CommandError;
 use super::identify::Model;
 use super::input::RobotArg;
 use super::ui::Ui;
-use crate::identify::Base;
+use crate::identify::{Base, agree, grouped};
 
 /// Lists the canonical (base) parameters: the combinations that motion and torque can tell apart.
 #[derive(Debug, ClapArgs)]
@@ -31,6 +31,8 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load()?;
     let base = Base::structural(&robot, args.model.into(), args.seed)?;
+    let rules = grouped(&robot)?;
+    let same = agree(&rules, &base);
     let list: Vec<(String, &str)> = (0..base.len())
         .map(|k| (base.expression(k), base.unit(k)))
         .collect();
@@ -43,12 +45,23 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "schema": "rig-base/1",
             "robot": robot.name,
             "count": list.len(),
+            "count_by_rules": rules.len(),
+            "rules_agree": same,
             "base_parameters": parameters,
         });
         ui.say(&format!("{result:#}"));
         return Ok(());
     }
     ui.say(&format!("{}: {} base parameters", robot.name, list.len()));
+    if same {
+        ui.say("Numeric rank and the grouping rules for modified Denavit-Hartenberg frames give the same set.");
+    } else {
+        ui.remark(&format!(
+            "The grouping rules give {} parameters, the numeric rank {}, and the sets differ; the list is that of the numeric rank.",
+            rules.len(),
+            list.len()
+        ));
+    }
     for (expression, unit) in list {
         ui.say(&format!("{expression}  [{unit}]"));
     }

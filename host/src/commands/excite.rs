@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use super::error::CommandError;
 use super::ui::Ui;
-use crate::excite::{Criterion, Design, Options, StagedKind, design, staged};
+use crate::excite::{Criterion, Design, Options, Parameters, Scaling, StagedKind, design, staged};
 use crate::robot::Robot;
 
 /// What is optimised.
@@ -18,6 +18,24 @@ pub(crate) enum CriterionArg {
     MinSingular,
     /// Determinant of the information: the smallest confidence ellipsoid
     DOptimal,
+}
+
+/// Which parameters count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ParametersArg {
+    /// All that `rig identify` finds: links, drive inertias, friction, offsets
+    All,
+    /// Inertial parameters of the links alone
+    Links,
+}
+
+/// By what the columns of the regressor are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ScalingArg {
+    /// By what the limits would let any motion do for the column alone
+    Sizes,
+    /// By nothing: SI units as they are
+    None,
 }
 
 /// Kind of motion.
@@ -37,8 +55,8 @@ pub(crate) enum KindArg {
 
 /// Designs a motion within the robot's limits that tells its parameters apart.
 ///
-/// The limits stand in the robot description under [joint.limits]. The torque limit is kept by the inertia and
-/// friction written there, where they are. The same seed gives the same file.
+/// The limits stand in the robot description under [joint.limits], and [[workspace]] for points of the links. The
+/// torque limit is kept by the inertia and friction written there, where they are. The same seed gives the same file.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Robot description (.toml or .urdf)
@@ -53,12 +71,25 @@ pub(crate) struct Args {
     /// What is optimised (fourier)
     #[arg(long, value_enum, default_value_t = CriterionArg::Cond)]
     pub(crate) criterion: CriterionArg,
+    /// Which parameters the motion is to tell apart (fourier)
+    #[arg(long, value_enum, default_value_t = ParametersArg::All)]
+    pub(crate) parameters: ParametersArg,
+    /// By what the columns of the regressor are divided before it is judged (fourier)
+    #[arg(long, value_enum, default_value_t = ScalingArg::Sizes)]
+    pub(crate) scaling: ScalingArg,
+    /// Standard deviation of each joint's torque, comma between them, N*m or N [default: taken as a share of its
+    /// torque limit that is the same for all joints] (fourier)
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) torque_noise: Option<Vec<f64>>,
     /// Harmonics per joint, 1 to 8 (fourier)
     #[arg(long, default_value_t = 5)]
     pub(crate) harmonics: usize,
     /// Period of the slowest harmonic, s [default: from the limits] (fourier)
     #[arg(long)]
     pub(crate) period: Option<f64>,
+    /// Rise from rest to full amplitude and fall back to rest, each, s [default: one period] (fourier)
+    #[arg(long)]
+    pub(crate) ramp: Option<f64>,
     /// Whole periods at full amplitude (fourier)
     #[arg(long, default_value_t = 5)]
     pub(crate) periods: u16,
@@ -77,6 +108,9 @@ pub(crate) struct Args {
     /// Samples a second in a .csv, Hz
     #[arg(long, default_value_t = 1000.0)]
     pub(crate) rate: f64,
+    /// Replace the file if it exists
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// Runs the command.
@@ -84,6 +118,11 @@ pub(crate) struct Args {
 /// # Errors
 /// A description or options that do not serve, no motion within the limits, a file that cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    if args.out.exists() && !args.force {
+        return Err(CommandError::Exists {
+            path: args.out.clone(),
+        });
+    }
     let robot = Robot::load(&args.robot)?;
     let kind = match args.kind {
         KindArg::Fourier => return optimal(args, &robot, ui),
@@ -113,10 +152,19 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
             CriterionArg::MinSingular => Criterion::SmallestSingularValue,
             CriterionArg::DOptimal => Criterion::Determinant,
         },
+        parameters: match args.parameters {
+            ParametersArg::All => Parameters::All,
+            ParametersArg::Links => Parameters::Links,
+        },
+        scaling: match args.scaling {
+            ScalingArg::Sizes => Scaling::Sizes,
+            ScalingArg::None => Scaling::None,
+        },
+        torque_noise: args.torque_noise.clone(),
         harmonics: args.harmonics,
         period: args.period,
         periods: args.periods,
-        ramp: None,
+        ramp: args.ramp,
         start: args.start.clone(),
         starts: args.starts,
         seed: args.seed,
@@ -164,6 +212,13 @@ fn summary(found: &Design, robot: &Robot) -> Vec<String> {
         lines.push(format!(
             "Joint \"{}\" stays within position {:.3} to {:.3}, velocity {:.3}, acceleration {:.3}{torque} (SI units).",
             joint.name, reach.position[0], reach.position[1], reach.velocity, reach.acceleration
+        ));
+    }
+    for edge in &found.clearances {
+        let [x, y, z] = edge.normal;
+        lines.push(format!(
+            "The point of joint \"{}\" keeps {:.4} m from the edge of its region (normal {x:.3}, {y:.3}, {z:.3}).",
+            edge.joint, edge.distance
         ));
     }
     lines

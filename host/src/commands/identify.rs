@@ -46,6 +46,60 @@ pub(crate) enum Fit {
     Weighted,
     /// Weighted, and outliers count less (Huber)
     Robust,
+    /// Instrumental variables from the simulated closed loop (IDIM-IV): unbiased by noise in the motion
+    Iv,
+    /// Torque of the simulated closed loop against the measured one (DIDIM); needs [joint.controller] and ref<k>
+    OutputError,
+    /// Total least squares: noise in the motion, measured by its spectrum, and in the torque
+    Tls,
+    /// Maximum likelihood: residuals autoregressive in time and correlated between joints
+    Ml,
+    /// Ridge regression towards the description's values
+    Ridge,
+    /// Weighted, every link a body that can exist, friction and drive inertia not negative
+    Consistent,
+}
+
+impl From<Fit> for Estimator {
+    fn from(fit: Fit) -> Self {
+        match fit {
+            Fit::Ols => Self::Ols,
+            Fit::Weighted => Self::Weighted,
+            Fit::Robust => Self::Robust,
+            Fit::Iv => Self::Iv,
+            Fit::OutputError => Self::OutputError,
+            Fit::Tls => Self::Tls,
+            Fit::Ml => Self::Ml,
+            Fit::Ridge => Self::Ridge,
+            Fit::Consistent => Self::Consistent,
+        }
+    }
+}
+
+/// Whether estimators are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Compare {
+    /// weighted, iv and consistent, where the recordings are small enough for a second or two
+    Auto,
+    /// All that recordings and description allow
+    All,
+    /// None
+    None,
+}
+
+/// Bytes of recordings up to which a comparison takes a second or two.
+const COMPARED_BYTES: u64 = 12 << 20;
+
+impl Compare {
+    fn list(self, bytes: u64) -> Vec<Estimator> {
+        match self {
+            Self::All => Estimator::ALL.to_vec(),
+            Self::Auto if bytes <= COMPARED_BYTES => {
+                vec![Estimator::Weighted, Estimator::Iv, Estimator::Consistent]
+            }
+            Self::Auto | Self::None => Vec::new(),
+        }
+    }
 }
 
 /// A setting that is `auto` (chosen from the data) or a number.
@@ -78,6 +132,16 @@ pub(crate) struct Args {
     /// How they are fitted
     #[arg(long, value_enum, default_value = "weighted")]
     estimator: Fit,
+    /// Compare estimators on stretches of time left out of the fit, and say which to trust
+    #[arg(long, value_enum, default_value = "auto")]
+    compare: Compare,
+    /// How often each --data counts, in their order; 1 where not given
+    #[arg(long)]
+    weight: Vec<f64>,
+    /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for ridge and consistent
+    /// [default: ridge: what makes the data most likely; consistent: 1]
+    #[arg(long)]
+    prior_uncertainty: Option<f64>,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
     #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
     cutoff: Choice<f64>,
@@ -102,14 +166,10 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn options(&self) -> Options {
+    fn options(&self, bytes: u64) -> Options {
         Options {
             model: self.model.into(),
-            estimator: match self.estimator {
-                Fit::Ols => Estimator::Ols,
-                Fit::Weighted => Estimator::Weighted,
-                Fit::Robust => Estimator::Robust,
-            },
+            estimator: self.estimator.into(),
             loss: Loss::default(),
             prepare: PrepareOptions {
                 cutoff: self.cutoff,
@@ -120,6 +180,9 @@ impl Args {
             },
             window: self.window,
             seed: self.seed,
+            recording_weights: self.weight.clone(),
+            prior_uncertainty: self.prior_uncertainty,
+            compare: self.compare.list(bytes),
         }
     }
 }
@@ -136,6 +199,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     refuse_shared(&args.data, &args.holdout)?;
+    if args.weight.len() > args.data.len() {
+        return Err(CommandError::Sentence(format!(
+            "--weight is given {} times and --data {} times; each weight belongs to the recording of its place.",
+            args.weight.len(),
+            args.data.len()
+        )));
+    }
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
@@ -143,13 +213,24 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &robot,
         &recordings(&training.watched(&progress)),
         &recordings(&holdout.watched(&progress)),
-        &args.options(),
+        &args.options(training.bytes()),
     )?;
     drop(progress);
     refuse_driving_friction(&robot, &identification)?;
     folder(&args.out)?;
-    let (identified, remarks) = identified_robot(&robot, &identification);
+    let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
+    // A full set of parameters is a body each; combinations alone would not be.
+    let mut urdf = None;
+    if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
+        match identified.to_urdf() {
+            Ok(found) => {
+                remarks.extend(found.remarks);
+                urdf = Some(found.text);
+            }
+            Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
+        }
+    }
     let context = Context {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
@@ -162,6 +243,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
+    if let Some(urdf) = urdf {
+        write_whole(&args.out.join("identified.urdf"), urdf.as_bytes())?;
+    }
     write_whole(
         &args.out.join("identification.json"),
         (json + "\n").as_bytes(),
@@ -243,6 +327,12 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
             "not excited: {} ({}); {}",
             missing.combination, missing.why, missing.motion
         ));
+    }
+    for sentence in &result.procedure {
+        ui.say(sentence);
+    }
+    if let Some(comparison) = &result.comparison {
+        ui.say(&comparison.recommendation);
     }
     for warning in &result.warnings {
         ui.remark(warning);

@@ -7,14 +7,21 @@ use clap::{Args as ClapArgs, ValueEnum};
 use super::error::CommandError;
 use super::ui::Ui;
 use crate::files::write_whole;
+use crate::robot;
 
 /// Robots that there is a description of.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Kind {
     /// The one-link geared rig.
     OneLink,
+    /// The planar direct-drive arm of the book; its figures are representative.
+    Edda,
+    /// The five-axis IRp-6 of the book, with its ball screws, absolute drives and coupled wrist.
+    Irp6,
     /// The EMPS ball-screw axis whose public recordings the project reproduces.
     Emps,
+    /// The Stäubli TX40 whose public recording, made on the motor side, the project reproduces.
+    Tx40,
 }
 
 /// Writes a commented robot description to start from.
@@ -37,8 +44,11 @@ pub(crate) struct Args {
 /// Where the file exists already or cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (name, text) = match args.kind {
-        Kind::OneLink => ("one-link.toml", include_str!("../../robots/one-link.toml")),
-        Kind::Emps => ("emps.toml", include_str!("../../robots/emps.toml")),
+        Kind::OneLink => ("one-link.toml", robot::ONE_LINK_TEMPLATE),
+        Kind::Edda => ("edda.toml", robot::EDDA_TEMPLATE),
+        Kind::Irp6 => ("irp6.toml", robot::IRP6_TEMPLATE),
+        Kind::Emps => ("emps.toml", robot::EMPS),
+        Kind::Tx40 => ("tx40.toml", robot::TX40),
     };
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(name));
     if path.exists() && !args.force {

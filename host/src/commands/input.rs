@@ -114,6 +114,11 @@ impl Recording for Watched<'_> {
         }
         Ok(())
     }
+
+    fn passed(&self, share: f64) {
+        let bytes = share * self.source.bytes() as f64;
+        self.progress.borrow_mut().advance(bytes as u64);
+    }
 }
 
 impl Inputs {

@@ -4,6 +4,7 @@ mod base;
 mod demo;
 mod error;
 mod excite;
+mod flash;
 mod friction_map;
 mod identify;
 mod init;
@@ -11,6 +12,7 @@ mod input;
 mod record;
 mod simulate;
 mod ui;
+mod urdf;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -33,9 +35,11 @@ enum Command {
     Demo(demo::Args),
     Init(init::Args),
     Record(record::Args),
+    Flash(flash::Args),
     Excite(excite::Args),
     Simulate(simulate::Args),
     Base(base::Args),
+    Urdf(urdf::Args),
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
@@ -53,9 +57,11 @@ impl Cli {
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Excite(args)) => excite::run(&args, &ui),
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),
             Some(Command::Base(args)) => base::run(&args, &ui),
+            Some(Command::Urdf(args)) => urdf::run(&args, &ui),
             Some(Command::Identify(args)) => identify::run(&args, &ui),
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),

@@ -25,11 +25,14 @@ use crate::robot::{ONE_LINK_TEMPLATE, Robot};
 
 /// Records the rig's telemetry, at rest or while it runs a trajectory.
 #[derive(Debug, ClapArgs)]
-#[command(group = ArgGroup::new("where").required(true).args(["port", "emulated"]))]
+#[command(group = ArgGroup::new("where").required(true).args(["port", "probe", "emulated"]))]
 pub(crate) struct Args {
     /// Serial port of the rig, such as /dev/ttyACM0 or COM3
     #[arg(long)]
     port: Option<String>,
+    /// The board's debug probe instead of its serial port
+    #[arg(long)]
+    probe: bool,
     /// The emulated rig instead of hardware
     #[arg(long)]
     emulated: bool,
@@ -109,6 +112,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             &args.out,
             ui,
         )?
+    } else if args.probe {
+        record(open_probe()?, &experiment, &args.out, ui)?
     } else {
         let described = match robot {
             Some(robot) => robot,
@@ -128,6 +133,20 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     ui.say(&format!("{}: {losses}", args.out.display()));
     Ok(())
+}
+
+/// The rig behind the debug probe.
+#[cfg(feature = "probe")]
+fn open_probe() -> Result<crate::link::ProbeLine, CommandError> {
+    Ok(crate::link::ProbeLine::open()?)
+}
+
+/// A program without this ability says so.
+#[cfg(not(feature = "probe"))]
+fn open_probe() -> Result<Box<dyn Port>, CommandError> {
+    Err(CommandError::Sentence(
+        "This program was built without the debug probe; build it with `cargo build --release --features probe`, or use the board's serial port with --port.".to_owned(),
+    ))
 }
 
 /// The motion of the rig's one joint, if it starts where the link stands.

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::error::{DataError, Warning};
+use super::motors::MotorSide;
 use crate::robot::Robot;
 
 /// Whether every joint must come with its torque.
@@ -23,6 +24,10 @@ pub(super) enum Role {
     Position(usize),
     /// Times this factor.
     Effort(usize, f64),
+    /// Of the motor.
+    MotorPosition(usize),
+    /// Of the motor, times this factor.
+    MotorEffort(usize, f64),
     Velocity(usize),
     Acceleration(usize),
     Reference(usize),
@@ -52,13 +57,17 @@ pub(super) struct Layout {
     pub time: usize,
     pub joints: usize,
     pub extras: usize,
+    /// What is turned from the motors to the joints; none where nothing is.
+    pub motors: Option<MotorSide>,
     pub warnings: Vec<Warning>,
 }
 
 /// Columns that mean something beside the joints' own: wrist sensor and supply.
 const NUMERIC_EXTRAS: [&str; 7] = ["fx", "fy", "fz", "mx", "my", "mz", "supply"];
 
-const QUANTITIES: [&str; 9] = ["tau", "ref", "temp", "duty", "qdd", "qd", "q", "i", "u"];
+const QUANTITIES: [&str; 11] = [
+    "taum", "tau", "ref", "temp", "duty", "qdd", "qd", "qm", "q", "i", "u",
+];
 
 /// `tau12` → ("tau", 12); a number has no leading zero except `0` itself.
 fn split(name: &str) -> Option<(&'static str, usize)> {
@@ -141,43 +150,8 @@ pub(super) fn layout(
     }
     let mut warnings = Vec::new();
     let supply = find("supply");
-    for (k, joint) in (1..).zip(&robot.joints) {
-        if find(&format!("q{k}")).is_none() {
-            return Err(header(format!(
-                "there is no column `q{k}` (position of joint `{}`, in rad or m); the columns are {}",
-                joint.name,
-                shown(names)
-            )));
-        }
-        if find(&format!("tau{k}")).is_some() {
-            continue;
-        }
-        if find(&format!("i{k}")).is_none() {
-            if need == EffortNeed::Required {
-                return Err(header(format!(
-                    "there is neither `tau{k}` (torque of joint `{}`, N·m or N) nor `i{k}` (its motor current, A); one of them is needed, and the columns are {}",
-                    joint.name,
-                    shown(names)
-                )));
-            }
-            continue;
-        }
-        match &joint.drive {
-            None => {
-                return Err(header(format!(
-                    "column `i{k}` is a motor current, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio and torque_constant to the robot, or record `tau{k}`",
-                    joint.name, robot.name
-                )));
-            }
-            Some(drive) if drive.torque_constant == 0.0 => {
-                return Err(header(format!(
-                    "column `i{k}` is a motor current, but the drive of joint `{}` of robot `{}` has no torque_constant; add it (N·m/A) to the robot, or record `tau{k}`",
-                    joint.name, robot.name
-                )));
-            }
-            Some(_) => {}
-        }
-    }
+    let from_motors = motor_positions(names, robot, joints).map_err(header)?;
+    let efforts = efforts(names, robot, need).map_err(header)?;
     let mut extras = 0;
     let mut columns = Vec::with_capacity(names.len());
     for name in names {
@@ -187,20 +161,16 @@ pub(super) fn layout(
             Some((quantity, k)) => {
                 let joint = k - 1;
                 match quantity {
+                    "q" if from_motors => (Role::None, true),
                     "q" => (Role::Position(joint), false),
+                    "qm" if from_motors => (Role::MotorPosition(joint), false),
                     "tau" => (Role::Effort(joint, 1.0), false),
-                    // With the torque itself there, the current says nothing more to the model.
-                    "i" if find(&format!("tau{k}")).is_some() => (Role::None, true),
-                    "i" => {
-                        let drive = robot.joints.get(joint).and_then(|j| j.drive.as_ref());
-                        (
-                            Role::Effort(
-                                joint,
-                                drive.map_or(0.0, |d| d.gear_ratio * d.torque_constant),
-                            ),
-                            false,
-                        )
-                    }
+                    "qm" => (Role::None, true),
+                    "taum" | "i" => match efforts.role(name, joint) {
+                        Some(role) => (role, false),
+                        // With the torque itself there, the motor's says nothing more to the model.
+                        None => (Role::None, true),
+                    },
                     "qd" => (Role::Velocity(joint), false),
                     "qdd" => (Role::Acceleration(joint), false),
                     "ref" => (Role::Reference(joint), false),
@@ -229,11 +199,174 @@ pub(super) fn layout(
         });
         extras += usize::from(keep);
     }
+    let motors = if from_motors || efforts.turned.contains(&true) {
+        let side = MotorSide::new(robot, from_motors, efforts.turned).map_err(|e| {
+            header(format!(
+                "the drives of robot `{}` cannot turn motor columns to the joints: {e}",
+                robot.name
+            ))
+        })?;
+        Some(side)
+    } else {
+        None
+    };
     Ok(Layout {
         columns,
         time,
         joints,
         extras,
+        motors,
         warnings,
     })
+}
+
+/// Whether the positions are the motors'.
+fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<bool, String> {
+    let missing = |quantity: &str| -> Vec<usize> {
+        (1..=joints)
+            .filter(|k| !names.iter().any(|n| *n == format!("{quantity}{k}")))
+            .collect()
+    };
+    let (joint, motor) = (missing("q"), missing("qm"));
+    let Some(&first) = joint.first() else {
+        return Ok(false);
+    };
+    let Some(&first_motor) = motor.first() else {
+        return match robot.joints.iter().position(|j| j.drive.is_none()) {
+            None => Ok(true),
+            Some(k) => Err(format!(
+                "there is no column `q{}`, and column `qm{}` is a motor position, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio (and couples, zero) to the robot",
+                first,
+                k + 1,
+                robot.joints[k].name,
+                robot.name
+            )),
+        };
+    };
+    let name = &robot.joints[first - 1].name;
+    Err(if motor.len() == joints {
+        format!(
+            "there is no column `q{first}` (position of joint `{name}`, in rad or m); the columns are {}",
+            shown(names)
+        )
+    } else {
+        format!(
+            "there is neither `q{first}` (position of joint `{name}`, in rad or m) nor `qm{first_motor}` (motor position, rad); the position must be given by q for every joint or by qm for every motor, and the columns are {}",
+            shown(names)
+        )
+    })
+}
+
+/// Where the torques come from.
+struct Efforts {
+    /// Per joint: the file's factor for `i<k>` where the drive is its own, as before.
+    own: Vec<Option<(String, f64)>>,
+    /// Per joint: from motor torques through the Jacobian.
+    turned: Vec<bool>,
+    /// Per motor: column and factor to a motor torque, if it is needed.
+    motor: Vec<Option<(String, f64)>>,
+}
+
+impl Efforts {
+    fn role(&self, name: &str, joint: usize) -> Option<Role> {
+        let of = |list: &[Option<(String, f64)>]| {
+            let (column, factor) = list.get(joint)?.as_ref()?;
+            (column == name).then_some(*factor)
+        };
+        of(&self.motor)
+            .map(|f| Role::MotorEffort(joint, f))
+            .or_else(|| of(&self.own).map(|f| Role::Effort(joint, f)))
+    }
+}
+
+/// Finds a source for the torque of every joint: its own, or all motors that move it.
+fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts, String> {
+    let n = robot.joints.len();
+    let has = |name: String| names.contains(&name).then_some(name);
+    let mut found = Efforts {
+        own: vec![None; n],
+        turned: vec![false; n],
+        motor: vec![None; n],
+    };
+    // Torque of motor m from its column, with the factor that makes it N·m.
+    let source = |m: usize| -> Result<Option<(String, f64)>, String> {
+        if let Some(name) = has(format!("taum{}", m + 1)) {
+            return match &robot.joints[m].drive {
+                Some(_) => Ok(Some((name, 1.0))),
+                None => Err(format!(
+                    "column `{name}` is a motor torque, but joint `{}` of robot `{}` has no [joint.drive]; add its gear_ratio to the robot, or record `tau{}`",
+                    robot.joints[m].name,
+                    robot.name,
+                    m + 1
+                )),
+            };
+        }
+        let Some(name) = has(format!("i{}", m + 1)) else {
+            return Ok(None);
+        };
+        let (joint, k) = (&robot.joints[m].name, m + 1);
+        match &robot.joints[m].drive {
+            None => Err(format!(
+                "column `i{k}` is a motor current, but joint `{joint}` of robot `{}` has no [joint.drive]; add its gear_ratio and torque_constant to the robot, or record `tau{k}`",
+                robot.name
+            )),
+            Some(drive) if drive.torque_constant == 0.0 => Err(format!(
+                "column `i{k}` is a motor current, but the drive of joint `{joint}` of robot `{}` has no torque_constant; add it (N·m/A) to the robot, or record `tau{k}`",
+                robot.name
+            )),
+            Some(drive) => Ok(Some((name, drive.torque_constant))),
+        }
+    };
+    for j in 0..n {
+        if has(format!("tau{}", j + 1)).is_some() {
+            continue;
+        }
+        let movers: Vec<usize> = (0..n).filter(|m| robot.moves(*m, j)).collect();
+        let mut sources = Vec::with_capacity(movers.len());
+        for &m in &movers {
+            sources.push(source(m)?);
+        }
+        if sources.iter().all(Option::is_none) && need == EffortNeed::Optional {
+            continue;
+        }
+        let (joint, k) = (&robot.joints[j].name, j + 1);
+        if let Some(gap) = sources.iter().position(Option::is_none) {
+            let m = movers[gap] + 1;
+            return Err(if m == k {
+                format!(
+                    "there is neither `tau{k}` (torque of joint `{joint}`, N·m or N) nor `i{k}` (its motor current, A) nor `taum{k}` (its motor torque, N·m); one of them is needed, and the columns are {}",
+                    shown(names)
+                )
+            } else {
+                format!(
+                    "there is no `tau{k}` (torque of joint `{joint}`, N·m or N), and motor {m}, which moves that joint too, has neither `i{m}` (A) nor `taum{m}` (N·m); the columns are {}",
+                    shown(names)
+                )
+            });
+        }
+        let simple = movers == [j]
+            && robot.joints[j]
+                .drive
+                .as_ref()
+                .is_none_or(|d| d.screw.is_none());
+        for (&m, source) in movers.iter().zip(sources) {
+            let Some((name, factor)) = source else {
+                continue;
+            };
+            if simple {
+                let ratio = robot.joints[m].drive.as_ref().map_or(1.0, |d| d.gear_ratio);
+                found.own[m] = Some((name, factor * ratio));
+            } else {
+                found.motor[m] = Some((name, factor));
+                found.turned[j] = true;
+            }
+        }
+    }
+    // A motor whose torque is turned to several joints is read as a motor's; its own joint then follows by the Jacobian.
+    for m in 0..n {
+        if found.motor[m].is_some() && found.own[m].take().is_some() {
+            found.turned[m] = true;
+        }
+    }
+    Ok(found)
 }

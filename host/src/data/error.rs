@@ -20,6 +20,12 @@ pub enum DataError {
         /// The directory.
         path: PathBuf,
     },
+    /// The path is a pipe or a device.
+    #[error("{} is a pipe or a device, but a recording is gone through from its start more than once; save it as a .csv or .mcap file and give that", path.display())]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+    },
     /// No byte, or nothing but empty lines.
     #[error("{} is empty, but a recording has a header line such as `t,q1,tau1` and one row per sample", path.display())]
     Empty {
@@ -94,6 +100,16 @@ pub enum DataError {
         /// Time of this row, s.
         now: f64,
     },
+    /// Motor positions that no joint positions give.
+    #[error("{}:{line}: the motor positions (columns `qm<k>`) of this row belong to no joint position: {message} The description's drives (ratios, screw, zero) or the recording's signs or units are wrong.", path.display())]
+    Motors {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+        /// What cannot be turned to the joints, one sentence.
+        message: String,
+    },
     /// An MCAP file that is damaged or holds something else.
     #[error("{}: {message}", path.display())]
     Mcap {
@@ -140,6 +156,23 @@ pub enum Warning {
         /// Time missing beyond one sample period, s.
         lost: f64,
     },
+    /// An interval of a regular recording is too short or too long for its neighbours to be filtered together; a
+    /// new block begins.
+    Uneven {
+        /// Line of the row after it.
+        line: u64,
+        /// The interval, s.
+        step: f64,
+        /// The usual one, s.
+        period: f64,
+    },
+    /// One time stamp lies off the even grid, the rows before and after on it; the row is taken as evenly sampled.
+    Misplaced {
+        /// Line of the row.
+        line: u64,
+        /// How much later than the grid it is stamped, s.
+        off: f64,
+    },
     /// A column without meaning to the model holds something that is no number; it is NaN in
     /// [`super::Block::extra`].
     ExtraNotANumber {
@@ -162,6 +195,18 @@ impl fmt::Display for Warning {
                 write!(
                     f,
                     "line {line}: {lost:.6} s are missing after t = {from} s; the rows before and after are treated apart"
+                )
+            }
+            Self::Uneven { line, step, period } => {
+                write!(
+                    f,
+                    "line {line}: the time advances by {step:.6} s where {period:.6} s is usual; the rows before and after are treated apart"
+                )
+            }
+            Self::Misplaced { line, off } => {
+                write!(
+                    f,
+                    "line {line}: its time stamp lies {off:.6} s off the even grid that the rows around it keep; it is taken as evenly sampled"
                 )
             }
             Self::ExtraNotANumber { line, column } => {

@@ -7,6 +7,7 @@ mod columns;
 mod csv;
 mod error;
 mod mcap_rows;
+mod motors;
 mod plausibility;
 mod source;
 mod writer;
@@ -22,16 +23,16 @@ pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 pub enum EffortKind {
     /// Joint-side torque or force, column `tau<k>`.
     Torque,
-    /// Motor current, column `i<k>`; already multiplied by the drive's gear ratio and torque constant.
+    /// Motor current, column `i<k>`, through the drives' torque constants and ratios.
     Current,
 }
 
 /// The columns of one joint over a stretch of rows, all of the same length, SI, joint-side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointColumns {
-    /// Position, rad or m.
+    /// Position, rad or m (from `q<k>`, or from `qm<k>` of the motors through the drives).
     pub q: Vec<f64>,
-    /// Joint torque or force, N·m or N (from `tau<k>`, or from `i<k>` through the drive); empty where
+    /// Joint torque or force, N·m or N (from `tau<k>`, or from `taum<k>` or `i<k>` of the motors through the drives); empty where
     /// the recording has neither and was opened with [`EffortNeed::Optional`].
     pub tau: Vec<f64>,
     /// Measured velocity, if recorded.
@@ -86,5 +87,7 @@ pub fn data_dir() -> Option<std::path::PathBuf> {
     folders.find_map(|f| Some(f.join("shared/data")).filter(|p| p.is_dir()))
 }
 
+#[cfg(test)]
+mod motors_test;
 #[cfg(test)]
 mod tests;

@@ -193,6 +193,11 @@ fn wrong_recordings_are_named_by_line_and_column() {
         read(folder.0.path(), &rig()),
         Err(DataError::Directory { .. })
     ));
+    #[cfg(unix)]
+    assert!(matches!(
+        read(Path::new("/dev/null"), &rig()),
+        Err(DataError::NotAFile { .. })
+    ));
     assert!(matches!(
         read(&folder.path("none.csv"), &rig()),
         Err(DataError::Read { .. })

@@ -77,7 +77,7 @@ impl Run {
                     )));
                     return ControlFlow::Break(());
                 }
-                Event::Gap { .. } | Event::Snapshot(_) => {}
+                Event::Gap { .. } | Event::Snapshot(_) | Event::Capture(_) | Event::Health(_) => {}
             }
             ControlFlow::Continue(())
         })?;

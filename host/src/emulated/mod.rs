@@ -83,7 +83,8 @@ impl Device for EmulatedRig {
             .receive(&self.config, &mut self.state, from_host, &mut transmit);
         for _ in 0..self.ticks_per_slice() {
             let output = self.tick();
-            self.speaker.publish(&self.state, &output, &mut transmit);
+            self.speaker
+                .publish(&self.config, &self.state, &output, &mut transmit);
         }
     }
 

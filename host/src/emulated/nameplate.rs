@@ -279,3 +279,36 @@ fn estimator(model: &LinkParameters<f32>, limits: &Limits<f32>) -> EstimatorSett
         ..EstimatorSettings::for_band(lower, upper)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::robot::ONE_LINK_TEMPLATE;
+    use rig_firmware::nameplate::one_link;
+    use std::path::Path;
+
+    /// The board must start as the emulated rig does: else their recordings would differ.
+    #[test]
+    fn the_board_is_told_what_the_template_says() {
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+        let told = Nameplate::from_robot(&robot).unwrap();
+        let (config, mut settings) = one_link();
+        assert_eq!(config, told.config);
+        // The description's axis is tilted by a rounded π/2.
+        assert!((settings.model.gravity_sin - told.settings.model.gravity_sin).abs() < 1e-12);
+        settings.model.gravity_sin = told.settings.model.gravity_sin;
+        for (board, host) in [
+            (
+                settings.gains.proportional,
+                told.settings.gains.proportional,
+            ),
+            (settings.gains.derivative, told.settings.gains.derivative),
+            (settings.gains.adaptation, told.settings.gains.adaptation),
+        ] {
+            assert!((board - host).abs() <= 1e-6 * host, "{board} {host}");
+        }
+        settings.gains = told.settings.gains;
+        assert_eq!(settings, told.settings);
+    }
+}

@@ -6,12 +6,13 @@
 //! gives the torque's, whatever the number of joints. A cell in which a velocity can change its sign counts Coulomb
 //! friction in both directions.
 
-use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics};
+use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics, point_position};
 use rig_shared::scalar::Real;
 
 use super::ExciteError;
+use super::frame::Frame;
 use super::interval::Interval;
-use super::problem::{JointMotion, Schedule};
+use super::schedule::JointMotion;
 
 /// Cells per period of the fastest harmonic: what the proof takes away from a limit is then below 1 %.
 const CELLS: usize = 512;
@@ -40,6 +41,14 @@ pub struct Reach {
     pub torque: Option<f64>,
 }
 
+/// How far a motion goes at most.
+pub(super) struct Reached {
+    /// Joint by joint.
+    pub joints: Vec<Reach>,
+    /// Per plane of the frame the least distance along its normal, m.
+    pub heights: Vec<f64>,
+}
+
 /// Bound of the derivative of that order of envelope times series.
 fn derivative_bound(order: usize, omega: f64, coefficients: &[f64], ramp: Option<f64>) -> f64 {
     let harmonics = coefficients.len() / 2;
@@ -59,20 +68,22 @@ fn derivative_bound(order: usize, omega: f64, coefficients: &[f64], ramp: Option
     }
 }
 
-/// The reach of each joint, bounded from above.
+/// The reach of each joint, bounded from above, and how close points come to their planes.
 pub(super) fn reach(
-    schedule: &Schedule,
+    frame: &Frame,
     motions: &[JointMotion],
     chain: &Chain<Interval>,
-    parameters: Option<&[[f64; COLUMNS]]>,
-) -> Result<Vec<Reach>, ExciteError> {
+) -> Result<Reached, ExciteError> {
     let n = motions.len();
+    let schedule = &frame.schedule;
     let trajectories: Vec<_> = motions
         .iter()
         .map(|m| schedule.trajectory(&m.coefficients))
         .collect();
-    let rows: Option<Vec<[Interval; COLUMNS]>> =
-        parameters.map(|rows| rows.iter().map(|row| row.map(Interval::from_f64)).collect());
+    let rows: Option<Vec<[Interval; COLUMNS]>> = frame
+        .parameters
+        .as_ref()
+        .map(|rows| rows.iter().map(|row| row.map(Interval::from_f64)).collect());
     let mut reaches: Vec<Reach> = motions
         .iter()
         .map(|m| Reach {
@@ -82,6 +93,7 @@ pub(super) fn reach(
             torque: rows.as_ref().map(|_| 0.0),
         })
         .collect();
+    let mut heights = vec![f64::INFINITY; frame.planes.len()];
     let ramp = f64::from(schedule.ramp_us) * 1e-6;
     let period = f64::from(schedule.period_us) * 1e-6;
     let whole = if schedule.periods > 0 { period } else { 0.0 };
@@ -89,6 +101,7 @@ pub(super) fn reach(
     let per_second = (CELLS * schedule.harmonics) as f64 / period;
     let mut state = vec![[Interval::default(); 3]; n];
     let mut tau = vec![Interval::default(); n];
+    let mut jacobian = vec![[0.0; 3]; n];
     // One whole period stands for all of them.
     for (from, length, on_ramp) in [(0.0, ramp, true), (ramp, whole, false), (down, ramp, true)] {
         let cells = (length * per_second).ceil() as usize;
@@ -111,7 +124,17 @@ pub(super) fn reach(
                 here.acceleration,
             ]
         };
+        let mut heights_at = |q: &[[f64; 3]]| -> Result<Vec<f64>, ExciteError> {
+            let q: Vec<f64> = q.iter().map(|state| state[0]).collect();
+            let mut list = Vec::with_capacity(frame.planes.len());
+            for plane in &frame.planes {
+                let at = point_position(&frame.plain, &q, plane.link, plane.point, &mut jacobian)?;
+                list.push(plane.height(at));
+            }
+            Ok(list)
+        };
         let mut before: Vec<[f64; 3]> = (0..n).map(|j| at(j, 0)).collect();
+        let mut heights_before = heights_at(&before)?;
         for k in 1..=cells {
             for j in 0..n {
                 let now = at(j, k);
@@ -134,7 +157,20 @@ pub(super) fn reach(
                     reach.torque = reach.torque.map(|most| most.max(t.magnitude()));
                 }
             }
+            if !frame.planes.is_empty() {
+                let heights_now = heights_at(&before)?;
+                for (p, plane) in frame.planes.iter().enumerate() {
+                    let bend = plane.acceleration_bound(&state) * h * h / 8.0;
+                    let lowest = heights_before[p].min(heights_now[p]) - bend;
+                    // Rounding of sums of a few lengths.
+                    heights[p] = heights[p].min(lowest - 1e-12 * plane.reach);
+                }
+                heights_before = heights_now;
+            }
         }
     }
-    Ok(reaches)
+    Ok(Reached {
+        joints: reaches,
+        heights,
+    })
 }

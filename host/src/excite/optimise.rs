@@ -7,35 +7,45 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::criterion::Smoothing;
+
 /// Sufficient decrease and sufficient rise of the slope (Nocedal & Wright 2006, sec. 3.1).
 const ARMIJO: f64 = 1e-4;
 const WOLFE: f64 = 0.9;
 /// Halvings and doublings of a step before the direction is given up.
 const BISECTIONS: usize = 30;
 
+/// Between two updates of the multipliers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Round {
+    /// Weight of the penalty: constraints are relative to their limits and the criterion is a logarithm, so that
+    /// multipliers are of the order of one.
+    pub weight: f64,
+    /// How extreme singular values are smoothed.
+    pub smoothing: Smoothing,
+    /// Most steps of BFGS.
+    pub steps: usize,
+}
+
 /// What is minimised.
 pub(super) trait Objective {
     /// The value at `x` of the criterion plus the penalties; fills the gradient. Not finite where undefined.
     fn value(&mut self, x: &DVector<f64>, gradient: &mut DVector<f64>) -> f64;
-    /// Renews the multipliers at `x` for the penalty weight that follows.
-    fn update(&mut self, x: &DVector<f64>, next_weight: f64);
+    /// Renews the multipliers at `x` for the round that follows.
+    fn update(&mut self, x: &DVector<f64>, next: &Round);
 }
 
-/// Weights of the penalty, round by round: constraints are relative to their limits and the criterion is a
-/// logarithm, so that multipliers are of the order of one.
-pub(super) const WEIGHTS: [f64; 6] = [1e1, 1e2, 1e3, 1e3, 3e3, 3e3];
-
-/// Minimises from `x`, calling `round` after each round of the multipliers.
+/// Minimises from `x`, calling `done` after each round.
 pub(super) fn minimise(
     objective: &mut impl Objective,
     mut x: DVector<f64>,
-    iterations: usize,
-    mut round: impl FnMut(),
+    rounds: &[Round],
+    mut done: impl FnMut(),
 ) -> DVector<f64> {
-    for weight in WEIGHTS {
-        objective.update(&x, weight);
-        x = bfgs(objective, x, iterations);
-        round();
+    for round in rounds {
+        objective.update(&x, round);
+        x = bfgs(objective, x, round.steps);
+        done();
     }
     x
 }
@@ -144,11 +154,11 @@ mod tests {
             *gradient += 2.0 * self.weight * active * x;
             a * a + 100.0 * b * b + 0.5 * self.weight * active * active
         }
-        fn update(&mut self, x: &DVector<f64>, next_weight: f64) {
+        fn update(&mut self, x: &DVector<f64>, next: &Round) {
             if self.weight > 0.0 {
                 self.multiplier = (self.weight * Self::constraint(x) + self.multiplier).max(0.0);
             }
-            self.weight = next_weight;
+            self.weight = next.weight;
         }
     }
 
@@ -158,7 +168,17 @@ mod tests {
             weight: 0.0,
             multiplier: 0.0,
         };
-        let x = minimise(&mut valley, DVector::from_vec(vec![-0.5, 0.8]), 200, || ());
+        let rounds = [1e1, 1e2, 1e3, 1e3, 3e3, 3e3].map(|weight| Round {
+            weight,
+            smoothing: Smoothing(1),
+            steps: 200,
+        });
+        let x = minimise(
+            &mut valley,
+            DVector::from_vec(vec![-0.5, 0.8]),
+            &rounds,
+            || (),
+        );
         // On the circle with the angle as the only unknown, by a dense search.
         let best = (0..2_000_000)
             .map(|k| f64::from(k) * 1e-6)

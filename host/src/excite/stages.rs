@@ -6,8 +6,8 @@ use rig_shared::trajectory::{
     Chirp, Extremes, FrictionSweep, SlowReversals, Staircase, Sweep, Trajectory,
 };
 
-use super::problem::Bounds;
-use super::{ExciteError, JointTrajectory, TrajectoryFile, bounds_of, prior};
+use super::frame::{Bounds, bounds_of, prior};
+use super::{ExciteError, JointTrajectory, TrajectoryFile};
 use crate::robot::Robot;
 use crate::simulate::Model;
 
@@ -169,6 +169,12 @@ pub fn staged(
     start: Option<&[f64]>,
 ) -> Result<(TrajectoryFile, Vec<String>), ExciteError> {
     let (bounds, mut notes) = bounds_of(robot)?;
+    if !robot.workspace.is_empty() {
+        notes.push(
+            "The regions in [[workspace]] were not checked: only a motion of kind fourier is designed within them."
+                .into(),
+        );
+    }
     let moving = match joint {
         None => 0,
         Some(name) => robot.joint_index(name).ok_or_else(|| ExciteError::Option {

@@ -3,7 +3,11 @@
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rig_shared::multibody::{
-    COLUMN_NAMES, COLUMNS, Chain, column, differential_regressor, energy_regressor,
+    COLUMN_NAMES, COLUMNS, Chain, MAX_JOINTS, column, differential_regressor, energy_regressor,
+    friction_power_regressor,
+};
+use rig_shared::transmission::{
+    DriveKind, MOTOR_COLUMN_NAMES, MOTOR_COLUMNS, Transmission, motor_column,
 };
 
 use super::{IdentifyError, ModelKind};
@@ -22,6 +26,16 @@ const INDEPENDENT: f64 = 1e-7;
 /// [`IdentifyError::Model`] where the geometry is not one.
 pub fn chain_of(robot: &Robot) -> Result<Chain<f64>, IdentifyError> {
     Chain::new(&robot.geometry(), robot.gravity).map_err(|e| IdentifyError::Model(e.to_string()))
+}
+
+/// The drives of a robot description.
+///
+/// # Errors
+/// [`IdentifyError::Model`] where they cannot be.
+pub fn transmission_of(robot: &Robot) -> Result<Transmission<f64>, IdentifyError> {
+    robot
+        .transmission()
+        .map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
 /// Independent columns of a matrix and how the others follow from them.
@@ -111,20 +125,24 @@ pub fn independent_columns(matrix: &DMatrix<f64>, order: &[usize], tolerance: f6
     }
 }
 
-/// The base parameters of a robot: β = K·π.
+/// The base parameters of a robot: β = K·π, with π the 14 parameters of every joint and, where a drive moves more than
+/// its own joint, the 3 of every motor behind them ([`rig_shared::transmission`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Base {
-    /// Columns of the standard regressor (14 a joint) that stand for the base parameters.
+    /// Columns of the standard regressor (14 a joint, 3 a motor) that stand for the base parameters.
     pub columns: Vec<usize>,
-    /// K, base parameters × 14n.
+    /// K, base parameters × 14n, or × 17n where there are motor columns.
     pub combination: DMatrix<f64>,
     /// Kinds of the joints, for units and names.
     pub kinds: Vec<robot::JointKind>,
+    /// Kinds of the drives, one a joint.
+    pub drives: Vec<DriveKind>,
 }
 
 /// Order in which columns are preferred as representatives, so that the expressions group as the literature
 /// groups them (Khalil & Dombre 2002, ch. 9): of a revolute link `Iyy`, `mz` and `m` go to the link before,
-/// of a prismatic link its inertia; drive inertia joins the link's own where it cannot be told from it.
+/// of a prismatic link its inertia; drive inertia joins the link's own where it cannot be told from it. What a motor
+/// adds comes last.
 pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
     let revolute: &[usize] = &[4, 5, 6, 8, 9, 1, 2];
     let prismatic: &[usize] = &[0, 1, 2, 3];
@@ -160,54 +178,11 @@ impl Base {
     /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] where a column is
     /// neither clearly dependent nor clearly independent.
     pub fn structural(robot: &Robot, model: ModelKind, seed: u64) -> Result<Self, IdentifyError> {
-        let chain = chain_of(robot)?;
-        let n = robot.joints.len();
-        let width = n * COLUMNS;
-        let mut generator = rand_pcg::Pcg64::seed_from_u64(seed);
-        let mut symmetric = |scale: f64| scale * (2.0 * generator.random::<f64>() - 1.0);
-        // Three times as many rows as unknowns: a chance dependence of random rows has probability zero.
-        let matrix = match model {
-            ModelKind::Differential => {
-                let states = (3 * width).div_ceil(n);
-                let mut matrix = DMatrix::zeros(states * n, width);
-                let mut out = vec![0.0; n * width];
-                for s in 0..states {
-                    let [q, qd, qdd] = [3.0, 2.0, 5.0]
-                        .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
-                    differential_regressor(&chain, &q, &qd, &qdd, &mut out)
-                        .map_err(|e| IdentifyError::Model(e.to_string()))?;
-                    for j in 0..n {
-                        for c in 0..width {
-                            matrix[(s * n + j, c)] = out[j * width + c];
-                        }
-                    }
-                }
-                matrix
-            }
-            ModelKind::Integral => {
-                let mut matrix = DMatrix::zeros(3 * width, width);
-                let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
-                for row in 0..3 * width {
-                    for out in [&mut before, &mut after] {
-                        let [q, qd] = [3.0, 2.0]
-                            .map(|scale| (0..n).map(|_| symmetric(scale)).collect::<Vec<_>>());
-                        energy_regressor(&chain, &q, &qd, out)
-                            .map_err(|e| IdentifyError::Model(e.to_string()))?;
-                    }
-                    for c in 0..width {
-                        // What friction takes over a window depends on the whole way, not on its ends.
-                        matrix[(row, c)] = if c % COLUMNS >= column::VISCOUS {
-                            symmetric(2.0)
-                        } else {
-                            after[c] - before[c]
-                        };
-                    }
-                }
-                matrix
-            }
-        };
         let kinds: Vec<robot::JointKind> = robot.joints.iter().map(|j| j.kind).collect();
-        let found = independent_columns(&matrix, &preference(&kinds), DEPENDENT);
+        let matrix = Regressors::of(robot)?.random(model, seed)?;
+        let mut order = preference(&kinds);
+        order.extend(order.len()..matrix.ncols());
+        let found = independent_columns(&matrix, &order, DEPENDENT);
         if found.remainders.0 < INDEPENDENT {
             return Err(IdentifyError::Undecided {
                 least: found.remainders.0,
@@ -218,7 +193,22 @@ impl Base {
             columns: found.kept,
             combination: found.combination,
             kinds,
+            drives: robot.drive_kinds(),
         })
+    }
+
+    /// The base parameters whose own column satisfies `keep`.
+    #[must_use]
+    pub fn restricted(self, keep: impl Fn(usize) -> bool) -> Self {
+        let rows: Vec<usize> = (0..self.columns.len())
+            .filter(|&k| keep(self.columns[k]))
+            .collect();
+        Self {
+            columns: rows.iter().map(|&k| self.columns[k]).collect(),
+            combination: self.combination.select_rows(&rows),
+            kinds: self.kinds,
+            drives: self.drives,
+        }
     }
 
     /// Number of base parameters.
@@ -238,18 +228,192 @@ impl Base {
 
     /// Unit of a base parameter, ASCII.
     pub fn unit(&self, row: usize) -> &'static str {
-        unit(self.columns[row], &self.kinds)
+        self.column_unit(self.columns[row])
+    }
+
+    /// Name of a column of the standard regressor, with the number of its joint or motor.
+    pub fn column_name(&self, c: usize) -> String {
+        column_name(c, self.kinds.len())
+    }
+
+    /// Unit of a column, ASCII.
+    pub fn column_unit(&self, c: usize) -> &'static str {
+        unit(c, &self.kinds, &self.drives)
     }
 }
 
-/// Name of a standard column with the joint's number.
-pub fn column_name(c: usize) -> String {
-    format!("{}{}", COLUMN_NAMES[c % COLUMNS], c / COLUMNS + 1)
+/// The regressors of a robot with its drives.
+struct Regressors {
+    chain: Chain<f64>,
+    transmission: Transmission<f64>,
+    /// About where the joints move: the middle of their ranges, and how far random states go from there.
+    middle: Vec<f64>,
+    reach: f64,
+}
+
+impl Regressors {
+    fn of(robot: &Robot) -> Result<Self, IdentifyError> {
+        let chain = chain_of(robot)?;
+        let transmission = robot
+            .transmission()
+            .map_err(|e| IdentifyError::Model(e.to_string()))?;
+        let n = robot.joints.len();
+        let (middle, reach) = if transmission.is_constant() {
+            (vec![0.0; n], 3.0)
+        } else {
+            // A screw has no length beyond its reach; its ratio changes enough within this, rad or m.
+            (robot.middle_position(), 0.3)
+        };
+        Ok(Self {
+            chain,
+            transmission,
+            middle,
+            reach,
+        })
+    }
+
+    /// Three times as many rows at random states as there are columns: a chance dependence has probability zero.
+    fn random(&self, model: ModelKind, seed: u64) -> Result<DMatrix<f64>, IdentifyError> {
+        let failed = |e: &dyn std::fmt::Display| IdentifyError::Model(e.to_string());
+        let n = self.middle.len();
+        let links = n * COLUMNS;
+        let motors = if self.transmission.is_simple() {
+            0
+        } else {
+            n * MOTOR_COLUMNS
+        };
+        let width = links + motors;
+        let mut generator = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut symmetric = |scale: f64| scale * (2.0 * generator.random::<f64>() - 1.0);
+        let mut state = || {
+            let q: Vec<f64> = self
+                .middle
+                .iter()
+                .map(|m| m + symmetric(self.reach))
+                .collect();
+            let qd: Vec<f64> = (0..n).map(|_| symmetric(2.0)).collect();
+            let qdd: Vec<f64> = (0..n).map(|_| symmetric(5.0)).collect();
+            (q, qd, qdd)
+        };
+        let mut matrix;
+        match model {
+            ModelKind::Differential => {
+                let states = (3 * width).div_ceil(n);
+                matrix = DMatrix::zeros(states * n, width);
+                let mut out = vec![0.0; n * links];
+                let mut more = vec![0.0; n * n * MOTOR_COLUMNS];
+                for s in 0..states {
+                    let (q, qd, qdd) = state();
+                    differential_regressor(&self.chain, &q, &qd, &qdd, &mut out)
+                        .map_err(|e| failed(&e))?;
+                    self.transmission
+                        .motor_columns(&q, &qd, &qdd, &mut more)
+                        .map_err(|e| failed(&e))?;
+                    for j in 0..n {
+                        for c in 0..links {
+                            matrix[(s * n + j, c)] = out[j * links + c];
+                        }
+                        for c in 0..motors {
+                            matrix[(s * n + j, links + c)] = more[j * motors + c];
+                        }
+                    }
+                }
+            }
+            ModelKind::Integral => {
+                matrix = DMatrix::zeros(3 * width, width);
+                for row in 0..3 * width {
+                    let (start, end) = (state(), state());
+                    // What friction takes over a window depends on the whole way, not on its ends: a few states of it.
+                    let way: Vec<_> = (0..n + 3).map(|_| state()).collect();
+                    for (sign, (q, qd, _)) in [(-1.0, &start), (1.0, &end)] {
+                        let energy = self.energy(q, qd, motors).map_err(|e| failed(&e))?;
+                        for (c, value) in energy.into_iter().enumerate() {
+                            matrix[(row, c)] += sign * value;
+                        }
+                    }
+                    for (q, qd, _) in &way {
+                        let power = self.power(q, qd, motors).map_err(|e| failed(&e))?;
+                        for (c, value) in power.into_iter().enumerate() {
+                            matrix[(row, c)] += value;
+                        }
+                    }
+                    for j in 0..n {
+                        // A constant torque does its work over the distance between the ends.
+                        matrix[(row, j * COLUMNS + column::OFFSET)] = end.0[j] - start.0[j];
+                    }
+                }
+            }
+        }
+        for j in 0..n {
+            if !self.transmission.has_joint_inertia(j) {
+                matrix
+                    .column_mut(j * COLUMNS + column::DRIVE_INERTIA)
+                    .fill(0.0);
+            }
+        }
+        Ok(matrix)
+    }
+
+    fn energy(
+        &self,
+        q: &[f64],
+        qd: &[f64],
+        motors: usize,
+    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
+        let mut row = vec![0.0; self.chain.parameter_count()];
+        energy_regressor(&self.chain, q, qd, &mut row)?;
+        if motors > 0 {
+            let mut more = vec![0.0; motors];
+            self.transmission.motor_energy_columns(q, qd, &mut more)?;
+            row.append(&mut more);
+        }
+        Ok(row)
+    }
+
+    fn power(
+        &self,
+        q: &[f64],
+        qd: &[f64],
+        motors: usize,
+    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
+        let mut row = vec![0.0; self.chain.parameter_count()];
+        friction_power_regressor(&self.chain, qd, &mut row)?;
+        if motors > 0 {
+            let mut more = vec![0.0; motors];
+            self.transmission.motor_power_columns(q, qd, &mut more)?;
+            row.append(&mut more);
+        }
+        Ok(row)
+    }
+}
+
+/// Name of a column with the number of its joint or motor, for a robot of so many joints.
+pub fn column_name(c: usize, joints: usize) -> String {
+    match c.checked_sub(joints * COLUMNS) {
+        None => format!("{}{}", COLUMN_NAMES[c % COLUMNS], c / COLUMNS + 1),
+        Some(motor) => format!(
+            "{}{}",
+            MOTOR_COLUMN_NAMES[motor % MOTOR_COLUMNS],
+            motor / MOTOR_COLUMNS + 1
+        ),
+    }
+}
+
+/// Number of joints from the number of columns: 14 a joint, or 17 with the motors' (no number of at most
+/// [`MAX_JOINTS`] joints gives both).
+fn joints_of(columns: usize) -> usize {
+    let without = columns / COLUMNS;
+    if columns.is_multiple_of(COLUMNS) && without <= MAX_JOINTS {
+        without
+    } else {
+        columns / (COLUMNS + MOTOR_COLUMNS)
+    }
 }
 
 /// A row of a combination matrix in words, its own column first.
 pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String {
-    let mut text = column_name(own);
+    let joints = joints_of(combination.ncols());
+    let mut text = column_name(own, joints);
     for c in 0..combination.ncols() {
         let k = combination[(row, c)];
         // Rounding of the text only: the values are computed with the coefficients as they are.
@@ -258,7 +422,7 @@ pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String 
         }
         let sign = if k < 0.0 { '-' } else { '+' };
         let size = k.abs();
-        let name = column_name(c);
+        let name = column_name(c, joints);
         if (size - 1.0).abs() < 1e-9 {
             text.push_str(&format!(" {sign} {name}"));
         } else {
@@ -269,10 +433,24 @@ pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String 
     text
 }
 
-/// Unit of a standard column.
-pub fn unit(c: usize, kinds: &[robot::JointKind]) -> &'static str {
-    let revolute = matches!(kinds.get(c / COLUMNS), Some(robot::JointKind::Revolute));
-    match (c % COLUMNS, revolute) {
+/// Unit of a column.
+pub fn unit(c: usize, kinds: &[robot::JointKind], drives: &[DriveKind]) -> &'static str {
+    let (joint, place) = match c.checked_sub(kinds.len() * COLUMNS) {
+        None => (c / COLUMNS, c % COLUMNS),
+        Some(motor) => {
+            let same = match motor % MOTOR_COLUMNS {
+                motor_column::INERTIA => column::DRIVE_INERTIA,
+                motor_column::VISCOUS => column::VISCOUS,
+                _ => column::COULOMB,
+            };
+            (motor / MOTOR_COLUMNS, same)
+        }
+    };
+    // The values of a drive of changing ratio are the motor's own, which always turns.
+    let at_motor =
+        c >= kinds.len() * COLUMNS && matches!(drives.get(joint), Some(DriveKind::Varying));
+    let revolute = at_motor || matches!(kinds.get(joint), Some(robot::JointKind::Revolute));
+    match (place, revolute) {
         (column::MASS, _) => "kg",
         (1..=3, _) => "kg*m",
         (4..=9, _) => "kg*m^2",
@@ -284,3 +462,7 @@ pub fn unit(c: usize, kinds: &[robot::JointKind]) -> &'static str {
         (_, false) => "N",
     }
 }
+
+#[cfg(test)]
+#[path = "base_test.rs"]
+mod tests;

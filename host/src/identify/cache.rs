@@ -1,12 +1,13 @@
 //! Rows that several passes need, kept in a temporary file: made once, read as often as asked, memory constant.
 
-use std::cell::RefCell;
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, ErrorKind, Read, Seek, Write};
+use std::io::Seek;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::model::{Equation, Rows, Tally};
 use super::{IdentifyError, ModelKind};
+use crate::prepare::record::{self, Record, begin, put_count, put_numbers, unusable};
 use crate::prepare::{PrepareError, Recording};
 
 /// Which rows: of which recording (by address and name, both fixed while it is borrowed), of which model.
@@ -15,7 +16,9 @@ type Key = (usize, String, bool);
 /// Rows of every recording that a plan has been applied to.
 #[derive(Debug, Default)]
 pub struct RowCache {
-    kept: RefCell<HashMap<Key, (File, Tally)>>,
+    /// Rows that differ from the wanted ones only in which of them are used.
+    earlier: Option<Box<RowCache>>,
+    kept: Mutex<HashMap<Key, (File, Tally)>>,
 }
 
 fn key(recording: &dyn Recording, model: ModelKind) -> Key {
@@ -23,13 +26,49 @@ fn key(recording: &dyn Recording, model: ModelKind) -> Key {
     (address, recording.label(), model == ModelKind::Integral)
 }
 
-fn failed(e: std::io::Error) -> PrepareError {
-    PrepareError::Stopped(format!(
-        "The temporary file for prepared rows cannot be used ({e}); make room in the folder for temporary files."
-    ))
-}
-
 impl RowCache {
+    /// A cache for a plan that differs from that of `earlier` only in which rows are used: the rows of the
+    /// differential model are then taken from there.
+    pub(super) fn after(earlier: Self) -> Self {
+        Self {
+            earlier: Some(Box::new(earlier)),
+            ..Self::default()
+        }
+    }
+
+    /// Rows of the earlier plan, record by record, if there are any.
+    pub(super) fn earlier(
+        &self,
+        recording: &dyn Recording,
+        model: ModelKind,
+    ) -> Result<Option<Records>, PrepareError> {
+        match &self.earlier {
+            Some(earlier) => Ok(earlier
+                .records(recording, model)?
+                .map(|(records, _)| records)),
+            None => Ok(None),
+        }
+    }
+
+    fn records(
+        &self,
+        recording: &dyn Recording,
+        model: ModelKind,
+    ) -> Result<Option<(Records, Tally)>, PrepareError> {
+        let key = key(recording, model);
+        let (mut file, tally) = match self.files().get(&key) {
+            Some((file, tally)) => (file.try_clone().map_err(unusable)?, tally.clone()),
+            None => return Ok(None),
+        };
+        file.rewind().map_err(unusable)?;
+        let record = Vec::new();
+        Ok(Some((Records { file, record }, tally)))
+    }
+
+    fn files(&self) -> MutexGuard<'_, HashMap<Key, (File, Tally)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Gives the rows again if they are kept; `None` if they have to be made.
     pub(super) fn replay(
         &self,
@@ -37,14 +76,10 @@ impl RowCache {
         model: ModelKind,
         take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
     ) -> Result<Option<Tally>, IdentifyError> {
-        let key = key(recording, model);
-        let (mut file, tally) = match self.kept.borrow().get(&key) {
-            Some((file, tally)) => (file.try_clone().map_err(failed)?, tally.clone()),
-            None => return Ok(None),
+        let Some((mut records, tally)) = self.records(recording, model)? else {
+            return Ok(None);
         };
-        file.rewind().map_err(failed)?;
-        let mut reader = BufReader::new(file);
-        while let Some(rows) = read(&mut reader).map_err(failed)? {
+        while let Some(rows) = records.next()? {
             take(&rows)?;
         }
         Ok(Some(tally))
@@ -60,82 +95,92 @@ impl RowCache {
         ) -> Result<Tally, IdentifyError>,
         take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
     ) -> Result<Tally, IdentifyError> {
-        let mut writer = BufWriter::new(tempfile::tempfile().map_err(failed)?);
+        let mut file = tempfile::tempfile().map_err(unusable)?;
+        let mut record = Vec::new();
         let tally = make(&mut |rows| {
-            write(&mut writer, rows).map_err(failed)?;
+            write(&mut file, &mut record, rows).map_err(unusable)?;
             take(rows)
         })?;
-        let file = writer.into_inner().map_err(|e| failed(e.into_error()))?;
-        self.kept
-            .borrow_mut()
+        self.files()
             .insert(key(recording, model), (file, tally.clone()));
         Ok(tally)
     }
 }
 
-fn write_numbers(to: &mut impl Write, list: &[f64]) -> std::io::Result<()> {
-    to.write_all(&(list.len() as u64).to_le_bytes())?;
-    list.iter().try_for_each(|x| to.write_all(&x.to_le_bytes()))
+/// Rows that are read again.
+pub(super) struct Records {
+    file: File,
+    record: Vec<u8>,
 }
 
-fn write(to: &mut impl Write, rows: &Rows) -> std::io::Result<()> {
-    to.write_all(&(rows.equations.len() as u64).to_le_bytes())?;
-    to.write_all(&(rows.q.len() as u64).to_le_bytes())?;
-    write_numbers(to, &rows.t)?;
-    rows.q
-        .iter()
-        .chain(&rows.qd)
-        .try_for_each(|list| write_numbers(to, list))?;
-    rows.equations.iter().try_for_each(|equation| {
-        write_numbers(to, &equation.x)?;
-        write_numbers(to, &equation.y)?;
-        equation
-            .keep
-            .iter()
-            .try_for_each(|keep| to.write_all(&[u8::from(*keep)]))
+impl Records {
+    /// The rows of the next piece.
+    pub(super) fn next(&mut self) -> Result<Option<Rows>, PrepareError> {
+        read(&mut self.file, &mut self.record).map_err(unusable)
+    }
+}
+
+/// Columns of the regressor before the first that is not zero throughout: those of the links below the joint.
+fn leading_zeros(equation: &Equation) -> usize {
+    let width = equation.x.len() / equation.y.len().max(1);
+    let mut rows = equation.x.chunks_exact(width.max(1));
+    rows.try_fold(width, |least, row| {
+        let zeros = row[..least].iter().take_while(|x| **x == 0.0).count();
+        // Nothing more to be found.
+        if zeros == 0 { Err(()) } else { Ok(zeros) }
     })
+    .unwrap_or(0)
 }
 
-fn read_count(from: &mut impl Read) -> std::io::Result<usize> {
-    let mut bytes = [0; 8];
-    from.read_exact(&mut bytes)?;
-    Ok(u64::from_le_bytes(bytes) as usize)
+/// One record: its length in bytes, then the rows.
+fn write(to: &mut File, record: &mut Vec<u8>, rows: &Rows) -> std::io::Result<()> {
+    begin(record);
+    put_count(record, rows.equations.len());
+    put_count(record, rows.q.len());
+    put_numbers(record, rows.t.iter());
+    for list in rows.q.iter().chain(&rows.qd) {
+        put_numbers(record, list.iter());
+    }
+    for equation in &rows.equations {
+        let width = equation.x.len() / equation.y.len().max(1);
+        let zeros = leading_zeros(equation);
+        put_count(record, width);
+        put_count(record, zeros);
+        put_numbers(record, equation.y.iter());
+        for row in equation.x.chunks_exact(width.max(1)) {
+            put_numbers(record, row[zeros..].iter());
+        }
+        record.extend(equation.keep.iter().map(|keep| u8::from(*keep)));
+    }
+    record::write(to, record)
 }
 
-fn read_numbers(from: &mut impl Read) -> std::io::Result<Vec<f64>> {
-    let mut bytes = vec![0; 8 * read_count(from)?];
-    from.read_exact(&mut bytes)?;
-    Ok(bytes
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|b| f64::from_le_bytes(*b))
-        .collect())
-}
-
-fn read(from: &mut impl Read) -> std::io::Result<Option<Rows>> {
-    let equations = match read_count(from) {
-        Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(None),
-        other => other?,
-    };
-    let joints = read_count(from)?;
-    let t = read_numbers(from)?;
+fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Rows>> {
+    if !record::read(from, record)? {
+        return Ok(None);
+    }
+    let mut record = Record(record);
+    let (equations, joints) = (record.count()?, record.count()?);
+    let t = record.list()?;
     let mut lists = |n: usize| {
         (0..n)
-            .map(|_| read_numbers(from))
+            .map(|_| record.list())
             .collect::<std::io::Result<Vec<_>>>()
     };
     let (q, qd) = (lists(joints)?, lists(joints)?);
     let equations = (0..equations)
         .map(|_| {
-            let (x, y) = (read_numbers(from)?, read_numbers(from)?);
-            let mut keep = vec![0; y.len()];
-            from.read_exact(&mut keep)?;
-            Ok(Equation {
-                x,
-                y,
-                keep: keep.iter().map(|k| *k == 1).collect(),
-            })
+            let (width, zeros) = (record.count()?, record.count()?);
+            let y = record.list()?;
+            let mut x = Vec::with_capacity(width * y.len());
+            for row in 1..=y.len() {
+                x.resize(x.len() + zeros, 0.0);
+                record.numbers(&mut x)?;
+                // Every row is whole, whatever the file says.
+                x.resize(row * width, 0.0);
+            }
+            let keep = record.bytes(y.len())?.iter().map(|k| *k == 1).collect();
+            Ok(Equation { x, y, keep })
         })
         .collect::<std::io::Result<Vec<_>>>()?;
     Ok(Some(Rows {
@@ -144,4 +189,53 @@ fn read(from: &mut impl Read) -> std::io::Result<Option<Rows>> {
         q,
         qd,
     }))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_as_they_went() {
+        let equation = |x: &[f64], y: &[f64]| Equation {
+            x: x.to_vec(),
+            y: y.to_vec(),
+            keep: y.iter().map(|y| *y > 0.0).collect(),
+        };
+        let pieces = [
+            Rows {
+                t: vec![0.0, 1.0],
+                equations: vec![
+                    equation(&[0.0, -0.0, 1.5, 0.0, 0.0, 1e-300], &[1.0, -1.0]),
+                    equation(&[0.0; 6], &[0.5, 0.25]),
+                    equation(&[1.0, 0.0, 0.0, 0.0, 2.0, 3.0], &[0.0, 7.0]),
+                ],
+                q: vec![vec![1.0, 2.0], vec![3.0, 4.0]],
+                qd: vec![vec![5.0, 6.0], vec![7.0, 8.0]],
+            },
+            Rows {
+                equations: vec![Equation::default()],
+                ..Default::default()
+            },
+        ];
+        let mut file = tempfile::tempfile().unwrap();
+        let mut record = Vec::new();
+        for rows in &pieces {
+            write(&mut file, &mut record, rows).unwrap();
+        }
+        file.rewind().unwrap();
+        for rows in &pieces {
+            let found = read(&mut file, &mut record).unwrap().unwrap();
+            assert_eq!(
+                (&found.t, &found.q, &found.qd),
+                (&rows.t, &rows.q, &rows.qd)
+            );
+            assert_eq!(found.equations.len(), rows.equations.len());
+            for (a, b) in found.equations.iter().zip(&rows.equations) {
+                assert_eq!((&a.x, &a.y, &a.keep), (&b.x, &b.y, &b.keep));
+            }
+        }
+        assert!(read(&mut file, &mut record).unwrap().is_none());
+    }
 }

@@ -16,6 +16,7 @@ pub(super) const LAGS: usize = 200;
 /// Autocovariance of a stream of residuals.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
+    /// The latest residuals from `next` on, newest first.
     ring: Vec<f64>,
     next: usize,
     seen: u64,
@@ -25,8 +26,8 @@ pub(super) struct Memory {
 impl Default for Memory {
     fn default() -> Self {
         Self {
-            ring: vec![0.0; LAGS + 1],
-            next: 0,
+            ring: vec![0.0; 8 * LAGS],
+            next: 7 * LAGS,
             seen: 0,
             sums: vec![0.0; LAGS + 1],
         }
@@ -36,12 +37,18 @@ impl Default for Memory {
 impl Memory {
     /// Takes the next residual.
     pub(super) fn push(&mut self, e: f64) {
-        let size = self.ring.len();
-        self.ring[self.next] = e;
-        for lag in 0..size.min(self.seen as usize + 1) {
-            self.sums[lag] += e * self.ring[(self.next + size - lag) % size];
+        // Written backwards, so that what came before lies in order behind it; zeros before the first.
+        if self.next == 0 {
+            self.next = self.ring.len() - LAGS;
+            let (start, end) = self.ring.split_at_mut(self.next);
+            end.copy_from_slice(&start[..LAGS]);
         }
-        self.next = (self.next + 1) % size;
+        self.next -= 1;
+        self.ring[self.next] = e;
+        let before = &self.ring[self.next..=self.next + LAGS];
+        for (sum, past) in self.sums.iter_mut().zip(before) {
+            *sum += e * past;
+        }
         self.seen += 1;
     }
 
@@ -54,20 +61,24 @@ impl Memory {
     /// Integrated memory 1 + 2·Σρ in rows, summed while ρ stays above twice its standard error (the truncation
     /// of Geyer's initial sequence, 1992, with the noise of the estimate in mind); never below one.
     pub(super) fn length(&self) -> f64 {
-        let threshold = 2.0 / (self.seen.max(1) as f64).sqrt();
-        let sum: f64 = self
-            .correlation()
-            .iter()
-            .skip(1)
-            .take_while(|r| **r > threshold)
-            .sum();
-        1.0 + 2.0 * sum
+        memory_of(&self.correlation(), self.seen)
     }
 
     /// Residuals seen.
     pub(super) fn seen(&self) -> u64 {
         self.seen
     }
+}
+
+/// [`Memory::length`] of a given autocorrelation (lag 0 first) of `seen` residuals.
+pub(super) fn memory_of(correlation: &[f64], seen: u64) -> f64 {
+    let threshold = 2.0 / (seen.max(1) as f64).sqrt();
+    let sum: f64 = correlation
+        .iter()
+        .skip(1)
+        .take_while(|r| **r > threshold)
+        .sum();
+    1.0 + 2.0 * sum
 }
 
 /// Sums over stretches of time, in coordinates z in which Σ z·zᵀ over all rows is the identity.

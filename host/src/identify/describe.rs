@@ -2,53 +2,48 @@
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::Identification;
-use crate::robot::{Inertial, JointFriction, JointKind, Robot};
+use crate::robot::{JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
 ///
-/// Only combinations are identified, so their split is a choice: the prior description is moved by the smallest
-/// step that gives the identified combinations (K⁺·(β − K·π₀)). A robot of one link is then made a body that can
-/// exist: positive mass, inertia no smaller than its centre of mass demands, the drive's share as given before.
-/// For several links physical consistency is not enforced; the second result lists what had to be said.
+/// Only combinations are identified, so their split is a choice: the physically consistent full set where there is
+/// one ([`super::StandardSet`]). A robot of one link is otherwise made a body that can exist: positive mass, inertia no
+/// smaller than its centre of mass demands, the drive's share as given before. Failing both, the prior description is
+/// moved by the smallest step that gives the identified combinations (K⁺·(β − K·π₀)). The second result lists what
+/// had to be said.
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let k = &identification.details.combination;
     let values = DVector::from_column_slice(&identification.details.estimate.values);
-    let mut pi = DVector::from_vec(robot.standard_parameters().concat());
+    let links = robot.joints.len() * COLUMNS;
+    let mut described = robot.standard_parameters().concat();
+    described.extend(robot.motor_parameters().as_flattened());
+    // Without coupled drives there are no columns of motors, and their parameters are all zero.
+    described.truncate(k.ncols().max(links));
+    let mut pi = DVector::from_vec(described);
     let mut remarks = Vec::new();
-    let mut result = robot.clone();
-    if robot.joints.len() == 1 {
+    if let Some(set) = &identification.standard_parameters {
+        for (entry, value) in pi.iter_mut().zip(set.values()) {
+            *entry = value;
+        }
+        remarks.extend(set.prior.iter().cloned());
+    } else if robot.joints.len() == 1 {
         one_link(robot, identification, &mut pi, &mut remarks);
     } else if let Ok(inverse) = pseudo_inverse(k) {
         let step = inverse * (&values - k * &pi);
         pi += step;
         remarks.push("The split of the combinations over the links is the smallest change of the description; single masses and inertias need not be physical.".into());
     }
-    for (j, joint) in result.joints.iter_mut().enumerate() {
-        let row = &pi.as_slice()[j * COLUMNS..(j + 1) * COLUMNS];
-        let mut first_moment = [0.0; 3];
-        first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
-        let mut inertia = [0.0; 6];
-        inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
-        if let Some(drive) = &mut joint.drive {
-            drive.rotor_inertia =
-                row[column::DRIVE_INERTIA] / (drive.gear_ratio * drive.gear_ratio);
-        } else {
-            // Without a drive there is no place for its inertia but the link's own.
-            inertia[5] += row[column::DRIVE_INERTIA];
-        }
-        joint.inertial = Some(Inertial {
-            mass: row[column::MASS],
-            first_moment,
-            inertia,
-        });
-        joint.friction = Some(JointFriction {
-            coulomb: row[column::COULOMB],
-            viscous: row[column::VISCOUS],
-            offset: row[column::OFFSET],
-        });
-    }
+    let (joints, motors) = pi.as_slice().split_at(links);
+    let mut motors = motors.to_vec();
+    motors.resize(robot.joints.len() * MOTOR_COLUMNS, 0.0);
+    let (result, said) = robot.with_parameters(
+        joints.as_chunks::<COLUMNS>().0,
+        motors.as_chunks::<MOTOR_COLUMNS>().0,
+    );
+    remarks.extend(said);
     (result, remarks)
 }
 

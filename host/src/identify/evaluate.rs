@@ -32,7 +32,7 @@ pub(super) fn covariance(
     let whiten = inverse.transpose();
     let mut x_kept = DVector::zeros(size);
     let mut z = DVector::zeros(size);
-    for recording in training {
+    for (r, recording) in training.iter().enumerate() {
         each_rows(*recording, plan, options.model, &mut |rows| {
             for i in 0..rows.t.len() {
                 for (k, equation) in rows.equations.iter().enumerate() {
@@ -42,7 +42,7 @@ pub(super) fn covariance(
                     let x = &equation.x[i * p..(i + 1) * p];
                     let e = equation.y[i] - product(x, &full);
                     memories[k].push(e);
-                    let mut weight = weights[k];
+                    let mut weight = options.row_weight(r) * weights[k];
                     if let Some((loss, scale)) = loss {
                         weight *= loss.weight(e / scale[k].max(f64::MIN_POSITIVE)).sqrt();
                     }

@@ -2,9 +2,10 @@
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::NotExcited;
-use super::base::{Base, Independent, column_name, independent_columns, preference};
+use super::base::{Base, Independent, independent_columns, preference};
 use super::factor::TriangularFactor;
 use crate::robot::JointKind;
 
@@ -27,6 +28,7 @@ fn data_order(base: &Base) -> Vec<usize> {
     let preferred = preference(&base.kinds);
     let rank = |c: usize| preferred.iter().position(|&x| x == c).unwrap_or(usize::MAX);
     let mut order: Vec<usize> = (0..base.len()).collect();
+    // Motor columns are not in the list of preference: they come last, in their order.
     order.sort_by_key(|&k| rank(base.columns[k]));
     order
 }
@@ -56,9 +58,11 @@ pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
                 .iter()
                 .enumerate()
                 .filter(|(row, _)| data.combination[(*row, k)].abs() > 1e-6)
-                .map(|(_, &c)| column_name(base.columns[c]))
+                .map(|(_, &c)| base.column_name(base.columns[c]))
                 .collect();
-            let joint = base.columns[k] / COLUMNS + 1;
+            let links = base.kinds.len() * COLUMNS;
+            let motor = base.columns[k].checked_sub(links);
+            let joint = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS) + 1;
             let why = if partners.is_empty() {
                 "It has no effect on the torque in these data.".to_owned()
             } else {
@@ -70,6 +74,7 @@ pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
             };
             let revolute = base.kinds[joint - 1] == JointKind::Revolute;
             let motion = match base.columns[k] % COLUMNS {
+                _ if motor.is_some() => format!("Move joint {joint} and the joints that its drive is coupled to together and against each other, at several speeds and with changing accelerations."),
                 column::VISCOUS => format!("Move joint {joint} at several clearly different speeds, in both directions."),
                 column::COULOMB => format!("Move joint {joint} slowly in both directions, with reversals."),
                 column::OFFSET => format!("Move joint {joint} in both directions and, where it lifts, over a wider range of positions."),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::IdentifyError;
-use super::base::{Base, Independent, column_name};
+use super::base::{Base, Independent};
 use super::factor::TriangularFactor;
 
 /// Row times parameters.
@@ -46,7 +46,7 @@ pub(super) fn least_squares(
                 .min_by(|&i, &j| a.column(i).norm().total_cmp(&a.column(j).norm()))
                 .unwrap_or(0);
             IdentifyError::Singular {
-                column: column_name(base.columns[data.kept[smallest]]),
+                column: base.column_name(base.columns[data.kept[smallest]]),
             }
         })
 }

@@ -5,41 +5,76 @@
 //! recordings give residuals and a covariance that allows for their correlation in time. Memory does not grow
 //! with the recordings.
 //!
-//! Leaves out: instrumental variables and output-error methods; physical consistency as a constraint of the fit;
-//! errors in the regressor (kept small by the choice of the cut-off, [`crate::prepare::NOISE_SHARE`]).
+//! Least squares (ordinary, weighted by joint, robust) take the regressor as exact; its noise is kept small by the
+//! choice of the cut-off ([`crate::prepare::NOISE_SHARE`]). Where that does not do, there are instrumental variables,
+//! output error and total least squares; maximum likelihood for residuals that are correlated; ridge regression and
+//! physical consistency for what the motion leaves open. Every estimate can be compared with the others on stretches
+//! of time left out of the fit ([`Comparison`]).
+//!
+//! Leaves out: estimation of the friction law's form (see [`friction_map()`]); noise models that change with the motion.
 
+mod band;
 mod base;
 mod cache;
+mod closed;
+mod compare;
+mod consistent;
 mod covariance;
 mod describe;
+mod differential;
+mod essential;
 mod evaluate;
 mod excitation;
 mod factor;
 mod friction_map;
+mod further;
+mod grouping;
+mod instrumental;
+mod integral;
+mod least;
+mod likelihood;
 mod linear;
 mod model;
+mod momentum;
+mod output_error;
+mod parts;
+mod prior;
+mod problem;
+mod pseudo_inertia;
 mod residual;
+mod ridge;
 mod robust;
 mod solve;
 mod speed;
+mod standard;
+mod total;
+mod twin;
 
+#[cfg(test)]
+mod rows_test;
 #[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
 
 pub use base::{
-    Base, Independent, chain_of, column_name, expression, independent_columns, preference, unit,
+    Base, Independent, chain_of, column_name, expression, independent_columns, preference,
+    transmission_of, unit,
 };
 pub use cache::RowCache;
+pub use compare::{Compared, Comparison, Endogeneity};
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
+pub use essential::{Essential, EssentialSet};
 pub(crate) use evaluate::torque_residuals;
 pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
+pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
+pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};
 pub use solve::identify;
+pub use standard::{StandardParameter, StandardSet};
 
 use crate::prepare::{Masked, PrepareError, PrepareOptions, Survey, Treatment};
 
@@ -50,13 +85,14 @@ pub enum ModelKind {
     /// Torque against acceleration, velocity and position.
     #[default]
     Differential,
-    /// Work against change of energy over windows; needs no acceleration.
+    /// One joint: work against change of energy over windows. Several: impulse against change of momentum, one equation a
+    /// joint. Needs no acceleration.
     Integral,
 }
 
 /// How they are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Estimator {
     /// Ordinary least squares.
     Ols,
@@ -65,6 +101,63 @@ pub enum Estimator {
     Weighted,
     /// Weighted, and rows with large residuals count less (iteratively reweighted least squares).
     Robust,
+    /// Instrumental variables from the simulated closed loop (IDIM-IV).
+    Iv,
+    /// Torque of the simulated closed loop against the measured one (DIDIM).
+    OutputError,
+    /// Total least squares: noise in the regressor too.
+    Tls,
+    /// Maximum likelihood: autoregressive residuals, correlated between joints.
+    Ml,
+    /// Ridge regression towards the description's values.
+    Ridge,
+    /// Weighted, under the condition that every link is a body that can exist.
+    Consistent,
+}
+
+impl Estimator {
+    /// All, plain ones first.
+    pub const ALL: [Self; 9] = [
+        Self::Ols,
+        Self::Weighted,
+        Self::Robust,
+        Self::Iv,
+        Self::OutputError,
+        Self::Tls,
+        Self::Ml,
+        Self::Ridge,
+        Self::Consistent,
+    ];
+
+    /// As the command line and `identification.json` name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ols => "ols",
+            Self::Weighted => "weighted",
+            Self::Robust => "robust",
+            Self::Iv => "iv",
+            Self::OutputError => "output-error",
+            Self::Tls => "tls",
+            Self::Ml => "ml",
+            Self::Ridge => "ridge",
+            Self::Consistent => "consistent",
+        }
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Ols => "ordinary least squares",
+            Self::Weighted => "weighted least squares",
+            Self::Robust => "robust (reweighted) least squares",
+            Self::Iv => "instrumental variables (IDIM-IV)",
+            Self::OutputError => "closed-loop output error (DIDIM)",
+            Self::Tls => "total least squares",
+            Self::Ml => "maximum likelihood with the residual's covariance",
+            Self::Ridge => "ridge regression towards the description",
+            Self::Consistent => "physically consistent least squares",
+        }
+    }
 }
 
 /// Which large residuals count less, and how much.
@@ -106,6 +199,20 @@ pub struct Options {
     pub window: Option<f64>,
     /// Seed of the random states from which the base parameters are found.
     pub seed: u64,
+    /// How many times each training recording counts; those beyond the list count once.
+    pub recording_weights: Vec<f64>,
+    /// Relative uncertainty of the description's inertial values, for `ridge` and `consistent`; where absent, `ridge`
+    /// takes what makes the data most likely and `consistent` takes 1.
+    pub prior_uncertainty: Option<f64>,
+    /// Which estimators are compared besides; none for no comparison.
+    pub compare: Vec<Estimator>,
+}
+
+impl Options {
+    /// Factor that rows of training recording `r` are multiplied by: squares then count as often as was asked.
+    pub fn row_weight(&self, r: usize) -> f64 {
+        self.recording_weights.get(r).map_or(1.0, |w| w.sqrt())
+    }
 }
 
 impl Default for Options {
@@ -117,6 +224,9 @@ impl Default for Options {
             prepare: PrepareOptions::default(),
             window: None,
             seed: 1,
+            recording_weights: Vec::new(),
+            prior_uncertainty: None,
+            compare: Vec::new(),
         }
     }
 }
@@ -197,6 +307,34 @@ pub enum IdentifyError {
         /// Longest possible, s.
         most: f64,
     },
+    /// An iteration that does not end.
+    #[error(
+        "{what} did not settle after {passes} steps; a longer recording or a prior closer to the robot would help."
+    )]
+    Unsettled {
+        /// What was iterated.
+        what: &'static str,
+        /// Steps.
+        passes: usize,
+    },
+    /// Output error without a closed loop.
+    #[error(
+        "Estimator output-error simulates the closed loop: every joint needs a [joint.controller] in the description and a column ref<k> in every recording; use iv, which makes do with less."
+    )]
+    NoLoop,
+    /// The identified model cannot be simulated.
+    #[error("The identified model cannot be simulated: {0}")]
+    Simulation(String),
+    /// A weight that is none.
+    #[error(
+        "A recording's weight is {0}; it must be above zero (1 counts the recording once, 2 twice)."
+    )]
+    Weight(f64),
+    /// A prior uncertainty that is none.
+    #[error(
+        "The description's relative uncertainty is given as {0}; it must be above zero (0.1 means 10 %)."
+    )]
+    PriorUncertainty(f64),
     /// A friction map cannot be drawn.
     #[error("{0}")]
     FrictionMap(String),
@@ -270,6 +408,14 @@ pub struct Identification {
     pub not_excited: Vec<NotExcited>,
     /// Sentences.
     pub warnings: Vec<String>,
+    /// The few parameters that the torque needs.
+    pub essential: Option<EssentialSet>,
+    /// A full set of standard parameters that a robot can have; absent for a single joint unless asked for.
+    pub standard_parameters: Option<StandardSet>,
+    /// Estimators side by side and the one to trust, where asked for.
+    pub comparison: Option<Comparison>,
+    /// How the estimator went, sentences.
+    pub procedure: Vec<String>,
     /// What a report shows beyond that.
     #[serde(skip)]
     pub details: Details,

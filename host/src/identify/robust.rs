@@ -1,8 +1,11 @@
 //! Iteratively reweighted least squares (Huber 1964; Holland & Welsch 1977), one pass an iteration.
 
 use super::factor::TriangularFactor;
-use super::linear::product;
+use super::least::from_factors;
+use super::linear::{product, spread};
 use super::model::{Plan, each_rows};
+use super::parts::{LeaveOut, PARTS, Parts, joined, part_of};
+use super::problem::{Fitted, Problem};
 use super::{IdentifyError, Options};
 use crate::prepare::Recording;
 
@@ -75,7 +78,7 @@ pub(super) fn reweighted(
     let p = full.len();
     let mut factor = TriangularFactor::new(p);
     let mut medians = vec![Median::new(); weights.len()];
-    for recording in training {
+    for (r, recording) in training.iter().enumerate() {
         each_rows(*recording, plan, options.model, &mut |rows| {
             for (k, equation) in rows.equations.iter().enumerate() {
                 for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
@@ -83,11 +86,70 @@ pub(super) fn reweighted(
                     let e = equation.y[i] - product(x, full);
                     medians[k].push(e);
                     let weight = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
-                    factor.push(x, equation.y[i], weights[k] * weight.sqrt());
+                    factor.push(
+                        x,
+                        equation.y[i],
+                        options.row_weight(r) * weights[k] * weight.sqrt(),
+                    );
                 }
             }
             Ok(())
         })?;
     }
     Ok((factor, medians.iter().map(Median::sigma).collect()))
+}
+
+/// Passes of the fit that is only compared with others.
+const COMPARED_PASSES: usize = 15;
+
+/// Robust least squares with one stretch left out at a time: the weights of all rows are those of the whole fit.
+pub(super) fn robust(problem: &Problem, parts: &Parts) -> Result<Fitted, IdentifyError> {
+    let (training, plan, options) = (problem.training, problem.plan, problem.options);
+    let p = problem.base.len();
+    let mut full = problem.start_full();
+    let mut scale = spread_of(training, plan, options, &full, problem.weights.len())?;
+    for pass in 0.. {
+        let mut factors = vec![TriangularFactor::new(p); PARTS];
+        let mut medians = vec![Median::new(); problem.weights.len()];
+        let mut index = 0;
+        for (r, recording) in training.iter().enumerate() {
+            each_rows(*recording, plan, options.model, &mut |rows| {
+                for i in 0..rows.t.len() {
+                    let factor = &mut factors[part_of(index, problem.instants)];
+                    for (k, equation) in rows.equations.iter().enumerate() {
+                        if equation.keep[i] {
+                            let x = &equation.x[i * p..(i + 1) * p];
+                            let e = equation.y[i] - product(x, &full);
+                            medians[k].push(e);
+                            let loss = options.loss.weight(e / scale[k].max(f64::MIN_POSITIVE));
+                            let weight = options.row_weight(r) * problem.weights[k] * loss.sqrt();
+                            factor.push(x, equation.y[i], weight);
+                        }
+                    }
+                    index += 1;
+                }
+                Ok(())
+            })?;
+        }
+        let fitted = from_factors(problem, &LeaveOut::of(&joined(factors, parts.count)))?;
+        let before: Vec<f64> = problem.data.kept.iter().map(|&c| full[c]).collect();
+        let moved = fitted
+            .kept
+            .whole
+            .iter()
+            .zip(&before)
+            .zip(&fitted.classical_std)
+            .map(|((a, b), s)| (a - b).abs() / s.max(f64::MIN_POSITIVE))
+            .fold(0.0, f64::max);
+        if moved <= 1e-2 || pass + 1 == COMPARED_PASSES {
+            return Ok(fitted);
+        }
+        full = spread(&fitted.kept.whole, &problem.data.kept, p);
+        scale = medians.iter().map(Median::sigma).collect();
+    }
+    // The loop above ends by its pass count.
+    Err(IdentifyError::Unsettled {
+        what: "The robust fit",
+        passes: COMPARED_PASSES,
+    })
 }

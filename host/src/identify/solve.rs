@@ -1,12 +1,16 @@
 //! The way from recordings to an [`Identification`].
 
-use super::base::{Base, chain_of, expression};
+use super::band::explained_band;
+use super::base::{Base, chain_of, expression, transmission_of};
 use super::cache::RowCache;
+use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
+use super::further::{self, Outcome, further};
 use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
+use super::problem::Problem;
 use super::residual::ResidualReport;
 use super::robust::{reweighted, spread_of};
 use super::speed::speed_thresholds;
@@ -14,9 +18,13 @@ use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
-use crate::prepare::{Choice, Recording, Survey, Treatment};
+use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
 use crate::robot::Robot;
 
+/// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
+const ROWS_A_PARAMETER: usize = 10;
+/// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
+const HALF_POWER: f64 = 0.443;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -32,19 +40,21 @@ pub fn identify(
     holdout: &[&dyn Recording],
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
+    further::check(options)?;
     let chain = chain_of(robot)?;
+    let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
     let base = Base::structural(robot, options.model, options.seed)?;
-    let survey = |list: &[&dyn Recording]| {
-        list.iter()
-            .map(|r| Survey::take(*r, joints))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let surveys = survey(training)?;
+    // What is spooled has no references any more.
+    let sources = training;
+    let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
+    let (surveys, training) = surveyed(&training, joints)?;
     if surveys.is_empty() {
         return Err(IdentifyError::NoRecording);
     }
-    let holdout_surveys = survey(holdout)?;
+    let (holdout_surveys, holdout) = surveyed(&holdout, joints)?;
+    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
+    let (training, holdout) = (training.as_slice(), holdout.as_slice());
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
         return Err(IdentifyError::NoTorque { joint: j + 1 });
     }
@@ -57,7 +67,6 @@ pub fn identify(
     for s in &holdout_surveys {
         decided.admits(s)?;
     }
-    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let loudness: Vec<f64> = (0..joints)
         .map(|j| {
             surveys
@@ -66,8 +75,9 @@ pub fn identify(
                 .fold(0.0, f64::max)
         })
         .collect();
-    let plan_with = |treatment| Plan {
+    let plan_with = |treatment, window: usize| Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &base.columns,
         treatment,
         window,
@@ -75,43 +85,59 @@ pub fn identify(
         loudness: loudness.clone(),
         cache: RowCache::default(),
     };
+    let wide = decided;
+    let explained = match options.prepare.decimation {
+        Choice::Auto => explained_band(training, &plan_with(&wide, 1))?,
+        Choice::Fixed(_) => None,
+    };
+    let decided = match explained {
+        Some(band) => {
+            let rows = (ROWS_A_PARAMETER * base.len()).div_ceil(joints) as u64;
+            wide.narrowed(band, rows, &surveys, &options.prepare, &limits)?
+        }
+        None => wide.clone(),
+    };
+    let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let mut treatment = decided.clone();
     let mut made = RowCache::default();
     if options.prepare.speed_threshold == Choice::Auto {
-        let by_noise = plan_with(&decided);
+        let by_noise = plan_with(&decided, window);
         let (speeds, reason) = speed_thresholds(training, &by_noise)?;
-        if speeds == decided.speed_threshold {
-            made = by_noise.cache;
-        }
+        made = if speeds == decided.speed_threshold {
+            by_noise.cache
+        } else {
+            RowCache::after(by_noise.cache)
+        };
         (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
     }
     let plan = Plan {
         cache: made,
-        ..plan_with(&treatment)
+        ..plan_with(&treatment, window)
     };
     let p = base.len();
 
     // First fit: everything into one factor an equation.
-    let equations = match options.model {
-        ModelKind::Differential => joints,
-        ModelKind::Integral => 1,
-    };
+    let equations = joints;
     let mut factors = vec![TriangularFactor::new(p); equations];
     let mut instants = 0u64;
     let mut tally = Tally::default();
-    for recording in training {
+    for (r, recording) in training.iter().enumerate() {
+        let weight = options.row_weight(r);
         let part = each_rows(*recording, &plan, options.model, &mut |rows| {
-            for (factor, equation) in factors.iter_mut().zip(&rows.equations) {
+            each_of(threads(treatment.threads), &mut factors, &|k, factor| {
+                let Some(equation) = rows.equations.get(k) else {
+                    return;
+                };
                 for (i, keep) in equation.keep.iter().enumerate() {
                     if *keep {
-                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
+                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], weight);
                     }
                 }
-            }
+            });
             instants += rows.t.len() as u64;
             Ok(())
         })?;
-        add(&mut tally, &part);
+        tally.add(&part);
     }
     if tally.used < 2 * p as u64 {
         return Err(IdentifyError::NothingLeft {
@@ -140,17 +166,24 @@ pub fn identify(
 
     let mut weights = vec![1.0; equations];
     let mut beta = least_squares(&combine(&weights), &data, &base)?;
-    if options.estimator != Estimator::Ols {
+    let by_noise: Vec<f64> = {
         let full = spread(&beta, &data.kept, p);
-        for (weight, factor) in weights.iter_mut().zip(&factors) {
-            let freedom = factor
-                .rows()
-                .saturating_sub(p as u64 / equations as u64)
-                .max(1);
-            let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
-            *weight = if sigma > 0.0 { 1.0 / sigma } else { 1.0 };
-        }
-        beta = least_squares(&combine(&weights), &data, &base)?;
+        factors
+            .iter()
+            .map(|factor| {
+                let freedom = factor
+                    .rows()
+                    .saturating_sub(p as u64 / equations as u64)
+                    .max(1);
+                let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
+                if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
+            })
+            .collect()
+    };
+    let weighted_beta = least_squares(&combine(&by_noise), &data, &base)?;
+    if options.estimator != Estimator::Ols {
+        weights.clone_from(&by_noise);
+        beta.clone_from(&weighted_beta);
     }
     let mut factor = combine(&weights);
     let mut scales = None;
@@ -187,12 +220,31 @@ pub fn identify(
         scales = Some(scale);
     }
 
-    // Second look: residuals of the fitted equations, for the covariance.
-    let full = spread(&beta, &data.kept, p);
-    let loss = scales.as_ref().map(|s| (options.loss, s.as_slice()));
-    let estimate = covariance(
-        training, &plan, options, &factor, &data, &beta, &weights, loss, instants,
-    )?;
+    let problem = Problem {
+        robot,
+        training,
+        sources,
+        surveys: &surveys,
+        plan: &plan,
+        options,
+        base: &base,
+        data: &data,
+        weights: &by_noise,
+        start: &weighted_beta,
+        instants,
+    };
+    let own = further::own(&problem)?;
+    let (estimate, full) = match &own {
+        Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
+        // Second look: residuals of the fitted equations, for the covariance.
+        None => {
+            let loss = scales.as_ref().map(|s| (options.loss, s.as_slice()));
+            let estimate = covariance(
+                training, &plan, options, &factor, &data, &beta, &weights, loss, instants,
+            )?;
+            (estimate, spread(&beta, &data.kept, p))
+        }
+    };
     let residuals = |recordings: &[&dyn Recording], surveys: &[Survey]| {
         torque_residuals(recordings, surveys, &plan, &full)
     };
@@ -205,20 +257,44 @@ pub fn identify(
 
     let combination = &data.combination * &base.combination;
     let columns: Vec<usize> = data.kept.iter().map(|&k| base.columns[k]).collect();
-    let base_parameters = (0..columns.len())
+    let base_parameters: Vec<BaseParameter> = (0..columns.len())
         .map(|k| BaseParameter {
             expression: expression(&combination, k, columns[k]),
             value: estimate.values[k],
             std: estimate.std[k],
             relative_std_percent: 100.0 * estimate.std[k] / estimate.values[k].abs(),
-            unit: super::unit(columns[k], &base.kinds).to_owned(),
+            unit: base.column_unit(columns[k]).to_owned(),
             interval: estimate.interval[k],
             classical_relative_std_percent: 100.0 * estimate.classical_std[k]
                 / estimate.values[k].abs(),
         })
         .collect();
     let not_excited = not_excited(&base, &data);
-    let mut warnings = Vec::new();
+    let beyond = further(
+        &problem,
+        own,
+        &Outcome {
+            estimate: &estimate,
+            full: &full,
+            factors: &factors,
+            memory: match options.model {
+                ModelKind::Differential => train
+                    .iter()
+                    .map(|r| memory_of(&r.autocorrelation, r.rows))
+                    .collect(),
+                ModelKind::Integral => vec![estimate.memory_rows],
+            },
+            parameters: &base_parameters,
+        },
+        holdout,
+    )?;
+    let mut warnings = beyond.warnings;
+    warnings.extend(
+        surveys
+            .iter()
+            .chain(&holdout_surveys)
+            .filter_map(|survey| survey.note.clone()),
+    );
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -289,9 +365,13 @@ pub fn identify(
             .collect(),
         not_excited,
         warnings,
+        essential: beyond.essential,
+        standard_parameters: beyond.standard,
+        comparison: beyond.comparison,
+        procedure: beyond.procedure,
         details: Details {
-            masked: tally.masked(options.model),
-            training: surveys,
+            masked: tally.masked(),
+            training: surveys.clone(),
             holdout: holdout_surveys,
             estimate,
             combination,
@@ -305,21 +385,11 @@ pub fn identify(
     })
 }
 
-fn add(total: &mut Tally, part: &Tally) {
-    total.used += part.used;
-    total.short += part.short;
-    for (list, more) in [
-        (&mut total.slow, &part.slow),
-        (&mut total.saturated, &part.saturated),
-    ] {
-        list.resize(list.len().max(more.len()), 0);
-        for (a, b) in list.iter_mut().zip(more) {
-            *a += b;
-        }
-    }
+fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
+    list.iter().map(AsRef::as_ref).collect()
 }
 
-/// A sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
+/// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
 /// short enough that speeding up and slowing down fall into different windows. On EMPS, where friction is not
 /// quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
 fn choose_window(
@@ -333,13 +403,27 @@ fn choose_window(
     let (seconds, reason) = match options.window {
         Some(seconds) => (seconds, format!("{seconds} s, as given.")),
         None => {
-            let seconds = (0.0625 / treatment.motion_frequency).clamp(least, most.max(least));
+            let several = surveys.iter().any(|s| s.joints.len() > 1);
+            let wish = if several {
+                HALF_POWER / treatment.parallel_edge
+            } else {
+                0.0625 / treatment.motion_frequency
+            };
+            let seconds = wish.clamp(least, most.max(least));
+            let why = if several {
+                format!(
+                    "over which a mean passes up to the {:.3} Hz that the differential model's low-pass does",
+                    treatment.parallel_edge
+                )
+            } else {
+                format!(
+                    "a sixteenth of the period of the fastest motion ({:.3} Hz)",
+                    treatment.motion_frequency
+                )
+            };
             (
                 seconds,
-                format!(
-                    "{seconds:.4} s, a sixteenth of the period of the fastest motion ({:.3} Hz); windows start every quarter of that.",
-                    treatment.motion_frequency
-                ),
+                format!("{seconds:.4} s, {why}; windows start every quarter of that."),
             )
         }
     };

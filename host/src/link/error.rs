@@ -43,6 +43,16 @@ pub enum LinkError {
         /// What the system says.
         source: serialport::Error,
     },
+    /// The debug probe.
+    #[error(
+        "The debug probe cannot reach the rig: {0}; check that the board is plugged in at its ST-LINK socket, that no other program uses it, and that the rig's firmware is on it (`rig flash`)."
+    )]
+    Probe(String),
+    /// None to talk to, or more than one.
+    #[error(
+        "There are {0} debug probes at this computer, and one is needed; plug the rig's board in, and no other."
+    )]
+    ProbeCount(usize),
     /// The line broke.
     #[error("The line to the rig has broken: {0}; check the cable and the rig's supply.")]
     Io(#[from] io::Error),
@@ -134,5 +144,10 @@ pub fn describe(refusal: Refusal) -> &'static str {
             "the trajectory would leave the limits; make it smaller or slower"
         }
         Refusal::NoTrajectory => "no trajectory is loaded; upload one first",
+        Refusal::Busy => "the settings are being stored; try again in a moment",
+        Refusal::NoStorage => "this rig has no memory that keeps settings",
+        Refusal::StorageFailed => {
+            "the memory did not take the settings; those stored before still stand"
+        }
     }
 }

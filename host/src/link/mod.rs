@@ -1,6 +1,6 @@
 //! The line to the rig: ports, the conversation over them, and recording.
 //!
-//! [`port`] is the seam: a [`serial`] device, an [`emulated`] rig in this process, or either of them behind a
+//! [`port`] is the seam: a [`serial`] device, a debug probe (feature `probe`), an [`emulated`] rig in this process, or either of them behind a
 //! [`lossy`] line. [`session`] greets the rig and has requests carried out exactly once; [`recorder`] runs a
 //! stream and knows what of it is missing; [`convert`] turns samples into rows of SI quantities.
 
@@ -10,6 +10,8 @@ pub mod error;
 pub mod experiment;
 pub mod lossy;
 pub mod port;
+#[cfg(feature = "probe")]
+pub mod probe;
 pub mod recorder;
 pub mod serial;
 pub mod session;
@@ -19,6 +21,8 @@ pub use emulated::{Device, EmulatedPort};
 pub use error::LinkError;
 pub use lossy::{Disturbance, Lossy};
 pub use port::Port;
+#[cfg(feature = "probe")]
+pub use probe::ProbeLine;
 pub use recorder::{Event, LossReport, RecordSettings, record};
 pub use serial::SerialLine;
 pub use session::{Session, SessionSettings};

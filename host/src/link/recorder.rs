@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use rig_shared::safety::FaultRecord;
 use rig_shared::wire::message::{
-    Estimate, Report, RequestBody, SnapshotPart, StateSample, StreamEnd,
+    Estimate, Health, Report, RequestBody, SnapshotPart, StateSample, StreamEnd,
 };
 use rig_shared::wire::{FrameCounts, Gap, Reassembly};
 
@@ -37,6 +37,10 @@ pub enum Event<'a> {
     Fault(&'a FaultRecord),
     /// Part of the fault's snapshot.
     Snapshot(&'a SnapshotPart),
+    /// Part of the capture of single control ticks.
+    Capture(&'a SnapshotPart),
+    /// How the board is.
+    Health(&'a Health),
 }
 
 /// What to record.
@@ -226,6 +230,8 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
             Report::Estimate(estimate) => self.emit(Event::Estimate(estimate)),
             Report::Fault(fault) => self.emit(Event::Fault(fault)),
             Report::Snapshot(part) => self.emit(Event::Snapshot(part)),
+            Report::Capture(part) => self.emit(Event::Capture(part)),
+            Report::Health(health) => self.emit(Event::Health(health)),
             Report::Greeting(_) | Report::Acknowledge(_) | Report::StreamEnd(_) => {}
         }
     }

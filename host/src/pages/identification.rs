@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Context, parts};
-use crate::identify::{Estimator, Identification, ModelKind};
+use crate::identify::{Identification, ModelKind};
 use crate::report::{
     Axis, Block, Column, Document, Fact, NoteKind, Plot, Role, Section, Series, Style, Table, Tone,
     format_significant, format_value,
@@ -24,6 +24,7 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
     sections.push(parameters(found));
     sections.push(not_excited(found));
     sections.push(fit(robot, found));
+    sections.extend(super::estimators::sections(robot, found));
     sections.push(confidence(found));
     sections.push(data(robot, found));
     sections.push(residuals(robot, found));
@@ -32,11 +33,7 @@ pub fn identification(robot: &Robot, found: &Identification, context: &Context) 
         ModelKind::Differential => "torque against acceleration, velocity and position",
         ModelKind::Integral => "work against change of energy over windows",
     };
-    let estimator = match found.estimator {
-        Estimator::Ols => "ordinary least squares",
-        Estimator::Weighted => "weighted least squares",
-        Estimator::Robust => "robust (reweighted) least squares",
-    };
+    let estimator = found.estimator.words();
     Document {
         title: format!("{}: identified parameters", found.robot),
         subtitle: format!("{} base parameters by {estimator}, {model}.", found.rank),

@@ -4,6 +4,7 @@
 //! a result does not already hold, no file, no clock.
 
 mod demo;
+mod estimators;
 mod friction_map;
 mod identification;
 mod parts;

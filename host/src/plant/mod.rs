@@ -142,6 +142,11 @@ impl Plant {
         &mut self.faults
     }
 
+    /// Replaces the command in force since the last sampling instant, for a bridge that does not wait for one.
+    pub fn order(&mut self, command: Command) {
+        self.active = command;
+    }
+
     /// One control tick: the rig moves on under the command given before, is sampled, and takes `command`
     /// for the tick to come.
     pub fn advance(&mut self, command: Command) -> Sample {
@@ -241,6 +246,9 @@ impl Plant {
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
             driver_fault: faults.driver,
             overrun: faults.overrun,
+            // The plant has no board around it.
+            encoder_wrong: None,
+            stack_left: None,
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::Complex;
+
 /// One second-order section in transposed direct form II, a₀ = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Section {
@@ -22,6 +24,8 @@ impl Section {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LowPass {
     sections: Vec<Section>,
+    /// Poles in z: real ones, and of conjugate pairs the one in the upper half plane.
+    poles: Vec<Complex<f64>>,
     settle: usize,
 }
 
@@ -61,6 +65,7 @@ impl LowPass {
         }
         let warped = (PI * edge_hz / sample_rate).tan();
         let mut sections = Vec::new();
+        let mut digital = Vec::new();
         let mut radius: f64 = 0.0;
         for (re, im) in poles {
             // One section for each conjugate pair, from the pole in the upper half plane.
@@ -72,6 +77,7 @@ impl LowPass {
             );
             if im.abs() < 1e-12 * warped {
                 radius = radius.max(zr.abs());
+                digital.push(Complex::new(zr, 0.0));
                 let gain = (1.0 - zr) / 2.0;
                 sections.push(Section {
                     b: [gain, gain, 0.0],
@@ -80,6 +86,7 @@ impl LowPass {
             } else if im > 0.0 {
                 let squared = zr * zr + zi * zi;
                 radius = radius.max(squared.sqrt());
+                digital.push(Complex::new(zr, zi));
                 let gain = (1.0 - 2.0 * zr + squared) / 4.0;
                 sections.push(Section {
                     b: [gain, 2.0 * gain, gain],
@@ -94,7 +101,21 @@ impl LowPass {
         // polynomial factors of nearly equal poles are covered (checked in the tests by streaming).
         let settle =
             (1.25 * 1e-13f64.ln() / radius.max(1e-6).ln()).ceil() as usize + 2 * sections.len() + 1;
-        Some(Self { sections, settle })
+        Some(Self {
+            sections,
+            poles: digital,
+            settle,
+        })
+    }
+
+    /// Poles in z: real ones, and of conjugate pairs the one in the upper half plane. All zeros lie at −1.
+    pub(super) fn poles(&self) -> &[Complex<f64>] {
+        &self.poles
+    }
+
+    /// Factor of (1 + z⁻¹)^order in the numerator.
+    pub(super) fn leading(&self) -> f64 {
+        self.sections.iter().map(|s| s.b[0]).product()
     }
 
     /// Samples after which a wrong initial state has died away (below 1e-13 of its size).

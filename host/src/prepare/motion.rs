@@ -1,9 +1,10 @@
 //! Filtered motion, piece by piece.
 
 use super::PrepareError;
-use super::filter::{central_difference, second_difference};
-use super::pieces::{Recording, each_piece};
+use super::filter::{LowPass, central_difference, second_difference};
+use super::pieces::{Piece, Recording, each_piece};
 use super::treatment::Treatment;
+use super::workers::{in_order, threads};
 
 /// One joint over a piece, at the full rate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,6 +38,8 @@ pub struct Motion {
     pub offset: u64,
     /// Number of the stretch without a gap.
     pub segment: usize,
+    /// Whether the rows start and end where the segment does.
+    pub at_ends: [bool; 2],
 }
 
 /// Calls `take` with the whole recording's motion in order. `reach` is the number of rows beyond a row that
@@ -50,6 +53,23 @@ pub fn each_motion(
     reach: usize,
     take: &mut dyn FnMut(&Motion) -> Result<(), PrepareError>,
 ) -> Result<(), PrepareError> {
+    worked_motion(recording, treatment, reach, &Ok, &mut |motion| {
+        take(&motion)
+    })
+}
+
+/// Calls `take` with what `work` makes of the whole recording's motion, in order; the work is spread over
+/// [`Treatment::threads`].
+///
+/// # Errors
+/// What reading, `work` or `take` gives; [`PrepareError::NoDerivative`].
+pub fn worked_motion<R: Send>(
+    recording: &dyn Recording,
+    treatment: &Treatment,
+    reach: usize,
+    work: &(dyn Fn(Motion) -> Result<R, PrepareError> + Sync),
+    take: &mut dyn FnMut(R) -> Result<(), PrepareError>,
+) -> Result<(), PrepareError> {
     let impossible = || PrepareError::Cutoff {
         cutoff: treatment.cutoff,
         rate: treatment.sample_rate,
@@ -62,65 +82,76 @@ pub fn each_motion(
         position.settle_samples() + parallel.settle_samples() + treatment.trimmed + reach + 4,
     );
     let core = round(treatment.piece_rows.max(margin));
+    let label = recording.label();
+    in_order(
+        threads(treatment.threads),
+        |push| each_piece(recording, core, margin, push),
+        &|piece| work(motion_of(piece, treatment, &position, &label)?),
+        take,
+    )
+}
+
+fn motion_of(
+    piece: Piece,
+    treatment: &Treatment,
+    position: &LowPass,
+    label: &str,
+) -> Result<Motion, PrepareError> {
+    let rows = piece.rows.len();
     let dt = treatment.dt();
-    each_piece(recording, core, margin, &mut |piece| {
-        let rows = piece.rows.len();
-        let joints = piece
-            .rows
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(j, column)| {
-                let missing = |name: &str| PrepareError::NoDerivative {
-                    label: recording.label(),
-                    column: format!("{name}{}", j + 1),
+    let joints = piece
+        .rows
+        .joints
+        .into_iter()
+        .enumerate()
+        .map(|(j, column)| {
+            let missing = |name: &str| PrepareError::NoDerivative {
+                label: label.to_owned(),
+                column: format!("{name}{}", j + 1),
+            };
+            let q = position.zero_phase(&column.q);
+            let (qd, qdd) = if treatment.measured_derivatives {
+                let qd = position.zero_phase(column.qd.as_ref().ok_or_else(|| missing("qd"))?);
+                let qdd = match &column.qdd {
+                    Some(qdd) => position.zero_phase(qdd),
+                    None => central_difference(&qd, dt),
                 };
-                let q = position.zero_phase(&column.q);
-                let (qd, qdd) = if treatment.measured_derivatives {
-                    let qd = position.zero_phase(column.qd.as_ref().ok_or_else(|| missing("qd"))?);
-                    let qdd = match &column.qdd {
-                        Some(qdd) => position.zero_phase(qdd),
-                        None => central_difference(&qd, dt),
-                    };
-                    (qd, qdd)
-                } else {
-                    (central_difference(&q, dt), second_difference(&q, dt))
-                };
-                let (q, qd, qdd) = later(q, qd, qdd, treatment.torque_lead, dt);
-                let threshold = treatment.speed_threshold[j];
-                let [low, high] = treatment.saturation[j];
-                Ok(JointMotion {
-                    slow: qd.iter().map(|v| v.abs() < threshold).collect(),
-                    saturated: column
-                        .tau
-                        .iter()
-                        .map(|tau| {
-                            low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h)
-                        })
-                        .collect(),
-                    tau: column.tau.clone(),
-                    q,
-                    qd,
-                    qdd,
-                })
+                (qd, qdd)
+            } else {
+                (central_difference(&q, dt), second_difference(&q, dt))
+            };
+            let (q, qd, qdd) = later(q, qd, qdd, treatment.torque_lead, dt);
+            let threshold = treatment.speed_threshold[j];
+            let [low, high] = treatment.saturation[j];
+            Ok(JointMotion {
+                slow: qd.iter().map(|v| v.abs() < threshold).collect(),
+                saturated: column
+                    .tau
+                    .iter()
+                    .map(|tau| low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h))
+                    .collect(),
+                tau: column.tau,
+                q,
+                qd,
+                qdd,
             })
-            .collect::<Result<Vec<_>, PrepareError>>()?;
-        let trim = |end: bool| if end { treatment.trimmed.min(rows) } else { 0 };
-        let (front, back) = (trim(piece.at_ends[0]), trim(piece.at_ends[1]));
-        let start = if piece.at_ends[0] {
-            piece.core_start.max(front)
-        } else {
-            piece.core_start
-        };
-        let motion = Motion {
-            t: piece.rows.t.clone(),
-            joints,
-            usable: (start, piece.core_end.min(rows - back).max(start)),
-            sound_end: rows - back,
-            offset: piece.offset,
-            segment: piece.segment,
-        };
-        take(&motion)
+        })
+        .collect::<Result<Vec<_>, PrepareError>>()?;
+    let trim = |end: bool| if end { treatment.trimmed.min(rows) } else { 0 };
+    let (front, back) = (trim(piece.at_ends[0]), trim(piece.at_ends[1]));
+    let start = if piece.at_ends[0] {
+        piece.core_start.max(front)
+    } else {
+        piece.core_start
+    };
+    Ok(Motion {
+        t: piece.rows.t,
+        joints,
+        usable: (start, piece.core_end.min(rows - back).max(start)),
+        sound_end: rows - back,
+        offset: piece.offset,
+        segment: piece.segment,
+        at_ends: piece.at_ends,
     })
 }
 

@@ -13,6 +13,10 @@ pub trait Recording {
         rows: usize,
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError>;
+    /// Told when `share` of it has been gone through once more without reading it: for progress.
+    fn passed(&self, share: f64) {
+        let _ = share;
+    }
 }
 
 /// A recording held in memory.
@@ -77,7 +81,7 @@ pub struct Piece {
 }
 
 /// Rows `start .. end` of a block.
-fn stretch(block: &Block, start: usize, end: usize) -> Block {
+pub(super) fn stretch(block: &Block, start: usize, end: usize) -> Block {
     let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
     Block {
         t: of(&block.t),
@@ -160,7 +164,7 @@ pub fn each_piece(
     recording: &dyn Recording,
     core: usize,
     margin: usize,
-    take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>,
+    take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>,
 ) -> Result<(), PrepareError> {
     let mut buffer = Block::default();
     let mut offset = 0u64;
@@ -171,7 +175,7 @@ pub fn each_piece(
                  offset: &mut u64,
                  done: &mut usize,
                  segment: usize,
-                 take: &mut dyn FnMut(&Piece) -> Result<(), PrepareError>| {
+                 take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>| {
         if !buffer.is_empty() {
             let piece = Piece {
                 core_start: *done,
@@ -181,7 +185,7 @@ pub fn each_piece(
                 segment,
                 at_ends: [*offset == 0, true],
             };
-            take(&piece)?;
+            take(piece)?;
         }
         *buffer = Block::default();
         (*offset, *done) = (0, 0);
@@ -208,7 +212,7 @@ pub fn each_piece(
                 segment,
                 at_ends: [offset == 0, false],
             };
-            take(&piece)?;
+            take(piece)?;
             let drop = (done + core).saturating_sub(margin);
             drop_front(&mut buffer, drop);
             done = done + core - drop;

@@ -6,9 +6,16 @@ use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
 
-/// Steps may differ from the mean by this share: time stamps written with single precision or by a jittery
-/// clock pass, a lost or doubled row does not.
-const STEP_TOLERANCE: f64 = 0.2;
+/// Over up to [`STEPS_TOGETHER`] rows the time may run off the even grid by this share of a step: time stamps written
+/// with single precision or by a jittery clock pass, and a stamp off the grid between rows that are on it; a lost or
+/// doubled row does not.
+const STEP_TOLERANCE: f64 = 0.4;
+
+/// Rows over which the grid is watched.
+const STEPS_TOGETHER: usize = 8;
+
+/// Steps that are this much alike count as equal: the first of them is named.
+const ROUNDING: f64 = 1e-9;
 
 /// Rows below which a spectrum says nothing.
 const FEWEST_ROWS: u64 = 256;
@@ -47,6 +54,8 @@ pub struct Survey {
     pub sample_rate: f64,
     /// One entry a joint.
     pub joints: Vec<JointSurvey>,
+    /// What was done to its time stamps, a sentence; none where nothing was.
+    pub note: Option<String>,
 }
 
 struct Extreme {
@@ -85,7 +94,51 @@ struct Running {
     square: f64,
     high: Extreme,
     low: Extreme,
-    welch: Welch,
+    welch: Delayed,
+}
+
+/// Rows of the longest segments of the spectrum: at 1 kHz they resolve 0.25 Hz.
+const LONGEST_SEGMENT: usize = 4096;
+
+/// A spectrum whose segments are as long as the recording allows: at least seven of them, half overlapping. Rows
+/// wait until it is known that the recording is long enough for the longest segments.
+#[derive(Default)]
+struct Delayed {
+    /// Value, and whether it follows the one before without a gap.
+    waiting: Vec<(f64, bool)>,
+    welch: Option<Welch>,
+}
+
+impl Delayed {
+    fn push(&mut self, x: f64, follows: bool) {
+        if let Some(welch) = &mut self.welch {
+            if !follows {
+                welch.interrupt();
+            }
+            welch.push(x);
+            return;
+        }
+        self.waiting.push((x, follows));
+        if self.waiting.len() == 4 * LONGEST_SEGMENT {
+            self.start();
+        }
+    }
+
+    fn start(&mut self) {
+        let quarter = (self.waiting.len() / 4).max(1);
+        let segment = (1usize << quarter.ilog2()).clamp(64, LONGEST_SEGMENT);
+        self.welch = Some(Welch::new(segment));
+        for (x, follows) in std::mem::take(&mut self.waiting) {
+            self.push(x, follows);
+        }
+    }
+
+    fn finish(mut self) -> Welch {
+        if self.welch.is_none() {
+            self.start();
+        }
+        self.welch.unwrap_or_else(|| Welch::new(LONGEST_SEGMENT))
+    }
 }
 
 impl Survey {
@@ -94,20 +147,6 @@ impl Survey {
     /// # Errors
     /// [`PrepareError`]: too short, unevenly sampled, not moving, wrong number of joints.
     pub fn take(recording: &dyn Recording, joints: usize) -> Result<Self, PrepareError> {
-        // Segments of 4096 rows resolve 0.25 Hz at 1 kHz; a short recording gets at least seven of them.
-        let mut rows_total = 0u64;
-        recording.each_block(1 << 16, &mut |b| {
-            rows_total += b.len() as u64;
-            Ok(())
-        })?;
-        if rows_total < FEWEST_ROWS {
-            return Err(PrepareError::TooShort {
-                label: recording.label(),
-                rows: rows_total,
-                needed: FEWEST_ROWS,
-            });
-        }
-        let segment = (1usize << (rows_total / 4).ilog2()).clamp(64, 4096);
         let mut running: Vec<Running> = (0..joints)
             .map(|_| Running {
                 position: [f64::INFINITY, f64::NEG_INFINITY],
@@ -116,12 +155,13 @@ impl Survey {
                 square: 0.0,
                 high: Extreme::new(),
                 low: Extreme::new(),
-                welch: Welch::new(segment),
+                welch: Delayed::default(),
             })
             .collect();
         let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
         let (mut span, mut steps) = (0.0, 0u64);
         let mut last_time = 0.0;
+        let mut recent = [0.0; STEPS_TOGETHER];
         let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
         recording.each_block(1 << 16, &mut |block| {
             if block.joints.len() != joints {
@@ -139,17 +179,21 @@ impl Survey {
                     span += step;
                     steps += 1;
                     let line = block.first_line + k as u64;
-                    if step < shortest.0 {
-                        shortest = (step, line);
-                    }
-                    if step > widest.0 {
-                        widest = (step, line);
+                    if run >= STEPS_TOGETHER as u64 {
+                        let together = t - recent[rows as usize % STEPS_TOGETHER];
+                        if together < shortest.0 * (1.0 - ROUNDING) {
+                            shortest = (together, line);
+                        }
+                        if together > widest.0 * (1.0 + ROUNDING) {
+                            widest = (together, line);
+                        }
                     }
                     run += 1;
                 } else {
                     run = 1;
                 }
                 longest = longest.max(run);
+                recent[rows as usize % STEPS_TOGETHER] = t;
                 last_time = t;
                 rows += 1;
                 for (r, column) in running.iter_mut().zip(&block.joints) {
@@ -157,20 +201,31 @@ impl Survey {
                     r.position = [r.position[0].min(q), r.position[1].max(q)];
                     if follows {
                         r.step = r.step.max((q - r.last).abs());
-                    } else {
-                        r.welch.interrupt();
                     }
                     r.last = q;
                     r.square += tau * tau;
                     r.high.push(tau);
                     r.low.push(-tau);
-                    r.welch.push(q);
+                    r.welch.push(q, follows);
                 }
             }
             Ok(())
         })?;
+        if rows < FEWEST_ROWS {
+            return Err(PrepareError::TooShort {
+                label: recording.label(),
+                rows,
+                needed: FEWEST_ROWS,
+            });
+        }
         let mean = span / steps.max(1) as f64;
-        for (step, line) in [shortest, widest] {
+        for (together, line) in [shortest, widest] {
+            // No stretch was long enough to be watched where there is none of them.
+            if !together.is_finite() || line == 0 {
+                continue;
+            }
+            // The step that the row would have made alone.
+            let step = together - (STEPS_TOGETHER - 1) as f64 * mean;
             let deviation = (step / mean - 1.0).abs();
             if deviation > STEP_TOLERANCE || deviation.is_nan() {
                 return Err(PrepareError::Irregular {
@@ -178,6 +233,7 @@ impl Survey {
                     line,
                     step,
                     mean,
+                    longest: widest.0,
                 });
             }
         }
@@ -194,13 +250,13 @@ impl Survey {
                     });
                 }
                 let (frequency, density) =
-                    r.welch
-                        .density(sample_rate)
-                        .ok_or_else(|| PrepareError::TooShort {
+                    r.welch.finish().density(sample_rate).ok_or_else(|| {
+                        PrepareError::TooShort {
                             label: recording.label(),
                             rows: longest,
                             needed: FEWEST_ROWS,
-                        })?;
+                        }
+                    })?;
                 Ok(JointSurvey {
                     position: r.position,
                     peak_speed: r.step * sample_rate,
@@ -217,6 +273,7 @@ impl Survey {
             longest,
             sample_rate,
             joints,
+            note: None,
         })
     }
 }

@@ -37,6 +37,8 @@ pub struct PrepareOptions {
     pub torque_lead: f64,
     /// Rows that are processed together; memory grows with it, results do not depend on it.
     pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has. Results do not depend on it, to the last bit.
+    pub threads: usize,
 }
 
 impl Default for PrepareOptions {
@@ -48,7 +50,8 @@ impl Default for PrepareOptions {
             speed_threshold: Choice::Auto,
             measured_derivatives: false,
             torque_lead: 0.0,
-            piece_rows: 1 << 17,
+            piece_rows: 1 << 16,
+            threads: 0,
         }
     }
 }
@@ -104,6 +107,9 @@ pub struct Treatment {
     /// Rows that one piece holds.
     #[serde(skip)]
     pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has.
+    #[serde(skip)]
+    pub threads: usize,
 }
 
 /// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
@@ -261,7 +267,40 @@ impl Treatment {
             spectra,
             motion_frequency: motion,
             piece_rows: options.piece_rows,
+            threads: options.threads,
         })
+    }
+
+    /// The same with fewer rows: the low-pass before decimation passes only what the model explains, up to `band` in Hz,
+    /// as long as `rows` of the shortest recording are left; unchanged where that keeps as many rows, or where the
+    /// decimation was given.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn narrowed(
+        &self,
+        band: f64,
+        rows: u64,
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+        let most = (shortest / rows.max(FEWEST_KEPT)).max(1);
+        let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, most) as usize;
+        if options.decimation != Choice::Auto || n <= self.decimation {
+            return Ok(self.clone());
+        }
+        let fixed = PrepareOptions {
+            decimation: Choice::Fixed(n),
+            ..options.clone()
+        };
+        let mut narrow = Self::decide(surveys, &fixed, torque_limits)?;
+        narrow.decimation_reason = format!(
+            "One row in {n}: the low-pass before it passes up to {:.3} Hz; beyond {band:.3} Hz more than half of the power of every joint's torque is nothing that the model explains.",
+            narrow.parallel_edge
+        );
+        Ok(narrow)
     }
 
     /// Checks that a further recording (a hold-out) can be treated the same way.

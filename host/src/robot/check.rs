@@ -5,7 +5,9 @@
 
 use std::collections::HashSet;
 
-use super::{Joint, JointKind, Robot};
+use super::check_drives::check_transmission;
+use super::workspace::check_workspace;
+use super::{Drive, Joint, JointKind, Robot};
 
 /// Names of effects beyond the standard model.
 pub const EFFECT_NAMES: [&str; 22] = [
@@ -34,12 +36,14 @@ pub const EFFECT_NAMES: [&str; 22] = [
 ];
 
 /// One step of the way to a value in the tree of a description.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// A key of a table.
     Key(&'static str),
     /// An index of a list.
     At(usize),
+    /// A key of a table whose keys are names.
+    Name(String),
 }
 
 /// A value that cannot be right.
@@ -95,6 +99,8 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             f
         })?;
     }
+    check_transmission(robot)?;
+    check_workspace(robot)?;
     check_effects(robot)
 }
 
@@ -154,23 +160,22 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
     number(joint, &[Key("theta")], "theta", "rad", Finite, joint.theta)?;
     number(joint, &[Key("d")], "d", "m", Finite, joint.d)?;
     if let Some(inertial) = &joint.inertial {
-        let key = Key("inertial");
         number(
             joint,
-            &[key, Key("mass")],
+            &[Key("inertial"), Key("mass")],
             "mass",
             "kg",
             NotNegative,
             inertial.mass,
         )?;
         for (i, v) in inertial.first_moment.iter().enumerate() {
-            let way = [key, Key("first_moment"), At(i)];
+            let way = [Key("inertial"), Key("first_moment"), At(i)];
             number(joint, &way, "first_moment", "kg·m", Finite, *v)?;
         }
         for (i, v) in inertial.inertia.iter().enumerate() {
             number(
                 joint,
-                &[key, Key("inertia"), At(i)],
+                &[Key("inertial"), Key("inertia"), At(i)],
                 "inertia",
                 "kg·m²",
                 Finite,
@@ -210,7 +215,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             &way("coulomb"),
             "Coulomb friction",
             force,
-            Finite,
+            NotNegative,
             friction.coulomb,
         )?;
         let unit = format!("{force}·s/{angle}");
@@ -219,7 +224,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             &way("viscous"),
             "viscous friction",
             &unit,
-            Finite,
+            NotNegative,
             friction.viscous,
         )?;
         number(
@@ -232,45 +237,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
         )?;
     }
     if let Some(drive) = &joint.drive {
-        let way = |k| [Key("drive"), Key(k)];
-        number(
-            joint,
-            &way("gear_ratio"),
-            "gear ratio",
-            "motor turns per joint turn",
-            NotZero,
-            drive.gear_ratio,
-        )?;
-        number(
-            joint,
-            &way("rotor_inertia"),
-            "rotor inertia",
-            "kg·m²",
-            NotNegative,
-            drive.rotor_inertia,
-        )?;
-        number(
-            joint,
-            &way("torque_constant"),
-            "torque constant",
-            "N·m/A",
-            NotNegative,
-            drive.torque_constant,
-        )?;
-        let optional = [
-            ("resistance", "Ω", drive.resistance),
-            ("inductance", "H", drive.inductance),
-            (
-                "encoder_counts_per_rev",
-                "counts per motor turn",
-                drive.encoder_counts_per_rev,
-            ),
-        ];
-        for (key, unit, value) in optional {
-            if let Some(v) = value {
-                number(joint, &way(key), key, unit, Positive, v)?;
-            }
-        }
+        check_drive(joint, drive)?;
     }
     if let Some(controller) = &joint.controller {
         let way = |k| [Key("controller"), Key(k)];
@@ -300,6 +267,127 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             NotZero,
             controller.torque_gain,
         )?;
+    }
+    Ok(())
+}
+
+/// What a drive must satisfy on its own; [`check_transmission`] sees to what it does with the others.
+fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
+    use Must::{Finite, NotNegative, NotZero, Positive};
+    use Step::{At, Key};
+    let way = |k| [Key("drive"), Key(k)];
+    if drive.screw.is_none() {
+        number(
+            joint,
+            &way("gear_ratio"),
+            "gear ratio",
+            "motor turns per joint turn",
+            NotZero,
+            drive.gear_ratio,
+        )?;
+    } else if drive.gear_ratio != 0.0 {
+        return Err(Fault {
+            way: way("gear_ratio").to_vec(),
+            what: format!("the gear ratio of joint `{}`", joint.name),
+            found: drive.gear_ratio.to_string(),
+            right: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
+        });
+    }
+    let numbers = [
+        ("zero", "motor zero", "rad", Finite, drive.zero),
+        (
+            "rotor_inertia",
+            "rotor inertia",
+            "kg·m²",
+            NotNegative,
+            drive.rotor_inertia,
+        ),
+        (
+            "joint_inertia",
+            "drive inertia seen at the joint",
+            "kg·m² (kg where prismatic)",
+            Finite,
+            drive.joint_inertia,
+        ),
+        (
+            "coulomb",
+            "Coulomb friction of the motor",
+            "N·m, on the motor side",
+            NotNegative,
+            drive.coulomb,
+        ),
+        (
+            "viscous",
+            "viscous friction of the motor",
+            "N·m·s/rad, on the motor side",
+            NotNegative,
+            drive.viscous,
+        ),
+        (
+            "torque_constant",
+            "torque constant",
+            "N·m/A",
+            NotNegative,
+            drive.torque_constant,
+        ),
+    ];
+    for (key, what, unit, must, value) in numbers {
+        number(joint, &way(key), what, unit, must, value)?;
+    }
+    let optional = [
+        ("resistance", "Ω", drive.resistance),
+        ("inductance", "H", drive.inductance),
+        (
+            "encoder_counts_per_rev",
+            "counts per motor turn",
+            drive.encoder_counts_per_rev,
+        ),
+    ];
+    for (key, unit, value) in optional {
+        if let Some(v) = value {
+            number(joint, &way(key), key, unit, Positive, v)?;
+        }
+    }
+    if let Some(screw) = &drive.screw {
+        let way = |k| [Key("drive"), Key("screw"), Key(k)];
+        number(
+            joint,
+            &way("lead"),
+            "lead of the screw",
+            "m per motor turn",
+            NotZero,
+            screw.lead,
+        )?;
+        number(
+            joint,
+            &way("crank"),
+            "crank of the screw",
+            "m",
+            Positive,
+            screw.crank,
+        )?;
+        for (i, v) in screw.anchor.iter().enumerate() {
+            let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
+            number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
+        }
+        number(
+            joint,
+            &way("offset"),
+            "crank's offset",
+            "rad",
+            Finite,
+            screw.offset,
+        )?;
+        if let Some([low, high]) = screw.range
+            && !(low.is_finite() && high.is_finite() && low < high)
+        {
+            return Err(Fault {
+                way: way("range").to_vec(),
+                what: format!("the range of the crank of joint `{}`", joint.name),
+                found: format!("[{low}, {high}]"),
+                right: "it must be [lowest, highest], two finite angles in rad".into(),
+            });
+        }
     }
     Ok(())
 }

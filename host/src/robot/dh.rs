@@ -13,7 +13,7 @@ use super::{Drive, Inertial, Joint, Robot};
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
 /// base link, the customary rounded value that robot descriptions and simulators are used with.
-const GRAVITY: f64 = 9.81;
+pub(super) const GRAVITY: f64 = 9.81;
 
 /// Axes closer to parallel than this are parallel, rad. Files give π/2 with about 11 digits, and
 /// common normals of axes that meet at a smaller angle lie meaninglessly far away.
@@ -159,6 +159,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         name: chain.name.clone(),
         gravity: [0.0, 0.0, -GRAVITY],
         joints,
+        workspace: Vec::new(),
         effects: Vec::new(),
     };
     Converted { robot, base }
@@ -183,12 +184,7 @@ fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<
         friction: body.friction.clone(),
         drive: body.reduction.map(|gear_ratio| Drive {
             gear_ratio,
-            rotor_inertia: 0.0,
-            torque_constant: 0.0,
-            resistance: None,
-            inductance: None,
-            encoder_counts_per_rev: None,
-            pole_pairs: None,
+            ..Drive::default()
         }),
         controller: None,
     }

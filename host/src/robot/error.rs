@@ -129,4 +129,12 @@ pub enum RobotError {
         /// What the serialiser said.
         message: String,
     },
+    /// The description cannot be put into URDF.
+    #[error("joint `{joint}` {why}; the robot cannot be written as URDF")]
+    NotUrdf {
+        /// The joint.
+        joint: String,
+        /// What is missing, as the rest of a sentence about the joint.
+        why: String,
+    },
 }

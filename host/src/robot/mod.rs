@@ -7,12 +7,17 @@
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
 mod check;
+mod check_drives;
 mod dh;
+mod drives;
 mod error;
 mod numbers;
 mod text;
 mod urdf;
+mod urdf_out;
+mod workspace;
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -20,7 +25,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
+pub use drives::Screw;
 pub use error::{Place, RobotError};
+pub use urdf_out::Urdf;
+pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
 pub const MAX_BYTES: u64 = 16 << 20;
@@ -30,6 +38,15 @@ pub const ONE_LINK_TEMPLATE: &str = include_str!("../../robots/one-link.toml");
 
 /// The EMPS axis (Janot, Gautier, Brunot 2019) without any prior inertial or friction value.
 pub const EMPS: &str = include_str!("../../robots/emps.toml");
+
+/// The IRp-6 with its ball screws, absolute drives and coupled wrist; each figure with its source.
+pub const IRP6_TEMPLATE: &str = include_str!("../../robots/irp6.toml");
+
+/// A planar arm with two direct drives, as the EDDA was one; every figure is representative.
+pub const EDDA_TEMPLATE: &str = include_str!("../../robots/edda.toml");
+
+/// The Stäubli TX40 with its coupled wrist, as its published recording needs it.
+pub const TX40: &str = include_str!("../../robots/tx40.toml");
 
 /// A serial robot as a file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +59,9 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
+    /// Where points of the links must stay.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub workspace: Vec<Region>,
     /// Effects beyond the standard model, as `diagnose` adds them; kept as read.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<toml::Table>,
@@ -131,15 +151,32 @@ pub struct JointFriction {
     pub offset: f64,
 }
 
-/// Motor and gear.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Motor and gear. The motor's position is gear_ratio·q + Σ couples·q_j + what the screw gives + zero.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
-    /// Motor turns per joint turn (negative where the gear reverses).
+    /// Motor turns per joint turn (negative where the gear reverses); 0 (key absent) where a screw moves the joint.
+    #[serde(default)]
     pub gear_ratio: f64,
+    /// Motor turns per turn of other joints, by their names.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub couples: BTreeMap<String, f64>,
+    /// Motor position where all joints are at zero (beyond what a screw gives), rad
+    #[serde(default)]
+    pub zero: f64,
     /// kg·m², on the motor side
     #[serde(default)]
     pub rotor_inertia: f64,
+    /// Inertia of gear and shaft seen at the joint beside the rotors', kg·m² (kg where prismatic); identified, a small
+    /// one may come out negative.
+    #[serde(default)]
+    pub joint_inertia: f64,
+    /// Coulomb friction on the motor side, N·m
+    #[serde(default)]
+    pub coulomb: f64,
+    /// Viscous friction on the motor side, N·m·s/rad
+    #[serde(default)]
+    pub viscous: f64,
     /// N·m/A, on the motor side; 0 (key absent) where unknown, so that motor currents cannot be used
     #[serde(default)]
     pub torque_constant: f64,
@@ -155,6 +192,9 @@ pub struct Drive {
     /// 0 where brushed
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pole_pairs: Option<u32>,
+    /// A ball screw on a crank instead of a constant ratio.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screw: Option<Screw>,
 }
 
 /// Cascade of a proportional position loop and a proportional velocity loop:
@@ -179,6 +219,10 @@ fn one() -> f64 {
 pub fn template(kind: &str) -> Option<&'static str> {
     match kind {
         "one-link" => Some(ONE_LINK_TEMPLATE),
+        "edda" => Some(EDDA_TEMPLATE),
+        "irp6" => Some(IRP6_TEMPLATE),
+        "emps" => Some(EMPS),
+        "tx40" => Some(TX40),
         _ => None,
     }
 }
@@ -263,5 +307,7 @@ fn read_text(path: &Path) -> Result<String, RobotError> {
     Ok(text)
 }
 
+#[cfg(test)]
+mod drives_test;
 #[cfg(test)]
 mod tests;

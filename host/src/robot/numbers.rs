@@ -21,7 +21,8 @@ impl Robot {
     }
 
     /// Standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 where the description is silent.
-    /// The drive's inertia stands on the joint side.
+    /// The drives' inertia and friction stand on the joint side; what coupled drives and screws add beside the joints'
+    /// diagonals is [`Self::motor_parameters`].
     pub fn standard_parameters(&self) -> Vec<[f64; COLUMNS]> {
         let joint = |joint: &super::Joint| {
             let mut row = [0.0; COLUMNS];
@@ -30,10 +31,6 @@ impl Robot {
                 row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&inertial.first_moment);
                 row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
             }
-            if let Some(drive) = &joint.drive {
-                row[column::DRIVE_INERTIA] =
-                    drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
-            }
             if let Some(friction) = &joint.friction {
                 row[column::VISCOUS] = friction.viscous;
                 row[column::COULOMB] = friction.coulomb;
@@ -41,6 +38,8 @@ impl Robot {
             }
             row
         };
-        self.joints.iter().map(joint).collect()
+        let mut rows: Vec<[f64; COLUMNS]> = self.joints.iter().map(joint).collect();
+        self.add_drives(&mut rows);
+        rows
     }
 }

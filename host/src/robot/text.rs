@@ -1,5 +1,6 @@
 //! TOML in and out.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::check::{Step, check};
 use super::error::{Place, RobotError};
-use super::{Joint, JointKind, Robot};
+use super::{Drive, Joint, JointKind, Region, Robot, Screw};
 
 pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
     let robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
@@ -17,6 +18,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
         place: Place::of(text, e.span().map_or(0, |s| s.start)),
         message: sentence(&e),
     })?;
+    missing_ratio(&robot, text, path)?;
     check(&robot).map_err(|f| RobotError::Value {
         path: path.into(),
         place: Place::of(text, offset(text, &f.way)),
@@ -25,12 +27,8 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
         right: f.right,
     })?;
     for (i, joint) in robot.joints.iter().enumerate() {
-        let way = [
-            Step::Key("joint"),
-            Step::At(i),
-            Step::Key("drive"),
-            Step::Key("torque_constant"),
-        ];
+        let drive = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
+        let way = [&drive[..], &[Step::Key("torque_constant")]].concat();
         // Absent means unknown; written out, zero can only be a slip.
         if joint
             .drive
@@ -48,6 +46,24 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
         }
     }
     Ok(robot)
+}
+
+/// Every drive has a ratio, unless a screw takes its place.
+fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotError> {
+    for (i, joint) in robot.joints.iter().enumerate() {
+        let way = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
+        let absent = |drive: &Drive| drive.screw.is_none() && drive.gear_ratio == 0.0;
+        if joint.drive.as_ref().is_some_and(absent)
+            && !reaches(text, &[&way[..], &[Step::Key("gear_ratio")]].concat())
+        {
+            return Err(RobotError::Toml {
+                path: path.into(),
+                place: Place::of(text, offset(text, &way)),
+                message: "missing field `gear_ratio`; add this key (motor turns per joint turn) to the table that begins here, or a table [joint.drive.screw]".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// What the TOML reader said, on one line, with the mend where it is ours to know.
@@ -96,6 +112,7 @@ fn walk(text: &str, way: &[Step]) -> (usize, bool) {
         let next = match step {
             Step::Key(key) => here.get_ref().get(*key),
             Step::At(index) => here.get_ref().get(*index),
+            Step::Name(name) => here.get_ref().get(name.as_str()),
         };
         match next {
             Some(value) => here = value,
@@ -145,6 +162,9 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     for joint in &robot.joints {
         write_joint(&mut out, joint);
     }
+    for region in &robot.workspace {
+        write_region(&mut out, region);
+    }
     #[derive(Serialize)]
     struct Effects<'a> {
         effect: [&'a toml::Table; 1],
@@ -160,6 +180,43 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
         out.push_str(&text);
     }
     Ok(out)
+}
+
+fn write_region(out: &mut String, region: &Region) {
+    out.push_str("\n[[workspace]]\n");
+    line(
+        out,
+        "joint",
+        &quoted(&region.joint),
+        "whose link carries the point",
+    );
+    line(
+        out,
+        "point",
+        &list(&region.point),
+        "m, in that joint's frame",
+    );
+    for (key, value, comment) in [
+        ("min", region.min, "m, x y z in the base frame"),
+        ("max", region.max, "m"),
+        (
+            "normal",
+            region.normal,
+            "towards the allowed side of a plane",
+        ),
+    ] {
+        if let Some(value) = value {
+            line(out, key, &list(&value), comment);
+        }
+    }
+    if let Some(beyond) = region.beyond {
+        line(
+            out,
+            "beyond",
+            &float(beyond),
+            "m along the normal from the base frame's origin",
+        );
+    }
 }
 
 fn write_joint(out: &mut String, joint: &Joint) {
@@ -234,38 +291,7 @@ fn write_joint(out: &mut String, joint: &Joint) {
         );
     }
     if let Some(d) = &joint.drive {
-        out.push_str("\n[joint.drive]\n");
-        line(
-            out,
-            "gear_ratio",
-            &float(d.gear_ratio),
-            "motor turns per joint turn, negative where the gear reverses",
-        );
-        line(
-            out,
-            "rotor_inertia",
-            &float(d.rotor_inertia),
-            "kg*m^2, on the motor side",
-        );
-        if d.torque_constant != 0.0 {
-            line(
-                out,
-                "torque_constant",
-                &float(d.torque_constant),
-                "N*m/A, on the motor side",
-            );
-        }
-        optional(out, "resistance", d.resistance, "ohm");
-        optional(out, "inductance", d.inductance, "H");
-        optional(
-            out,
-            "encoder_counts_per_rev",
-            d.encoder_counts_per_rev,
-            "counts per motor turn after quadrature",
-        );
-        if let Some(p) = d.pole_pairs {
-            line(out, "pole_pairs", &p.to_string(), "0 where brushed");
-        }
+        write_drive(out, d);
     }
     if let Some(c) = &joint.controller {
         out.push_str("\n[joint.controller]\n");
@@ -283,6 +309,146 @@ fn write_joint(out: &mut String, joint: &Joint) {
             &format!("{force} per controller output"),
         );
     }
+}
+
+fn write_drive(out: &mut String, d: &Drive) {
+    out.push_str("\n[joint.drive]\n");
+    if d.screw.is_none() || d.gear_ratio != 0.0 {
+        line(
+            out,
+            "gear_ratio",
+            &float(d.gear_ratio),
+            "motor turns per joint turn, negative where the gear reverses",
+        );
+    }
+    if !d.couples.is_empty() {
+        line(
+            out,
+            "couples",
+            &table(&d.couples),
+            "motor turns per turn of these joints",
+        );
+    }
+    let beyond = [
+        (
+            "zero",
+            d.zero,
+            "rad, motor position where all joints are at zero (beyond the screw's)",
+        ),
+        (
+            "joint_inertia",
+            d.joint_inertia,
+            "kg*m^2 (kg where prismatic), seen at the joint beside the rotors",
+        ),
+        ("coulomb", d.coulomb, "N*m, on the motor side"),
+        ("viscous", d.viscous, "N*m*s/rad, on the motor side"),
+    ];
+    for (key, value, comment) in beyond {
+        if value != 0.0 {
+            line(out, key, &float(value), comment);
+        }
+    }
+    line(
+        out,
+        "rotor_inertia",
+        &float(d.rotor_inertia),
+        "kg*m^2, on the motor side",
+    );
+    if d.torque_constant != 0.0 {
+        line(
+            out,
+            "torque_constant",
+            &float(d.torque_constant),
+            "N*m/A, on the motor side",
+        );
+    }
+    optional(out, "resistance", d.resistance, "ohm");
+    optional(out, "inductance", d.inductance, "H");
+    optional(
+        out,
+        "encoder_counts_per_rev",
+        d.encoder_counts_per_rev,
+        "counts per motor turn after quadrature",
+    );
+    if let Some(p) = d.pole_pairs {
+        line(out, "pole_pairs", &p.to_string(), "0 where brushed");
+    }
+    if let Some(s) = &d.screw {
+        write_screw(out, s);
+    }
+}
+
+fn write_screw(out: &mut String, s: &Screw) {
+    out.push_str("\n[joint.drive.screw]\n");
+    line(
+        out,
+        "lead",
+        &float(s.lead),
+        "m per motor turn, negative where the screw shortens as the motor turns forwards",
+    );
+    line(out, "crank", &float(s.crank), "m");
+    line(
+        out,
+        "anchor",
+        &list(&s.anchor),
+        "m, fixed end of the screw in the crank's plane, the axle at the origin",
+    );
+    line(
+        out,
+        "angle",
+        &table(&s.angle),
+        "turns of the crank per turn of these joints",
+    );
+    line(
+        out,
+        "offset",
+        &float(s.offset),
+        "rad, the crank's angle where all joints are at zero",
+    );
+    if let Some(range) = &s.range {
+        line(
+            out,
+            "range",
+            &list(range),
+            "rad, lowest and highest angle of the crank",
+        );
+    }
+}
+
+/// Inline table of numbers by name.
+fn table(values: &BTreeMap<String, f64>) -> String {
+    let key = |name: &str| {
+        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if !name.is_empty() && name.chars().all(bare) {
+            name.to_owned()
+        } else {
+            quoted_key(name)
+        }
+    };
+    let items: Vec<String> = values
+        .iter()
+        .map(|(name, v)| format!("{} = {}", key(name), float(*v)))
+        .collect();
+    format!("{{ {} }}", items.join(", "))
+}
+
+/// A name as a basic TOML string on one line.
+fn quoted_key(name: &str) -> String {
+    let mut text = String::from("\"");
+    for c in name.chars() {
+        match c {
+            '"' | '\\' => {
+                text.push('\\');
+                text.push(c);
+            }
+            c if c.is_control() => {
+                let _ = write!(text, "\\u{:04X}", u32::from(c));
+            }
+            c => text.push(c),
+        }
+    }
+    text.push('"');
+    text
 }
 
 fn optional(out: &mut String, key: &str, value: Option<f64>, comment: &str) {

@@ -4,7 +4,10 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-use rig_shared::multibody::{COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix};
+use rig_shared::multibody::{
+    COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix, inverse_dynamics,
+};
+use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError};
 use thiserror::Error;
 
 use crate::robot::{Controller, Robot};
@@ -56,6 +59,17 @@ pub enum SimulateError {
     /// The chain cannot be built.
     #[error(transparent)]
     Chain(#[from] ChainError),
+    /// Friction of coupled drives that feeds energy in.
+    #[error(
+        "the viscous friction of the coupled drives (fvm with fv of the joints they move) would drive some motion: its least damping is {least} N·m·s/rad; give the motors or the joints more, or identify them anew."
+    )]
+    DrivingFriction {
+        /// Least eigenvalue of the damping matrix.
+        least: f64,
+    },
+    /// The drives cannot be used.
+    #[error(transparent)]
+    Drives(#[from] TransmissionError),
     /// Lengths or inertia.
     #[error(transparent)]
     Multibody(#[from] MultibodyError),
@@ -67,6 +81,16 @@ pub struct Model {
     pub chain: Chain<f64>,
     /// Parameters, joint by joint.
     pub parameters: Vec<[f64; COLUMNS]>,
+    /// Drives that move more than their own joint or do it at a changing ratio; none where there is no such drive.
+    pub motors: Option<Motors>,
+}
+
+/// Coupled drives and what they add to the joints' own parameters.
+pub struct Motors {
+    /// Motor positions as functions of the joints'.
+    pub transmission: Transmission<f64>,
+    /// Parameters, motor by motor, in the order of `MOTOR_COLUMN_NAMES`.
+    pub parameters: Vec<[f64; MOTOR_COLUMNS]>,
 }
 
 impl Model {
@@ -76,8 +100,65 @@ impl Model {
     /// [`SimulateError::Chain`] on geometry that is no chain.
     pub fn from_robot(robot: &Robot) -> Result<Self, SimulateError> {
         let chain = Chain::new(&robot.geometry(), robot.gravity)?;
-        let parameters = robot.standard_parameters();
-        Ok(Self { chain, parameters })
+        Ok(Self {
+            chain,
+            parameters: robot.standard_parameters(),
+            motors: Motors::from_robot(robot)?,
+        })
+    }
+
+    /// Inertia matrix at `q`, n × n row-major, drives and motors included.
+    ///
+    /// # Errors
+    /// [`SimulateError::Multibody`], [`SimulateError::Drives`]: lengths.
+    pub fn inertia_matrix(&self, q: &[f64], out: &mut [f64]) -> Result<(), SimulateError> {
+        inertia_matrix(&self.chain, &self.parameters, q, out)?;
+        if let Some(motors) = &self.motors {
+            motors
+                .transmission
+                .add_motor_inertia(&motors.parameters, q, out)?;
+        }
+        Ok(())
+    }
+
+    /// Torques of the joints (length n) that a motion needs, drives, motors and friction included.
+    ///
+    /// # Errors
+    /// As [`Self::inertia_matrix`].
+    pub fn inverse_dynamics(
+        &self,
+        q: &[f64],
+        qd: &[f64],
+        qdd: &[f64],
+        tau: &mut [f64],
+    ) -> Result<(), SimulateError> {
+        inverse_dynamics(&self.chain, &self.parameters, q, qd, qdd, tau)?;
+        if let Some(motors) = &self.motors {
+            let width = motors.parameters.len() * MOTOR_COLUMNS;
+            let mut columns = vec![0.0; tau.len() * width];
+            motors
+                .transmission
+                .motor_columns(q, qd, qdd, &mut columns)?;
+            let values = motors.parameters.as_flattened();
+            for (entry, row) in tau.iter_mut().zip(columns.chunks_exact(width)) {
+                *entry += row.iter().zip(values).map(|(y, p)| y * p).sum::<f64>();
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Motors {
+    /// Those of a description; none where every drive moves its own joint at a constant ratio.
+    ///
+    /// # Errors
+    /// [`SimulateError::Drives`] on drives that are none.
+    pub fn from_robot(robot: &Robot) -> Result<Option<Self>, SimulateError> {
+        let transmission = robot.transmission()?;
+        Ok((!transmission.is_simple()).then(|| Self {
+            transmission,
+            parameters: robot.motor_parameters(),
+        }))
     }
 }
 
@@ -95,7 +176,7 @@ pub fn controllers(
 ) -> Result<(Vec<Controller>, Vec<String>), SimulateError> {
     let n = robot.joints.len();
     let mut mass = vec![0.0; n * n];
-    inertia_matrix(&model.chain, &model.parameters, q, &mut mass)?;
+    model.inertia_matrix(q, &mut mass)?;
     let mut stand_ins = Vec::new();
     let mut list = Vec::with_capacity(n);
     for (i, joint) in robot.joints.iter().enumerate() {

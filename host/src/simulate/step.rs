@@ -5,9 +5,13 @@
 //! whatever value in [−fc, fc] brings the joint to rest, or ±fc if that is not enough. Nothing is smoothed,
 //! so a joint below breakaway stands still exactly. Second order in the step while no joint starts or stops.
 //!
+//! Motors of coupled drives count with their inertia A + Jᵀ·I_m·J, its change with the position, their viscous friction
+//! and a Coulomb friction along the motor's own motion, all of the middle of the step.
+//!
 //! Leaves out: every friction beyond Coulomb and viscous, elasticity, end stops.
 
 use rig_shared::multibody::{COLUMNS, bias_torque, column, inertia_matrix};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
 use super::{Model, SimulateError};
 
@@ -15,6 +19,8 @@ use super::{Model, SimulateError};
 const PASSES: usize = 2;
 /// Bound on the sweeps over the joints for the friction torques; they converge geometrically.
 const SWEEPS: usize = 200;
+/// Joints that a stuck motor holds are at rest below this speed, rad/s or m/s: rounding of the friction torques.
+const AT_REST: f64 = 1e-11;
 
 /// Steps a model; owns every buffer, so that a step allocates nothing.
 pub struct Stepper<'a> {
@@ -28,8 +34,19 @@ pub struct Stepper<'a> {
     middle: Vec<f64>,
     mean_velocity: Vec<f64>,
     free: Vec<f64>,
-    friction: Vec<f64>,
     next: Vec<f64>,
+    /// Viscous friction, n × n.
+    damping: Vec<f64>,
+    /// Directions along which Coulomb friction acts, one row each: the joints, then the motors of coupled drives.
+    along: Vec<f64>,
+    /// Its bounds.
+    limits: Vec<f64>,
+    friction: Vec<f64>,
+    /// What a unit of each friction does to the velocities (n columns a row), and to the speeds along all directions.
+    response: Vec<f64>,
+    coupling: Vec<f64>,
+    /// Columns of the motors at rest acceleration.
+    columns: Vec<f64>,
 }
 
 impl<'a> Stepper<'a> {
@@ -54,7 +71,37 @@ impl<'a> Stepper<'a> {
             row[column::COULOMB] = 0.0;
             row[column::OFFSET] = 0.0;
         }
-        Ok(Self {
+        let mut limits: Vec<f64> = model
+            .parameters
+            .iter()
+            .map(|p| p[column::COULOMB])
+            .collect();
+        let mut columns = Vec::new();
+        if let Some(motors) = &model.motors {
+            let names = [
+                (motor_column::VISCOUS, "fvm"),
+                (motor_column::COULOMB, "fcm"),
+            ];
+            for (k, row) in motors.parameters.iter().enumerate() {
+                for (place, name) in names {
+                    // `!(>=)`: NaN is refused as well.
+                    if row[place].is_nan() || row[place] < 0.0 {
+                        return Err(SimulateError::NegativeFriction {
+                            parameter: format!("{name}{}", k + 1),
+                            value: row[place],
+                        });
+                    }
+                }
+                limits.push(row[motor_column::COULOMB]);
+            }
+            columns = vec![0.0; n * n * MOTOR_COLUMNS];
+        }
+        let contacts = limits.len();
+        let mut along = vec![0.0; contacts * n];
+        for i in 0..n {
+            along[i * n + i] = 1.0;
+        }
+        let stepper = Self {
             model,
             smooth,
             mass: vec![0.0; n * n],
@@ -64,9 +111,100 @@ impl<'a> Stepper<'a> {
             middle: vec![0.0; n],
             mean_velocity: vec![0.0; n],
             free: vec![0.0; n],
-            friction: vec![0.0; n],
             next: vec![0.0; n],
-        })
+            damping: vec![0.0; n * n],
+            along,
+            limits,
+            friction: vec![0.0; contacts],
+            response: vec![0.0; contacts * n],
+            coupling: vec![0.0; contacts * contacts],
+            columns,
+        };
+        stepper.refuse_driving_friction()?;
+        Ok(stepper)
+    }
+
+    /// Coupled drives take energy out in every motion. (Those of changing ratio do by their signs; the others' damping is
+    /// the same everywhere.)
+    fn refuse_driving_friction(&self) -> Result<(), SimulateError> {
+        let Some(motors) = &self.model.motors else {
+            return Ok(());
+        };
+        let n = self.smooth.len();
+        let mut constant = motors.parameters.clone();
+        for (k, row) in constant.iter_mut().enumerate() {
+            if motors.transmission.kind(k) == Some(DriveKind::Varying) {
+                row[motor_column::VISCOUS] = 0.0;
+            }
+        }
+        let mut damping = nalgebra::DMatrix::zeros(n, n);
+        for i in 0..n {
+            damping[(i, i)] = self.model.parameters[i][column::VISCOUS];
+        }
+        let origin = vec![0.0; n];
+        motors
+            .transmission
+            .add_motor_viscosity(&constant, &origin, damping.as_mut_slice())?;
+        let scale = damping.amax();
+        let least = damping.symmetric_eigenvalues().min();
+        // Rounding of the entries; a drive without friction of its own has a damping of exactly zero.
+        if least < -1e-9 * scale {
+            return Err(SimulateError::DrivingFriction { least });
+        }
+        Ok(())
+    }
+
+    /// What depends on the position alone: inertia, damping and the directions of friction in the middle of the step.
+    fn place(&mut self) -> Result<(), SimulateError> {
+        let n = self.middle.len();
+        inertia_matrix(
+            &self.model.chain,
+            &self.smooth,
+            &self.middle,
+            &mut self.mass,
+        )?;
+        self.damping.fill(0.0);
+        for i in 0..n {
+            self.damping[i * n + i] = self.model.parameters[i][column::VISCOUS];
+        }
+        if let Some(motors) = &self.model.motors {
+            let t = &motors.transmission;
+            t.add_motor_inertia(&motors.parameters, &self.middle, &mut self.mass)?;
+            t.add_motor_viscosity(&motors.parameters, &self.middle, &mut self.damping)?;
+            t.motor_directions(&self.middle, &mut self.along[n * n..])?;
+        }
+        Ok(())
+    }
+
+    /// Torques at rest acceleration without friction, with the change of the motors' ratios.
+    fn bias(&mut self) -> Result<(), SimulateError> {
+        bias_torque(
+            &self.model.chain,
+            &self.smooth,
+            &self.middle,
+            &self.mean_velocity,
+            &mut self.bias,
+        )?;
+        if let Some(motors) = &self.model.motors
+            && !motors.transmission.is_constant()
+        {
+            let n = self.bias.len();
+            // Accelerations of zero; `free` gets its values after this.
+            self.free.fill(0.0);
+            motors.transmission.motor_columns(
+                &self.middle,
+                &self.mean_velocity,
+                &self.free,
+                &mut self.columns,
+            )?;
+            for (i, row) in self.columns.chunks_exact(n * MOTOR_COLUMNS).enumerate() {
+                for (k, parameters) in motors.parameters.iter().enumerate() {
+                    let place = k * MOTOR_COLUMNS + motor_column::INERTIA;
+                    self.bias[i] += row[place] * parameters[motor_column::INERTIA];
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`.
@@ -84,34 +222,30 @@ impl<'a> Stepper<'a> {
         for i in 0..n {
             self.middle[i] = q[i] + 0.5 * dt * v[i];
         }
-        inertia_matrix(
-            &self.model.chain,
-            &self.smooth,
-            &self.middle,
-            &mut self.mass,
-        )?;
+        self.place()?;
         // Viscous friction acts on the mean velocity of the step: half of it belongs to the unknown.
-        self.factor.copy_from_slice(&self.mass);
-        for i in 0..n {
-            self.factor[i * n + i] += 0.5 * dt * self.model.parameters[i][column::VISCOUS];
+        for (entry, (mass, damping)) in self
+            .factor
+            .iter_mut()
+            .zip(self.mass.iter().zip(&self.damping))
+        {
+            *entry = mass + 0.5 * dt * damping;
         }
         invert(&mut self.factor, &mut self.inverse, n)?;
+        self.respond();
         self.mean_velocity.copy_from_slice(v);
         for _ in 0..PASSES {
-            bias_torque(
-                &self.model.chain,
-                &self.smooth,
-                &self.middle,
-                &self.mean_velocity,
-                &mut self.bias,
-            )?;
+            self.bias()?;
             for i in 0..n {
                 let own = &self.model.parameters[i];
-                let driving = torque[i]
-                    - self.bias[i]
-                    - own[column::OFFSET]
-                    - 0.5 * own[column::VISCOUS] * v[i];
-                let momentum: f64 = (0..n).map(|k| self.mass[i * n + k] * v[k]).sum();
+                let row = i * n..(i + 1) * n;
+                let drag: f64 = self.damping[row.clone()]
+                    .iter()
+                    .zip(&*v)
+                    .map(|(d, v)| d * v)
+                    .sum();
+                let driving = torque[i] - self.bias[i] - own[column::OFFSET] - 0.5 * drag;
+                let momentum: f64 = self.mass[row].iter().zip(&*v).map(|(m, v)| m * v).sum();
                 self.next[i] = momentum + dt * driving;
             }
             for i in 0..n {
@@ -129,22 +263,47 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
+    /// What a unit of each friction torque does: its own direction through the inverse, and what the others see of it.
+    fn respond(&mut self) {
+        let n = self.free.len();
+        let contacts = self.limits.len();
+        for c in 0..contacts {
+            for i in 0..n {
+                self.response[c * n + i] = (0..n)
+                    .map(|k| self.inverse[i * n + k] * self.along[c * n + k])
+                    .sum();
+            }
+        }
+        for c in 0..contacts {
+            for d in 0..contacts {
+                self.coupling[c * contacts + d] = (0..n)
+                    .map(|k| self.along[c * n + k] * self.response[d * n + k])
+                    .sum();
+            }
+        }
+    }
+
     /// Projected Gauss–Seidel on the friction torques: afterwards `next` holds the velocities.
     fn solve_friction(&mut self, dt: f64) {
         let n = self.free.len();
+        let contacts = self.limits.len();
         for _ in 0..SWEEPS {
             let mut change = 0.0_f64;
-            for i in 0..n {
-                let coupled: f64 = (0..n)
-                    .map(|k| self.inverse[i * n + k] * self.friction[k])
+            for c in 0..contacts {
+                let limit = self.limits[c];
+                let own = self.coupling[c * contacts + c];
+                // A motor that moves its own joint only has no direction here: its friction is the joint's.
+                if limit == 0.0 || own <= 0.0 {
+                    continue;
+                }
+                let coupled: f64 = (0..contacts)
+                    .map(|k| self.coupling[c * contacts + k] * self.friction[k])
                     .sum();
-                let velocity = self.free[i] - dt * coupled;
-                let limit = self.model.parameters[i][column::COULOMB];
-                let before = self.friction[i];
-                let wanted = before + velocity / (dt * self.inverse[i * n + i]);
-                self.friction[i] = wanted.clamp(-limit, limit);
-                change =
-                    change.max((self.friction[i] - before).abs() / limit.max(f64::MIN_POSITIVE));
+                let free: f64 = (0..n).map(|k| self.along[c * n + k] * self.free[k]).sum();
+                let before = self.friction[c];
+                let wanted = before + (free - dt * coupled) / (dt * own);
+                self.friction[c] = wanted.clamp(-limit, limit);
+                change = change.max((self.friction[c] - before).abs() / limit);
             }
             // A single joint is exact after one sweep; the comparison ends it after the second.
             if change < 1e-12 {
@@ -152,13 +311,27 @@ impl<'a> Stepper<'a> {
             }
         }
         for i in 0..n {
-            let coupled: f64 = (0..n)
-                .map(|k| self.inverse[i * n + k] * self.friction[k])
+            let coupled: f64 = (0..contacts)
+                .map(|c| self.response[c * n + i] * self.friction[c])
                 .sum();
-            let velocity = self.free[i] - dt * coupled;
-            // A stuck joint is at rest exactly, not to rounding: drift over minutes would otherwise add up.
-            let stuck = self.friction[i].abs() < self.model.parameters[i][column::COULOMB];
-            self.next[i] = if stuck { 0.0 } else { velocity };
+            self.next[i] = self.free[i] - dt * coupled;
+        }
+        // What is stuck is at rest exactly, not to rounding: drift over minutes would otherwise add up.
+        for c in 0..contacts {
+            if self.friction[c].abs() >= self.limits[c] {
+                continue;
+            }
+            let along = &self.along[c * n..(c + 1) * n];
+            let touched = |i: usize| along[i] != 0.0;
+            if c < n {
+                self.next[c] = 0.0;
+            } else if (0..n).all(|i| !touched(i) || self.next[i].abs() < AT_REST) {
+                for i in 0..n {
+                    if touched(i) {
+                        self.next[i] = 0.0;
+                    }
+                }
+            }
         }
     }
 }

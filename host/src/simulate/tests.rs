@@ -168,3 +168,144 @@ fn friction_below_zero_is_refused_by_name() {
     let error = Stepper::new(&model).err().unwrap().to_string();
     assert!(error.contains("fv1") && error.contains("-0.2"), "{error}");
 }
+
+/// The IRp-6 of the book without friction and without controllers.
+fn frictionless_irp6() -> Robot {
+    let path = std::path::Path::new("irp6.toml");
+    let mut robot = Robot::from_toml(crate::robot::IRP6_TEMPLATE, path).unwrap();
+    for joint in &mut robot.joints {
+        joint.friction = None;
+        let drive = joint.drive.as_mut().unwrap();
+        (drive.coulomb, drive.viscous) = (0.0, 0.0);
+    }
+    robot
+}
+
+/// Energy of links and rotors, the rotors' from the motor speeds themselves.
+fn energy_with_rotors(robot: &Robot, q: &[f64], v: &[f64]) -> f64 {
+    let mut links = robot.clone();
+    for joint in &mut links.joints {
+        joint.drive = None;
+    }
+    let links = Model::from_robot(&links).unwrap();
+    let mut psid = vec![0.0; q.len()];
+    robot
+        .transmission()
+        .unwrap()
+        .motor_velocity(q, v, &mut psid)
+        .unwrap();
+    let rotors: f64 = psid
+        .iter()
+        .zip(&robot.joints)
+        .map(|(w, j)| 0.5 * j.drive.as_ref().unwrap().rotor_inertia * w * w)
+        .sum();
+    energy(&links, q, v) + rotors
+}
+
+/// Joint speeds at which no motor of the IRp-6 stands still, nor reverses for some tenths of a second.
+const THROWN: [f64; 5] = [0.8, 1.0, -2.2, 2.5, 2.0];
+
+/// A throw of the IRp-6 from the middle of its range: final state, and ∫ f(q, v) dt on the way.
+fn throw(
+    robot: &Robot,
+    dt: f64,
+    seconds: f64,
+    mut power: impl FnMut(&[f64], &[f64]) -> f64,
+) -> (Vec<f64>, Vec<f64>, f64) {
+    let model = Model::from_robot(robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, mut v) = (robot.middle_position(), THROWN.to_vec());
+    let mut sum = 0.5 * power(&q, &v);
+    let steps = (seconds / dt).round() as usize;
+    for k in 0..steps {
+        stepper.step(&mut q, &mut v, &[0.0; 5], dt).unwrap();
+        sum += if k + 1 == steps { 0.5 } else { 1.0 } * power(&q, &v);
+    }
+    (q, v, sum * dt)
+}
+
+#[test]
+fn the_irp6_keeps_the_energy_of_its_links_and_rotors() {
+    let robot = frictionless_irp6();
+    let start = energy_with_rotors(&robot, &robot.middle_position(), &THROWN);
+    let drift = |dt: f64| {
+        let (q, v, _) = throw(&robot, dt, 0.3, |_, _| 0.0);
+        (energy_with_rotors(&robot, &q, &v) - start).abs()
+    };
+    let (coarse, fine) = (drift(2e-3), drift(1e-3));
+    assert!(coarse < 1e-3 * start.abs(), "{coarse} of {start}");
+    assert!(fine < coarse / 3.0, "{coarse} {fine}");
+}
+
+#[test]
+fn the_friction_of_the_motors_takes_its_power_at_the_motors() {
+    let mut robot = frictionless_irp6();
+    for joint in &mut robot.joints {
+        let drive = joint.drive.as_mut().unwrap();
+        (drive.coulomb, drive.viscous) = (0.01, 3e-4);
+    }
+    let start = energy_with_rotors(&robot, &robot.middle_position(), &THROWN);
+    let transmission = robot.transmission().unwrap();
+    let (q, v, lost) = throw(&robot, 1e-4, 0.2, |q, v| {
+        let mut psid = [0.0; 5];
+        transmission.motor_velocity(q, v, &mut psid).unwrap();
+        // A motor that reverses would make the sum of steps inexact.
+        assert!(psid.iter().all(|w| w.abs() > 1.0), "{psid:?}");
+        psid.iter().map(|w| 3e-4 * w * w + 0.01 * w.abs()).sum()
+    });
+    let after = energy_with_rotors(&robot, &q, &v);
+    assert!(lost > 1.0);
+    assert!(
+        (start - after - lost).abs() < 1e-4 * lost,
+        "{start} {after} {lost}"
+    );
+}
+
+#[test]
+fn a_motor_that_sticks_holds_the_joints_it_moves() {
+    // Friction of the screws' motors beyond what gravity asks of them; the wrist's is at its joints.
+    let mut robot = frictionless_irp6();
+    for joint in &mut robot.joints {
+        joint.drive.as_mut().unwrap().coulomb = 3.0;
+    }
+    let model = Model::from_robot(&robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let start = robot.middle_position();
+    let (mut q, mut v) = (start.clone(), vec![0.0; 5]);
+    for _ in 0..20_000 {
+        stepper.step(&mut q, &mut v, &[0.0; 5], 1e-3).unwrap();
+    }
+    assert_eq!(q, start);
+}
+
+#[test]
+fn model_and_simulation_agree_on_the_irp6_with_all_its_friction() {
+    let path = std::path::Path::new("irp6.toml");
+    let robot = Robot::from_toml(crate::robot::IRP6_TEMPLATE, path).unwrap();
+    let model = Model::from_robot(&robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (q, v) = (robot.middle_position(), [0.3, 0.25, -0.35, 0.4, -0.7]);
+    let torque = [150.0, -220.0, 90.0, -40.0, 25.0];
+    let dt = 1e-6;
+    let (mut next_q, mut next_v) = (q.clone(), v.to_vec());
+    stepper.step(&mut next_q, &mut next_v, &torque, dt).unwrap();
+    let acceleration: Vec<f64> = next_v.iter().zip(v).map(|(a, b)| (a - b) / dt).collect();
+    let mut tau = [0.0; 5];
+    model
+        .inverse_dynamics(&q, &v, &acceleration, &mut tau)
+        .unwrap();
+    for (a, b) in tau.iter().zip(torque) {
+        assert!((a - b).abs() < 0.01, "{tau:?} {torque:?}");
+    }
+}
+
+#[test]
+fn coupled_friction_that_would_drive_is_refused() {
+    let path = std::path::Path::new("tx40.toml");
+    let robot = Robot::from_toml(crate::robot::TX40, path).unwrap();
+    let mut model = Model::from_robot(&robot).unwrap();
+    // Cross damping of the wrist without the diagonal that it belongs to.
+    model.motors.as_mut().unwrap().parameters[5][1] = 0.5;
+    let error = Stepper::new(&model).err().unwrap().to_string();
+    assert!(error.contains("-0.5"), "{error}");
+}

@@ -19,6 +19,7 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use motion::added_torque;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
@@ -224,11 +225,17 @@ pub fn validate(
     }
     let chain = chain_of(robot)?;
     let model = Model::from_robot(robot)?;
+    // Those of coupled drives follow the joints'.
+    let motors = model
+        .motors
+        .as_ref()
+        .map_or(&[][..], |m| m.parameters.as_flattened());
     // Parameters that are zero add nothing to the torque: their columns are not formed.
     let (columns, values): (Vec<usize>, Vec<f64>) = model
         .parameters
         .iter()
         .flatten()
+        .chain(motors)
         .copied()
         .enumerate()
         .filter(|(_, value)| *value != 0.0)
@@ -249,8 +256,10 @@ pub fn validate(
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
     let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
+        transmission: &transmission,
         columns: &columns,
         treatment: &treatment,
         window: 0,

@@ -301,7 +301,7 @@ fn gather(
 }
 
 /// The torque added to joint `j` over the first `rows` rows of a block, and in words where it is the first such.
-fn added_torque(
+pub(crate) fn added_torque(
     block: &Block,
     j: usize,
     controllers: &[Controller],

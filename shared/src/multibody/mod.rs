@@ -19,6 +19,7 @@
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
 //! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
 
+mod adjoint;
 mod articulated;
 pub mod block;
 mod chain;
@@ -28,6 +29,7 @@ mod energy;
 mod forward;
 mod inertia_matrix;
 mod inverse;
+mod kinematics;
 mod momentum;
 mod parameters;
 mod regressor;
@@ -44,6 +46,7 @@ mod textbook;
 #[cfg(test)]
 mod timing;
 
+pub use adjoint::regressor_gradient;
 pub use articulated::articulated_forward_dynamics;
 pub use chain::{Chain, ChainError, JointGeometry, JointKind, MAX_JOINTS, MultibodyError};
 pub use coefficients::{pair_column, velocity_coefficients};
@@ -55,6 +58,7 @@ pub use energy::{
 pub use forward::forward_dynamics;
 pub use inertia_matrix::inertia_matrix;
 pub use inverse::{bias_torque, gravity_vector, inverse_dynamics};
+pub use kinematics::point_position;
 pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;

@@ -32,6 +32,11 @@ pub enum Fault {
     Deadline,
     /// The host has been silent for longer than allowed; the value is in s.
     HostSilent,
+    /// The encoder's channels changed both at once, or its index came at a wrong count; the value is by how many
+    /// counts, 0 where the channels were at fault.
+    EncoderSignal,
+    /// The stack has come near its end; the value is the bytes that are left.
+    Stack,
 }
 
 /// The first fault since the last clearing.

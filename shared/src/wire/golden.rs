@@ -127,6 +127,13 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             RequestBody::SetPosition(-1.5),
             "048202120107c0bf5151085200"
         ),
+        ("Store", RequestBody::Store, "088202134182678000"),
+        (
+            "Capture",
+            RequestBody::Capture(300),
+            "0a820214ac02484d04bc00"
+        ),
+        ("GetCapture", RequestBody::GetCapture, "08820215a965c6a600"),
     ]
 }
 
@@ -232,6 +239,47 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
             }),
             "0c060b5510c0843d6827e16500"
         ),
+        (
+            "Acknowledge, not stored",
+            Report::Acknowledge(Acknowledge {
+                id: 302,
+                result: Err(Refusal::StorageFailed)
+            }),
+            "0a01ae0201080c27f31c00"
+        ),
+        (
+            "Capture",
+            Report::Capture(SnapshotPart {
+                first: 2040,
+                total: 2048,
+                samples: core::iter::once(SnapshotSample {
+                    tick: 91,
+                    position: -77,
+                    current: 8.5,
+                    duty: -0.25,
+                    supply: 23.5,
+                    reference: 0.125
+                })
+                .collect()
+            }),
+            "0a07f80f8010015b990101030841010380be0103bc410101063ee3b84a6400"
+        ),
+        (
+            "Health",
+            Report::Health(Health {
+                tick: 10_000,
+                reset: ResetCause::Watchdog,
+                settings: SettingsOrigin::Damaged,
+                clock_hz: 170_000_000,
+                crystal: true,
+                tick_cycles_max: 5000,
+                tick_cycles_mean: 3000,
+                stack_free: 20_000,
+                bad_requests: 1,
+                dropped: 8
+            }),
+            "1808904e030380fd8751018827b817a09c0101089e59a71d00"
+        ),
     ]
 }
 
@@ -279,6 +327,9 @@ fn request_number(body: &RequestBody) -> usize {
         RequestBody::StopStream => 16,
         RequestBody::GetSnapshot => 17,
         RequestBody::SetPosition(_) => 18,
+        RequestBody::Store => 19,
+        RequestBody::Capture(_) => 20,
+        RequestBody::GetCapture => 21,
     }
 }
 
@@ -291,29 +342,31 @@ fn report_number(report: &Report) -> usize {
         Report::Fault(_) => 4,
         Report::Snapshot(_) => 5,
         Report::StreamEnd(_) => 6,
+        Report::Capture(_) => 7,
+        Report::Health(_) => 8,
     }
 }
 
 #[test]
 fn every_request_has_its_bytes() {
     let mut right = true;
-    let mut seen = [false; 19];
+    let mut seen = [false; 22];
     for (name, body, expected) in requests() {
         seen[request_number(&body)] = true;
         right &= check(name, &Request { id: 258, body }, expected);
     }
-    assert_eq!(seen, [true; 19]);
+    assert_eq!(seen, [true; 22]);
     assert!(right, "the format has changed: see the head of this file");
 }
 
 #[test]
 fn every_report_has_its_bytes() {
     let mut right = true;
-    let mut seen = [false; 7];
+    let mut seen = [false; 9];
     for (name, report, expected) in reports() {
         seen[report_number(&report)] = true;
         right &= check(name, &report, expected);
     }
-    assert_eq!(seen, [true; 7]);
+    assert_eq!(seen, [true; 9]);
     assert!(right, "the format has changed: see the head of this file");
 }

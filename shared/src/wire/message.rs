@@ -73,6 +73,14 @@ pub enum RequestBody {
     GetSnapshot,
     /// Say where the link stands now, rad; only while disarmed. An incremental encoder cannot know.
     SetPosition(f32),
+    /// Keep limits, gains, laws and models in the rig's own memory, for the next power on; only while disarmed.
+    /// Answered when it is done.
+    Store,
+    /// Have the capture of single control ticks stand still so many ticks from now. One that waits to be
+    /// fetched is given up.
+    Capture(u16),
+    /// Send the capture, part by part, once it stands still; one part without samples where none was triggered.
+    GetCapture,
 }
 
 /// Rig to host.
@@ -93,6 +101,10 @@ pub enum Report {
     Snapshot(SnapshotPart),
     /// The stream has ended; what was sent in all, so that losses at its end count too.
     StreamEnd(StreamEnd),
+    /// Part of the capture: single control ticks.
+    Capture(SnapshotPart),
+    /// How the board is, about once a second.
+    Health(Health),
 }
 
 /// Who speaks, in which version, at which rates.
@@ -119,7 +131,7 @@ pub struct Greeting {
 }
 
 /// Answer to a [`Request`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Acknowledge {
     /// The request's number.
     pub id: u16,
@@ -142,6 +154,12 @@ pub enum Refusal {
     OutsideLimits,
     /// No trajectory is loaded.
     NoTrajectory,
+    /// The settings are being stored; ask again when that has been answered.
+    Busy,
+    /// This rig cannot keep settings.
+    NoStorage,
+    /// The memory did not take the settings; those stored before still stand.
+    StorageFailed,
 }
 
 /// Consecutive state samples, oldest first.
@@ -213,4 +231,59 @@ pub struct StreamEnd {
     pub dropped: u64,
     /// Control tick at which the stream's first window began; places a loss of the whole stream.
     pub first_tick: u64,
+}
+
+/// Where the settings came from that the rig started with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum SettingsOrigin {
+    /// Nothing was ever stored: the firmware's own.
+    Defaults,
+    /// As stored.
+    Stored,
+    /// One of the two stored copies is damaged: the other.
+    OlderCopy,
+    /// What is stored is damaged: the firmware's own.
+    Damaged,
+    /// What is stored is of another firmware's form, or cannot be used: the firmware's own.
+    Unusable,
+}
+
+/// Why the chip last started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ResetCause {
+    /// Power on, or the supply of the chip broke down.
+    Power,
+    /// The reset button or the debugger.
+    Pin,
+    /// The firmware itself, after a panic or a processor fault.
+    Software,
+    /// The independent watchdog: a part of the firmware no longer reported.
+    Watchdog,
+    /// Another one.
+    Other,
+}
+
+/// How the board is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Health {
+    /// Control tick of this report.
+    pub tick: u64,
+    /// Why the chip last started.
+    pub reset: ResetCause,
+    /// Where the settings came from.
+    pub settings: SettingsOrigin,
+    /// Processor cycles in a second.
+    pub clock_hz: u32,
+    /// A crystal sets the pace (some 50 ppm); else the chip's own oscillator (1 %), and every time is so wrong.
+    pub crystal: bool,
+    /// Processor cycles that the longest control tick took since the last report, interrupt entry excluded.
+    pub tick_cycles_max: u32,
+    /// Processor cycles that a control tick took on average since the last report.
+    pub tick_cycles_mean: u32,
+    /// Bytes of the stack that have never been used.
+    pub stack_free: u32,
+    /// Requests that came damaged since power on.
+    pub bad_requests: u32,
+    /// Telemetry windows that found no room since power on.
+    pub dropped: u32,
 }

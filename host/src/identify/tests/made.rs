@@ -279,10 +279,7 @@ fn description_of_the_identified_robot_has_the_identified_dynamics() {
             gear_ratio: 50.0,
             rotor_inertia,
             torque_constant: 0.05,
-            resistance: None,
-            inductance: None,
-            encoder_counts_per_rev: None,
-            pole_pairs: None,
+            ..Default::default()
         });
         let found = identify(&prior, &[&recording], &[], &Options::default()).unwrap();
         let (robot, remarks) = identified_robot(&prior, &found);

@@ -1,6 +1,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod arms;
 mod emps;
+mod exact;
+mod judged;
+mod lwr4;
 mod made;
 
 use super::*;
@@ -30,6 +34,7 @@ fn robot(name: &str, joints: Vec<Joint>) -> Robot {
         name: name.into(),
         gravity: [0.0, 0.0, -9.81],
         joints,
+        workspace: Vec::new(),
         effects: Vec::new(),
     }
 }

@@ -1,0 +1,86 @@
+//! What the health report says, and where the tick's cycles are counted.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use embassy_stm32::pac::RCC;
+use rig_shared::wire::message::{Health, ResetCause, SettingsOrigin};
+
+use super::clock::CORE_HZ;
+use super::stack;
+
+/// Requests that came damaged; counted by the command task.
+pub(crate) static BAD_REQUESTS: AtomicU32 = AtomicU32::new(0);
+
+/// Cycles of the ticks since the last report, and what does not change.
+pub(crate) struct Checkup {
+    start: Start,
+    every: u32,
+    ticks: u32,
+    sum: u32,
+    max: u32,
+}
+
+/// What was found at the start.
+#[derive(Clone, Copy)]
+pub(crate) struct Start {
+    pub(crate) reset: ResetCause,
+    pub(crate) settings: SettingsOrigin,
+    pub(crate) crystal: bool,
+}
+
+impl Checkup {
+    /// A report every so many ticks.
+    pub(crate) fn new(start: Start, every: u32) -> Self {
+        Self {
+            start,
+            every,
+            ticks: 0,
+            sum: 0,
+            max: 0,
+        }
+    }
+
+    /// Counts a tick; gives the report where one is due. `tick` is its number, `dropped` the windows lost so far.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, cycles: u32, tick: u64, dropped: u32) -> Option<Health> {
+        self.ticks += 1;
+        self.sum = self.sum.saturating_add(cycles);
+        self.max = self.max.max(cycles);
+        if self.ticks < self.every {
+            return None;
+        }
+        let health = Health {
+            tick,
+            reset: self.start.reset,
+            settings: self.start.settings,
+            clock_hz: CORE_HZ,
+            crystal: self.start.crystal,
+            tick_cycles_max: self.max,
+            // At 10 kHz the sum of a second is below 2³² by far: every tick is shorter than its period.
+            tick_cycles_mean: self.sum / self.ticks.max(1),
+            stack_free: stack::free(),
+            bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
+            dropped,
+        };
+        *self = Self::new(self.start, self.every);
+        Some(health)
+    }
+}
+
+/// Why the chip last started; forgets it, so that the next start sees its own cause alone.
+pub(crate) fn reset_cause() -> ResetCause {
+    let flags = RCC.csr().read();
+    RCC.csr().modify(|w| w.set_rmvf(true));
+    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440, RCC, "System reset").
+    if flags.iwdgrstf() {
+        ResetCause::Watchdog
+    } else if flags.sftrstf() {
+        ResetCause::Software
+    } else if flags.borrstf() {
+        ResetCause::Power
+    } else if flags.wwdgrstf() || flags.lpwrrstf() || flags.oblrstf() {
+        ResetCause::Other
+    } else {
+        ResetCause::Pin
+    }
+}

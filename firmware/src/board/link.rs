@@ -1,0 +1,150 @@
+//! LPUART1 to the ST-LINK's serial port: what comes in by a ring of DMA, what goes out by DMA.
+
+use core::sync::atomic::Ordering;
+
+use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, LPUART1};
+use embassy_stm32::usart::{
+    Config as UartConfig, ConfigError, InterruptHandler, RingBufferedUartRx, Uart, UartTx,
+};
+use embassy_stm32::{bind_interrupts, dma, mode};
+use embassy_time::{Duration, Ticker, with_timeout};
+use heapless::Vec;
+use heapless::spsc::{Consumer, Producer};
+use rig_firmware::config::Config;
+use rig_firmware::desk::Desk;
+use rig_firmware::examined::{Examined, examine};
+use rig_firmware::note::Note;
+use rig_shared::wire::message::Request;
+use rig_shared::wire::{DecodeError, MAX_FRAME, MessageDecoder};
+use static_cell::ConstStaticCell;
+
+use super::clock::LINK_PRIORITY;
+use super::health::BAD_REQUESTS;
+use super::pins::LinkPins;
+use super::probe;
+use super::watchdog::{Part, report};
+
+/// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
+const BAUD: u32 = 921_600;
+/// Bytes that may come in while the command task is away: 11 ms of line.
+const RING: usize = 1024;
+/// Bytes that go out at a time: two of the longest frames.
+const SEND: usize = 2 * MAX_FRAME;
+/// Longest wait for bytes, so that the command task reports to the watchdog while nobody talks.
+const SILENCE: Duration = Duration::from_millis(20);
+
+static RING_BUFFER: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+static SEND_BUFFER: ConstStaticCell<Vec<u8, SEND>> = ConstStaticCell::new(Vec::new());
+
+bind_interrupts!(struct Interrupts {
+    LPUART1 => InterruptHandler<LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+});
+
+/// Outgoing half.
+pub(crate) type Sender = UartTx<'static, mode::Async>;
+/// Incoming half.
+pub(crate) type Receiver = RingBufferedUartRx<'static>;
+
+/// Opens the line.
+pub(crate) fn open(pins: LinkPins) -> Result<(Sender, Receiver), ConfigError> {
+    let mut config = UartConfig::default();
+    config.baudrate = BAUD;
+    let uart = Uart::new(
+        pins.uart,
+        pins.rx,
+        pins.tx,
+        pins.tx_dma,
+        pins.rx_dma,
+        Interrupts,
+        config,
+    )?;
+    interrupt::LPUART1.set_priority(LINK_PRIORITY);
+    let (sender, receiver) = uart.split();
+    Ok((sender, receiver.into_ring_buffered(RING_BUFFER.take())))
+}
+
+/// Takes notes from the tick a thousand times a second, makes frames of them and sends these.
+#[embassy_executor::task]
+pub(crate) async fn telemetry(
+    config: &'static Config,
+    mut line: Sender,
+    mut probe: probe::Outgoing,
+    mut notes: Consumer<'static, Note>,
+) -> ! {
+    let mut desk = Desk::new();
+    let bytes = SEND_BUFFER.take();
+    let mut ticker = Ticker::every(Duration::from_millis(1));
+    loop {
+        ticker.next().await;
+        report(Part::Telemetry);
+        bytes.clear();
+        while bytes.len() + MAX_FRAME <= SEND
+            && let Some(note) = notes.dequeue()
+        {
+            desk.tell(config, &note, &mut |frame: &[u8]| {
+                bytes.extend_from_slice(frame).is_ok()
+            });
+        }
+        if bytes.is_empty() {
+            continue;
+        }
+        // All of it or nothing: the buffer is longer, so that frames stay whole.
+        let _taken = probe.write(bytes);
+        if line.write(bytes).await.is_err() {
+            defmt::warn!("the serial line did not take {} bytes", bytes.len());
+        }
+    }
+}
+
+/// Passes a request on to the tick.
+fn hand_over(
+    decoded: Option<Result<Request, DecodeError>>,
+    requests: &mut Producer<'static, Examined>,
+) {
+    let taken = match decoded {
+        None => true,
+        // Unanswered, the host repeats it.
+        Some(Err(_)) => {
+            BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
+            true
+        }
+        Some(Ok(request)) => requests.enqueue(examine(request)).is_ok(),
+    };
+    if !taken {
+        defmt::warn!("more requests than can be served");
+    }
+}
+
+/// Takes bytes from the host, makes requests of them and hands these to the tick.
+#[embassy_executor::task]
+pub(crate) async fn commands(
+    mut line: Receiver,
+    mut probe: probe::Incoming,
+    mut requests: Producer<'static, Examined>,
+) -> ! {
+    let mut from_line = MessageDecoder::<Request>::default();
+    let mut from_probe = MessageDecoder::<Request>::default();
+    let mut bytes = [0; 64];
+    loop {
+        report(Part::Commands);
+        let count = match with_timeout(SILENCE, line.read(&mut bytes)).await {
+            Ok(Ok(count)) => count,
+            // A damaged byte or one too many: the frame's check sum finds it, the host repeats its request.
+            Ok(Err(_)) => {
+                defmt::warn!("an error on the serial line");
+                0
+            }
+            Err(_) => 0,
+        };
+        for &byte in bytes.iter().take(count) {
+            hand_over(from_line.push(byte), &mut requests);
+        }
+        let count = probe.read(&mut bytes);
+        for &byte in bytes.iter().take(count) {
+            hand_over(from_probe.push(byte), &mut requests);
+        }
+    }
+}

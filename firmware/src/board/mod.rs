@@ -1,0 +1,18 @@
+//! Everything that knows the chip. `unsafe` stands only where hardware needs it, with the reason beside it.
+
+mod adc;
+mod clock;
+mod cycles;
+mod encoder;
+mod fault;
+mod health;
+mod link;
+mod pins;
+mod probe;
+mod pwm;
+mod queue;
+mod stack;
+pub(crate) mod start;
+mod storage;
+mod tick;
+mod watchdog;

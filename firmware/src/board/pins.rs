@@ -1,0 +1,143 @@
+//! Which wire goes where: the one file that names pins. The table in `docs/firmware.md` says the same.
+
+use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::peripherals::{
+    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB5, PB12, PC0,
+    PC1, PC2,
+};
+use embassy_stm32::{Peri, Peripherals};
+
+/// TIM1 and its break input on PA8, PA9 and PB12 (STM32G474 data sheet DS12288, "Alternate function").
+const AF_TIM1: u8 = 6;
+/// TIM2 channels 1 and 2 on PA0 and PA1.
+const AF_TIM2: u8 = 1;
+/// TIM2's external trigger on PA15.
+const AF_TIM2_ETR: u8 = 14;
+
+/// Converter channels of ADC1.
+pub(crate) const CURRENT_CHANNEL: u8 = 6; // PC0
+pub(crate) const SUPPLY_CHANNEL: u8 = 7; // PC1
+pub(crate) const TEMPERATURE_CHANNEL: u8 = 8; // PC2
+
+/// The bridge's side of the wiring, its pins not yet driven.
+pub(crate) struct BridgePins {
+    pub(crate) enable: Output<'static>,
+    in1: Peri<'static, PA8>,
+    in2: Peri<'static, PA9>,
+    fault: Peri<'static, PB12>,
+}
+
+/// The serial line to the ST-LINK.
+pub(crate) struct LinkPins {
+    pub(crate) uart: Peri<'static, LPUART1>,
+    pub(crate) tx: Peri<'static, PA2>,
+    pub(crate) rx: Peri<'static, PA3>,
+    pub(crate) tx_dma: Peri<'static, DMA1_CH1>,
+    pub(crate) rx_dma: Peri<'static, DMA1_CH2>,
+}
+
+/// All of it.
+pub(crate) struct Pins {
+    pub(crate) bridge: BridgePins,
+    pub(crate) encoder: EncoderPins,
+    pub(crate) analog: AnalogPins,
+    pub(crate) link: LinkPins,
+    pub(crate) led: Output<'static>,
+    pub(crate) watchdog: Peri<'static, IWDG>,
+}
+
+/// The encoder's channels and index.
+pub(crate) struct EncoderPins {
+    a: Peri<'static, PA0>,
+    b: Peri<'static, PA1>,
+    index: Peri<'static, PA15>,
+}
+
+/// Current, supply, temperature.
+pub(crate) struct AnalogPins {
+    current: Peri<'static, PC0>,
+    supply: Peri<'static, PC1>,
+    temperature: Peri<'static, PC2>,
+}
+
+impl Pins {
+    /// Sorts the chip's pins; the bridge's enable is driven low at once.
+    pub(crate) fn new(p: Peripherals) -> Self {
+        let enable: Peri<'static, PB5> = p.PB5;
+        let led: Peri<'static, PA5> = p.PA5;
+        Self {
+            bridge: BridgePins {
+                enable: Output::new(enable, Level::Low, Speed::Low),
+                in1: p.PA8,
+                in2: p.PA9,
+                fault: p.PB12,
+            },
+            encoder: EncoderPins {
+                a: p.PA0,
+                b: p.PA1,
+                index: p.PA15,
+            },
+            analog: AnalogPins {
+                current: p.PC0,
+                supply: p.PC1,
+                temperature: p.PC2,
+            },
+            link: LinkPins {
+                uart: p.LPUART1,
+                tx: p.PA2,
+                rx: p.PA3,
+                tx_dma: p.DMA1_CH1,
+                rx_dma: p.DMA1_CH2,
+            },
+            led: Output::new(led, Level::Low, Speed::Low),
+            watchdog: p.IWDG,
+        }
+    }
+}
+
+impl BridgePins {
+    /// Gives the outputs and the break input to TIM1, which must already hold its outputs idle.
+    pub(crate) fn connect(self) -> Output<'static> {
+        let output = AfType::output(OutputType::PushPull, Speed::Medium);
+        // The driver's fault output is an open drain.
+        let fault = AfType::input(Pull::Up);
+        keep(Flex::new(self.in1), AF_TIM1, output);
+        keep(Flex::new(self.in2), AF_TIM1, output);
+        keep(Flex::new(self.fault), AF_TIM1, fault);
+        self.enable
+    }
+}
+
+impl EncoderPins {
+    /// Gives the encoder to TIM2.
+    pub(crate) fn connect(self) {
+        // A wire that is off rests at a level instead of counting noise.
+        keep(Flex::new(self.a), AF_TIM2, AfType::input(Pull::Up));
+        keep(Flex::new(self.b), AF_TIM2, AfType::input(Pull::Up));
+        keep(
+            Flex::new(self.index),
+            AF_TIM2_ETR,
+            AfType::input(Pull::Down),
+        );
+    }
+}
+
+impl AnalogPins {
+    /// Gives the inputs to the converter.
+    pub(crate) fn connect(self) {
+        for mut pin in [
+            Flex::new(self.current),
+            Flex::new(self.supply),
+            Flex::new(self.temperature),
+        ] {
+            pin.set_as_analog();
+            core::mem::forget(pin);
+        }
+    }
+}
+
+/// Sets a pin to an alternate function for good: a `Flex` that goes out of use disconnects its pin.
+fn keep(mut pin: Flex<'static>, function: u8, kind: AfType) {
+    pin.set_as_af_unchecked(function, kind);
+    core::mem::forget(pin);
+}

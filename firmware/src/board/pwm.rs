@@ -1,0 +1,143 @@
+//! TIM1: the bridge's two inputs, the break input, and the trigger of every sample.
+//!
+//! Centre-aligned at 20 kHz. With d > 0 input 1 is high and input 2 low for the share d of a period, both high
+//! for the rest (drive and brake, so-called slow decay): the motor's current flows on through the bridge, the
+//! ripple is the smallest, and the mean voltage is d times the supply. With d < 0 the inputs change places.
+//!
+//! The repetition counter lets every fourth overflow or underflow through as an update, 10 000 a second, always
+//! at the same end of the ramp: there the new duty takes effect, and there the converter is triggered. It is the
+//! middle of a driving or of a braking interval, where the current equals its mean over the period.
+
+use embassy_stm32::gpio::Output;
+use embassy_stm32::pac::timer::vals::{
+    Bkinp, Bkp, CcmrOutputCcs, Cms, FilterValue, Mms2, Ocm, Ossi, Ossr, Urs,
+};
+use embassy_stm32::pac::{RCC, SYSCFG, TIM1};
+use rig_firmware::sample::Command;
+
+use super::clock::CORE_HZ;
+use super::pins::BridgePins;
+
+/// Pulses a second.
+pub(crate) const PWM_HZ: u32 = 20_000;
+/// Top of the ramp: up and down are one pulse.
+const TOP: u16 = (CORE_HZ / PWM_HZ / 2) as u16;
+
+/// The bridge.
+pub(crate) struct Bridge {
+    enable: Output<'static>,
+}
+
+impl Bridge {
+    /// Sets TIM1 up with its outputs idle and the bridge disabled. `control_hz` must divide twice the pulse rate.
+    pub(crate) fn new(pins: BridgePins, control_hz: u32) -> Self {
+        RCC.apb2enr().modify(|w| {
+            w.set_tim1en(true);
+            w.set_syscfgen(true);
+        });
+        // A processor that has locked up, a flash word beyond repair or a supply that breaks down act on the
+        // break input too (RM0440, SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).
+        SYSCFG.cfgr2().modify(|w| {
+            w.set_cll(true);
+            w.set_eccl(true);
+            w.set_pvdl(true);
+        });
+        let timer = TIM1;
+        timer.cr1().write(|w| {
+            w.set_cms(Cms::CENTER_ALIGNED1);
+            w.set_arpe(true);
+            // Only the counter itself makes updates, and with them triggers.
+            w.set_urs(Urs::COUNTER_ONLY);
+        });
+        timer.psc().write_value(0);
+        timer.arr().write(|w| w.set_arr(TOP));
+        timer
+            .rcr()
+            .write(|w| w.set_rep((2 * PWM_HZ / control_hz - 1) as u16));
+        timer.ccmr_output(0).write(|w| {
+            for channel in 0..2 {
+                w.set_ccs(channel, CcmrOutputCcs::OUTPUT);
+                w.set_ocm(channel, Ocm::PWM_MODE1);
+                w.set_ocpe(channel, true);
+            }
+        });
+        // Idle outputs are low: both inputs low leave the motor open-circuit.
+        timer.cr2().write(|w| w.set_mms2(Mms2::UPDATE));
+        timer.ccr(0).write(|w| w.set_ccr(0));
+        timer.ccr(1).write(|w| w.set_ccr(0));
+        timer.ccer().write(|w| {
+            w.set_cce(0, true);
+            w.set_cce(1, true);
+        });
+        // The break input, active low; its source is the pin (reset value of AF1, written for clarity).
+        timer.af1().write(|w| {
+            w.set_bkine(true);
+            w.set_bkinp(Bkinp::NOT_INVERTED);
+        });
+        timer.bdtr().write(|w| {
+            w.set_bke(0, true);
+            w.set_bkp(0, Bkp::ACTIVE_LOW);
+            // Eight samples at the timer's clock: 47 ns, against spikes that the bridge itself couples in.
+            w.set_bkf(0, FilterValue::FCK_INT_N8);
+            w.set_aoe(false);
+            w.set_ossi(Ossi::IDLE_LEVEL);
+            w.set_ossr(Ossr::IDLE_LEVEL);
+        });
+        // Loads the preloaded registers.
+        timer.egr().write(|w| w.set_ug(true));
+        timer.sr().write_value(Default::default());
+        Self {
+            enable: pins.connect(),
+        }
+    }
+
+    /// Starts the ramp, and with it the sampling. The outputs stay idle.
+    pub(crate) fn run(&mut self) {
+        TIM1.cr1().modify(|w| w.set_cen(true));
+    }
+
+    /// Whether the break input has acted since the bridge was last switched on, or acts now.
+    #[inline(always)]
+    pub(crate) fn broken(&self) -> bool {
+        TIM1.sr().read().bif(0)
+    }
+
+    /// Puts a command on the outputs, effective from the next update on; switching off is at once.
+    #[inline(always)]
+    pub(crate) fn apply(&mut self, command: Command) {
+        let timer = TIM1;
+        if !command.bridge {
+            off();
+            // A driver fault that has gone may be cleared: the flag rises again at once if it has not.
+            timer.sr().write(|w| {
+                // Written with zero a flag is cleared, with one it is left (rc_w0).
+                *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
+                w.set_bif(0, false);
+            });
+            return;
+        }
+        let high = f32::from(TOP);
+        let braking = (high * (1.0 - command.duty.0.abs())) as u16;
+        // Above the top: never low.
+        let (one, two) = if command.duty.0 >= 0.0 {
+            (TOP + 1, braking)
+        } else {
+            (braking, TOP + 1)
+        };
+        timer.ccr(0).write(|w| w.set_ccr(one));
+        timer.ccr(1).write(|w| w.set_ccr(two));
+        if !self.enable.is_set_high() {
+            timer.bdtr().modify(|w| w.set_moe(true));
+            self.enable.set_high();
+        }
+    }
+}
+
+/// Switches the bridge off from anywhere, with nothing but two stores.
+#[inline(always)]
+pub(crate) fn off() {
+    TIM1.bdtr().modify(|w| w.set_moe(false));
+    embassy_stm32::pac::GPIOB
+        .bsrr()
+        .write(|w| w.set_br(5, true));
+}

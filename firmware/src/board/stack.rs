@@ -1,0 +1,51 @@
+//! How much of the stack has been used: it was painted before the program began.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+/// What `cortex-m-rt` paints the stack with (its feature `paint-stack`).
+const PAINT: u32 = 0xcccc_cccc;
+/// Bytes from the stack's end where the tick looks: enough for an interrupt on top of whatever came so far.
+const GUARD: usize = 1024;
+
+// Symbols of memory.x; only their addresses are used.
+#[allow(unsafe_code)]
+unsafe extern "C" {
+    static _stack_end: u32;
+    static _stack_start: u32;
+}
+
+static FREE: AtomicU32 = AtomicU32::new(u32::MAX);
+
+/// Whether a word, counted from the stack's end, has never been used. Below the stack pointer nothing else lies.
+#[inline(always)]
+fn untouched(word: usize) -> bool {
+    let end = &raw const _stack_end;
+    // Within the stack's own region; volatile, because whoever uses it does so behind the compiler's back.
+    #[allow(unsafe_code)]
+    unsafe {
+        end.add(word).read_volatile() == PAINT
+    }
+}
+
+/// Bytes left where the stack has reached its guard.
+#[inline(always)]
+pub(crate) fn near_end() -> Option<u32> {
+    let word = GUARD / 4;
+    // Four words: a frame may skip one that it does not write.
+    let clean =
+        untouched(word) && untouched(word + 1) && untouched(word + 2) && untouched(word + 3);
+    (!clean).then_some(GUARD as u32)
+}
+
+/// Counts the bytes never used; takes a while.
+pub(crate) fn survey() {
+    let words = (&raw const _stack_start as usize - &raw const _stack_end as usize) / 4;
+    let free = (0..words).take_while(|&word| untouched(word)).count();
+    FREE.store(4 * free as u32, Ordering::Relaxed);
+}
+
+/// Bytes never used, as last counted.
+#[inline(always)]
+pub(crate) fn free() -> u32 {
+    FREE.load(Ordering::Relaxed)
+}

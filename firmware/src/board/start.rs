@@ -1,0 +1,165 @@
+//! From reset to the first tick.
+
+use embassy_executor::{Executor, InterruptExecutor};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::InterruptExt;
+use embassy_time::{Duration, Ticker};
+use heapless::spsc;
+use rig_firmware::capture::Capture;
+use rig_firmware::clerk::Clerk;
+use rig_firmware::config::{Config, Settings};
+use rig_firmware::examined::Examined;
+use rig_firmware::nameplate;
+use rig_firmware::note::Note;
+use rig_firmware::state::State;
+use rig_shared::estimation::OneLinkEstimator;
+use static_cell::{ConstStaticCell, StaticCell};
+
+use super::adc::Converter;
+use super::clock::{self, LINK_PRIORITY, TASK_PRIORITY};
+use super::encoder::EncoderTimer;
+use super::health::{Checkup, Start};
+use super::pins::Pins;
+use super::pwm::Bridge;
+use super::queue::{Inlet, Outlet};
+use super::storage::Storage;
+use super::tick::{NOTES, REQUESTS, Tick};
+use super::watchdog::Watchdog;
+use super::{cycles, health, link, probe, stack, tick};
+use embassy_stm32::gpio::Output;
+
+static CONFIG: StaticCell<Config> = StaticCell::new();
+static STATE: StaticCell<State> = StaticCell::new();
+static CAPTURE: ConstStaticCell<Capture> = ConstStaticCell::new(Capture::new());
+// A ring of n places holds n − 1.
+static NOTE_QUEUE: StaticCell<spsc::Queue<Note, { NOTES + 1 }>> = StaticCell::new();
+static REQUEST_QUEUE: StaticCell<spsc::Queue<Examined, { REQUESTS + 1 }>> = StaticCell::new();
+static STORE_QUEUE: StaticCell<spsc::Queue<Settings, 2>> = StaticCell::new();
+/// Tasks that may not wait while a trajectory is being examined, which takes some 0.1 s.
+static PUNCTUAL: InterruptExecutor = InterruptExecutor::new();
+static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+
+/// Brings the board up and runs it.
+pub(crate) fn run() -> ! {
+    let (probe_out, probe_in) = probe::open();
+    let reset = health::reset_cause();
+    let crystal = clock::crystal();
+    let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
+    clock::boost();
+    let peripherals = embassy_stm32::init(clock::config(crystal));
+    cycles::start(&mut core.DCB, &mut core.DWT);
+    interrupt::TIM3.set_priority(LINK_PRIORITY);
+    let pins = Pins::new(peripherals);
+
+    let (config, own) = nameplate::one_link();
+    let config: &'static Config = CONFIG.init(config);
+    let (storage, found) = Storage::open(config);
+    let settings = found.settings.unwrap_or(own);
+    let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
+    let state = state(config, settings);
+    let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
+    let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
+    let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
+    let encoder = EncoderTimer::new(pins.encoder, config.encoder.counts_per_motor_turn);
+    let converter = Converter::new(pins.analog);
+    let Ok((sender, receiver)) = link::open(pins.link) else {
+        unreachable!()
+    };
+    let watchdog = Watchdog::start(pins.watchdog);
+    tick::start(Tick {
+        config,
+        state,
+        capture: CAPTURE.take(),
+        clerk: Clerk::new(),
+        requests: Outlet(request_out),
+        notes: Inlet(note_in),
+        bridge,
+        converter,
+        encoder,
+        period_cycles: Tick::period(config.rates.control_hz),
+        entered: 0,
+        late: false,
+        checkup: Checkup::new(
+            Start {
+                reset,
+                settings: found.origin,
+                crystal,
+            },
+            config.rates.control_hz,
+        ),
+        to_store: Inlet(to_store),
+    });
+    defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
+    // Each is spawned once, and its place is reserved at compile time.
+    let placed = (
+        link::telemetry(config, sender, probe_out, note_out),
+        indicator(watchdog, pins.led),
+        link::commands(receiver, probe_in, request_in),
+        keeper(storage, from_tick),
+    );
+    let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(keeper)) = placed else {
+        unreachable!()
+    };
+    interrupt::CORDIC.set_priority(TASK_PRIORITY);
+    let punctual = PUNCTUAL.start(interrupt::CORDIC);
+    punctual.spawn(telemetry);
+    punctual.spawn(indicator);
+    EXECUTOR.init(Executor::new()).run(|spawner| {
+        spawner.spawn(commands);
+        spawner.spawn(keeper);
+    })
+}
+
+/// Runs the punctual tasks: the interrupt of a peripheral that is not used, raised by software.
+#[interrupt]
+fn CORDIC() {
+    // This is the interrupt that the executor was started with.
+    #[allow(unsafe_code)]
+    unsafe {
+        PUNCTUAL.on_interrupt();
+    }
+}
+
+/// The state at power on, made in its place: it is half as large as the stack.
+#[inline(never)]
+fn state(config: &Config, settings: Settings) -> &'static mut State {
+    match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
+        Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
+        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        Err(_) => unreachable!(),
+    }
+}
+
+/// Feeds the watchdog and blinks: a light that stands still is a program that does.
+#[embassy_executor::task]
+async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
+    let mut ticker = Ticker::every(Duration::from_millis(10));
+    let mut count = 0_u32;
+    loop {
+        ticker.next().await;
+        watchdog.feed();
+        count = count.wrapping_add(1);
+        if count.is_multiple_of(50) {
+            led.toggle();
+        }
+        if count.is_multiple_of(100) {
+            stack::survey();
+        }
+    }
+}
+
+/// Writes settings to flash when the tick hands some over.
+#[embassy_executor::task]
+async fn keeper(mut storage: Storage, mut from_tick: spsc::Consumer<'static, Settings>) -> ! {
+    let mut ticker = Ticker::every(Duration::from_millis(5));
+    loop {
+        ticker.next().await;
+        if let Some(settings) = from_tick.dequeue() {
+            let done = storage.store(&settings).await.is_ok();
+            if !done {
+                defmt::warn!("the flash did not take the settings");
+            }
+            tick::stored(done);
+        }
+    }
+}

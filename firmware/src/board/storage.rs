@@ -1,0 +1,158 @@
+//! Settings in the last two pages of flash bank 2. The program runs from bank 1, which can be read meanwhile.
+//!
+//! Registers and sequences: RM0440, embedded flash memory, "Erase and program operations" (page erase, standard programming of 64-bit words).
+
+use embassy_stm32::pac::FLASH;
+use embassy_stm32::pac::flash::regs::Sr;
+use embassy_time::{Duration, Instant, Timer};
+use rig_firmware::config::{Config, Settings};
+use rig_firmware::stored::{self, Copy, Found, IMAGE};
+
+/// Page size with two banks, bytes.
+const PAGE: usize = 2048;
+/// Pages of a bank.
+const PAGES: u8 = 128;
+/// A page erase takes at most 25 ms, a word 0.13 ms (DS12288, "Flash memory characteristics").
+const PATIENCE: Duration = Duration::from_millis(100);
+
+// Symbols of memory.x; only their addresses are used.
+#[allow(unsafe_code)]
+unsafe extern "C" {
+    static _store_start: u32;
+}
+
+/// The flash as storage.
+pub(crate) struct Storage {
+    /// The place to write next, and its number.
+    place: usize,
+    number: u32,
+}
+
+/// The flash did not do as told.
+pub(crate) struct Refused;
+
+/// Address of a place.
+fn address(place: usize) -> *mut u32 {
+    let start = (&raw const _store_start).cast_mut();
+    start.wrapping_byte_add(place * PAGE)
+}
+
+fn look(place: usize) -> Copy {
+    let mut bytes = [0; IMAGE];
+    for (word, chunk) in bytes.chunks_exact_mut(4).enumerate() {
+        // Inside the page, aligned; volatile, because the flash changes behind the compiler's back. A word that
+        // cannot be corrected ends in `fault::non_maskable`, which lets it be read as it is.
+        #[allow(unsafe_code)]
+        let value = unsafe { address(place).wrapping_add(word).read_volatile() };
+        chunk.copy_from_slice(&value.to_le_bytes());
+    }
+    stored::read(&bytes)
+}
+
+impl Storage {
+    /// Looks at what is stored.
+    pub(crate) fn open(config: &Config) -> (Self, Found) {
+        let found = stored::choose(config, [look(0), look(1)]);
+        let storage = Self {
+            place: found.place,
+            number: found.number,
+        };
+        (storage, found)
+    }
+
+    /// Stores settings, over the older copy, and reads them back.
+    pub(crate) async fn store(&mut self, settings: &Settings) -> Result<(), Refused> {
+        // With one bank, pages are twice as large, and writing would stall the control tick.
+        if !FLASH.optr().read().dbank() {
+            return Err(Refused);
+        }
+        let bytes = stored::write(settings, self.number).ok_or(Refused)?;
+        unlock();
+        let done = self.write(&bytes).await;
+        FLASH.cr().modify(|w| w.set_lock(true));
+        done?;
+        let wanted = Copy::Whole {
+            number: self.number,
+            settings: *settings,
+        };
+        if look(self.place) != wanted {
+            return Err(Refused);
+        }
+        self.place = 1 - self.place;
+        self.number = self.number.wrapping_add(1);
+        Ok(())
+    }
+
+    async fn write(&self, bytes: &[u8]) -> Result<(), Refused> {
+        ready().await?;
+        clear_errors();
+        FLASH.cr().modify(|w| {
+            w.set_per(true);
+            w.set_bker(true);
+            w.set_pnb(PAGES - 2 + self.place as u8);
+        });
+        FLASH.cr().modify(|w| w.set_strt(true));
+        let erased = ready().await;
+        FLASH.cr().modify(|w| {
+            w.set_per(false);
+            w.set_bker(false);
+        });
+        // What was read before must not come from the data cache again.
+        FLASH.acr().modify(|w| w.set_dcen(false));
+        FLASH.acr().modify(|w| w.set_dcrst(true));
+        FLASH.acr().modify(|w| w.set_dcrst(false));
+        FLASH.acr().modify(|w| w.set_dcen(true));
+        erased?;
+        for (index, word) in bytes.chunks_exact(8).enumerate() {
+            FLASH.cr().modify(|w| w.set_pg(true));
+            for (half, chunk) in word.chunks_exact(4).enumerate() {
+                let value = chunk
+                    .iter()
+                    .rev()
+                    .fold(0, |sum, &byte| sum << 8 | u32::from(byte));
+                // Inside the page just erased: an image is shorter than a page.
+                #[allow(unsafe_code)]
+                unsafe {
+                    address(self.place)
+                        .wrapping_add(2 * index + half)
+                        .write_volatile(value);
+                }
+            }
+            let written = ready().await;
+            FLASH.cr().modify(|w| w.set_pg(false));
+            written?;
+        }
+        Ok(())
+    }
+}
+
+fn unlock() {
+    if FLASH.cr().read().lock() {
+        FLASH.keyr().write_value(0x4567_0123);
+        FLASH.keyr().write_value(0xcdef_89ab);
+    }
+}
+
+/// Error flags are cleared by writing them with one.
+fn clear_errors() {
+    FLASH.sr().write_value(Sr(ERRORS | 1));
+}
+
+/// OPERR, PROGERR, WRPERR, PGAERR, SIZERR, PGSERR, MISERR, FASTERR.
+const ERRORS: u32 = 0x3fa;
+
+/// Waits for the flash without stopping anyone else.
+async fn ready() -> Result<(), Refused> {
+    let start = Instant::now();
+    while FLASH.sr().read().bsy() {
+        if start.elapsed() > PATIENCE {
+            return Err(Refused);
+        }
+        Timer::after_micros(200).await;
+    }
+    if FLASH.sr().read().0 & ERRORS == 0 {
+        Ok(())
+    } else {
+        Err(Refused)
+    }
+}

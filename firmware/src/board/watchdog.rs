@@ -1,0 +1,63 @@
+//! The independent watchdog, fed only when every part of the program has reported since the last time.
+
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use embassy_stm32::Peri;
+use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::wdg::IndependentWatchdog;
+
+/// Longest silence of the tick or the telemetry, µs: a thousand control ticks.
+const PATIENCE_US: u32 = 100_000;
+/// Feedings in a row that the command task may miss: it examines a trajectory in up to 0.2 s. At 100 a second
+/// they are half a second.
+const COMMANDS_MAY_MISS: u32 = 50;
+
+/// Parts that report, one bit each.
+#[derive(Clone, Copy)]
+#[repr(u8)]
+pub(crate) enum Part {
+    /// The control interrupt.
+    Tick = 1,
+    /// The task that sends.
+    Telemetry = 2,
+    /// The task that listens.
+    Commands = 4,
+}
+
+const ALL: u8 = Part::Tick as u8 | Part::Telemetry as u8 | Part::Commands as u8;
+
+static REPORTED: AtomicU8 = AtomicU8::new(0);
+
+/// Says that a part is alive.
+#[inline(always)]
+pub(crate) fn report(part: Part) {
+    REPORTED.fetch_or(part as u8, Ordering::Relaxed);
+}
+
+/// The watchdog.
+pub(crate) struct Watchdog {
+    missed: u32,
+    inner: IndependentWatchdog<'static, IWDG>,
+}
+
+impl Watchdog {
+    /// Starts it. Nothing but a reset stops it.
+    pub(crate) fn start(peripheral: Peri<'static, IWDG>) -> Self {
+        let mut inner = IndependentWatchdog::new(peripheral, PATIENCE_US);
+        inner.unleash();
+        Self { missed: 0, inner }
+    }
+
+    /// Feeds it if every part has reported.
+    pub(crate) fn feed(&mut self) {
+        let reported = REPORTED.load(Ordering::Relaxed);
+        let commands = reported & Part::Commands as u8 != 0;
+        let all_but_commands = reported | Part::Commands as u8 == ALL;
+        if !all_but_commands || (!commands && self.missed >= COMMANDS_MAY_MISS) {
+            return;
+        }
+        REPORTED.store(0, Ordering::Relaxed);
+        self.missed = if commands { 0 } else { self.missed + 1 };
+        self.inner.pet();
+    }
+}

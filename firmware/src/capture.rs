@@ -1,0 +1,232 @@
+//! A burst of control ticks kept in RAM at the full control rate: what the telemetry averages away.
+//!
+//! The ring turns until it is triggered, by the host or by a fault, and stands still a chosen number of ticks
+//! later, so that it holds what came before and after.
+
+use rig_shared::safety::SnapshotSample;
+
+/// Control ticks that the capture keeps: 0.2 s at 10 kHz.
+pub const CAPTURE_TICKS: usize = 2048;
+
+/// A tick in less memory: its number follows from its place, its position from the trigger's.
+#[derive(Clone, Copy, Debug)]
+struct Packed {
+    counts: i32,
+    current: f32,
+    duty: f32,
+    supply: f32,
+    reference: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Turning,
+    /// Ticks still to be kept.
+    Awaited(u16),
+    Complete,
+}
+
+/// A ring of the last [`CAPTURE_TICKS`] control ticks.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    ring: [Packed; CAPTURE_TICKS],
+    next: usize,
+    filled: usize,
+    phase: Phase,
+    /// The last tick kept, whole.
+    last: SnapshotSample,
+}
+
+impl Default for Capture {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Capture {
+    /// Ticks kept after a fault: an eighth shows what the fault reaction did.
+    pub const AFTER_FAULT: u16 = (CAPTURE_TICKS / 8) as u16;
+
+    /// Turning, empty.
+    pub const fn new() -> Self {
+        Self {
+            ring: [Packed {
+                counts: 0,
+                current: 0.0,
+                duty: 0.0,
+                supply: 0.0,
+                reference: 0.0,
+            }; CAPTURE_TICKS],
+            next: 0,
+            filled: 0,
+            phase: Phase::Turning,
+            last: SnapshotSample {
+                tick: 0,
+                position: 0,
+                current: 0.0,
+                duty: 0.0,
+                supply: 0.0,
+                reference: 0.0,
+            },
+        }
+    }
+
+    /// Keeps a tick, unless the capture is complete.
+    pub fn push(&mut self, sample: &SnapshotSample) {
+        match &mut self.phase {
+            Phase::Complete => return,
+            Phase::Awaited(0) => {
+                self.phase = Phase::Complete;
+                return;
+            }
+            Phase::Awaited(remaining) => *remaining -= 1,
+            Phase::Turning => {}
+        }
+        if let Some(slot) = self.ring.get_mut(self.next) {
+            *slot = Packed {
+                // The low half: the rest follows from the last tick, for no joint turns 2³¹ counts in a burst.
+                counts: sample.position as i32,
+                current: sample.current,
+                duty: sample.duty,
+                supply: sample.supply,
+                reference: sample.reference,
+            };
+        }
+        self.last = *sample;
+        self.next = if self.next + 1 < CAPTURE_TICKS {
+            self.next + 1
+        } else {
+            0
+        };
+        self.filled = (self.filled + 1).min(CAPTURE_TICKS);
+    }
+
+    /// Has the ring stand still `after` ticks from now, at most its length. A complete capture is given up for a new one.
+    pub fn trigger(&mut self, after: u16) {
+        if self.is_complete() {
+            self.next = 0;
+            self.filled = 0;
+        }
+        self.phase = Phase::Awaited(after.min(CAPTURE_TICKS as u16));
+    }
+
+    /// A fault triggers too, unless a capture is under way or waits to be fetched.
+    pub fn trigger_by_fault(&mut self) {
+        if self.phase == Phase::Turning {
+            self.trigger(Self::AFTER_FAULT);
+        }
+    }
+
+    /// Has the ring turn again.
+    pub fn release(&mut self) {
+        self.next = 0;
+        self.filled = 0;
+        self.phase = Phase::Turning;
+    }
+
+    /// Whether a trigger has come and ticks are still to come.
+    pub fn is_awaited(&self) -> bool {
+        matches!(self.phase, Phase::Awaited(_))
+    }
+
+    /// Whether the ring stands still.
+    pub fn is_complete(&self) -> bool {
+        self.phase == Phase::Complete
+    }
+
+    /// Ticks kept.
+    pub fn len(&self) -> usize {
+        self.filled
+    }
+
+    /// Whether nothing has been kept yet.
+    pub fn is_empty(&self) -> bool {
+        self.filled == 0
+    }
+
+    /// The `index`-th kept tick, 0 the oldest.
+    pub fn get(&self, index: usize) -> Option<SnapshotSample> {
+        if index >= self.filled {
+            return None;
+        }
+        let oldest = if self.filled < CAPTURE_TICKS {
+            0
+        } else {
+            self.next
+        };
+        let place = oldest + index;
+        let packed = self.ring.get(if place < CAPTURE_TICKS {
+            place
+        } else {
+            place - CAPTURE_TICKS
+        })?;
+        let age = (self.filled - 1 - index) as u64;
+        let back = (self.last.position as i32).wrapping_sub(packed.counts);
+        Some(SnapshotSample {
+            tick: self.last.tick.saturating_sub(age),
+            position: self.last.position - i64::from(back),
+            current: packed.current,
+            duty: packed.duty,
+            supply: packed.supply,
+            reference: packed.reference,
+        })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn at(tick: u64) -> SnapshotSample {
+        SnapshotSample {
+            tick,
+            // Across the wrap of the low half.
+            position: i64::from(i32::MAX) - 1000 + 3 * tick as i64,
+            current: tick as f32,
+            ..SnapshotSample::default()
+        }
+    }
+
+    #[test]
+    fn holds_what_came_before_and_after_the_trigger() {
+        let mut capture = Capture::new();
+        for tick in 0..5000 {
+            capture.push(&at(tick));
+        }
+        capture.trigger(100);
+        assert!(capture.is_awaited());
+        for tick in 5000..9000 {
+            capture.push(&at(tick));
+            capture.trigger_by_fault();
+        }
+        assert!(capture.is_complete());
+        assert_eq!(capture.len(), CAPTURE_TICKS);
+        for index in 0..CAPTURE_TICKS {
+            let tick = 5100 - CAPTURE_TICKS as u64 + index as u64;
+            assert_eq!(capture.get(index).unwrap(), at(tick));
+        }
+        assert!(capture.get(CAPTURE_TICKS).is_none());
+    }
+
+    #[test]
+    fn a_new_trigger_gives_up_the_old_burst_and_a_fault_does_not() {
+        let mut capture = Capture::new();
+        for tick in 0..10 {
+            capture.push(&at(tick));
+        }
+        capture.trigger(0);
+        capture.push(&at(10));
+        capture.trigger_by_fault();
+        assert!(capture.is_complete());
+        assert_eq!(capture.get(9).unwrap(), at(9));
+        capture.trigger(2);
+        for tick in 20..30 {
+            capture.push(&at(tick));
+        }
+        assert_eq!(capture.len(), 2);
+        assert_eq!(capture.get(0).unwrap(), at(20));
+        capture.release();
+        assert!(capture.is_empty() && !capture.is_complete());
+    }
+}

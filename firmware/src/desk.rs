@@ -1,0 +1,161 @@
+//! The conversation's half that takes its time: notes in, frames out.
+
+use heapless::{String, Vec};
+use rig_shared::safety::SnapshotSample;
+use rig_shared::wire::message::{Batch, Greeting, Report, SNAPSHOT_PART, SnapshotPart};
+use rig_shared::wire::{Batcher, MAX_FRAME, PROTOCOL_VERSION, encode, schema};
+
+use crate::config::Config;
+use crate::note::{Kept, Note, Topic};
+
+/// Takes one frame for the host; false where the transmit queue has no room for it.
+pub trait Transmit {
+    /// Queues a whole frame or nothing.
+    fn frame(&mut self, bytes: &[u8]) -> bool;
+}
+
+impl<F: FnMut(&[u8]) -> bool> Transmit for F {
+    fn frame(&mut self, bytes: &[u8]) -> bool {
+        self(bytes)
+    }
+}
+
+/// Kept ticks that wait until they fill a part.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    first: u16,
+    samples: Vec<SnapshotSample, SNAPSHOT_PART>,
+}
+
+impl Part {
+    /// Adds a tick; gives a part when one is full or the last.
+    fn push(&mut self, kept: &Kept) -> Option<SnapshotPart> {
+        if kept.index == 0 || self.samples.is_full() {
+            self.samples.clear();
+        }
+        if self.samples.is_empty() {
+            self.first = kept.index;
+        }
+        let nothing = kept.total == 0;
+        let last = nothing || kept.index + 1 == kept.total;
+        if !nothing {
+            self.samples.push(kept.sample).ok()?;
+        }
+        (last || self.samples.is_full()).then(|| SnapshotPart {
+            first: self.first,
+            total: kept.total,
+            samples: core::mem::take(&mut self.samples),
+        })
+    }
+}
+
+/// What the conversation's end remembers.
+#[derive(Default)]
+pub struct Desk {
+    batcher: Batcher,
+    snapshot: Part,
+    capture: Part,
+}
+
+impl Desk {
+    /// Nothing said yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Tells the host what a note says.
+    pub fn tell(&mut self, config: &Config, note: &Note, transmit: &mut impl Transmit) {
+        match note {
+            Note::Answer(acknowledge, topic) => {
+                send(&Report::Acknowledge(*acknowledge), transmit);
+                self.converse(config, topic, transmit);
+            }
+            Note::Sample { sample, missed } => {
+                for _ in 0..*missed {
+                    self.batcher.skip();
+                }
+                if let Some(batch) = self.batcher.push(*sample) {
+                    self.send_batch(batch, transmit);
+                }
+            }
+            Note::Estimate(estimate) => {
+                send(&Report::Estimate(*estimate), transmit);
+            }
+            Note::Fault(record) => {
+                send(&Report::Fault(*record), transmit);
+            }
+            Note::Snapshot(kept) => {
+                if let Some(part) = self.snapshot.push(kept) {
+                    send(&Report::Snapshot(part), transmit);
+                }
+            }
+            Note::Capture(kept) => {
+                if let Some(part) = self.capture.push(kept) {
+                    send(&Report::Capture(part), transmit);
+                }
+            }
+            Note::Health(health) => {
+                send(&Report::Health(*health), transmit);
+            }
+        }
+    }
+
+    /// What follows an acknowledgement.
+    fn converse(&mut self, config: &Config, topic: &Topic, transmit: &mut impl Transmit) {
+        match topic {
+            Topic::None => {}
+            Topic::Greeting => {
+                send(&Report::Greeting(greeting(config)), transmit);
+            }
+            Topic::StreamStart(first_tick) => self
+                .batcher
+                .start(*first_tick, config.rates.telemetry_decimation),
+            Topic::StreamEnd => {
+                if let Some(batch) = self.batcher.close() {
+                    self.send_batch(batch, transmit);
+                }
+                send(&Report::StreamEnd(self.batcher.end()), transmit);
+            }
+            Topic::Snapshot(record) => {
+                if let Some(record) = record {
+                    send(&Report::Fault(*record), transmit);
+                }
+            }
+        }
+    }
+
+    fn send_batch(&mut self, batch: Batch, transmit: &mut impl Transmit) {
+        let report = Report::Batch(batch);
+        if !send(&report, transmit)
+            && let Report::Batch(batch) = &report
+        {
+            self.batcher.refused(batch);
+        }
+    }
+}
+
+/// Frames a report and queues it; false where it could not be queued.
+fn send(report: &Report, transmit: &mut impl Transmit) -> bool {
+    let mut frame = [0; MAX_FRAME];
+    match encode(report, &mut frame) {
+        Ok(length) => frame
+            .get(..length)
+            .is_some_and(|bytes| transmit.frame(bytes)),
+        // The longest report fits (tested with the wire format); an unsendable one counts as refused.
+        Err(_) => false,
+    }
+}
+
+fn greeting(config: &Config) -> Greeting {
+    Greeting {
+        protocol: PROTOCOL_VERSION,
+        schema: schema(),
+        firmware: String::try_from(env!("CARGO_PKG_VERSION")).unwrap_or_default(),
+        control_rate_hz: config.rates.control_hz,
+        telemetry_decimation: config.rates.telemetry_decimation,
+        estimator_decimation: config.rates.estimator_decimation,
+        counts_per_motor_turn: config.encoder.counts_per_motor_turn,
+        gear_ratio: config.drive.gear_ratio,
+        torque_constant: config.drive.torque_constant,
+    }
+}

@@ -1,0 +1,32 @@
+//! The rig on its board: a NUCLEO-G474RE. See `docs/firmware.md` for wiring and first start.
+//!
+//! ```text
+//!  TIM1 ──update──► ADC1 ──end of sequence──► interrupt: step, duty ──► TIM1          (board::tick)
+//!                     TIM2 (encoder) ────────────┘  ▲ requests      │ notes
+//!                                                   │               ▼
+//!  LPUART1 ──DMA──► command task: decode, examine ──┘    telemetry task: frames ──DMA──► LPUART1
+//! ```
+//!
+//! The interrupt shares nothing with the tasks but queues without locks and a few atomic words.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+use board::start;
+
+/// On the desktop there is no board to run on.
+#[cfg(not(target_os = "none"))]
+fn main() -> std::process::ExitCode {
+    eprintln!(
+        "rig-firmware: this is the image for the STM32G474 and does nothing on a desktop; build it with firmware/build, flash it with `rig flash`."
+    );
+    std::process::ExitCode::FAILURE
+}
+
+#[cfg(target_os = "none")]
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    start::run()
+}

@@ -1,0 +1,210 @@
+//! What the image's control tick may call: nothing that can panic, and nothing that cannot be seen here.
+//!
+//! Reads the machine code that will be flashed: from the converter's interrupt along every branch that leaves a
+//! function. Needs the image: build it with `firmware/build` and name it in `RIG_FIRMWARE_ELF`.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The converter's interrupt.
+const ROOT: &str = "ADC1_2";
+
+fn half(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap())
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+struct Function {
+    name: String,
+    size: u32,
+}
+
+/// The parts of a 32-bit little-endian ELF file that matter here (ELF for the Arm architecture, IHI 0044).
+struct Image {
+    bytes: Vec<u8>,
+    /// Address, place in the file, size.
+    code: Vec<(u32, usize, u32)>,
+    functions: BTreeMap<u32, Function>,
+    /// Where data begins (true) among code and code again (false): mapping symbols.
+    data: BTreeMap<u32, bool>,
+}
+
+impl Image {
+    fn read(path: &str) -> Self {
+        let bytes = std::fs::read(path).unwrap();
+        assert_eq!(&bytes[..5], b"\x7fELF\x01", "{path} is no 32-bit ELF file");
+        let table = word(&bytes, 32) as usize;
+        let (size, count) = (half(&bytes, 46) as usize, half(&bytes, 48) as usize);
+        let section = |index: usize, field: usize| word(&bytes, table + index * size + 4 * field);
+        let mut image = Self {
+            code: Vec::new(),
+            functions: BTreeMap::new(),
+            data: BTreeMap::new(),
+            bytes: bytes.clone(),
+        };
+        for index in 0..count {
+            // Contents, executable.
+            if section(index, 1) == 1 && section(index, 2) & 4 != 0 {
+                let place = (
+                    section(index, 3),
+                    section(index, 4) as usize,
+                    section(index, 5),
+                );
+                image.code.push(place);
+            }
+            if section(index, 1) == 2 {
+                let names = section(section(index, 6) as usize, 4) as usize;
+                for entry in 0..section(index, 5) as usize / 16 {
+                    let at = section(index, 4) as usize + 16 * entry;
+                    let text = &bytes[names + word(&bytes, at) as usize..];
+                    let end = text.iter().position(|&byte| byte == 0).unwrap();
+                    let name = String::from_utf8_lossy(&text[..end]).into_owned();
+                    let (value, length) = (word(&bytes, at + 4), word(&bytes, at + 8));
+                    if name.starts_with("$t") || name.starts_with("$d") {
+                        image.data.insert(value, name.starts_with("$d"));
+                    } else if bytes[at + 12] & 15 == 2 {
+                        let function = Function { name, size: length };
+                        image.functions.insert(value & !1, function);
+                    }
+                }
+            }
+        }
+        image
+    }
+
+    fn at(&self, address: u32) -> u16 {
+        let inside =
+            |&&(from, _, size): &&(u32, usize, u32)| (from..from + size).contains(&address);
+        let (from, place, _) = self.code.iter().find(inside).unwrap();
+        half(&self.bytes, place + (address - from) as usize)
+    }
+
+    /// The function that an address belongs to.
+    fn owner(&self, address: u32) -> u32 {
+        *self.functions.range(..=address).next_back().unwrap().0
+    }
+
+    /// Functions that one branches to, and whether it calls through a register.
+    fn branches(&self, from: u32) -> (BTreeSet<u32>, bool) {
+        let end = from + self.functions[&from].size;
+        let (mut targets, mut through_register) = (BTreeSet::new(), false);
+        let mut at = from;
+        while at < end {
+            if self
+                .data
+                .range(..=at)
+                .next_back()
+                .is_some_and(|(_, &data)| data)
+            {
+                at += 2;
+                continue;
+            }
+            let first = self.at(at);
+            // Below 0b11101 an instruction is of 16 bits (Armv7-M ARM, A5.1).
+            if first >> 11 < 0b11101 {
+                // BLX register.
+                through_register |= first & 0xff87 == 0x4780;
+                at += 2;
+                continue;
+            }
+            if let Some(offset) = branch(first, self.at(at + 2)) {
+                let target = (at + 4).wrapping_add_signed(offset);
+                if !(from..end).contains(&target) {
+                    targets.insert(self.owner(target));
+                }
+            }
+            at += 4;
+        }
+        (targets, through_register)
+    }
+}
+
+/// Offset of a 32-bit branch with or without link or condition (Armv7-M ARM, A7.7.12 and A7.7.18).
+fn branch(first: u16, second: u16) -> Option<i32> {
+    if first >> 11 != 0b11110 || second & 0x8000 == 0 {
+        return None;
+    }
+    let (first, second) = (i32::from(first), i32::from(second));
+    let (sign, j1, j2) = (first >> 10 & 1, second >> 13 & 1, second >> 11 & 1);
+    let low = (second & 0x7ff) << 1;
+    match second & 0x5000 {
+        // BL, B.
+        0x5000 | 0x1000 => {
+            let (i1, i2) = (1 ^ j1 ^ sign, 1 ^ j2 ^ sign);
+            Some((i1 << 23 | i2 << 22 | (first & 0x3ff) << 12 | low) - (sign << 24))
+        }
+        // B with a condition; what looks like conditions 14 and 15 is something else.
+        0 if first >> 7 & 7 != 7 => {
+            Some((j2 << 19 | j1 << 18 | (first & 0x3f) << 12 | low) - (sign << 20))
+        }
+        _ => None,
+    }
+}
+
+#[test]
+#[ignore = "needs the image for the chip: firmware/build, then RIG_FIRMWARE_ELF"]
+fn nothing_that_the_tick_reaches_can_panic() {
+    let path = std::env::var("RIG_FIRMWARE_ELF").expect("RIG_FIRMWARE_ELF must name the image");
+    let image = Image::read(&path);
+    let find = |wanted: &str| {
+        let named = |whole: bool| {
+            image
+                .functions
+                .iter()
+                .find(|(_, function)| match whole {
+                    true => function.name == wanted,
+                    false => function.name.contains(wanted),
+                })
+                .map(|(&address, _)| address)
+        };
+        named(true).or_else(|| named(false)).unwrap()
+    };
+    // The scan must be able to see a panic where there is one: from the start to the panic handler.
+    let handler = find("rust_begin_unwind");
+    assert!(
+        reached(&image, find("main")).contains_key(&handler),
+        "the start reaches no panic: the scan is blind"
+    );
+    let tick = reached(&image, find(ROOT));
+    assert!(
+        tick.len() > 20,
+        "the tick reaches only {} functions",
+        tick.len()
+    );
+    if tick.contains_key(&handler) {
+        let (mut way, mut at) = (Vec::new(), handler);
+        loop {
+            way.push(image.functions[&at].name.as_str());
+            match tick[&at] {
+                Some(caller) => at = caller,
+                None => break,
+            }
+        }
+        panic!("the tick can panic: {}", way.join(" <- "));
+    }
+    for function in tick.keys() {
+        assert!(
+            !image.branches(*function).1,
+            "{} calls through a register, so that this check sees nothing behind it",
+            image.functions[function].name
+        );
+    }
+}
+
+/// Every function reached, with the one it was reached from.
+fn reached(image: &Image, root: u32) -> BTreeMap<u32, Option<u32>> {
+    let mut seen = BTreeMap::from([(root, None)]);
+    let mut open = vec![root];
+    while let Some(function) = open.pop() {
+        for target in image.branches(function).0 {
+            if let std::collections::btree_map::Entry::Vacant(entry) = seen.entry(target) {
+                entry.insert(Some(function));
+                open.push(target);
+            }
+        }
+    }
+    seen
+}

@@ -1,0 +1,117 @@
+//! `rig flash`: the image onto the board.
+
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::ui::Ui;
+
+/// The chip, as probe-rs calls it.
+pub(crate) const CHIP: &str = "STM32G474RETx";
+/// Where `firmware/build` puts the image, from the project's folder.
+const IMAGE: &str = "target/thumbv7em-none-eabihf/chip/rig-firmware";
+/// The tool that talks to the debug probe.
+const TOOL: &str = "probe-rs";
+/// Machine number of Arm in an ELF header (`EM_ARM`).
+const ARM: [u8; 2] = [40, 0];
+
+/// Flashes the rig's firmware through the board's debug probe.
+///
+/// Needs the probe-rs tool (`cargo install probe-rs-tools`, or its installer at https://probe.rs). The bridge
+/// stays off while flashing and afterwards, until the rig is armed.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    /// The image; without it the one that firmware/build has made
+    #[arg(long)]
+    elf: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence: no image, no tool, no board.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let elf = args.elf.clone().unwrap_or_else(|| PathBuf::from(IMAGE));
+    check(&elf)?;
+    call(&["download", "--chip", CHIP, "--verify"], Some(&elf))?;
+    // The chip stands still after a download.
+    call(&["reset", "--chip", CHIP], None)?;
+    ui.say(&format!("{} is on the board and runs.", elf.display()));
+    Ok(())
+}
+
+/// Whether a file can be an image for the chip.
+fn check(elf: &Path) -> Result<(), CommandError> {
+    let sentence = |text: String| Err(CommandError::Sentence(text));
+    let mut head = [0; 20];
+    match std::fs::File::open(elf).and_then(|mut file| file.read_exact(&mut head)) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return sentence(format!(
+                "There is no image {}; build it with firmware/build, or name another with --elf.",
+                elf.display()
+            ));
+        }
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {}
+        Err(error) => {
+            return sentence(format!(
+                "The image {} cannot be read: {error}; check its permissions.",
+                elf.display()
+            ));
+        }
+    }
+    if !head.starts_with(b"\x7fELF") || head[18..20] != ARM {
+        return sentence(format!(
+            "{} is no ELF file for an Arm processor; firmware/build makes one and says where.",
+            elf.display()
+        ));
+    }
+    Ok(())
+}
+
+/// Calls the tool, which tells its own progress.
+fn call(arguments: &[&str], elf: Option<&Path>) -> Result<(), CommandError> {
+    let mut command = Command::new(TOOL);
+    command.args(arguments).args(elf);
+    let status = command.status().map_err(|error| {
+        CommandError::Sentence(match error.kind() {
+            io::ErrorKind::NotFound => format!(
+                "The tool {TOOL}, which talks to the board, is not installed; install it with `cargo install probe-rs-tools --locked`, or see https://probe.rs."
+            ),
+            _ => format!("The tool {TOOL} cannot be started: {error}; install it anew."),
+        })
+    })?;
+    if status.success() {
+        return Ok(());
+    }
+    Err(CommandError::Sentence(format!(
+        "`{TOOL} {}` has failed ({status}); its own words stand above: check that the board is plugged in at its ST-LINK socket and that no other program uses it.",
+        arguments.join(" ")
+    )))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_image_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image");
+        let text = |path: &Path| check(path).unwrap_err().to_string();
+        assert!(text(&path).contains("build it with firmware/build"));
+        std::fs::write(&path, b"\x7fELF").unwrap();
+        assert!(text(&path).contains("no ELF file for an Arm processor"));
+        // This test program itself is an ELF file on most desktops, but for another processor.
+        let mut head = *b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x3e\0";
+        std::fs::write(&path, head).unwrap();
+        assert!(text(&path).contains("no ELF file for an Arm processor"));
+        head[18] = 40;
+        std::fs::write(&path, head).unwrap();
+        assert!(check(&path).is_ok());
+    }
+}

@@ -1,0 +1,106 @@
+//! From what the optimiser found to a motion that is proved to keep the limits.
+
+use rig_shared::multibody::{Chain, point_position};
+
+use super::ExciteError;
+use super::certificate::{Reach, Reached, reach};
+use super::frame::Frame;
+use super::interval::Interval;
+use super::schedule::JointMotion;
+
+/// Kept free of every limit, so that a trajectory rounded to single precision still fits.
+const ROUNDING: f64 = 1e-6;
+/// Attempts to shrink a motion until the proof succeeds; each takes away at least 0.1 %.
+const SHRINKS: usize = 100;
+
+/// The joint and the limit at fault.
+pub(super) type Blame = (usize, &'static str);
+
+/// A motion and its proved reach, or what is at fault.
+pub(super) type Fitted = Result<(Vec<JointMotion>, Reached), Blame>;
+
+fn share(value: f64, limit: f64) -> f64 {
+    if value > 0.0 {
+        limit / value
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// What keeps a motion from its limits: the joint and the limit, with the factor that would repair the worst of them
+/// if it were proportional to the amplitude; none where all is well.
+fn worst(
+    frame: &Frame,
+    reached: &Reached,
+    motions: &[JointMotion],
+) -> Result<Option<(f64, Blame)>, ExciteError> {
+    let mut rooms: Vec<(f64, Blame)> = Vec::new();
+    for (j, (reach, b)) in reached.joints.iter().zip(&frame.bounds).enumerate() {
+        let base = motions[j].base;
+        let Reach {
+            position: [low, high],
+            velocity,
+            acceleration,
+            torque,
+        } = *reach;
+        let free = f64::INFINITY;
+        rooms.extend([
+            (share(high - base, b.high - base), (j, "position")),
+            (share(base - low, base - b.low), (j, "position")),
+            (share(velocity, b.velocity), (j, "velocity")),
+            (
+                b.acceleration.map_or(free, |a| share(acceleration, a)),
+                (j, "acceleration"),
+            ),
+            (
+                torque
+                    .zip(b.torque)
+                    .map_or(free, |(t, limit)| share(t, limit)),
+                (j, "torque"),
+            ),
+        ]);
+    }
+    let base: Vec<f64> = motions.iter().map(|m| m.base).collect();
+    let mut unused = vec![[0.0; 3]; base.len()];
+    for (plane, lowest) in frame.planes.iter().zip(&reached.heights) {
+        let at = point_position(&frame.plain, &base, plane.link, plane.point, &mut unused)?;
+        let start = plane.height(at);
+        rooms.push((
+            share(start - lowest, start - plane.least),
+            (plane.link, "workspace"),
+        ));
+    }
+    Ok(rooms
+        .into_iter()
+        .map(|(factor, blame)| (factor * (1.0 - ROUNDING), blame))
+        // NaN counts as outside.
+        .filter(|(factor, _)| !(*factor >= 1.0))
+        .min_by(|(a, _), (b, _)| a.total_cmp(b)))
+}
+
+/// A motion scaled down about its start until the proof succeeds; the joint and limit at fault where it never does.
+pub(super) fn fit_within(
+    frame: &Frame,
+    enclosing: &Chain<Interval>,
+    mut motions: Vec<JointMotion>,
+) -> Result<Fitted, ExciteError> {
+    let mut blame = (0, "position");
+    for _ in 0..SHRINKS {
+        let reached = reach(frame, &motions, enclosing)?;
+        let Some((factor, at_fault)) = worst(frame, &reached, &motions)? else {
+            return Ok(Ok((motions, reached)));
+        };
+        blame = at_fault;
+        if !factor.is_finite() {
+            break;
+        }
+        // Torque is not proportional to the amplitude: never more than 5 % at once.
+        let factor = factor.clamp(0.95, 0.999);
+        for motion in &mut motions {
+            for c in &mut motion.coefficients {
+                *c *= factor;
+            }
+        }
+    }
+    Ok(Err(blame))
+}

@@ -1,0 +1,401 @@
+//! Everything that is the same for all starts of a design.
+
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rig_shared::lanes::Lanes;
+use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor};
+use rig_shared::trajectory::HARMONICS;
+
+use super::criterion::Values;
+use super::problem::LANES;
+use super::schedule::{JointMotion, Schedule};
+use super::workspace::{Plane, planes_of};
+use super::{Criterion, ExciteError, Options, Parameters, Scaling};
+use crate::identify::{Base, ModelKind};
+use crate::robot::Robot;
+use crate::simulate::{Model, SimulateError};
+
+/// States from which the size of a column is estimated; it serves as a unit and need not be precise.
+const SIZE_STATES: usize = 4000;
+/// Seed of these states and of those that find the base parameters: not the user's, so that values of different
+/// seeds compare.
+const SIZE_SEED: u64 = 1;
+
+/// What a joint may do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// Lowest position.
+    pub low: f64,
+    /// Highest position.
+    pub high: f64,
+    pub velocity: f64,
+    pub acceleration: Option<f64>,
+    pub torque: Option<f64>,
+}
+
+impl Bounds {
+    pub(super) fn half(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.high + self.low)
+    }
+}
+
+/// Everything that is the same for all starts.
+pub(super) struct Frame {
+    pub lanes: Chain<Lanes<LANES>>,
+    pub plain: Chain<f64>,
+    /// Regressor columns that stand for the base parameters, in ascending order.
+    pub columns: Vec<usize>,
+    /// Size of each of these columns by which it is divided.
+    pub sizes: Vec<f64>,
+    /// Factor of each joint's rows.
+    pub weights: Vec<f64>,
+    /// Prior parameters, where the description has them all.
+    pub parameters: Option<Vec<[f64; COLUMNS]>>,
+    pub bounds: Vec<Bounds>,
+    /// Where points of the links must stay.
+    pub planes: Vec<Plane>,
+    pub schedule: Schedule,
+    /// Where the joints start, if that is not free.
+    pub fixed: Option<Vec<f64>>,
+    pub criterion: Criterion,
+}
+
+/// A period whose harmonics can use the limits: the fundamental slow enough to sweep the position range at the
+/// velocity limit, and the fastest harmonic no faster than where velocity and acceleration limits meet; the longest
+/// over the joints, rounded up to 0.1 s.
+pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
+    use core::f64::consts::TAU;
+    let mut period = 0.1_f64;
+    for bounds in bounds_of(robot)?.0 {
+        period = period.max(TAU * bounds.half() / bounds.velocity);
+        if let Some(acceleration) = bounds.acceleration {
+            period = period.max(TAU * harmonics as f64 * bounds.velocity / acceleration);
+        }
+    }
+    // Rounding must not lift an exact tenth to the next.
+    Ok((period * 10.0 - 1e-9).ceil() / 10.0)
+}
+
+/// Limits of all joints, and notes on what they lack.
+pub(super) fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
+    let mut notes = Vec::new();
+    let mut list = Vec::new();
+    let mut boundless = Vec::new();
+    for joint in &robot.joints {
+        let limits = joint.limits.as_ref().ok_or_else(|| ExciteError::NoLimits {
+            joint: joint.name.clone(),
+        })?;
+        let [mut low, mut high] = limits.position;
+        if !low.is_finite() || !high.is_finite() {
+            (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
+            notes.push(format!(
+                "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
+                joint.name
+            ));
+        }
+        if limits.acceleration.is_none() {
+            boundless.push(joint.name.as_str());
+        }
+        list.push(Bounds {
+            low,
+            high,
+            velocity: limits.velocity,
+            acceleration: limits.acceleration,
+            torque: limits.torque,
+        });
+    }
+    if !boundless.is_empty() {
+        notes.push(format!(
+            "No acceleration limit in [joint.limits] of {}; acceleration is bounded by velocity and harmonics only.",
+            named(&boundless)
+        ));
+    }
+    Ok((list, notes))
+}
+
+/// "joint \"a\"", "joints \"a\", \"b\"".
+fn named(joints: &[&str]) -> String {
+    let quoted: Vec<String> = joints.iter().map(|name| format!("\"{name}\"")).collect();
+    let plural = if joints.len() == 1 { "" } else { "s" };
+    format!("joint{plural} {}", quoted.join(", "))
+}
+
+/// Prior parameters, if every link has its own; else none, with the name of the first joint without.
+pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>, String> {
+    match robot.joints.iter().find(|j| j.inertial.is_none()) {
+        Some(joint) => Err(joint.name.clone()),
+        None => Ok(model.parameters.clone()),
+    }
+}
+
+/// Root mean square of each base column over states within the limits.
+fn column_sizes(
+    chain: &Chain<f64>,
+    columns: &[usize],
+    bounds: &[Bounds],
+    weights: &[f64],
+    fastest: f64,
+) -> Result<Vec<f64>, ExciteError> {
+    let n = bounds.len();
+    let width = n * COLUMNS;
+    let mut random = rand_pcg::Pcg64::seed_from_u64(SIZE_SEED);
+    let mut symmetric = |limit: f64| limit * (2.0 * random.random::<f64>() - 1.0);
+    let mut squares = vec![0.0; columns.len()];
+    let mut out = vec![0.0; n * width];
+    let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for _ in 0..SIZE_STATES {
+        for (j, b) in bounds.iter().enumerate() {
+            q[j] = b.middle() + symmetric(b.half());
+            qd[j] = symmetric(b.velocity);
+            // What the velocity limit lets the fastest harmonic do, where that is less.
+            let reachable = b.velocity * fastest;
+            qdd[j] = symmetric(b.acceleration.map_or(reachable, |a| a.min(reachable)));
+        }
+        differential_regressor(chain, &q, &qd, &qdd, &mut out)?;
+        for (sum, c) in squares.iter_mut().zip(columns) {
+            *sum += (0..n)
+                .map(|j| (weights[j] * out[j * width + c]).powi(2))
+                .sum::<f64>();
+        }
+    }
+    Ok(squares
+        .iter()
+        .map(|s| (s / SIZE_STATES as f64).sqrt())
+        .collect())
+}
+
+/// Singular values of a motion's regressor over one period at `samples` instants.
+pub(super) fn values_of(
+    frame: &Frame,
+    motions: &[JointMotion],
+    samples: usize,
+) -> Result<Values, ExciteError> {
+    let n = motions.len();
+    let (p, width) = (frame.columns.len(), n * COLUMNS);
+    let trajectories: Vec<_> = motions
+        .iter()
+        .map(|m| frame.schedule.trajectory(&m.coefficients))
+        .collect();
+    let mut scaled = DMatrix::zeros(samples * n, p);
+    let mut plain = DMatrix::zeros(samples * n, p);
+    let mut out = vec![0.0; n * width];
+    let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for s in 0..samples {
+        let micros = f64::from(frame.schedule.ramp_us)
+            + f64::from(frame.schedule.period_us) * s as f64 / samples as f64;
+        for j in 0..n {
+            let at = trajectories[j].at(micros * 1e-6);
+            q[j] = motions[j].base + at.position;
+            qd[j] = at.velocity;
+            qdd[j] = at.acceleration;
+        }
+        differential_regressor(&frame.plain, &q, &qd, &qdd, &mut out)?;
+        for j in 0..n {
+            for (c, source) in frame.columns.iter().enumerate() {
+                let entry = out[j * width + source];
+                plain[(s * n + j, c)] = entry;
+                scaled[(s * n + j, c)] = entry * frame.weights[j] / frame.sizes[c];
+            }
+        }
+    }
+    let condition = |s: &DVector<f64>| s.max() / s.min();
+    // The triangular factor has the same singular values and is far smaller.
+    let singular_values = |m: DMatrix<f64>| m.qr().r().singular_values();
+    let singular = singular_values(scaled);
+    let root = (samples as f64).sqrt();
+    let logs: f64 = singular.iter().map(|s| (s / root).ln()).sum();
+    Ok(Values {
+        condition_number: condition(&singular),
+        smallest_singular_value: singular.min() / root,
+        mean_singular_value: (logs / p as f64).exp(),
+        si_condition_number: condition(&singular_values(plain)),
+    })
+}
+
+fn micros(name: &'static str, seconds: f64) -> Result<u32, ExciteError> {
+    let micros = (seconds * 1e6).round();
+    // An hour: the trajectory's own times are 32 bits of microseconds.
+    if (1e3..=3.6e9).contains(&micros) {
+        Ok(micros as u32)
+    } else {
+        Err(ExciteError::Option {
+            name,
+            value: seconds.to_string(),
+            right: "it must be between 0.001 and 3600 s".into(),
+        })
+    }
+}
+
+fn wrong(name: &'static str, value: String, right: String) -> ExciteError {
+    ExciteError::Option { name, value, right }
+}
+
+fn schedule_of(robot: &Robot, options: &Options) -> Result<Schedule, ExciteError> {
+    if !(1..=HARMONICS).contains(&options.harmonics) {
+        return Err(wrong(
+            "number of harmonics",
+            options.harmonics.to_string(),
+            format!("it must be between 1 and {HARMONICS}"),
+        ));
+    }
+    for (name, count) in [
+        ("number of starts", options.starts),
+        ("number of periods", u32::from(options.periods)),
+    ] {
+        if count == 0 {
+            return Err(wrong(name, "0".into(), "there must be at least one".into()));
+        }
+    }
+    let period = match options.period {
+        Some(period) => period,
+        None => default_period(robot, options.harmonics)?,
+    };
+    let period_us = micros("period", period)?;
+    let ramp_us = micros("ramp", options.ramp.unwrap_or(period))?;
+    if ramp_us / 4 > period_us {
+        return Err(wrong(
+            "ramp",
+            format!("{} s", f64::from(ramp_us) * 1e-6),
+            format!("it must not be longer than four periods of {period} s"),
+        ));
+    }
+    Ok(Schedule {
+        period_us,
+        ramp_us,
+        periods: options.periods,
+        harmonics: options.harmonics,
+    })
+}
+
+fn check_start(robot: &Robot, start: &[f64], bounds: &[Bounds]) -> Result<(), ExciteError> {
+    if start.len() != robot.joints.len() {
+        return Err(wrong(
+            "start",
+            format!("{} numbers", start.len()),
+            format!("the robot has {} joints", robot.joints.len()),
+        ));
+    }
+    for ((value, b), joint) in start.iter().zip(bounds).zip(&robot.joints) {
+        if !(b.low < *value && *value < b.high) {
+            return Err(wrong(
+                "start",
+                value.to_string(),
+                format!(
+                    "joint \"{}\" can move between {} and {}",
+                    joint.name, b.low, b.high
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Factors of the joints' rows: what is known of their noise, else of their strength.
+fn weights_of(
+    robot: &Robot,
+    options: &Options,
+    bounds: &[Bounds],
+) -> Result<Vec<f64>, ExciteError> {
+    if let Some(noise) = &options.torque_noise {
+        if noise.len() != robot.joints.len() {
+            return Err(wrong(
+                "torque noise",
+                format!("{} numbers", noise.len()),
+                format!("the robot has {} joints", robot.joints.len()),
+            ));
+        }
+        if let Some(value) = noise.iter().find(|v| !(v.is_finite() && **v > 0.0)) {
+            return Err(wrong(
+                "torque noise",
+                value.to_string(),
+                "a standard deviation must be greater than 0, in N·m (N for a prismatic joint)"
+                    .into(),
+            ));
+        }
+        return Ok(noise.iter().map(|sigma| 1.0 / sigma).collect());
+    }
+    // Unlike units only compare where every joint says what it can give.
+    let comparable = options.scaling == Scaling::Sizes
+        && bounds.len() > 1
+        && bounds.iter().all(|b| b.torque.is_some());
+    Ok(bounds
+        .iter()
+        .map(|b| match b.torque {
+            Some(limit) if comparable => 1.0 / limit,
+            _ => 1.0,
+        })
+        .collect())
+}
+
+pub(super) fn frame_of(
+    robot: &Robot,
+    options: &Options,
+) -> Result<(Frame, Base, Vec<String>), ExciteError> {
+    let (bounds, mut notes) = bounds_of(robot)?;
+    let schedule = schedule_of(robot, options)?;
+    if let Some(start) = &options.start {
+        check_start(robot, start, &bounds)?;
+    }
+    let model = Model::from_robot(robot)?;
+    let parameters = match prior(robot, &model) {
+        Ok(parameters) => Some(parameters),
+        Err(joint) => {
+            if bounds.iter().any(|b| b.torque.is_some()) {
+                notes.push(format!(
+                    "The torque limit was not checked: joint \"{joint}\" has no [joint.inertial], so that its torque is not known beforehand."
+                ));
+            }
+            None
+        }
+    };
+    let unlimited: Vec<&str> = bounds
+        .iter()
+        .zip(&robot.joints)
+        .filter(|(b, _)| b.torque.is_none())
+        .map(|(_, joint)| joint.name.as_str())
+        .collect();
+    if !unlimited.is_empty() {
+        notes.push(format!(
+            "No torque limit in [joint.limits] of {}, so none was kept there.",
+            named(&unlimited)
+        ));
+    }
+    let own = robot.joints.len() * COLUMNS;
+    let mut base = Base::structural(robot, ModelKind::Differential, SIZE_SEED)?;
+    if options.parameters == Parameters::Links {
+        // Of a link's own columns and its drive's, the link's are preferred as representatives, so that what is
+        // left without the drives' is a base of the links alone.
+        base = base.restricted(|c| c < own && c % COLUMNS < column::DRIVE_INERTIA);
+    }
+    if base.columns.iter().any(|c| *c >= own) {
+        notes.push(
+            "The parameters of the coupled motors themselves (Iam, fvm, fcm) are not among those that the motion is optimal for, and their part of the torque was not checked against its limit."
+                .into(),
+        );
+        base = base.restricted(|c| c < own);
+    }
+    let weights = weights_of(robot, options, &bounds)?;
+    let fastest = schedule.omega() * options.harmonics as f64;
+    let sizes = match options.scaling {
+        Scaling::Sizes => column_sizes(&model.chain, &base.columns, &bounds, &weights, fastest)?,
+        Scaling::None => vec![1.0; base.columns.len()],
+    };
+    let frame = Frame {
+        lanes: Chain::new(&robot.geometry(), robot.gravity).map_err(SimulateError::from)?,
+        planes: planes_of(robot),
+        plain: model.chain,
+        columns: base.columns.clone(),
+        sizes,
+        weights,
+        parameters,
+        bounds,
+        schedule,
+        fixed: options.start.clone(),
+        criterion: options.criterion,
+    };
+    Ok((frame, base, notes))
+}

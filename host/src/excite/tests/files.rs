@@ -1,0 +1,99 @@
+//! Trajectory files.
+
+use std::path::Path;
+
+use rig_shared::trajectory::Trajectory;
+
+use super::*;
+
+#[test]
+fn samples_in_a_file_are_the_trajectory() {
+    let robot = one_link();
+    let file = designed(&robot, &quick(Criterion::ConditionNumber)).file;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.csv");
+    file.save(&path, &robot, 500.0).unwrap();
+    let read = load_reference(&path, &robot, 1000.0).unwrap();
+    let direct = file.sampled(500.0).unwrap();
+    assert!((read.period - 0.002).abs() < 1e-12);
+    assert_eq!(read.position, direct.position);
+    assert_eq!(direct.position[0].last(), Some(&file.joints[0].start));
+}
+
+#[test]
+fn faults_in_a_file_are_named_with_their_line() {
+    let robot = one_link();
+    let good = designed(&robot, &quick(Criterion::ConditionNumber))
+        .file
+        .to_toml(&robot);
+    let said = |from: &str, to: &str| {
+        assert!(good.contains(from), "{from}");
+        TrajectoryFile::from_toml(&good.replace(from, to), Path::new("t.toml"))
+            .unwrap_err()
+            .to_string()
+    };
+    let text = said("period = 3.3", "period = 3.30000001");
+    assert!(
+        text.starts_with("t.toml:13:") && text.contains("microseconds"),
+        "{text}"
+    );
+    let text = said("kind = \"fourier\"", "kind = \"furrier\"");
+    assert!(
+        text.starts_with("t.toml:1") && text.contains("furrier"),
+        "{text}"
+    );
+    let text = said("sine = [", "sine = [0.0, 0.0, 0.0, 0.0, ");
+    assert!(text.contains("9 entries"), "{text}");
+    let text = said("ramp = 3.3", "ramp = 0.0");
+    assert!(text.contains("ramp"), "{text}");
+    let text = said("\"cond\"", "\"best\"");
+    assert!(text.contains("min-singular"), "{text}");
+    let missing = load_reference(Path::new("no-such.toml"), &robot, 1000.0)
+        .unwrap_err()
+        .to_string();
+    assert!(missing.contains("no-such.toml"));
+}
+
+#[test]
+fn staged_motions_keep_the_limits_and_every_kind_survives_its_file() {
+    let robot = one_link();
+    let limits = robot.joints[0].limits.clone().unwrap();
+    let mut files = vec![designed(&robot, &quick(Criterion::ConditionNumber)).file];
+    for kind in [
+        StagedKind::Chirp,
+        StagedKind::Staircase,
+        StagedKind::Reversals,
+        StagedKind::Sweep,
+    ] {
+        let (file, notes) = staged(&robot, kind, None, None).unwrap();
+        assert!(
+            notes.is_empty() && file.duration() > 5.0 && file.duration() < 1800.0,
+            "{file:?}"
+        );
+        let [low, high, v, a, torque] = sampled_reach(&robot, &file)[0];
+        assert!(
+            limits.position[0] <= low && high <= limits.position[1] && high > 0.1,
+            "{kind:?} {low} {high}"
+        );
+        assert!(
+            v <= limits.velocity && a <= 60.0 && torque <= 8.0,
+            "{kind:?} {v} {a} {torque}"
+        );
+        files.push(file);
+    }
+    files.push(TrajectoryFile {
+        robot: "r \"1\"".into(),
+        design: None,
+        joints: vec![JointTrajectory {
+            name: "link".into(),
+            start: 0.1,
+            trajectory: Trajectory::Hold(123_457),
+        }],
+    });
+    let folder = tempfile::tempdir().unwrap();
+    for file in files {
+        let path = folder.path().join("t.toml");
+        file.save(&path, &robot, 1000.0).unwrap();
+        assert_eq!(TrajectoryFile::load(&path).unwrap(), file);
+    }
+}

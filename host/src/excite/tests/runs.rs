@@ -1,0 +1,137 @@
+//! Runs through the simulated closed loop.
+
+use nalgebra::{DMatrix, DVector};
+use rig_shared::multibody::{kinetic_energy, potential_energy};
+
+use super::*;
+use crate::data::Source;
+use crate::robot::JointFriction;
+
+#[test]
+fn the_simulated_run_conserves_energy_and_reads_back() {
+    let mut robot = one_link();
+    let friction = JointFriction {
+        coulomb: 0.4,
+        viscous: 0.3,
+        offset: 0.1,
+    };
+    robot.joints[0].friction = Some(friction);
+    let file = designed(&robot, &quick(Criterion::ConditionNumber)).file;
+    let reference = file.sampled(1000.0).unwrap();
+    let run = replay(&robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
+    assert!(
+        run.notes.iter().any(|n| n.contains("stand-in")),
+        "{:?}",
+        run.notes
+    );
+    let motion = &run.motion;
+    let model = Model::from_robot(&robot).unwrap();
+    let energy = |k: usize| {
+        let (q, qd) = (&motion.q[0][k..=k], &motion.qd[0][k..=k]);
+        kinetic_energy(&model.chain, &model.parameters, q, qd).unwrap()
+            + potential_energy(&model.chain, &model.parameters, q).unwrap()
+    };
+    // Work put in, less what friction takes and the offset holds, is the energy gained.
+    let (mut put_in, mut lost) = (0.0, 0.0);
+    let last = motion.q[0].len() - 1;
+    for k in 0..last {
+        let way = motion.q[0][k + 1] - motion.q[0][k];
+        let speed = way / run.period;
+        put_in += 0.5 * (motion.tau[0][k] + motion.tau[0][k + 1]) * way;
+        lost += 0.4 * way.abs() + 0.3 * speed * way + 0.1 * way;
+    }
+    let gained = energy(last) - energy(0);
+    assert!(put_in > 10.0, "{put_in}");
+    assert!(
+        (put_in - lost - gained).abs() < 2e-3 * put_in,
+        "{put_in} {lost} {gained}"
+    );
+    // It follows its reference as well as a cascade without feed-forward can.
+    let worst = motion.q[0]
+        .iter()
+        .zip(&run.reference[0])
+        .map(|(q, r)| (q - r).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 0.6, "{worst}");
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["run.csv", "run.mcap"] {
+        let path = folder.path().join(name);
+        run.save(&path, &robot).unwrap();
+        let (blocks, warnings) = Source::open(&path, &robot).unwrap().read_all().unwrap();
+        assert!(blocks.len() == 1 && warnings.is_empty());
+        assert_eq!(blocks[0].joints[0].tau, motion.tau[0]);
+        assert_eq!(
+            blocks[0].joints[0].reference.as_ref(),
+            Some(&run.reference[0])
+        );
+        // A recording's reference can be run again.
+        assert_eq!(
+            load_reference(&path, &robot, 1.0).unwrap().position,
+            reference.position
+        );
+    }
+}
+
+#[test]
+fn a_noiseless_run_gives_its_parameters_back() {
+    let robot = one_link();
+    let file = designed(&robot, &quick(Criterion::ConditionNumber)).file;
+    let reference = file.sampled(1000.0).unwrap();
+    let run = replay(&robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
+    let (q, qd, tau) = (&run.motion.q[0], &run.motion.qd[0], &run.motion.tau[0]);
+    // The whole periods, by the model written out; acceleration by central differences.
+    let used: Vec<usize> = (3300..q.len() - 3300)
+        .filter(|k| qd[*k].abs() > 0.05)
+        .collect();
+    let rows = DMatrix::from_fn(used.len(), 6, |row, c| {
+        let k = used[row];
+        let acceleration = (qd[k + 1] - qd[k - 1]) / (2.0 * run.period);
+        let (s, cos) = q[k].sin_cos();
+        [
+            9.81 * cos,
+            -9.81 * s,
+            acceleration,
+            qd[k],
+            qd[k].signum(),
+            1.0,
+        ][c]
+    });
+    let right = DVector::from_iterator(used.len(), used.iter().map(|k| tau[*k]));
+    let found = rows.svd(true, true).solve(&right, 0.0).unwrap();
+    for (value, truth) in found.iter().zip([0.3, 0.0, 0.17, 0.3, 0.4, 0.0]) {
+        assert!((value - truth).abs() < 1e-3, "{found}");
+    }
+}
+
+#[test]
+fn noise_has_its_deviation_and_its_seed_and_saturation_is_said() {
+    let mut robot = one_link();
+    let file = staged(&robot, StagedKind::Staircase, None, None).unwrap().0;
+    let reference = file.sampled(500.0).unwrap();
+    let run =
+        |robot: &Robot, noise, seed| replay(robot, &reference, noise, seed, |_, _| ()).unwrap();
+    let clean = run(&robot, Noise::default(), 1);
+    let noise = Noise {
+        position: 0.01,
+        velocity: 0.0,
+        torque: 0.2,
+    };
+    let noisy = run(&robot, noise, 1);
+    let deviation = |a: &[f64], b: &[f64]| {
+        (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+    };
+    assert!((deviation(&noisy.motion.q[0], &clean.motion.q[0]) / 0.01 - 1.0).abs() < 0.05);
+    assert!((deviation(&noisy.motion.tau[0], &clean.motion.tau[0]) / 0.2 - 1.0).abs() < 0.05);
+    assert_eq!(noisy.motion.qd, clean.motion.qd);
+    assert_eq!(noisy, run(&robot, noise, 1));
+    assert_ne!(noisy, run(&robot, noise, 2));
+    assert!(!clean.notes.iter().any(|n| n.contains("cut in")));
+    robot.joints[0].limits.as_mut().unwrap().torque = Some(2.5);
+    let cut = run(&robot, Noise::default(), 1);
+    assert!(
+        cut.notes.iter().any(|n| n.contains("cut in")),
+        "{:?}",
+        cut.notes
+    );
+    assert!(cut.motion.tau[0].iter().all(|t| t.abs() <= 2.5));
+}

@@ -1,0 +1,247 @@
+//! The motion that an identified model makes in its closed loop, as a companion of the recording.
+
+use nalgebra::{DMatrix, DVector};
+use rig_shared::multibody::{COLUMNS, Chain};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS};
+
+use super::IdentifyError;
+use super::consistent::{Quadratic, consistent};
+use super::factor::TriangularFactor;
+use super::prior::Prior;
+use super::problem::Problem;
+use super::twin::Companion;
+use crate::data::Block;
+use crate::prepare::{LowPass, PrepareError};
+use crate::robot::{Controller, Robot};
+use crate::simulate::{Model, Motors, Stepper};
+use crate::validate::added_torque;
+
+/// Rows through which a parabola is laid for the first state of a stretch.
+const FIRST_ROWS: usize = 21;
+/// Steps of the simulation within one sample.
+const SUBSTEPS: u32 = 4;
+/// Cut-off of the stand-in for a missing reference, as a multiple of the highest frequency of the motion.
+const SMOOTHING: f64 = 1.5;
+
+/// Where a motion free of the measurement's noise can come from.
+pub(super) enum Source {
+    /// Model and the description's controllers, driven by the recorded reference.
+    Loop(Vec<Controller>),
+    /// The recorded reference itself: what a computed-torque controller designed from the model follows.
+    Reference,
+    /// The measured position behind a low-pass close to the motion.
+    Smoothed(LowPass),
+}
+
+impl Source {
+    /// The best that description and recordings allow, and in words.
+    pub(super) fn of(problem: &Problem) -> Result<(Self, String), IdentifyError> {
+        let n = problem.robot.joints.len();
+        let mut referenced = true;
+        for recording in problem.sources {
+            // One block decides: columns do not change within a recording.
+            let mut looked = false;
+            recording.each_block(1 << 10, &mut |block| {
+                if !looked {
+                    referenced &= block.joints.iter().all(|j| j.reference.is_some());
+                    looked = true;
+                }
+                Ok(())
+            })?;
+        }
+        let controllers: Vec<Controller> = problem
+            .robot
+            .joints
+            .iter()
+            .filter_map(|j| j.controller.clone())
+            .collect();
+        if referenced && controllers.len() == n {
+            return Ok((
+                Self::Loop(controllers),
+                "the closed loop of the identified model and the description's controllers, driven by the recorded reference".into(),
+            ));
+        }
+        if referenced {
+            return Ok((
+                Self::Reference,
+                "the recorded reference, which the loop of the identified model and a computed-torque controller designed from it follows (the description has no [joint.controller] for every joint)".into(),
+            ));
+        }
+        let treatment = problem.plan.treatment;
+        let cutoff = (SMOOTHING * treatment.motion_frequency).min(0.8 * treatment.cutoff);
+        let low_pass =
+            LowPass::butterworth(4, cutoff, treatment.sample_rate).ok_or(PrepareError::Cutoff {
+                cutoff,
+                rate: treatment.sample_rate,
+                nyquist: treatment.sample_rate / 2.0,
+            })?;
+        Ok((
+            Self::Smoothed(low_pass),
+            format!(
+                "the measured position behind a low-pass of {cutoff:.3} Hz, because the recordings have no reference (columns ref<k>); noise below that frequency is still in it"
+            ),
+        ))
+    }
+}
+
+/// The physically consistent model nearest to values of the base columns, in the data's own measure.
+pub(super) fn nearest(
+    problem: &Problem,
+    factor: &TriangularFactor,
+    prior: &Prior,
+    full: &[f64],
+) -> Result<Vec<f64>, IdentifyError> {
+    let (r, _) = factor.system();
+    let right = &r * DVector::from_column_slice(full);
+    let data = Quadratic {
+        matrix: r * &problem.base.combination,
+        right,
+    };
+    Ok(consistent(&data, prior)?.parameters)
+}
+
+/// Standard parameters as a model to simulate, with the drives of `robot`.
+///
+/// # Errors
+/// [`IdentifyError::Model`] where the drives make no transmission.
+pub(super) fn model_of(
+    robot: &Robot,
+    chain: &Chain<f64>,
+    standard: &[f64],
+) -> Result<Model, IdentifyError> {
+    let (joints, motors) = standard.split_at(robot.joints.len() * COLUMNS);
+    let motors = if robot.drive_kinds().iter().all(|k| *k == DriveKind::Simple) {
+        None
+    } else {
+        Some(Motors {
+            transmission: robot
+                .transmission()
+                .map_err(|e| IdentifyError::Model(e.to_string()))?,
+            parameters: motors.as_chunks::<MOTOR_COLUMNS>().0.to_vec(),
+        })
+    };
+    Ok(Model {
+        chain: chain.clone(),
+        parameters: joints.as_chunks::<COLUMNS>().0.to_vec(),
+        motors,
+    })
+}
+
+/// Simulates block after block; the state carries over where a block continues the one before.
+pub(super) struct LoopMotion<'a> {
+    robot: &'a Robot,
+    controllers: &'a [Controller],
+    stepper: Stepper<'a>,
+    period: f64,
+    state: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+impl<'a> LoopMotion<'a> {
+    /// For one recording sampled every `period` seconds.
+    pub(super) fn new(
+        robot: &'a Robot,
+        controllers: &'a [Controller],
+        model: &'a Model,
+        period: f64,
+    ) -> Result<Self, IdentifyError> {
+        Ok(Self {
+            robot,
+            controllers,
+            stepper: Stepper::new(model).map_err(|e| IdentifyError::Simulation(e.to_string()))?,
+            period,
+            state: None,
+        })
+    }
+}
+
+fn stopped(e: impl std::fmt::Display) -> PrepareError {
+    PrepareError::Stopped(format!("The identified model cannot be simulated: {e}"))
+}
+
+fn references(block: &Block) -> Result<Vec<&Vec<f64>>, PrepareError> {
+    block
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            joint
+                .reference
+                .as_ref()
+                .ok_or_else(|| stopped(format!("column ref{} is missing.", j + 1)))
+        })
+        .collect()
+}
+
+impl Companion for LoopMotion<'_> {
+    fn positions(&mut self, block: &Block) -> Result<Vec<Vec<f64>>, PrepareError> {
+        let n = block.joints.len();
+        let rows = block.len();
+        let reference = references(block)?;
+        let mut words = Vec::new();
+        let added: Vec<Vec<f64>> = (0..n)
+            .map(|j| added_torque(block, j, self.controllers, rows, &mut words))
+            .collect();
+        let (mut q, mut v) = match self.state.take() {
+            Some(state) if block.continues => state,
+            _ => first_state(block, self.period),
+        };
+        let mut positions = vec![Vec::with_capacity(rows); n];
+        let mut torque = vec![0.0; n];
+        let dt = self.period / f64::from(SUBSTEPS);
+        for k in 0..rows {
+            for i in 0..n {
+                let c = &self.controllers[i];
+                let wish = c.torque_gain
+                    * c.velocity_gain
+                    * (c.position_gain * (reference[i][k] - q[i]) - v[i])
+                    + added[i][k];
+                let limit = self.robot.joints[i]
+                    .limits
+                    .as_ref()
+                    .and_then(|l| l.torque)
+                    .unwrap_or(f64::INFINITY);
+                torque[i] = wish.max(-limit).min(limit);
+                positions[i].push(q[i]);
+                if !(q[i].is_finite() && torque[i].is_finite()) {
+                    return Err(stopped(format!(
+                        "its joint {} grew beyond all bounds at {:.3} s; the gains of [joint.controller] do not fit.",
+                        self.robot.joints[i].name, block.t[k]
+                    )));
+                }
+            }
+            for _ in 0..SUBSTEPS {
+                self.stepper
+                    .step(&mut q, &mut v, &torque, dt)
+                    .map_err(stopped)?;
+            }
+        }
+        self.state = Some((q, v));
+        Ok(positions)
+    }
+}
+
+/// The reference as it was recorded.
+pub(super) struct ReferenceMotion;
+
+impl Companion for ReferenceMotion {
+    fn positions(&mut self, block: &Block) -> Result<Vec<Vec<f64>>, PrepareError> {
+        Ok(references(block)?.into_iter().cloned().collect())
+    }
+}
+
+/// Position and velocity at the first row of a stretch, by a parabola through its first rows.
+fn first_state(block: &Block, period: f64) -> (Vec<f64>, Vec<f64>) {
+    let rows = FIRST_ROWS.min(block.len());
+    let a = DMatrix::from_fn(rows, 3, |i, power| (i as f64).powi(power as i32));
+    let svd = a.svd(true, true);
+    block
+        .joints
+        .iter()
+        .map(|joint| {
+            let y = DVector::from_fn(rows, |i, _| joint.q[i]);
+            // A parabola over distinct instants always has a solution; the first row stands in otherwise.
+            svd.solve(&y, 1e-12)
+                .map_or((joint.q[0], 0.0), |x| (x[0], x[1] / period))
+        })
+        .unzip()
+}

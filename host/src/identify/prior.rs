@@ -1,0 +1,293 @@
+//! What is known of a robot before its data: the description's inertial values, or a plausible body in their place.
+
+use nalgebra::{DMatrix, DVector, Matrix4};
+use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
+
+use super::pseudo_inertia::{Divergence, INERTIAL, parameters_of};
+use crate::robot::Robot;
+
+/// Density of the stand-in bodies, kg/m³: aluminium castings with as much air as metal.
+const DENSITY: f64 = 1300.0;
+/// Least half-width of a stand-in body, m.
+const LEAST_HALF_WIDTH: f64 = 0.06;
+/// Relative uncertainty of a stand-in body: right to a factor of a few.
+const STAND_IN_UNCERTAINTY: f64 = 3.0;
+/// Where nothing is known of a friction or drive value: this share of what the joint's torque and speed suggest.
+const SMALL_SHARE: f64 = 0.01;
+
+/// What a standard column must obey.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rule {
+    /// One of the ten inertial parameters of a link (its index): J positive definite.
+    Inertial(usize),
+    /// Friction and drive inertia: not below zero.
+    NotNegative,
+    /// Offsets.
+    Free,
+}
+
+/// Prior values, their natural scales and rules, by standard column.
+#[derive(Clone, Debug)]
+pub(super) struct Prior {
+    /// Centre.
+    pub centre: Vec<f64>,
+    /// Natural size of each column: what "100 %" means.
+    pub scale: Vec<f64>,
+    /// Relative uncertainty of each column; infinite where nothing is known.
+    pub uncertainty: Vec<f64>,
+    /// Rules.
+    pub rules: Vec<Rule>,
+    /// What each joint's own columns hold of drives that move it from another joint: π = shares·π', π' the values
+    /// here. Absent where every drive moves its own joint only.
+    pub shares: Option<DMatrix<f64>>,
+    /// One divergence a link.
+    pub bodies: Vec<Divergence>,
+    /// Multiplies every pull: where the path of the solution ends.
+    pub strength: f64,
+    /// Sentences: what stands in for what.
+    pub remarks: Vec<String>,
+    /// Whether the description states inertial values for every link.
+    pub stated: bool,
+}
+
+/// What the data suggest for a column that the description does not know.
+pub(super) struct Hints {
+    /// Least-squares value of each standard column that is identified on its own, else NaN.
+    pub values: Vec<f64>,
+    /// RMS torque of each joint.
+    pub torque: Vec<f64>,
+    /// RMS speed of each joint.
+    pub speed: Vec<f64>,
+    /// RMS acceleration of each joint.
+    pub acceleration: Vec<f64>,
+}
+
+impl Prior {
+    /// From the description; `given` is the relative uncertainty stated for its values (1 where none is).
+    pub(super) fn of(robot: &Robot, columns: usize, hints: &Hints, given: f64) -> Self {
+        let n = robot.joints.len();
+        let shares = shares(robot, columns);
+        let mut described = described(robot, columns);
+        if let Some(shares) = &shares {
+            // Triangular with ones on the diagonal.
+            described = 2.0 * &described - shares * &described;
+        }
+        let described = described.as_slice().to_vec();
+        let mut prior = Self {
+            centre: described.clone(),
+            scale: vec![1.0; columns],
+            uncertainty: vec![given; columns],
+            rules: vec![Rule::NotNegative; columns],
+            shares,
+            bodies: Vec::with_capacity(n),
+            strength: 1.0,
+            remarks: Vec::new(),
+            stated: true,
+        };
+        for i in 0..n {
+            prior.link(robot, i, given);
+        }
+        for c in 0..columns {
+            // Motor columns follow the standard ones, three a joint: inertia, viscous, Coulomb.
+            let (joint, place) = if c < n * COLUMNS {
+                (c / COLUMNS, c % COLUMNS)
+            } else {
+                let after = c - n * COLUMNS;
+                let place = match after % MOTOR_COLUMNS {
+                    motor_column::INERTIA => column::DRIVE_INERTIA,
+                    motor_column::VISCOUS => column::VISCOUS,
+                    _ => column::COULOMB,
+                };
+                ((after / MOTOR_COLUMNS).min(n - 1), place)
+            };
+            if place < INERTIAL {
+                continue;
+            }
+            let size = hints.torque[joint]
+                / match place {
+                    column::DRIVE_INERTIA => hints.acceleration[joint],
+                    column::VISCOUS => hints.speed[joint],
+                    _ => 1.0,
+                }
+                .max(f64::MIN_POSITIVE);
+            let size = if size > 0.0 && size.is_finite() {
+                size
+            } else {
+                1.0
+            };
+            if place == column::OFFSET {
+                prior.rules[c] = Rule::Free;
+                prior.scale[c] = size;
+                prior.uncertainty[c] = f64::INFINITY;
+                continue;
+            }
+            if described[c] > 0.0 {
+                prior.scale[c] = described[c];
+                continue;
+            }
+            let value = hints.values[c];
+            prior.uncertainty[c] = f64::INFINITY;
+            prior.centre[c] = if value > SMALL_SHARE * size {
+                value
+            } else {
+                SMALL_SHARE * size
+            };
+            prior.scale[c] = prior.centre[c];
+        }
+        prior
+    }
+
+    /// The ten parameters of link `i`: the description's where a body can have them, else a stand-in.
+    fn link(&mut self, robot: &Robot, i: usize, given: f64) {
+        let at = i * COLUMNS;
+        let stated = robot.joints[i].inertial.is_some();
+        let own = &self.centre[at..at + INERTIAL];
+        let divergence = if stated { Divergence::new(own) } else { None };
+        let divergence = match divergence {
+            Some(divergence) => divergence,
+            None => {
+                let mass = (stated && own[0] > 0.0).then_some(own[0]);
+                let moment = stated.then(|| [own[1], own[2], own[3]]);
+                let stand_in = stand_in(robot, i, mass, moment);
+                self.centre[at..at + INERTIAL].copy_from_slice(&stand_in);
+                self.stated = false;
+                self.remarks.push(format!(
+                    "Joint {}: {}, so a uniform block of {:.3} kg stands in for its link.",
+                    robot.joints[i].name,
+                    if stated {
+                        "no body has the inertial values that the description states"
+                    } else {
+                        "the description states no inertial values"
+                    },
+                    stand_in[0]
+                ));
+                for c in at..at + INERTIAL {
+                    self.uncertainty[c] = STAND_IN_UNCERTAINTY.max(given);
+                }
+                // A block of finite size is always a body; the unit block answers for rounding.
+                match Divergence::new(&stand_in) {
+                    Some(divergence) => divergence,
+                    None => return self.unit_block(at),
+                }
+            }
+        };
+        self.scales(at);
+        self.bodies.push(divergence);
+    }
+
+    fn unit_block(&mut self, at: usize) {
+        let block = parameters_of(&Matrix4::from_diagonal_element(1.0));
+        self.centre[at..at + INERTIAL].copy_from_slice(&block);
+        self.scales(at);
+        self.bodies.extend(Divergence::new(&block));
+    }
+
+    fn scales(&mut self, at: usize) {
+        let p = &self.centre[at..at + INERTIAL];
+        let (mass, second) = (p[0], 0.5 * (p[4] + p[7] + p[9]));
+        let moment = (mass * second).sqrt();
+        for k in 0..INERTIAL {
+            self.rules[at + k] = Rule::Inertial(k);
+            self.scale[at + k] = match k {
+                0 => mass,
+                1..=3 => moment,
+                _ => second,
+            };
+        }
+    }
+
+    /// A matrix over the standard columns as one over the values here.
+    pub(super) fn own(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        match &self.shares {
+            Some(shares) => matrix * shares,
+            None => matrix.clone(),
+        }
+    }
+
+    /// Values here as standard parameters.
+    pub(super) fn standard(&self, own: &DVector<f64>) -> Vec<f64> {
+        match &self.shares {
+            Some(shares) => (shares * own).as_slice().to_vec(),
+            None => own.as_slice().to_vec(),
+        }
+    }
+
+    /// Size of the divergence's pull: the inverse square of the relative uncertainty, by standard column.
+    pub(super) fn pull(&self, c: usize) -> f64 {
+        let u = self.uncertainty[c];
+        if u.is_finite() {
+            1.0 / (u * u)
+        } else {
+            // Barrier only: keeps the value off zero by a share of its own uncertainty.
+            0.1
+        }
+    }
+}
+
+/// The description's standard parameters, those of motors behind them where there are columns for them.
+fn described(robot: &Robot, columns: usize) -> DVector<f64> {
+    let mut all = robot.standard_parameters().concat();
+    all.extend(robot.motor_parameters().concat());
+    all.truncate(columns);
+    DVector::from_vec(all)
+}
+
+/// Where a drive moves other joints too, their columns hold its inertia and viscous friction by the square of the
+/// ratio; see [`rig_shared::transmission`].
+fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
+    let n = robot.joints.len();
+    if columns <= n * COLUMNS {
+        return None;
+    }
+    let mut shares = DMatrix::identity(columns, columns);
+    for (k, kind) in robot.drive_kinds().into_iter().enumerate() {
+        let (DriveKind::Coupled, Some(drive)) = (kind, &robot.joints[k].drive) else {
+            continue;
+        };
+        let motor = n * COLUMNS + k * MOTOR_COLUMNS;
+        for (i, joint) in robot.joints.iter().enumerate() {
+            let ratio = if i == k {
+                1.0
+            } else {
+                drive.couples.get(&joint.name).copied().unwrap_or(0.0) / drive.gear_ratio
+            };
+            let at = i * COLUMNS;
+            if i != k {
+                shares[(at + column::DRIVE_INERTIA, motor + motor_column::INERTIA)] = ratio * ratio;
+            }
+            shares[(at + column::VISCOUS, motor + motor_column::VISCOUS)] = ratio * ratio;
+        }
+    }
+    Some(shares)
+}
+
+/// A uniform block from the link's frame to the next one's (half as far again as wide at the end of the chain).
+fn stand_in(
+    robot: &Robot,
+    i: usize,
+    mass: Option<f64>,
+    moment: Option<[f64; 3]>,
+) -> [f64; INERTIAL] {
+    let reach = robot.joints.get(i + 1).map_or([0.0; 3], |next| {
+        let (s, c) = next.alpha.sin_cos();
+        [next.a, -s * next.d, c * next.d]
+    });
+    let length = reach.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let half = (0.25 * length).max(LEAST_HALF_WIDTH);
+    let volume = (2.0 * half).powi(2) * (length + 2.0 * half);
+    let mass = mass.unwrap_or(DENSITY * volume);
+    let centre = moment.map_or(reach.map(|x| 0.5 * x), |h| h.map(|x| x / mass));
+    let mut j = Matrix4::zeros();
+    for r in 0..3 {
+        // Second moment of a rod along the reach, and of the block's width in every direction.
+        for c in 0..3 {
+            j[(r, c)] = mass * (centre[r] * centre[c] + reach[r] * reach[c] / 12.0);
+        }
+        j[(r, r)] += mass * half * half / 3.0;
+        j[(r, 3)] = mass * centre[r];
+        j[(3, r)] = mass * centre[r];
+    }
+    j[(3, 3)] = mass;
+    parameters_of(&j)
+}

@@ -1,0 +1,159 @@
+//! What every estimator beyond least squares starts from, and what it gives back.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::base::{Base, Independent};
+use super::covariance::{Estimate, t_quantile};
+use super::linear::spread;
+use super::model::Plan;
+use super::parts::{Parts, Refit};
+use super::{IdentifyError, Options};
+use crate::prepare::{Recording, Survey};
+use crate::robot::Robot;
+
+/// The weighted fit and all that led to it.
+pub(super) struct Problem<'a> {
+    pub robot: &'a Robot,
+    pub training: &'a [&'a dyn Recording],
+    /// The same with all their columns.
+    pub sources: &'a [&'a dyn Recording],
+    pub surveys: &'a [Survey],
+    pub plan: &'a Plan<'a>,
+    pub options: &'a Options,
+    pub base: &'a Base,
+    pub data: &'a Independent,
+    /// Per equation, one over the standard deviation of its residual.
+    pub weights: &'a [f64],
+    /// Weighted least squares: values of the identified combinations.
+    pub start: &'a [f64],
+    /// Instants over all training recordings.
+    pub instants: u64,
+}
+
+impl Problem<'_> {
+    /// Values of the weighted fit over all base columns.
+    pub(super) fn start_full(&self) -> Vec<f64> {
+        spread(self.start, &self.data.kept, self.base.len())
+    }
+
+    /// Factor that the rows of each training recording are multiplied by.
+    pub(super) fn recording_weights(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.training.len()).map(|r| self.options.row_weight(r))
+    }
+
+    /// Weights by which rows count as what they are worth when the residual remembers its past: σ·√memory as unit.
+    pub(super) fn tempered(&self, parts: &Parts) -> Vec<f64> {
+        self.weights
+            .iter()
+            .zip(&parts.memory)
+            .map(|(w, m)| w / m.sqrt())
+            .collect()
+    }
+
+    /// The identified combinations of values of all base columns.
+    pub(super) fn identified(&self, full: &[f64]) -> Vec<f64> {
+        (&self.data.combination * DVector::from_column_slice(full))
+            .as_slice()
+            .to_vec()
+    }
+}
+
+/// What an estimator gives.
+#[derive(Clone, Debug)]
+pub(super) struct Fitted {
+    /// Values of all base columns, from everything and with one stretch left out at a time.
+    pub full: Refit,
+    /// Values of the identified combinations, likewise.
+    pub kept: Refit,
+    /// Full standard parameters, where the estimator gives them.
+    pub standard: Option<Vec<f64>>,
+    /// Standard deviations that the estimator's own theory gives for white residuals.
+    pub classical_std: Vec<f64>,
+    /// Covariance by the estimator's own theory, where the jackknife does not say what is meant.
+    pub covariance: Option<DMatrix<f64>>,
+    /// Upper triangle of the regressor as fitted, for condition numbers.
+    pub regressor: DMatrix<f64>,
+    /// How it went, sentences for the report.
+    pub said: Vec<String>,
+    /// What the reader must know.
+    pub warnings: Vec<String>,
+    /// Whether the estimate rests on something too weak to trust it over others (instruments only).
+    pub doubtful: bool,
+}
+
+impl Fitted {
+    /// The estimate with its covariance.
+    pub(super) fn estimate(&self, parts: &Parts) -> Estimate {
+        let size = self.kept.whole.len();
+        let (covariance, freedom) = match &self.covariance {
+            Some(own) => {
+                let memory = parts.memory.iter().copied().fold(1.0, f64::max);
+                let rows = parts.rows as f64 / memory;
+                (own.clone(), (rows as usize).saturating_sub(size).max(1))
+            }
+            None => (self.kept.covariance(), self.kept.without.len() - 1),
+        };
+        assemble(
+            &self.kept.whole,
+            covariance,
+            freedom,
+            self.classical_std.clone(),
+            &self.regressor,
+            parts,
+        )
+    }
+}
+
+/// An [`Estimate`] of values and covariance.
+fn assemble(
+    values: &[f64],
+    covariance: DMatrix<f64>,
+    degrees_of_freedom: usize,
+    classical_std: Vec<f64>,
+    regressor: &DMatrix<f64>,
+    parts: &Parts,
+) -> Estimate {
+    let size = values.len();
+    let std: Vec<f64> = (0..size)
+        .map(|k| covariance[(k, k)].max(0.0).sqrt())
+        .collect();
+    let quantile = t_quantile(degrees_of_freedom);
+    let condition = |m: DMatrix<f64>| {
+        let s = m.singular_values();
+        s.max() / s.min()
+    };
+    let mut scaled = regressor.clone();
+    for mut column in scaled.column_iter_mut() {
+        let norm = column.norm();
+        column /= norm;
+    }
+    let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
+        (0..size)
+            .map(|i| (0..size).map(|j| m(i, j)).collect())
+            .collect::<Vec<Vec<f64>>>()
+    };
+    let memory = parts.memory.iter().copied().fold(1.0, f64::max);
+    Estimate {
+        values: values.to_vec(),
+        interval: (0..size)
+            .map(|k| [values[k] - quantile * std[k], values[k] + quantile * std[k]])
+            .collect(),
+        covariance: rows_of(&|i, j| covariance[(i, j)]),
+        correlation: rows_of(&|i, j| covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)),
+        std,
+        classical_std,
+        degrees_of_freedom,
+        rows: parts.rows,
+        effective_rows: parts.rows as f64 / memory,
+        memory_rows: memory,
+        condition: condition(regressor.clone()),
+        scaled_condition: condition(scaled),
+    }
+}
+
+/// A sentence about a matrix that cannot be solved with.
+pub(super) fn singular(what: &str) -> IdentifyError {
+    IdentifyError::Singular {
+        column: what.to_owned(),
+    }
+}

@@ -1,0 +1,220 @@
+//! What the drives of a description must satisfy together: that the motors move all joints, everywhere they may be.
+
+use rig_shared::transmission::TransmissionError;
+
+use super::Robot;
+use super::check::{Fault, Step};
+use super::drives::Screw;
+
+/// A dead centre this close to the crank's range is within it, rad: the ratio there is hardly a hundredth of the best.
+const MARGIN: f64 = 0.01;
+
+/// Positions at which the Jacobian is tried, besides the middle.
+const TRIED: usize = 200;
+
+fn way(k: usize, rest: &[Step]) -> Vec<Step> {
+    let mut way = vec![Step::Key("joint"), Step::At(k), Step::Key("drive")];
+    way.extend_from_slice(rest);
+    way
+}
+
+/// The first fault of the drives, if any.
+pub(super) fn check_transmission(robot: &Robot) -> Result<(), Fault> {
+    use Step::{Key, Name};
+    for (k, joint) in robot.joints.iter().enumerate() {
+        let Some(drive) = &joint.drive else { continue };
+        for (name, ratio) in &drive.couples {
+            let place = || way(k, &[Key("couples"), Name(name.clone())]);
+            known(robot, &joint.name, name, "couples", place)?;
+            if *name == joint.name {
+                return Err(Fault {
+                    way: place(),
+                    what: format!("a joint that the drive of joint `{}` couples", joint.name),
+                    found: format!("`{name}` itself"),
+                    right: "its own ratio is gear_ratio; name other joints here".into(),
+                });
+            }
+            finite(
+                &joint.name,
+                name,
+                *ratio,
+                "motor turns per joint turn",
+                place,
+            )?;
+        }
+        if let Some(screw) = &drive.screw {
+            for (name, weight) in &screw.angle {
+                let place = || way(k, &[Key("screw"), Key("angle"), Name(name.clone())]);
+                known(robot, &joint.name, name, "turns its crank by", place)?;
+                finite(
+                    &joint.name,
+                    name,
+                    *weight,
+                    "turns of the crank per joint turn",
+                    place,
+                )?;
+            }
+            check_crank(robot, k, screw)?;
+        }
+    }
+    check_jacobian(robot)
+}
+
+fn known(
+    robot: &Robot,
+    joint: &str,
+    name: &str,
+    what: &str,
+    place: impl Fn() -> Vec<Step>,
+) -> Result<(), Fault> {
+    if robot.joint_index(name).is_some() {
+        return Ok(());
+    }
+    let all: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+    Err(Fault {
+        way: place(),
+        what: format!("a joint that the drive of joint `{joint}` {what}"),
+        found: format!("`{name}`"),
+        right: format!("this robot's joints are {}", all.join(", ")),
+    })
+}
+
+fn finite(
+    joint: &str,
+    name: &str,
+    value: f64,
+    unit: &str,
+    place: impl Fn() -> Vec<Step>,
+) -> Result<(), Fault> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Fault {
+        way: place(),
+        what: format!("the ratio of joint `{name}` in the drive of joint `{joint}`"),
+        found: value.to_string(),
+        right: format!("it must be a finite number, in {unit}"),
+    })
+}
+
+/// The crank turns with its own joint, has a range, and no dead centre within it.
+fn check_crank(robot: &Robot, k: usize, screw: &Screw) -> Result<(), Fault> {
+    use Step::Key;
+    let joint = &robot.joints[k].name;
+    if screw.angle.get(joint).is_none_or(|w| *w == 0.0) {
+        return Err(Fault {
+            way: way(k, &[Key("screw"), Key("angle")]),
+            what: format!("what turns the crank of joint `{joint}`"),
+            found: "other joints only".into(),
+            right: format!("its own joint must; write for instance {joint} = 1.0"),
+        });
+    }
+    let Some([low, high]) = screw.range.or_else(|| robot.crank_box(screw)) else {
+        return Err(Fault {
+            way: way(k, &[Key("screw")]),
+            what: format!("the range of the crank of joint `{joint}`"),
+            found: "not given".into(),
+            right: "a screw's length does not say which of two angles its crank has; give range = [lowest, highest] in rad, or the position limits of its joints".into(),
+        });
+    };
+    // Dead centres repeat every half turn.
+    let half = std::f64::consts::PI;
+    let first = screw.dead_centre();
+    let next = first + half * ((low - MARGIN - first) / half).ceil();
+    if next <= high + MARGIN {
+        return Err(Fault {
+            way: way(k, &[Key("screw")]),
+            what: format!("the ratio of the screw of joint `{joint}`"),
+            found: format!("0 where its crank is at {next:.4} rad, a dead centre in its range {low:.4} to {high:.4}"),
+            right: "no motor torque reaches the joint there; correct crank and anchor, or give a range without it".into(),
+        });
+    }
+    Ok(())
+}
+
+/// The motors together move all joints, at the middle of the range and at positions spread over it.
+fn check_jacobian(robot: &Robot) -> Result<(), Fault> {
+    let n = robot.joints.len();
+    let refuse = |error: TransmissionError, q: &[f64]| {
+        let (k, what) = match error {
+            TransmissionError::Singular { motor }
+            | TransmissionError::OwnRatioZero { motor }
+            | TransmissionError::NotFinite { motor, .. }
+            | TransmissionError::NoLead { motor }
+            | TransmissionError::NoScrew { motor } => (
+                motor,
+                format!("the drive of joint `{}`", robot.joints[motor].name),
+            ),
+            _ => (0, "the drives of the robot".to_owned()),
+        };
+        let shown: Vec<String> = q.iter().map(|x| format!("{x:.3}")).collect();
+        Err(Fault {
+            way: way(k, &[]),
+            what,
+            found: format!("singular at joint positions [{}]", shown.join(", ")),
+            right: "the motors must move every joint, each in a way of its own; correct its ratios (couples, gear_ratio) or its screw".into(),
+        })
+    };
+    if robot.joints.iter().all(|j| j.drive.is_none()) || n > rig_shared::multibody::MAX_JOINTS {
+        return Ok(());
+    }
+    let middle = robot.middle_position();
+    let transmission = match robot.transmission() {
+        Ok(transmission) => transmission,
+        Err(error) => return refuse(error, &middle),
+    };
+    let tries = if transmission.is_constant() { 0 } else { TRIED };
+    let mut qd = vec![0.0; n];
+    for draw in 0..=tries {
+        let q = if draw == 0 {
+            middle.clone()
+        } else {
+            spread(robot, &middle, draw)
+        };
+        if let Err(error) = transmission.joint_velocity(&q, &vec![1.0; n], &mut qd) {
+            return refuse(error, &q);
+        }
+    }
+    Ok(())
+}
+
+/// Position `draw` of an even sequence over the limits (Roberts 2018: powers of the generalised golden ratio), moved so
+/// that every crank stays within its range.
+fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
+    let n = middle.len();
+    let mut golden = 2.0f64;
+    for _ in 0..40 {
+        golden = (1.0 + golden).powf(1.0 / (n as f64 + 1.0));
+    }
+    let mut q: Vec<f64> = middle
+        .iter()
+        .zip(&robot.joints)
+        .enumerate()
+        .map(|(j, (&mid, joint))| {
+            let share = (0.5 + draw as f64 * golden.powi(-(j as i32 + 1))).fract();
+            match joint.limits.as_ref().map(|l| l.position) {
+                Some([low, high]) if low.is_finite() && high.is_finite() => {
+                    low + share * (high - low)
+                }
+                _ => mid + share - 0.5,
+            }
+        })
+        .collect();
+    for (k, joint) in robot.joints.iter().enumerate() {
+        let Some(screw) = joint.drive.as_ref().and_then(|d| d.screw.as_ref()) else {
+            continue;
+        };
+        let Some([low, high]) = screw.range.or_else(|| robot.crank_box(screw)) else {
+            continue;
+        };
+        let own = screw.angle.get(&joint.name).copied().unwrap_or(1.0);
+        let now = screw.offset
+            + screw
+                .angle
+                .iter()
+                .filter_map(|(name, w)| robot.joint_index(name).map(|j| w * q[j]))
+                .sum::<f64>();
+        q[k] += (now.clamp(low, high) - now) / own;
+    }
+    q
+}

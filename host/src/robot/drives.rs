@@ -1,0 +1,409 @@
+//! The drives of a description as the functions Ψ = F(q) that the mathematics takes.
+
+use std::collections::BTreeMap;
+
+use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::scalar::Real;
+use rig_shared::transmission::{
+    DriveKind, DriveMap, MOTOR_COLUMNS, ScrewMap, Transmission, TransmissionError, motor_column,
+};
+use serde::{Deserialize, Serialize};
+
+use super::{JointKind, Robot};
+
+/// A ball screw between a fixed anchor and the tip of a crank that turns with the joints.
+///
+/// In the plane of the crank, its axle at the origin: the tip lies at crank·(cos ψ, sin ψ) with ψ = Σ c_j·q_j + offset,
+/// the anchor at (x, y), and the motor turns by (2π/lead)·distance (Kozłowski 1998, joints 2 and 3 of the IRp-6).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screw {
+    /// m a motor turn; negative where the screw shortens as the motor turns forwards.
+    pub lead: f64,
+    /// m
+    pub crank: f64,
+    /// Place of the anchor, m.
+    pub anchor: [f64; 2],
+    /// Radians of the crank a radian (or metre) of each joint named.
+    pub angle: BTreeMap<String, f64>,
+    /// Crank's angle where all joints are at zero, rad.
+    #[serde(default)]
+    pub offset: f64,
+    /// Lowest and highest angle of the crank, rad; absent: what the limits of its joints allow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+}
+
+/// The numbers of one drive.
+struct Numbers {
+    ratios: Vec<f64>,
+    weights: Vec<f64>,
+    zero: f64,
+}
+
+impl Robot {
+    /// Motor coordinates as a function of the joint coordinates: one motor a joint; a joint without a drive counts as
+    /// its own motor.
+    ///
+    /// # Errors
+    /// [`TransmissionError`]; none for a description that was loaded, which has been checked.
+    pub fn transmission(&self) -> Result<Transmission<f64>, TransmissionError> {
+        self.transmission_of::<f64>()
+    }
+
+    /// [`Self::transmission`] over any scalar: lanes, dual numbers.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn transmission_of<T: Real>(&self) -> Result<Transmission<T>, TransmissionError> {
+        let numbers: Vec<Numbers> = (0..self.joints.len()).map(|k| self.numbers(k)).collect();
+        let maps: Vec<DriveMap<'_>> = numbers
+            .iter()
+            .zip(&self.joints)
+            .map(|(n, joint)| DriveMap {
+                ratios: &n.ratios,
+                screw: joint
+                    .drive
+                    .as_ref()
+                    .and_then(|d| d.screw.as_ref())
+                    .map(|s| s.map(&n.weights)),
+                zero: n.zero,
+            })
+            .collect();
+        Transmission::new(&maps)
+    }
+
+    fn numbers(&self, k: usize) -> Numbers {
+        let mut ratios = vec![0.0; self.joints.len()];
+        let Some(drive) = &self.joints[k].drive else {
+            ratios[k] = 1.0;
+            return Numbers {
+                ratios,
+                weights: Vec::new(),
+                zero: 0.0,
+            };
+        };
+        ratios[k] = drive.gear_ratio;
+        for (name, ratio) in &drive.couples {
+            if let Some(j) = self.joint_index(name) {
+                ratios[j] = *ratio;
+            }
+        }
+        Numbers {
+            ratios,
+            weights: drive
+                .screw
+                .as_ref()
+                .map(|s| self.weights(s))
+                .unwrap_or_default(),
+            zero: drive.zero,
+        }
+    }
+
+    /// What each joint adds to a crank's angle.
+    fn weights(&self, screw: &Screw) -> Vec<f64> {
+        let weight = |name: &String| screw.angle.get(name).copied().unwrap_or(0.0);
+        self.joints.iter().map(|j| weight(&j.name)).collect()
+    }
+
+    /// Parameters of the motors that the joints' own do not state, one row a motor in the order of
+    /// [`rig_shared::transmission::MOTOR_COLUMN_NAMES`]; all zero for a drive on its own joint.
+    pub fn motor_parameters(&self) -> Vec<[f64; MOTOR_COLUMNS]> {
+        let kinds = self.drive_kinds();
+        self.joints
+            .iter()
+            .zip(kinds)
+            .map(|(joint, kind)| {
+                let mut row = [0.0; MOTOR_COLUMNS];
+                let Some(drive) = &joint.drive else {
+                    return row;
+                };
+                let scale = match kind {
+                    DriveKind::Simple => return row,
+                    DriveKind::Coupled => drive.gear_ratio,
+                    DriveKind::Varying => 1.0,
+                };
+                row[motor_column::INERTIA] = drive.rotor_inertia * scale * scale;
+                row[motor_column::VISCOUS] = drive.viscous * scale * scale;
+                row[motor_column::COULOMB] = drive.coulomb * scale.abs();
+                row
+            })
+            .collect()
+    }
+
+    /// Kinds of the drives, base first, without building the transmission.
+    pub fn drive_kinds(&self) -> Vec<DriveKind> {
+        self.joints
+            .iter()
+            .map(|joint| match &joint.drive {
+                Some(drive) if drive.screw.is_some() => DriveKind::Varying,
+                Some(drive)
+                    if drive
+                        .couples
+                        .iter()
+                        .any(|(name, ratio)| *ratio != 0.0 && *name != joint.name) =>
+                {
+                    DriveKind::Coupled
+                }
+                _ => DriveKind::Simple,
+            })
+            .collect()
+    }
+
+    /// Adds what the drives put into the joints' own columns: a simple drive all it has, a coupled one what its rotor
+    /// and its viscous friction add to the diagonal of each joint.
+    pub(super) fn add_drives(&self, rows: &mut [[f64; COLUMNS]]) {
+        for (k, kind) in self.drive_kinds().into_iter().enumerate() {
+            let Some(drive) = &self.joints[k].drive else {
+                continue;
+            };
+            rows[k][column::DRIVE_INERTIA] += drive.joint_inertia;
+            match kind {
+                DriveKind::Simple => {
+                    let square = drive.gear_ratio * drive.gear_ratio;
+                    rows[k][column::DRIVE_INERTIA] += drive.rotor_inertia * square;
+                    rows[k][column::VISCOUS] += drive.viscous * square;
+                    rows[k][column::COULOMB] += drive.coulomb * drive.gear_ratio.abs();
+                }
+                DriveKind::Coupled => {
+                    for (i, ratio) in self.numbers(k).ratios.into_iter().enumerate() {
+                        let square = ratio * ratio;
+                        if i != k {
+                            rows[i][column::DRIVE_INERTIA] += drive.rotor_inertia * square;
+                        }
+                        rows[i][column::VISCOUS] += drive.viscous * square;
+                    }
+                }
+                DriveKind::Varying => {}
+            }
+        }
+    }
+
+    /// The description with other values: the inverse of [`Self::standard_parameters`] and [`Self::motor_parameters`], one
+    /// row a joint and a motor. A rotor takes what its joint's `Ia` has left beside the motors coupled to it; friction
+    /// stands at the joints, save that of coupled motors and screws. A joint without a drive gets one of ratio 1 for its
+    /// drive inertia.
+    ///
+    /// The second result says which values no description can hold (friction or rotor inertia below zero) and were put to
+    /// zero.
+    #[must_use]
+    pub fn with_parameters(
+        &self,
+        rows: &[[f64; COLUMNS]],
+        motors: &[[f64; MOTOR_COLUMNS]],
+    ) -> (Self, Vec<String>) {
+        let mut robot = self.clone();
+        let mut remarks = Vec::new();
+        let mut at_least_zero = |name: &str, k: usize, value: f64| {
+            if value < 0.0 {
+                remarks.push(format!(
+                    "{name} of joint {} came out as {value}, which feeds energy in; 0 stands in the description.",
+                    self.joints[k].name
+                ));
+                0.0
+            } else {
+                value
+            }
+        };
+        let kinds = self.drive_kinds();
+        // What the coupled motors put on the diagonals.
+        let mut shares = vec![[0.0; 2]; self.joints.len()];
+        for (k, kind) in kinds.iter().enumerate() {
+            let (Some(drive), Some(own)) = (&mut robot.joints[k].drive, motors.get(k)) else {
+                continue;
+            };
+            (drive.coulomb, drive.viscous) = (0.0, 0.0);
+            let scale = match kind {
+                DriveKind::Simple => continue,
+                DriveKind::Coupled => drive.gear_ratio.abs(),
+                DriveKind::Varying => 1.0,
+            };
+            drive.rotor_inertia = at_least_zero(
+                "Inertia of the motor",
+                k,
+                own[motor_column::INERTIA] / (scale * scale),
+            );
+            drive.viscous = at_least_zero(
+                "Viscous friction of the motor",
+                k,
+                own[motor_column::VISCOUS] / (scale * scale),
+            );
+            drive.coulomb = at_least_zero(
+                "Coulomb friction of the motor",
+                k,
+                own[motor_column::COULOMB] / scale,
+            );
+            if *kind == DriveKind::Coupled {
+                let (rotor, viscous) = (drive.rotor_inertia, drive.viscous);
+                for (i, ratio) in self.numbers(k).ratios.into_iter().enumerate() {
+                    shares[i][0] += if i == k { 0.0 } else { rotor * ratio * ratio };
+                    shares[i][1] += viscous * ratio * ratio;
+                }
+            }
+        }
+        for (k, (joint, row)) in robot.joints.iter_mut().zip(rows).enumerate() {
+            let mut first_moment = [0.0; 3];
+            first_moment.copy_from_slice(&row[column::FIRST_MOMENT..column::INERTIA]);
+            let mut inertia = [0.0; 6];
+            inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
+            let rest = row[column::DRIVE_INERTIA] - shares[k][0];
+            if joint.drive.is_none() && rest != 0.0 {
+                // A rotor's inertia made part of the link would be no body's.
+                joint.drive = Some(super::Drive {
+                    gear_ratio: 1.0,
+                    ..Default::default()
+                });
+            }
+            if let Some(drive) = &mut joint.drive {
+                if kinds[k] == DriveKind::Simple && rest >= 0.0 {
+                    let kept = drive.joint_inertia.clamp(0.0, rest);
+                    drive.joint_inertia = kept;
+                    drive.rotor_inertia = (rest - kept) / (drive.gear_ratio * drive.gear_ratio);
+                } else {
+                    drive.joint_inertia = without_rounding(rest, row[column::DRIVE_INERTIA]);
+                    if kinds[k] == DriveKind::Simple {
+                        drive.rotor_inertia = 0.0;
+                    }
+                }
+            }
+            joint.inertial = Some(super::Inertial {
+                mass: row[column::MASS],
+                first_moment,
+                inertia,
+            });
+            joint.friction = Some(super::JointFriction {
+                coulomb: at_least_zero("Coulomb friction", k, row[column::COULOMB]),
+                viscous: at_least_zero(
+                    "Viscous friction",
+                    k,
+                    without_rounding(row[column::VISCOUS] - shares[k][1], row[column::VISCOUS]),
+                ),
+                offset: row[column::OFFSET],
+            });
+        }
+        (robot, remarks)
+    }
+
+    /// A position in the middle of the joints' limits with every crank within its range: where the way from motors to
+    /// joints begins. Zero for a joint without limits.
+    pub fn middle_position(&self) -> Vec<f64> {
+        let mut q: Vec<f64> = self
+            .joints
+            .iter()
+            .map(|j| match j.limits.as_ref().map(|l| l.position) {
+                Some([low, high]) if low.is_finite() && high.is_finite() => 0.5 * (low + high),
+                _ => 0.0,
+            })
+            .collect();
+        for k in 0..q.len() {
+            let Some(screw) = self.joints[k].drive.as_ref().and_then(|d| d.screw.as_ref()) else {
+                continue;
+            };
+            let weights = self.weights(screw);
+            let Some([low, high]) = screw.range.or_else(|| self.crank_box(screw)) else {
+                continue;
+            };
+            let now = angle(&weights, &q) + screw.offset;
+            if weights[k] != 0.0 && !(low..=high).contains(&now) {
+                q[k] += (0.5 * (low + high) - now) / weights[k];
+            }
+        }
+        q
+    }
+
+    /// Angles that a crank can have within the limits of its joints; none where one of them has no limits.
+    pub(super) fn crank_box(&self, screw: &Screw) -> Option<[f64; 2]> {
+        let mut range = [screw.offset; 2];
+        for (weight, joint) in self.weights(screw).into_iter().zip(&self.joints) {
+            if weight == 0.0 {
+                continue;
+            }
+            let [low, high] = joint.limits.as_ref()?.position;
+            if !(low.is_finite() && high.is_finite()) {
+                return None;
+            }
+            range[0] += (weight * low).min(weight * high);
+            range[1] += (weight * low).max(weight * high);
+        }
+        Some(range)
+    }
+
+    /// Whether motor `motor` moves joint `joint` (both from 0) at some position.
+    pub fn moves(&self, motor: usize, joint: usize) -> bool {
+        let (Some(own), Some(moved)) = (self.joints.get(motor), self.joints.get(joint)) else {
+            return false;
+        };
+        let Some(drive) = &own.drive else {
+            return motor == joint;
+        };
+        let nonzero = |ratio: Option<&f64>| ratio.is_some_and(|r| *r != 0.0);
+        (motor == joint && drive.gear_ratio != 0.0)
+            || nonzero(drive.couples.get(&moved.name))
+            || drive
+                .screw
+                .as_ref()
+                .is_some_and(|s| nonzero(s.angle.get(&moved.name)))
+    }
+
+    /// Limits on combinations of joint positions beyond the joints' own: for every crank with a range its weights (one
+    /// a joint) and the lowest and highest value of Σ c_j·q_j.
+    pub fn combined_limits(&self) -> Vec<(Vec<f64>, [f64; 2])> {
+        self.joints
+            .iter()
+            .filter_map(|j| j.drive.as_ref()?.screw.as_ref())
+            .filter_map(|s| {
+                let [low, high] = s.range?;
+                Some((self.weights(s), [low - s.offset, high - s.offset]))
+            })
+            .collect()
+    }
+
+    /// Unit of a motor parameter (place `c` of motor `k`), ASCII.
+    pub fn motor_unit(&self, k: usize, c: usize) -> &'static str {
+        let kind = self.drive_kinds().get(k).copied();
+        let at_slide = kind != Some(DriveKind::Varying)
+            && self.joints.get(k).map(|j| j.kind) == Some(JointKind::Prismatic);
+        match (c, at_slide) {
+            (motor_column::INERTIA, false) => "kg*m^2",
+            (motor_column::INERTIA, true) => "kg",
+            (motor_column::VISCOUS, false) => "N*m*s/rad",
+            (motor_column::VISCOUS, true) => "N*s/m",
+            (_, false) => "N*m",
+            (_, true) => "N",
+        }
+    }
+}
+
+/// A difference that is only rounding of its parts is zero.
+fn without_rounding(difference: f64, part: f64) -> f64 {
+    if difference.abs() < 1e-12 * part.abs() {
+        0.0
+    } else {
+        difference
+    }
+}
+
+fn angle(weights: &[f64], q: &[f64]) -> f64 {
+    weights.iter().zip(q).map(|(c, x)| c * x).sum()
+}
+
+impl Screw {
+    /// Distance² = s + m·cos ψ − n·sin ψ.
+    fn map<'a>(&self, weights: &'a [f64]) -> ScrewMap<'a> {
+        let [x, y] = self.anchor;
+        ScrewMap {
+            lead: self.lead,
+            constant: self.crank * self.crank + x * x + y * y,
+            cosine: -2.0 * self.crank * x,
+            sine: 2.0 * self.crank * y,
+            weights,
+            offset: self.offset,
+        }
+    }
+
+    /// The angle of the crank at which the screw is longest; half a turn on it is shortest. Both are dead centres.
+    pub(super) fn dead_centre(&self) -> f64 {
+        let [x, y] = self.anchor;
+        (-y).atan2(-x)
+    }
+}

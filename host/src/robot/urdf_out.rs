@@ -1,0 +1,334 @@
+//! A description as URDF.
+//!
+//! Link frames are the description's own (modified Denavit–Hartenberg), so that every joint turns about z of its frame
+//! and keeps its zero and sense. What URDF has no place for is said: rotor inertia, constant torques, couplings between
+//! drives, effects, and gravity of another size than its readers assume.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
+use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
+use rig_shared::multibody::column;
+use rig_shared::transmission::DriveKind;
+
+use super::dh::{GRAVITY, step};
+use super::{Joint, JointKind, Robot, RobotError};
+
+/// Written where the description has no limit: URDF demands one.
+const NO_LIMIT: f64 = 1e6;
+
+/// A description as URDF, and what that leaves out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Urdf {
+    /// The file.
+    pub text: String,
+    /// Sentences.
+    pub remarks: Vec<String>,
+}
+
+impl Robot {
+    /// The description as URDF text; [`Robot::from_urdf`] reads back a chain with the same dynamics.
+    ///
+    /// # Errors
+    /// [`RobotError::NotUrdf`] where a link has no inertial parameters, or a first moment without a mass.
+    pub fn to_urdf(&self) -> Result<Urdf, RobotError> {
+        let mut remarks = Vec::new();
+        let mut taken: HashSet<String> = HashSet::new();
+        let mut name = |wish: String| {
+            let mut name = wish;
+            while !taken.insert(name.clone()) {
+                name.push('_');
+            }
+            name
+        };
+        let mut body = String::new();
+        let base = name("base_link".into());
+        let tilt = self.base_tilt(&mut remarks);
+        // Writing to a String cannot fail.
+        let _ = writeln!(body, "  <link name=\"{base}\"/>");
+        if let Some(rotation) = tilt {
+            let world = name("world".into());
+            let _ = writeln!(body, "  <link name=\"{world}\"/>");
+            let _ = writeln!(
+                body,
+                "  <joint name=\"{}\" type=\"fixed\">",
+                self.fixed_name()
+            );
+            let _ = writeln!(
+                body,
+                "    <parent link=\"{world}\"/>\n    <child link=\"{base}\"/>"
+            );
+            let _ = writeln!(
+                body,
+                "    <origin xyz=\"0 0 0\" rpy=\"{}\"/>",
+                rpy(&rotation)
+            );
+            body.push_str("  </joint>\n");
+        }
+        let mut parent = base;
+        let parameters = self.standard_parameters();
+        for (joint, row) in self.joints.iter().zip(&parameters) {
+            let link = name(format!("{}_link", escaped(&joint.name)));
+            write_link(&mut body, joint, &link)?;
+            let (viscous, coulomb) = (row[column::VISCOUS], row[column::COULOMB]);
+            write_joint(
+                &mut body,
+                joint,
+                &parent,
+                &link,
+                [viscous, coulomb],
+                &mut remarks,
+            );
+            parent = link;
+        }
+        self.write_transmissions(&mut body);
+        self.leave_out(&parameters, &mut remarks);
+        let mut text = String::from("<?xml version=\"1.0\"?>\n");
+        for remark in &remarks {
+            // Two dashes would end the comment.
+            let _ = writeln!(text, "<!-- {} -->", remark.replace("--", "- -"));
+        }
+        let _ = writeln!(text, "<robot name=\"{}\">", escaped(&self.name));
+        text.push_str(&body);
+        text.push_str("</robot>\n");
+        Ok(Urdf { text, remarks })
+    }
+
+    /// The base in a world whose gravity points along −z; none where it does already.
+    fn base_tilt(&self, remarks: &mut Vec<String>) -> Option<Rotation3<f64>> {
+        let gravity = Vector3::from(self.gravity);
+        let size = gravity.norm();
+        if (size - GRAVITY).abs() > 1e-9 {
+            remarks.push(format!(
+                "URDF states no gravity, and its readers assume {GRAVITY} m/s^2 along -z; this description has {size} m/s^2: set it in the program that loads the file."
+            ));
+        }
+        let down = Unit::try_new(gravity, 1e-12)?;
+        if down.x == 0.0 && down.y == 0.0 && down.z < 0.0 {
+            return None;
+        }
+        let turn = UnitQuaternion::rotation_between(&down, &-Vector3::z_axis())
+            // Upside down: any half turn about a level axis.
+            .unwrap_or_else(|| {
+                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+            });
+        Some(turn.to_rotation_matrix())
+    }
+
+    /// A name for the joint between world and base that no joint of the robot has.
+    fn fixed_name(&self) -> String {
+        let mut name = "world_to_base".to_owned();
+        while self.joint_index(&name).is_some() {
+            name.push('_');
+        }
+        name
+    }
+
+    fn write_transmissions(&self, out: &mut String) {
+        for (joint, kind) in self.joints.iter().zip(self.drive_kinds()) {
+            let Some(drive) = &joint.drive else { continue };
+            if kind != DriveKind::Simple || drive.gear_ratio == 1.0 {
+                continue;
+            }
+            let name = escaped(&joint.name);
+            let _ = writeln!(
+                out,
+                "  <transmission name=\"{name}_transmission\">\n    <type>transmission_interface/SimpleTransmission</type>\n    <joint name=\"{name}\">\n      <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface>\n    </joint>\n    <actuator name=\"{name}_motor\">\n      <mechanicalReduction>{:?}</mechanicalReduction>\n    </actuator>\n  </transmission>",
+                drive.gear_ratio
+            );
+        }
+    }
+
+    /// Says what the file does not hold.
+    fn leave_out(
+        &self,
+        parameters: &[[f64; rig_shared::multibody::COLUMNS]],
+        remarks: &mut Vec<String>,
+    ) {
+        let list = |place: usize, unit: fn(JointKind) -> &'static str| {
+            let entries: Vec<String> = self
+                .joints
+                .iter()
+                .zip(parameters)
+                .filter(|(_, row)| row[place] != 0.0)
+                .map(|(joint, row)| format!("{} {:?} {}", joint.name, row[place], unit(joint.kind)))
+                .collect();
+            (!entries.is_empty()).then(|| entries.join(", "))
+        };
+        let inertia = |kind| match kind {
+            JointKind::Revolute => "kg*m^2",
+            JointKind::Prismatic => "kg",
+        };
+        let torque = |kind| match kind {
+            JointKind::Revolute => "N*m",
+            JointKind::Prismatic => "N",
+        };
+        if let Some(entries) = list(column::DRIVE_INERTIA, inertia) {
+            remarks.push(format!("URDF has no place for the inertia of the drives, seen at the joints: {entries}; give it to the simulator as armature or rotor inertia."));
+        }
+        if let Some(entries) = list(column::OFFSET, torque) {
+            remarks.push(format!(
+                "URDF has no place for constant torques at the joints: {entries}."
+            ));
+        }
+        let coupled: Vec<&str> = self
+            .joints
+            .iter()
+            .zip(self.drive_kinds())
+            .filter(|(_, kind)| *kind != DriveKind::Simple)
+            .map(|(joint, _)| joint.name.as_str())
+            .collect();
+        if !coupled.is_empty() {
+            remarks.push(format!("URDF has no place for drives that move several joints or do so at a changing ratio: {}; inertia and friction of their motors beyond the joints' own are left out.", coupled.join(", ")));
+        }
+        if !self.effects.is_empty() {
+            remarks.push("URDF has no place for the effects beyond the standard model.".into());
+        }
+    }
+}
+
+fn write_link(out: &mut String, joint: &Joint, link: &str) -> Result<(), RobotError> {
+    let refused = |why: &str| RobotError::NotUrdf {
+        joint: joint.name.clone(),
+        why: why.into(),
+    };
+    let Some(inertial) = &joint.inertial else {
+        return Err(refused(
+            "has no [joint.inertial], which URDF needs of every link that moves",
+        ));
+    };
+    let h = Vector3::from(inertial.first_moment);
+    if inertial.mass <= 0.0 && h != Vector3::zeros() {
+        return Err(refused(
+            "has a first moment but no mass, so it has no centre of mass, which URDF is written about",
+        ));
+    }
+    let centre = if inertial.mass > 0.0 {
+        h / inertial.mass
+    } else {
+        Vector3::zeros()
+    };
+    let [xx, xy, xz, yy, yz, zz] = inertial.inertia;
+    let about_origin = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let steiner = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
+    let i = about_origin - steiner * inertial.mass;
+    let _ = writeln!(
+        out,
+        "  <link name=\"{link}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n    </inertial>\n  </link>",
+        three(&centre),
+        inertial.mass,
+        i.m11,
+        i.m12,
+        i.m13,
+        i.m22,
+        i.m23,
+        i.m33
+    );
+    Ok(())
+}
+
+fn write_joint(
+    out: &mut String,
+    joint: &Joint,
+    parent: &str,
+    link: &str,
+    [viscous, coulomb]: [f64; 2],
+    remarks: &mut Vec<String>,
+) {
+    let limits = joint.limits.as_ref();
+    let position = limits
+        .map(|l| l.position)
+        .filter(|[low, high]| low.is_finite() && high.is_finite());
+    let kind = match (joint.kind, position) {
+        (JointKind::Prismatic, _) => "prismatic",
+        (JointKind::Revolute, Some(_)) => "revolute",
+        (JointKind::Revolute, None) => "continuous",
+    };
+    let pose = step(joint.alpha, joint.a, joint.theta, joint.d);
+    let _ = writeln!(
+        out,
+        "  <joint name=\"{}\" type=\"{kind}\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{link}\"/>\n    <origin xyz=\"{}\" rpy=\"{}\"/>\n    <axis xyz=\"0 0 1\"/>",
+        escaped(&joint.name),
+        three(&pose.translation.vector),
+        rpy(&pose.rotation.to_rotation_matrix())
+    );
+    let torque = limits.and_then(|l| l.torque);
+    if limits.is_some() || kind == "prismatic" {
+        let mut unknown = Vec::new();
+        let mut known = |value: Option<f64>, what: &'static str| {
+            value.unwrap_or_else(|| {
+                unknown.push(what);
+                NO_LIMIT
+            })
+        };
+        let range = match (kind, position) {
+            ("continuous", _) => String::new(),
+            (_, Some([low, high])) => format!("lower=\"{low:?}\" upper=\"{high:?}\" "),
+            (_, None) => {
+                let far = known(None, "position");
+                format!("lower=\"{:?}\" upper=\"{far:?}\" ", -far)
+            }
+        };
+        let velocity = known(limits.map(|l| l.velocity), "velocity");
+        let effort = known(torque, "effort");
+        let _ = writeln!(
+            out,
+            "    <limit {range}velocity=\"{velocity:?}\" effort=\"{effort:?}\"/>"
+        );
+        if !unknown.is_empty() {
+            remarks.push(format!(
+                "The limits of joint {} for {} are not known; {NO_LIMIT:e} stands for them, as URDF demands numbers.",
+                joint.name,
+                unknown.join(", ")
+            ));
+        }
+    }
+    if viscous != 0.0 || coulomb != 0.0 {
+        let _ = writeln!(
+            out,
+            "    <dynamics damping=\"{viscous:?}\" friction=\"{coulomb:?}\"/>"
+        );
+    }
+    out.push_str("  </joint>\n");
+}
+
+/// Fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
+fn rpy(rotation: &Rotation3<f64>) -> String {
+    let r = rotation.matrix();
+    let level = r.m32.hypot(r.m33);
+    let pitch = (-r.m31).atan2(level);
+    // Pitch straight up or down: roll and yaw turn about the same axis, and roll is left at zero.
+    let (roll, yaw) = if level < 1e-12 {
+        (0.0, (-r.m12).atan2(r.m22))
+    } else {
+        (r.m32.atan2(r.m33), r.m21.atan2(r.m11))
+    };
+    three(&Vector3::new(roll, pitch, yaw))
+}
+
+fn three(v: &Vector3<f64>) -> String {
+    // Adding zero turns −0 into 0.
+    format!("{:?} {:?} {:?}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
+}
+
+/// Text for an XML attribute.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            c if c.is_control() => {
+                let _ = write!(out, "&#{};", u32::from(c));
+            }
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+#[path = "urdf_out_test.rs"]
+mod tests;

@@ -1,0 +1,169 @@
+//! URDF written and read back: the same dynamics.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rig_shared::multibody::{Chain, column, inverse_dynamics};
+
+use super::super::{IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind, Robot, TX40};
+
+/// A body of eight mass points.
+fn body(rng: &mut Pcg64) -> Inertial {
+    let mut inertial = Inertial {
+        mass: 0.0,
+        first_moment: [0.0; 3],
+        inertia: [0.0; 6],
+    };
+    for _ in 0..8 {
+        let m = rng.random_range(0.05..1.0);
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|_| rng.random_range(-0.4..0.5));
+        inertial.mass += m;
+        for (h, v) in inertial.first_moment.iter_mut().zip([x, y, z]) {
+            *h += m * v;
+        }
+        let products = [
+            y * y + z * z,
+            -x * y,
+            -x * z,
+            x * x + z * z,
+            -y * z,
+            x * x + y * y,
+        ];
+        for (i, v) in inertial.inertia.iter_mut().zip(products) {
+            *i += m * v;
+        }
+    }
+    inertial
+}
+
+fn random(rng: &mut Pcg64) -> Robot {
+    let n = rng.random_range(1..8);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let joints = (0..n)
+        .map(|k| Joint {
+            name: format!("<joint \"{k}\" & more>"),
+            kind: if rng.random_bool(0.7) {
+                JointKind::Revolute
+            } else {
+                JointKind::Prismatic
+            },
+            alpha: if rng.random_bool(0.6) {
+                quarter * rng.random_range(-2..3) as f64
+            } else {
+                rng.random_range(-3.0..3.0)
+            },
+            a: if rng.random_bool(0.3) {
+                0.0
+            } else {
+                rng.random_range(-0.5..0.5)
+            },
+            theta: if rng.random_bool(0.4) {
+                quarter * rng.random_range(-2..3) as f64
+            } else {
+                rng.random_range(-3.0..3.0)
+            },
+            d: rng.random_range(-0.5..0.5),
+            inertial: Some(body(rng)),
+            limits: None,
+            friction: Some(JointFriction {
+                coulomb: rng.random_range(0.0..2.0),
+                viscous: rng.random_range(0.0..2.0),
+                offset: 0.0,
+            }),
+            drive: None,
+            controller: None,
+        })
+        .collect();
+    let direction: [f64; 3] = if rng.random_bool(0.3) {
+        [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]][rng.random_range(0..3)]
+    } else {
+        std::array::from_fn(|_| rng.random_range(-1.0..1.0))
+    };
+    let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+    Robot {
+        name: "r & d".into(),
+        gravity: direction.map(|v| v / size * 9.81),
+        joints,
+        workspace: Vec::new(),
+        effects: Vec::new(),
+    }
+}
+
+fn torques(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+    let chain = Chain::new(&robot.geometry(), robot.gravity).unwrap();
+    let mut parameters = robot.standard_parameters();
+    for row in &mut parameters {
+        // URDF holds neither.
+        row[column::DRIVE_INERTIA] = 0.0;
+        row[column::OFFSET] = 0.0;
+    }
+    let mut tau = vec![f64::NAN; q.len()];
+    inverse_dynamics(&chain, &parameters, q, qd, qdd, &mut tau).unwrap();
+    tau
+}
+
+fn same_dynamics(robot: &Robot, rng: &mut Pcg64) {
+    let text = robot.to_urdf().unwrap().text;
+    let back = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap();
+    let names = |r: &Robot| r.joints.iter().map(|j| j.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&back), names(robot));
+    for _ in 0..5 {
+        let mut signal = |range: f64| -> Vec<f64> {
+            (0..robot.joints.len())
+                .map(|_| rng.random_range(-range..range))
+                .collect()
+        };
+        let (q, qd, qdd) = (signal(3.0), signal(3.0), signal(10.0));
+        let (a, b) = (torques(robot, &q, &qd, &qdd), torques(&back, &q, &qd, &qdd));
+        let scale = a.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        for (x, y) in a.iter().zip(&b) {
+            assert!((x - y).abs() < 1e-7 * scale, "{a:?} {b:?}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn what_is_written_reads_back_with_the_same_dynamics() {
+    let mut rng = Pcg64::seed_from_u64(23);
+    for _ in 0..150 {
+        let robot = random(&mut rng);
+        same_dynamics(&robot, &mut rng);
+    }
+    for text in [IRP6_TEMPLATE, TX40] {
+        let robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+        same_dynamics(&robot, &mut rng);
+    }
+}
+
+#[test]
+fn limits_drives_and_what_is_left_out_are_told() {
+    let robot = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
+    let urdf = robot.to_urdf().unwrap();
+    let back = Robot::from_urdf(&urdf.text, Path::new("r.urdf")).unwrap();
+    for (a, b) in robot.joints.iter().zip(&back.joints) {
+        assert_eq!(a.limits, b.limits);
+    }
+    assert_eq!(back.joints[3].drive.as_ref().unwrap().gear_ratio, -48.0);
+    assert!(back.joints[5].drive.is_none());
+    assert!(
+        urdf.remarks
+            .iter()
+            .any(|r| r.contains("several joints") && r.contains("joint_6"))
+    );
+    let irp6 = Robot::from_toml(IRP6_TEMPLATE, Path::new("r.toml")).unwrap();
+    let said = irp6.to_urdf().unwrap().remarks.join(" ");
+    assert!(
+        said.contains("inertia of the drives") && said.contains("column 4.99"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_link_without_inertia_cannot_be_written() {
+    let mut robot = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
+    robot.joints[2].inertial = None;
+    let said = robot.to_urdf().unwrap_err().to_string();
+    assert!(said.contains("`joint_3` has no [joint.inertial]"), "{said}");
+}

@@ -1,0 +1,117 @@
+//! Where a point of a link is, and how it moves with the joints.
+
+use super::chain::{Chain, JointKind, MultibodyError, check};
+use super::spatial::Vector3;
+use crate::scalar::Real;
+
+/// Position of a point of link `link` (from 0) in the base frame, m, and its derivatives by the joint positions.
+///
+/// `point` is given in frame `link`, which moves with it. `jacobian` has length n: entry j is the derivative of the
+/// position by q of joint j (Khalil & Dombre 2002, eq. 5.9), zero for the joints beyond the link.
+///
+/// # Errors
+/// [`MultibodyError::WrongLength`], also for a `link` that the chain does not have.
+pub fn point_position<T: Real>(
+    chain: &Chain<T>,
+    q: &[T],
+    link: usize,
+    point: [T; 3],
+    jacobian: &mut [[T; 3]],
+) -> Result<[T; 3], MultibodyError> {
+    let n = chain.joint_count();
+    check("q", n, q.len())?;
+    check("jacobian", n, jacobian.len())?;
+    if link >= n {
+        return Err(MultibodyError::WrongLength {
+            argument: "q",
+            expected: link + 1,
+            found: n,
+        });
+    }
+    jacobian.fill([T::ZERO; 3]);
+    let mut place = Vector3(point);
+    // Inwards: what is known in frame i is written in frame i − 1.
+    for i in (0..=link).rev() {
+        let joint = &chain.joints[i];
+        let transform = joint.transform(q[i]);
+        let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
+        jacobian[i] = match joint.kind {
+            JointKind::Revolute => z.cross(place).0,
+            JointKind::Prismatic => z.0,
+        };
+        for column in &mut jacobian[i..=link] {
+            *column = transform.direction_to_parent(Vector3(*column)).0;
+        }
+        place = transform.origin + transform.direction_to_parent(place);
+    }
+    Ok(place.0)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::dual::Dual;
+    use crate::multibody::samples::Sample;
+    use crate::multibody::{JointGeometry, potential_energy};
+    use std::vec;
+    use std::vec::Vec;
+
+    #[test]
+    fn two_links_in_a_plane() {
+        let joint = |a| JointGeometry {
+            kind: JointKind::Revolute,
+            alpha: 0.0,
+            a,
+            theta: 0.0,
+            d: 0.0,
+        };
+        let chain = Chain::<f64>::new(&[joint(0.0), joint(0.5)], [0.0; 3]).unwrap();
+        let (a, b) = (0.4_f64, 1.1_f64);
+        let mut jacobian = [[f64::NAN; 3]; 2];
+        let p = point_position(&chain, &[a, b], 1, [0.3, 0.0, 0.2], &mut jacobian).unwrap();
+        let expected = [
+            0.5 * a.cos() + 0.3 * (a + b).cos(),
+            0.5 * a.sin() + 0.3 * (a + b).sin(),
+            0.2,
+        ];
+        for k in 0..3 {
+            assert!((p[k] - expected[k]).abs() < 1e-15, "{p:?}");
+        }
+        assert!((jacobian[1][0] + 0.3 * (a + b).sin()).abs() < 1e-15);
+        assert!(point_position(&chain, &[a, b], 2, [0.0; 3], &mut jacobian).is_err());
+    }
+
+    #[test]
+    fn heights_are_those_of_the_potential_energy_and_derivatives_those_of_dual_numbers() {
+        type D = Dual<f64, 1>;
+        for seed in 0..40 {
+            let n = 1 + seed as usize % 7;
+            let s = Sample::random(n, seed);
+            let link = seed as usize % n;
+            let point = [0.1, -0.2, 0.3];
+            let mut jacobian = vec![[f64::NAN; 3]; n];
+            let p = point_position(&s.chain(), &s.q, link, point, &mut jacobian).unwrap();
+            // A mass of 1 kg there, under gravity along each axis in turn.
+            let mut mass = vec![[0.0; crate::multibody::COLUMNS]; n];
+            mass[link][..4].copy_from_slice(&[1.0, point[0], point[1], point[2]]);
+            for axis in 0..3 {
+                let mut gravity = [0.0; 3];
+                gravity[axis] = -1.0;
+                let tilted = s.chain().with_gravity(gravity);
+                let height = potential_energy(&tilted, &mass, &s.q).unwrap();
+                assert!((height - p[axis]).abs() < 1e-12, "{height} {p:?}");
+            }
+            let chain = Chain::<D>::new(&s.geometry, s.gravity).unwrap();
+            let mut unused = vec![[D::default(); 3]; n];
+            for k in 0..n {
+                let mut q: Vec<D> = s.q.iter().map(|x| D::constant(*x)).collect();
+                q[k] = D::variable(q[k].value, 0);
+                let moved = point_position(&chain, &q, link, point.map(D::constant), &mut unused);
+                for (found, dual) in jacobian[k].iter().zip(moved.unwrap()) {
+                    assert!((found - dual.derivative[0]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! From motors to joints.
+
+use super::solve::Factors;
+use super::{Transmission, TransmissionError, check};
+use crate::multibody::MAX_JOINTS;
+use crate::scalar::{Mask, Real};
+
+/// Most Newton steps of [`Transmission::joint_position`]; from a neighbouring sample two or three are enough.
+pub const MOST_STEPS: usize = 60;
+
+/// Most times a Newton step is halved because it left the screws' reach or came no nearer.
+const MOST_HALVINGS: usize = 30;
+
+/// Motor positions agree when they do to this share of the largest ratio times a radian, times the type's rounding.
+const ROUNDINGS: f64 = 64.0;
+
+impl<T: Real> Transmission<T> {
+    /// Torques of the motors that give the joint torques τ: τ_motor = J⁻ᵀ·τ.
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
+    pub fn motor_torque(
+        &self,
+        q: &[T],
+        tau: &[T],
+        tau_motor: &mut [T],
+    ) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("tau", n, tau.len())?;
+        check("tau_motor", n, tau_motor.len())?;
+        let factors = self.factored(q)?;
+        tau_motor.copy_from_slice(tau);
+        factors.solve_transposed(tau_motor);
+        Ok(())
+    }
+
+    /// Joint velocities q̇ = J⁻¹·Ψ̇.
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
+    pub fn joint_velocity(
+        &self,
+        q: &[T],
+        psid: &[T],
+        qd: &mut [T],
+    ) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("psid", n, psid.len())?;
+        check("qd", n, qd.len())?;
+        let factors = self.factored(q)?;
+        qd.copy_from_slice(psid);
+        factors.solve(qd);
+        Ok(())
+    }
+
+    /// Joint accelerations q̈ = J⁻¹·(Ψ̈ − J̇·q̇).
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
+    pub fn joint_acceleration(
+        &self,
+        q: &[T],
+        qd: &[T],
+        psidd: &[T],
+        qdd: &mut [T],
+    ) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("qd", n, qd.len())?;
+        check("psidd", n, psidd.len())?;
+        check("qdd", n, qdd.len())?;
+        let factors = self.factored(q)?;
+        for ((out, motor), &acceleration) in qdd.iter_mut().zip(&self.motors).zip(psidd) {
+            *out = acceleration - motor.convective(q, qd);
+        }
+        factors.solve(qdd);
+        Ok(())
+    }
+
+    /// Joint position with F(q) = Ψ, by Newton's method from the position that `q` holds on entry (the sample before);
+    /// `q` is the result, to rounding of the motor positions. Two angles of a crank give the same length of its
+    /// screw: the one on the side of the start is found, for a step is shortened where it would cross the dead centre
+    /// to where the screw's length has the wrong slope.
+    ///
+    /// # Errors
+    /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`] (also at a dead centre of a crank),
+    /// [`TransmissionError::OutOfReach`], [`TransmissionError::NotFound`]. `q` is then untouched.
+    pub fn joint_position(&self, psi: &[T], q: &mut [T]) -> Result<(), TransmissionError> {
+        let n = self.joint_count();
+        check("psi", n, psi.len())?;
+        check("q", n, q.len())?;
+        self.reach(psi)?;
+        let mut at = [T::ZERO; MAX_JOINTS];
+        at[..n].copy_from_slice(q);
+        let mut rest = [T::ZERO; MAX_JOINTS];
+        self.residual(psi, &at[..n], &mut rest[..n])?;
+        let mut before = size(&rest[..n]);
+        let scale = self.scale(psi);
+        let enough = T::from_f64(ROUNDINGS) * rounding::<T>() * scale;
+        for _ in 0..MOST_STEPS {
+            let factors = self.factored(&at[..n])?;
+            let mut step = rest;
+            factors.solve(&mut step[..n]);
+            if before.le(enough).all() {
+                // One step more costs little and carries the derivatives of dual numbers along.
+                for (out, (&position, &last)) in q.iter_mut().zip(at.iter().zip(&step)) {
+                    *out = position + last;
+                }
+                return Ok(());
+            }
+            let mut share = T::ONE;
+            let mut next = at;
+            for halving in 0..=MOST_HALVINGS {
+                for j in 0..n {
+                    next[j] = at[j] + share * step[j];
+                }
+                self.residual(psi, &next[..n], &mut rest[..n])?;
+                let now = size(&rest[..n]);
+                // Each lane shortens its own step; a screw out of reach gives NaN, which is never nearer.
+                let nearer = now.lt(before) | now.le(enough);
+                let good = nearer & self.same_side(&at[..n], &next[..n]);
+                if good.all() {
+                    before = now;
+                    break;
+                }
+                if halving == MOST_HALVINGS {
+                    return Err(self.farthest(psi, &at[..n]));
+                }
+                share = T::select(good, share, T::from_f64(0.5) * share);
+            }
+            at = next;
+        }
+        Err(self.farthest(psi, &at[..n]))
+    }
+
+    /// The Jacobian in factors.
+    pub(super) fn factored(&self, q: &[T]) -> Result<Factors<T>, TransmissionError> {
+        let n = self.joint_count();
+        let mut square = [[T::ZERO; MAX_JOINTS]; MAX_JOINTS];
+        let matrix = &mut square.as_flattened_mut()[..n * n];
+        self.jacobian(q, matrix)?;
+        Factors::of(matrix, n).ok_or_else(|| TransmissionError::Singular {
+            motor: self.dependent(q, matrix),
+        })
+    }
+
+    /// The motor whose row of a singular Jacobian follows best from the rows before it (Gram and Schmidt).
+    fn dependent(&self, q: &[T], jacobian: &mut [T]) -> usize {
+        let n = self.joint_count();
+        let mut worst = (n - 1, T::from_f64(f64::INFINITY));
+        for (k, motor) in self.motors.iter().enumerate() {
+            let (done, rest) = jacobian.split_at_mut(k * n);
+            let row = &mut rest[..n];
+            // What the row would be of, had its crank the best angle.
+            let reach = motor
+                .screw
+                .as_ref()
+                .map_or(T::ZERO, |s| s.at(s.angle(q)).position.abs());
+            let length = norm(row).max(reach);
+            for _ in 0..2 {
+                for unit in done.chunks_exact(n) {
+                    let mut along = T::ZERO;
+                    for (&u, &r) in unit.iter().zip(row.iter()) {
+                        along += u * r;
+                    }
+                    for (&u, r) in unit.iter().zip(row.iter_mut()) {
+                        *r -= along * u;
+                    }
+                }
+            }
+            let left = norm(row);
+            let share = left / length;
+            if share.lt(worst.1).any() {
+                worst = (k, share);
+            }
+            let safe = left.max(T::from_f64(f64::MIN_POSITIVE.sqrt()));
+            for entry in row {
+                *entry /= safe;
+            }
+        }
+        worst.0
+    }
+
+    /// Ψ − F(q).
+    fn residual(&self, psi: &[T], q: &[T], out: &mut [T]) -> Result<(), TransmissionError> {
+        self.motor_position(q, out)?;
+        for (entry, &wanted) in out.iter_mut().zip(psi) {
+            *entry = wanted - *entry;
+        }
+        Ok(())
+    }
+
+    /// Whether every screw's slope keeps its sign from one position to another.
+    fn same_side(&self, from: &[T], to: &[T]) -> T::Mask {
+        let mut all = T::ZERO.le(T::ZERO);
+        for screw in self.motors.iter().filter_map(|m| m.screw.as_ref()) {
+            let slope = |q: &[T]| screw.slope_sign(q);
+            all = all & T::ZERO.lt(slope(from) * slope(to));
+        }
+        all
+    }
+
+    /// Refuses what a screw that depends on its crank alone cannot reach at any angle.
+    fn reach(&self, psi: &[T]) -> Result<(), TransmissionError> {
+        for (motor, (m, &wanted)) in self.motors.iter().zip(psi).enumerate() {
+            let Some(screw) = &m.screw else { continue };
+            let own = m.ratios.iter().all(|r| r.abs().le(T::ZERO).all());
+            if own && !screw.reaches(wanted - m.zero).all() {
+                return Err(TransmissionError::OutOfReach { motor });
+            }
+        }
+        Ok(())
+    }
+
+    /// What the motor positions and the functions' own terms are of: the largest, rad, at least one turn of the joint.
+    fn scale(&self, psi: &[T]) -> T {
+        let mut scale = T::ONE;
+        for (m, &wanted) in self.motors.iter().zip(psi) {
+            scale = scale.max(wanted.abs()).max(m.zero.abs());
+            for &ratio in &m.ratios {
+                scale = scale.max(ratio.abs());
+            }
+            if let Some(screw) = &m.screw {
+                scale = scale.max((screw.factor * screw.constant.abs().sqrt()).abs());
+            }
+        }
+        scale
+    }
+
+    /// The motor that is farthest from its position, as an error.
+    fn farthest(&self, psi: &[T], q: &[T]) -> TransmissionError {
+        let n = self.joint_count();
+        let mut rest = [T::ZERO; MAX_JOINTS];
+        if let Err(error) = self.residual(psi, q, &mut rest[..n]) {
+            return error;
+        }
+        let mut motor = 0;
+        for k in 1..n {
+            if rest[motor].abs().lt(rest[k].abs()).any() {
+                motor = k;
+            }
+        }
+        TransmissionError::NotFound { motor }
+    }
+}
+
+/// Euclidean length.
+fn norm<T: Real>(values: &[T]) -> T {
+    let mut sum = T::ZERO;
+    for value in values {
+        sum += value.squared();
+    }
+    sum.sqrt()
+}
+
+/// Largest absolute entry; NaN where any entry is.
+fn size<T: Real>(values: &[T]) -> T {
+    let mut largest = T::ZERO;
+    for &value in values {
+        largest = largest.max(value.abs());
+    }
+    // 0, or NaN where any entry is not a finite number: comparisons alone would lose it.
+    let mut nothing = T::ZERO;
+    for &value in values {
+        nothing += T::ZERO * value;
+    }
+    largest + nothing
+}
+
+/// Distance from 1 to the next number of the type, by the textbook loop.
+fn rounding<T: Real>() -> T {
+    let half = T::from_f64(0.5);
+    let mut step = T::ONE;
+    while T::ONE.lt(T::ONE + half * step).any() {
+        step *= half;
+    }
+    step
+}

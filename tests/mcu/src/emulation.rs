@@ -1,0 +1,534 @@
+//! The emulated board as a whole: the processor's exceptions, sleep and reset, and the run itself.
+
+use thiserror::Error;
+
+use crate::board::Board;
+use crate::chip::{Chip, ChipError};
+use crate::cpu::{Cpu, Register, Stop};
+use crate::image::Image;
+use crate::map;
+use crate::nvic::{HARD_FAULT, SV_CALL};
+use crate::peripheral::rcc::Cause;
+use crate::time::{self, Instant, NEVER};
+
+/// Exception entry and return on a Cortex-M4 without wait states (ARM DDI 0439B, section 3.9.1).
+const ENTRY: u64 = 12;
+const RETURN: u64 = 10;
+/// What untouched RAM holds, to see how far the stack came down.
+const PAINT: u8 = 0xA5;
+
+/// Why a run ended before its time.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum EmulationError {
+    /// Something that the model does not have, or that the chip does not stand.
+    #[error("in {function}: {error}")]
+    Chip {
+        /// Function that runs.
+        function: String,
+        /// What.
+        error: ChipError,
+    },
+    /// The processor faulted, and no fault was expected.
+    #[error("{what} at {pc:#010x} in {function}: the processor goes to HardFault")]
+    Fault {
+        /// What happened.
+        what: String,
+        /// Where.
+        pc: u32,
+        /// Function.
+        function: String,
+    },
+    /// Something about the processor that is not modelled.
+    #[error("{0}")]
+    Processor(String),
+}
+
+/// What an exception's handler cost, without those that preempted it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Times it ran.
+    pub count: u64,
+    /// Instructions in all.
+    pub instructions: u64,
+    /// Instructions, most in one run.
+    pub worst_instructions: u64,
+    /// Cycles in all, estimated, with entry and return.
+    pub cycles: u64,
+    /// Cycles, most in one run.
+    pub worst_cycles: u64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    exception: u16,
+    instructions: u64,
+    cycles: u64,
+    /// Of these, others' that preempted it.
+    nested_instructions: u64,
+    nested_cycles: u64,
+}
+
+/// An image that runs.
+pub struct Emulation<C> {
+    cpu: C,
+    image: Image,
+    running: Vec<Running>,
+    costs: [Cost; 128],
+    locked: bool,
+    /// Resets so far, in order, with their times.
+    pub resets: Vec<(Instant, Cause)>,
+    /// Faults so far: program counter and what happened.
+    pub faults: Vec<(u32, String)>,
+    /// Faults lead to the image's HardFault handler instead of ending the run.
+    pub faults_expected: bool,
+    failure: Option<EmulationError>,
+}
+
+impl<C: Cpu<Chip>> Emulation<C> {
+    /// Loads an image into a processor whose chip is at power on.
+    pub fn new(cpu: C, image: Image) -> Self {
+        let mut emulation = Self {
+            cpu,
+            image,
+            running: Vec::new(),
+            costs: [Cost::default(); 128],
+            locked: false,
+            resets: Vec::new(),
+            faults: Vec::new(),
+            faults_expected: false,
+            failure: None,
+        };
+        let flash = emulation.image.flash.clone();
+        emulation.cpu.store(map::FLASH.start, &flash);
+        let system = factory_data();
+        emulation.cpu.store(map::SYSTEM.start, &system);
+        let ram = vec![PAINT; (map::RAM.end - map::RAM.start) as usize];
+        emulation.cpu.store(map::RAM.start, &ram);
+        emulation.start();
+        emulation
+    }
+
+    fn start(&mut self) {
+        self.running.clear();
+        self.locked = false;
+        let vectors = map::FLASH.start;
+        let (sp, pc) = (self.word(vectors), self.word(vectors + 4));
+        for n in 0..13 {
+            self.cpu.set(Register::General(n), 0);
+        }
+        self.cpu.set(Register::Control, 0);
+        self.cpu.set(Register::Primask, 0);
+        self.cpu.set(Register::Basepri, 0);
+        self.cpu.set(Register::Faultmask, 0);
+        self.cpu.set(Register::Xpsr, 0);
+        self.cpu.set(Register::Sp, sp);
+        self.cpu.set(Register::Lr, 0xFFFF_FFFF);
+        self.cpu.set(Register::Pc, pc);
+        // The boot loader's choice of memory leaves the vectors where the flash memory begins.
+        let mut chip = self.cpu.bus();
+        let now = chip.work.now;
+        let period = time::UNITS_PER_SECOND / 16_000_000;
+        // VTOR is 0 after reset, where the flash memory shows as well; the emulation has it at its own place.
+        let _ = chip.nvic.write(now, period, 0xD08, 4, vectors);
+    }
+
+    /// Resets the chip. The flash memory and the RAM keep what they hold.
+    pub fn reset(&mut self, cause: Cause) {
+        let now = {
+            let mut chip = self.cpu.bus();
+            chip.reset(cause);
+            chip.work.now
+        };
+        self.resets.push((now, cause));
+        self.start();
+    }
+
+    /// A word of memory; 0 where there is none.
+    pub fn word(&mut self, address: u32) -> u32 {
+        let mut bytes = [0; 4];
+        self.cpu.load(address, &mut bytes);
+        u32::from_le_bytes(bytes)
+    }
+
+    /// The processor.
+    pub fn cpu(&mut self) -> &mut C {
+        &mut self.cpu
+    }
+
+    /// The image.
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// The chip, to look into or to act upon. The processor stops at the next block to see what has changed.
+    pub fn with_chip<T>(&mut self, act: impl FnOnce(&mut Chip) -> T) -> T {
+        let mut chip = self.cpu.bus();
+        let result = act(&mut chip);
+        chip.interrupt_run();
+        result
+    }
+
+    /// The board.
+    pub fn with_board<T>(&mut self, act: impl FnOnce(&mut Board) -> T) -> T {
+        self.with_chip(|chip| act(&mut chip.board))
+    }
+
+    /// Time now, s since power on.
+    pub fn seconds(&mut self) -> f64 {
+        time::to_seconds(self.cpu.bus().work.now)
+    }
+
+    /// Cost of an exception's handler so far.
+    pub fn cost(&self, exception: u16) -> Cost {
+        self.costs
+            .get(usize::from(exception))
+            .copied()
+            .unwrap_or_default()
+    }
+
+    /// Forgets the costs so far.
+    pub fn clear_costs(&mut self) {
+        self.costs = [Cost::default(); 128];
+    }
+
+    /// What ended the run for good.
+    pub fn failure(&self) -> Option<&EmulationError> {
+        self.failure.as_ref()
+    }
+
+    /// Bytes of the stack that were ever used, and bytes that it may take before it meets the statics.
+    pub fn stack(&mut self) -> (u32, u32) {
+        let top = self.word(map::FLASH.start);
+        let bottom = ["__euninit", "__ebss", "_stack_end"]
+            .iter()
+            .filter_map(|name| self.image.symbol(name))
+            .map(|(address, _)| address)
+            .filter(|address| *address < top)
+            .max()
+            .unwrap_or(map::RAM.start);
+        let mut bytes = vec![0; (top - bottom) as usize];
+        self.cpu.load(bottom, &mut bytes);
+        // cortex-m-rt may have painted it anew before the program began (its feature `paint-stack`).
+        let painted = |byte: &&u8| matches!(**byte, PAINT | 0xCC);
+        let untouched = bytes.iter().take_while(painted).count();
+        (top - bottom - untouched as u32, top - bottom)
+    }
+
+    /// Runs for so many seconds.
+    ///
+    /// # Errors
+    /// What ended the run.
+    pub fn run_for(&mut self, seconds: f64) -> Result<(), EmulationError> {
+        let until = self.cpu.bus().work.now + time::from_seconds(seconds);
+        self.run_until(until)
+    }
+
+    /// Runs to a point of time.
+    ///
+    /// # Errors
+    /// What ended the run; the same again afterwards.
+    pub fn run_until(&mut self, until: Instant) -> Result<(), EmulationError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        let result = self.run(until);
+        if let Err(failure) = &result {
+            self.failure = Some(failure.clone());
+        }
+        result
+    }
+
+    fn run(&mut self, until: Instant) -> Result<(), EmulationError> {
+        self.cpu.bus().limit = until;
+        loop {
+            self.settle()?;
+            if self.cpu.bus().work.now >= until {
+                return Ok(());
+            }
+            if self.waits(until) {
+                continue;
+            }
+            let masks = self.cpu.masks();
+            let next = self.cpu.bus().nvic.next(masks);
+            if let Some(exception) = next {
+                self.enter(exception)?;
+                continue;
+            }
+            match self.cpu.run() {
+                Stop::Attention => {}
+                Stop::Sleep { event } => self.sleep(event, until)?,
+                Stop::ExceptionReturn(value) => self.leave(value)?,
+                Stop::SupervisorCall => self.cpu.bus().nvic.pend(SV_CALL),
+                Stop::Memory { address, write } => {
+                    let access = if write {
+                        "a store to"
+                    } else {
+                        "a load or fetch from"
+                    };
+                    // PRECISERR with BFARVALID.
+                    self.fault(0x8200, address, format!("{access} {}", map::name(address)))?;
+                }
+                // UNDEFINSTR.
+                Stop::Undefined => self.fault(1 << 16, 0, "an undefined instruction".to_owned())?,
+                Stop::Breakpoint => {
+                    self.fault(0, 0, "a breakpoint without a debugger".to_owned())?
+                }
+            }
+        }
+    }
+
+    /// Lets the peripherals do what is due, and sees to reset and failure.
+    fn settle(&mut self) -> Result<(), EmulationError> {
+        let (failure, changed, bitten, reset) = self.cpu.with_memory(|chip, memory| {
+            chip.settle(memory);
+            (
+                chip.failure.clone(),
+                core::mem::take(&mut chip.changed),
+                chip.bitten,
+                chip.nvic.reset_requested,
+            )
+        });
+        if let Some(error) = failure {
+            let at = self.cpu.bus().block;
+            return Err(EmulationError::Chip {
+                function: self.name(at),
+                error,
+            });
+        }
+        for (address, size) in changed {
+            self.cpu.forget_code(address, size);
+        }
+        if bitten {
+            self.reset(Cause::Watchdog);
+        } else if reset {
+            self.reset(Cause::Software);
+        }
+        Ok(())
+    }
+
+    fn name(&self, address: u32) -> String {
+        self.image
+            .function_at(address)
+            .map_or_else(|| "unknown code".to_owned(), |f| f.name.clone())
+    }
+
+    /// Whether the processor is held up; time has gone on to the next event then.
+    fn waits(&mut self, until: Instant) -> bool {
+        let mut chip = self.cpu.bus();
+        let held = if self.locked { NEVER } else { chip.held_until };
+        if held <= chip.work.now {
+            return false;
+        }
+        let next = chip.next_event().min(held).min(until);
+        chip.skip_to(next);
+        true
+    }
+
+    fn sleep(&mut self, for_event: bool, until: Instant) -> Result<(), EmulationError> {
+        let resets = self.resets.len();
+        loop {
+            self.settle()?;
+            if self.resets.len() > resets {
+                return Ok(());
+            }
+            let masks = self.cpu.masks();
+            let mut chip = self.cpu.bus();
+            let awake = if for_event {
+                chip.event
+                    || chip.nvic.next(masks).is_some()
+                    || chip.nvic.pending_wakes() && chip.nvic.has_pending()
+            } else {
+                chip.nvic.wakes(masks)
+            };
+            if awake {
+                chip.event &= !for_event;
+                return Ok(());
+            }
+            if chip.work.now >= until {
+                drop(chip);
+                // Asleep still: the instruction is met again.
+                let pc = self.cpu.get(Register::Pc);
+                self.cpu.set(Register::Pc, pc - 2);
+                self.cpu.bus().uncount_sleep();
+                return Ok(());
+            }
+            let next = chip.next_event().min(until);
+            chip.skip_to(next);
+        }
+    }
+
+    fn fault(&mut self, status: u32, address: u32, what: String) -> Result<(), EmulationError> {
+        let pc = self.cpu.get(Register::Pc);
+        self.faults.push((pc, what.clone()));
+        if !self.faults_expected {
+            return Err(EmulationError::Fault {
+                what,
+                pc,
+                function: self.name(pc),
+            });
+        }
+        let masks = self.cpu.masks();
+        let in_fault = self.cpu.bus().nvic.running() == Some(HARD_FAULT);
+        if in_fault || masks.faultmask {
+            self.lock_up();
+            return Ok(());
+        }
+        let mut chip = self.cpu.bus();
+        chip.nvic.fault(status, address);
+        chip.nvic.pend(HARD_FAULT);
+        Ok(())
+    }
+
+    fn lock_up(&mut self) {
+        self.locked = true;
+        self.cpu.bus().lock_up();
+    }
+
+    fn enter(&mut self, exception: u16) -> Result<(), EmulationError> {
+        let control = self.cpu.get(Register::Control);
+        if control & 3 != 0 {
+            return Err(EmulationError::Processor(
+                "the process stack and unprivileged mode are not modelled".to_owned(),
+            ));
+        }
+        let float = control & 4 != 0;
+        let sp = self.cpu.get(Register::Sp);
+        let size = if float { 104 } else { 32 };
+        let frame = sp.wrapping_sub(size) & !7;
+        let padded = frame != sp.wrapping_sub(size);
+        let xpsr = (self.cpu.get(Register::Xpsr) & !(1 << 9)) | u32::from(padded) << 9 | 1 << 24;
+        let mut words: Vec<u32> = [0, 1, 2, 3, 12]
+            .map(|n| self.cpu.get(Register::General(n)))
+            .to_vec();
+        words.extend([self.cpu.get(Register::Lr), self.cpu.get(Register::Pc), xpsr]);
+        if float {
+            words.extend((0..16).map(|n| self.cpu.get(Register::Single(n))));
+            words.extend([self.cpu.get(Register::Fpscr), 0]);
+        }
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        if !map::RAM.contains(&frame) || !self.cpu.store(frame, &bytes) {
+            // A fault while stacking for a fault locks the processor up (B1.5.15).
+            let what = format!("no room for exception {exception}'s frame at {frame:#010x}");
+            let pc = self.cpu.get(Register::Pc);
+            self.faults.push((pc, what.clone()));
+            if !self.faults_expected {
+                return Err(EmulationError::Fault {
+                    what,
+                    pc,
+                    function: self.name(pc),
+                });
+            }
+            self.lock_up();
+            return Ok(());
+        }
+        let nested = self.cpu.bus().nvic.depth() > 0;
+        let link = if nested { 0xFFFF_FFF1 } else { 0xFFFF_FFF9 } & !(u32::from(float) << 4);
+        let vectors = self.cpu.bus().nvic.vectors();
+        let handler = self.word(vectors + 4 * u32::from(exception));
+        self.cpu.set(Register::Sp, frame);
+        self.cpu.set(Register::Lr, link);
+        self.cpu.set(Register::Control, control & !4);
+        self.cpu.set(
+            Register::Xpsr,
+            (xpsr & 0xF80F_0000) | u32::from(exception) | 1 << 24,
+        );
+        self.cpu.set(Register::Pc, handler);
+        let mut chip = self.cpu.bus();
+        chip.event = true;
+        self.running.push(Running {
+            exception,
+            instructions: chip.work.instructions,
+            cycles: chip.work.cycles,
+            nested_instructions: 0,
+            nested_cycles: 0,
+        });
+        chip.spend(ENTRY);
+        chip.nvic.enter(exception);
+        Ok(())
+    }
+
+    fn leave(&mut self, link: u32) -> Result<(), EmulationError> {
+        let Some(running) = self.running.pop() else {
+            return Err(EmulationError::Processor(format!(
+                "a branch to {link:#010x} outside any exception"
+            )));
+        };
+        if link & 0xF != 1 && link & 0xF != 9 {
+            return Err(EmulationError::Processor(format!(
+                "exception return {link:#010x} to the process stack is not modelled"
+            )));
+        }
+        let float = link & 0x10 == 0;
+        let frame = self.cpu.get(Register::Sp);
+        let size = if float { 26 } else { 8 };
+        let mut bytes = vec![0; 4 * size];
+        self.cpu.load(frame, &mut bytes);
+        let words: Vec<u32> = bytes
+            .chunks_exact(4)
+            .map(|c| c.iter().rev().fold(0, |w, b| w << 8 | u32::from(*b)))
+            .collect();
+        let word = |k: usize| words.get(k).copied().unwrap_or(0);
+        for (k, n) in [0, 1, 2, 3, 12].into_iter().enumerate() {
+            self.cpu.set(Register::General(n), word(k));
+        }
+        self.cpu.set(Register::Lr, word(5));
+        let xpsr = word(7);
+        let padding = 4 * (xpsr >> 9 & 1);
+        if float {
+            for n in 0..16 {
+                self.cpu.set(Register::Single(n), word(8 + usize::from(n)));
+            }
+            self.cpu.set(Register::Fpscr, word(24));
+        }
+        let control = self.cpu.get(Register::Control) & !4 | u32::from(float) << 2;
+        self.cpu.set(Register::Xpsr, xpsr & !(1 << 9));
+        self.cpu.set(Register::Control, control);
+        self.cpu
+            .set(Register::Sp, frame + 4 * size as u32 + padding);
+        self.cpu.set(Register::Pc, word(6));
+        let mut chip = self.cpu.bus();
+        chip.event = true;
+        chip.spend(RETURN);
+        chip.nvic.leave();
+        let instructions = chip.work.instructions - running.instructions;
+        let cycles = chip.work.cycles - running.cycles;
+        drop(chip);
+        if running.exception == HARD_FAULT || self.cpu.masks().faultmask {
+            self.cpu.set(Register::Faultmask, 0);
+        }
+        let (own_instructions, own_cycles) = (
+            instructions - running.nested_instructions,
+            cycles - running.nested_cycles,
+        );
+        if let Some(cost) = self.costs.get_mut(usize::from(running.exception)) {
+            cost.count += 1;
+            cost.instructions += own_instructions;
+            cost.cycles += own_cycles;
+            cost.worst_instructions = cost.worst_instructions.max(own_instructions);
+            cost.worst_cycles = cost.worst_cycles.max(own_cycles);
+        }
+        if let Some(outer) = self.running.last_mut() {
+            outer.nested_instructions += instructions;
+            outer.nested_cycles += cycles;
+        }
+        Ok(())
+    }
+}
+
+/// System memory as the factory leaves it: unique identifier, flash size, calibration values (RM0440 section 48,
+/// DS12288 tables 5 and 6).
+fn factory_data() -> Vec<u8> {
+    let mut bytes = vec![0xFF; (map::SYSTEM.end - map::SYSTEM.start) as usize];
+    let mut put = |address: u32, value: &[u8]| {
+        let from = (address - map::SYSTEM.start) as usize;
+        if let Some(place) = bytes.get_mut(from..from + value.len()) {
+            place.copy_from_slice(value);
+        }
+    };
+    put(0x1FFF_7590, b"RIG-MCU-0001");
+    put(0x1FFF_75E0, &512_u16.to_le_bytes());
+    put(0x1FFF_75A8, &1034_u16.to_le_bytes());
+    put(0x1FFF_75AA, &1654_u16.to_le_bytes());
+    put(0x1FFF_75CA, &1378_u16.to_le_bytes());
+    bytes
+}

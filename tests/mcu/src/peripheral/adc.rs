@@ -1,0 +1,463 @@
+//! ADC1 (RM0440 section 21): switching on with its waits, calibration, the injected sequence by hardware trigger
+//! or software, single regular conversions, oversampling. ADC2's registers are there, its converter is not.
+//!
+//! Left out: DMA, analogue watchdogs, offsets and gain compensation, the context queue, dual mode.
+
+use super::{Bank, Refusal, Register, told};
+use crate::time::{Instant, NEVER, UNITS_PER_MICROSECOND};
+
+const ISR: u32 = 0x00;
+const IER: u32 = 0x04;
+const CR: u32 = 0x08;
+const CFGR: u32 = 0x0C;
+const CFGR2: u32 = 0x10;
+const SMPR1: u32 = 0x14;
+const SQR1: u32 = 0x30;
+const DR: u32 = 0x40;
+const JSQR: u32 = 0x4C;
+const JDR1: u32 = 0x80;
+const COMMON: u32 = 0x308;
+
+const ADEN: u32 = 1;
+const ADDIS: u32 = 1 << 1;
+const ADSTART: u32 = 1 << 2;
+const JADSTART: u32 = 1 << 3;
+const ADVREGEN: u32 = 1 << 28;
+const DEEPPWD: u32 = 1 << 29;
+const ADCAL: u32 = 1 << 31;
+const ADRDY: u32 = 1;
+const EOC: u32 = 1 << 2;
+const EOS: u32 = 1 << 3;
+const OVR: u32 = 1 << 4;
+const JEOC: u32 = 1 << 5;
+const JEOS: u32 = 1 << 6;
+
+/// Start-up of the regulator (data sheet DS12288, table 66): 20 µs.
+const REGULATOR: u64 = 20 * UNITS_PER_MICROSECOND;
+/// Calibration, cycles of the converter's clock (table 66).
+const CALIBRATION: u64 = 116;
+/// Fastest clock with one converter in use, Hz (table 66).
+const FASTEST: u64 = 60_000_000;
+
+#[rustfmt::skip]
+const REGISTERS: &[Register] = &[
+    Register(0x00, "ADC_ISR", 0, 0),
+    Register(0x04, "ADC_IER", 0, 0x0000_007F),
+    Register(0x08, "ADC_CR", 0x2000_0000, 0xF000_003F),
+    Register(0x0C, "ADC_CFGR", 0x8000_0000, 0x8070_BC78),
+    Register(0x10, "ADC_CFGR2", 0, 0x0000_07FF),
+    Register(0x14, "ADC_SMPR1", 0, 0xBFFF_FFFF),
+    Register(0x18, "ADC_SMPR2", 0, 0x07FF_FFFF),
+    Register(0x20, "ADC_TR1", 0x0FFF_0000, 0x0FFF_7FFF),
+    Register(0x24, "ADC_TR2", 0x00FF_0000, 0x00FF_00FF),
+    Register(0x28, "ADC_TR3", 0x00FF_0000, 0x00FF_00FF),
+    Register(0x30, "ADC_SQR1", 0, 0x1F7D_F7CF),
+    Register(0x34, "ADC_SQR2", 0, 0x1F7D_F7DF),
+    Register(0x38, "ADC_SQR3", 0, 0x1F7D_F7DF),
+    Register(0x3C, "ADC_SQR4", 0, 0x0000_07DF),
+    Register(0x40, "ADC_DR", 0, 0),
+    Register(0x4C, "ADC_JSQR", 0, 0xFBEF_BFFF),
+    Register(0x60, "ADC_OFR1", 0, 0),
+    Register(0x64, "ADC_OFR2", 0, 0),
+    Register(0x68, "ADC_OFR3", 0, 0),
+    Register(0x6C, "ADC_OFR4", 0, 0),
+    Register(0x80, "ADC_JDR1", 0, 0),
+    Register(0x84, "ADC_JDR2", 0, 0),
+    Register(0x88, "ADC_JDR3", 0, 0),
+    Register(0x8C, "ADC_JDR4", 0, 0),
+    Register(0xA0, "ADC_AWD2CR", 0, 0),
+    Register(0xA4, "ADC_AWD3CR", 0, 0),
+    Register(0xB0, "ADC_DIFSEL", 0, 0),
+    Register(0xB4, "ADC_CALFACT", 0, 0x007F_007F),
+    Register(0xC0, "ADC_GCOMP", 0x1000, 0),
+];
+
+/// One conversion under way.
+#[derive(Clone, Copy, Debug)]
+struct Conversion {
+    ends: Instant,
+    /// Rank from 0 among the injected ones; none: a regular one.
+    rank: Option<u32>,
+    value: u32,
+    last: bool,
+}
+
+/// A converter.
+#[derive(Clone, Debug)]
+pub struct Adc {
+    bank: Bank,
+    common: u32,
+    regulator: Option<Instant>,
+    calibrated: Instant,
+    under_way: Vec<Conversion>,
+    /// Triggers that came while a sequence was still running.
+    pub missed: u64,
+}
+
+impl Default for Adc {
+    fn default() -> Self {
+        Self {
+            bank: Bank::new(REGISTERS),
+            common: 0,
+            regulator: None,
+            calibrated: NEVER,
+            under_way: Vec::new(),
+            missed: 0,
+        }
+    }
+}
+
+/// What the board has on a channel's pin, as a 12-bit code; none where nothing is connected.
+pub type Codes<'a> = &'a dyn Fn(u32) -> Option<u16>;
+
+impl Adc {
+    /// Period of the converter's clock, from the AHB's and the asynchronous one.
+    fn clock(&self, system: u64, kernel: Result<u64, Refusal>) -> Result<u64, Refusal> {
+        const PRESCALERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
+        let period = match self.common >> 16 & 3 {
+            1 => system,
+            2 => 2 * system,
+            3 => 4 * system,
+            _ => {
+                let prescaler = (self.common >> 18 & 0xF) as usize;
+                kernel? * PRESCALERS.get(prescaler).copied().unwrap_or(1)
+            }
+        };
+        if crate::time::UNITS_PER_SECOND / period > FASTEST {
+            return told(format!(
+                "the converter's clock is {} Hz, above the {FASTEST} Hz that it stands",
+                crate::time::UNITS_PER_SECOND / period
+            ));
+        }
+        Ok(period)
+    }
+
+    /// Half cycles of the sampling time of a channel.
+    fn sampling(&self, channel: u32) -> u64 {
+        let code = self.bank.get(SMPR1 + 4 * (channel / 10)) >> (3 * (channel % 10)) & 7;
+        [5, 13, 25, 49, 95, 185, 495, 1281]
+            .get(code as usize)
+            .copied()
+            .unwrap_or(5)
+    }
+
+    /// Duration of a conversion in half cycles, and its result from one code.
+    fn conversion(&self, channel: u32, code: u16, injected: bool) -> Result<(u64, u32), Refusal> {
+        let config = self.bank.get(CFGR);
+        if config & 0x18 != 0 || config & 0x8000 != 0 {
+            return told("resolutions below 12 bits and left alignment are not modelled");
+        }
+        let single = self.sampling(channel) + 25;
+        let over = self.bank.get(CFGR2);
+        if over & (if injected { 2 } else { 1 }) == 0 {
+            return Ok((single, code.into()));
+        }
+        let ratio = 2_u32 << (over >> 2 & 7);
+        let sum = u32::from(code) * ratio;
+        let shift = over >> 5 & 0xF;
+        // Rounded (section 21.4.31).
+        let result = (sum + ((1 << shift) >> 1)) >> shift;
+        Ok((single * u64::from(ratio), result & 0xFFFF))
+    }
+
+    /// Whether the hardware trigger `source` starts the injected sequence.
+    pub fn listens_to(&self, source: u32) -> bool {
+        let jsqr = self.bank.get(JSQR);
+        self.bank.get(CR) & JADSTART != 0 && jsqr >> 7 & 3 != 0 && jsqr >> 2 & 0x1F == source
+    }
+
+    /// Starts the injected sequence.
+    ///
+    /// # Errors
+    /// A channel with nothing on it, or a clock out of range.
+    pub fn start_injected(
+        &mut self,
+        now: Instant,
+        system: u64,
+        kernel: Result<u64, Refusal>,
+        codes: Codes<'_>,
+    ) -> Result<(), Refusal> {
+        if self.under_way.iter().any(|c| c.rank.is_some()) {
+            self.missed += 1;
+            return Ok(());
+        }
+        let clock = self.clock(system, kernel)?;
+        let jsqr = self.bank.get(JSQR);
+        let length = (jsqr & 3) + 1;
+        let mut at = now;
+        for rank in 0..length {
+            let channel = jsqr >> (9 + 6 * rank) & 0x1F;
+            let Some(code) = codes(channel) else {
+                return told(format!("nothing is connected to ADC1 channel {channel}"));
+            };
+            let (half_cycles, value) = self.conversion(channel, code, true)?;
+            at += half_cycles * clock / 2;
+            self.under_way.push(Conversion {
+                ends: at,
+                rank: Some(rank),
+                value,
+                last: rank + 1 == length,
+            });
+        }
+        Ok(())
+    }
+
+    fn start_regular(
+        &mut self,
+        now: Instant,
+        system: u64,
+        kernel: Result<u64, Refusal>,
+        codes: Codes<'_>,
+    ) -> Result<(), Refusal> {
+        let (config, sequence) = (self.bank.get(CFGR), self.bank.get(SQR1));
+        if config & 0x2C03 != 0 || sequence & 0xF != 0 {
+            return told("only single regular conversions by software are modelled");
+        }
+        let channel = sequence >> 6 & 0x1F;
+        let Some(code) = codes(channel) else {
+            return told(format!("nothing is connected to ADC1 channel {channel}"));
+        };
+        let clock = self.clock(system, kernel)?;
+        let (half_cycles, value) = self.conversion(channel, code, false)?;
+        self.under_way.push(Conversion {
+            ends: now + half_cycles * clock / 2,
+            rank: None,
+            value,
+            last: true,
+        });
+        Ok(())
+    }
+
+    /// When a conversion ends next.
+    pub fn due(&self) -> Instant {
+        self.under_way.iter().map(|c| c.ends).min().unwrap_or(NEVER)
+    }
+
+    /// Ends conversions that are due.
+    pub fn advance(&mut self, now: Instant) {
+        if self.due() > now {
+            return;
+        }
+        let (done, left): (Vec<_>, Vec<_>) = self.under_way.iter().partition(|c| c.ends <= now);
+        self.under_way = left;
+        for conversion in done {
+            match conversion.rank {
+                Some(rank) => {
+                    self.bank.put(JDR1 + 4 * rank, conversion.value);
+                    self.flag(JEOC | if conversion.last { JEOS } else { 0 });
+                    if conversion.last && self.bank.get(JSQR) >> 7 & 3 == 0 {
+                        let control = self.bank.get(CR) & !JADSTART;
+                        self.bank.put(CR, control);
+                    }
+                }
+                None => {
+                    self.bank.put(DR, conversion.value);
+                    let overrun = if self.bank.get(ISR) & EOC != 0 {
+                        OVR
+                    } else {
+                        0
+                    };
+                    self.flag(EOC | EOS | overrun);
+                    let control = self.bank.get(CR) & !ADSTART;
+                    self.bank.put(CR, control);
+                }
+            }
+        }
+    }
+
+    fn flag(&mut self, bits: u32) {
+        let status = self.bank.get(ISR) | bits;
+        self.bank.put(ISR, status);
+    }
+
+    /// Whether an interrupt is requested.
+    pub fn requests(&self) -> bool {
+        self.bank.get(ISR) & self.bank.get(IER) != 0
+    }
+
+    /// A load.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn read(&mut self, now: Instant, offset: u32) -> Result<u32, Refusal> {
+        match offset {
+            COMMON => Ok(self.common),
+            0x300 => Ok(self.bank.get(ISR) & 0x7FF),
+            CR => {
+                if self.calibrated <= now {
+                    self.calibrated = NEVER;
+                    let control = self.bank.get(CR) & !ADCAL;
+                    self.bank.put(CR, control);
+                }
+                Ok(self.bank.get(CR))
+            }
+            DR => {
+                let status = self.bank.get(ISR) & !EOC;
+                self.bank.put(ISR, status);
+                Ok(self.bank.get(DR))
+            }
+            0x80..=0x8C => {
+                let status = self.bank.get(ISR) & !JEOC;
+                self.bank.put(ISR, status);
+                self.bank.read(offset)
+            }
+            _ => self.bank.read(offset),
+        }
+    }
+
+    /// A store.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn write(
+        &mut self,
+        now: Instant,
+        offset: u32,
+        value: u32,
+        system: u64,
+        kernel: Result<u64, Refusal>,
+        codes: Codes<'_>,
+    ) -> Result<(), Refusal> {
+        match offset {
+            COMMON => {
+                // Dual mode off; clocks and internal channels.
+                if value & !0x01FF_0000 != 0 {
+                    return told("dual mode of the converters is not modelled");
+                }
+                self.common = value;
+            }
+            ISR => {
+                let status = self.bank.get(ISR) & !value;
+                self.bank.put(ISR, status);
+            }
+            CR => self.control(now, value, system, kernel, codes)?,
+            JSQR if self.bank.get(CR) & JADSTART != 0 => {
+                return told("JSQR was written while the sequence is armed");
+            }
+            _ => {
+                self.bank.write(offset, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The control register: bits that are set by software and cleared by hardware.
+    fn control(
+        &mut self,
+        now: Instant,
+        value: u32,
+        system: u64,
+        kernel: Result<u64, Refusal>,
+        codes: Codes<'_>,
+    ) -> Result<(), Refusal> {
+        let before = self.bank.get(CR);
+        let new = value & !before;
+        // Start and enable bits are cleared by their stops only.
+        let mut control = value | (before & (ADEN | ADSTART | JADSTART | ADCAL));
+        if new & ADVREGEN != 0 {
+            if value & DEEPPWD != 0 {
+                return told("the ADC's regulator was switched on in deep power-down");
+            }
+            self.regulator = Some(now);
+        }
+        if value & ADVREGEN == 0 {
+            self.regulator = None;
+        }
+        let ready = self.regulator.is_some_and(|since| now - since >= REGULATOR);
+        if new & (ADCAL | ADEN) != 0 && !ready {
+            return told("the ADC was used before its regulator had its 20 µs");
+        }
+        if new & ADCAL != 0 {
+            if before & ADEN != 0 {
+                return told("the ADC was calibrated while it was on");
+            }
+            self.calibrated = now + CALIBRATION * self.clock(system, kernel.clone())?;
+        }
+        if new & ADEN != 0 {
+            self.flag(ADRDY);
+        }
+        if value & ADDIS != 0 {
+            control &= !(ADEN | ADDIS);
+            let status = self.bank.get(ISR) & !ADRDY;
+            self.bank.put(ISR, status);
+        }
+        if value & 0x30 != 0 {
+            // ADSTP, JADSTP.
+            control &= !((value & 0x30) >> 2 | 0x30);
+            self.under_way.retain(|c| match c.rank {
+                Some(_) => value & 0x20 == 0,
+                None => value & 0x10 == 0,
+            });
+        }
+        self.bank.write(CR, control & (before | 0xF000_003F))?;
+        self.bank.put(CR, control);
+        if new & (ADSTART | JADSTART) != 0 && control & ADEN == 0 {
+            return told("a conversion was started while the ADC was off");
+        }
+        if new & ADSTART != 0 {
+            self.start_regular(now, system, kernel.clone(), codes)?;
+        }
+        if new & JADSTART != 0 && self.bank.get(JSQR) >> 7 & 3 == 0 {
+            self.start_injected(now, system, kernel, codes)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod test {
+    use super::*;
+
+    fn code(channel: u32) -> Option<u16> {
+        (channel < 10).then_some(100 * channel as u16)
+    }
+
+    fn write(adc: &mut Adc, now: Instant, offset: u32, value: u32) -> Result<(), Refusal> {
+        adc.write(now, offset, value, 24, Ok(24), &code)
+    }
+
+    /// HCLK/4 = 42.5 MHz; three channels of 12.5 + 12.5 cycles.
+    #[test]
+    fn a_triggered_sequence_takes_its_time_and_flags_its_end() {
+        let mut adc = Adc::default();
+        write(&mut adc, 0, COMMON, 3 << 16).unwrap();
+        write(&mut adc, 0, CR, 0).unwrap();
+        write(&mut adc, 0, CR, ADVREGEN).unwrap();
+        assert!(write(&mut adc, REGULATOR - 1, CR, ADVREGEN | ADEN).is_err());
+        let t = REGULATOR;
+        write(&mut adc, t, CR, ADVREGEN | ADCAL).unwrap();
+        assert!(adc.read(t, CR).unwrap() & ADCAL != 0);
+        assert!(adc.read(t + 116 * 96, CR).unwrap() & ADCAL == 0);
+        write(&mut adc, t, CR, ADVREGEN | ADEN).unwrap();
+        write(&mut adc, t, SMPR1, 2 << 18 | 2 << 21 | 2 << 24).unwrap();
+        write(
+            &mut adc,
+            t,
+            JSQR,
+            2 | 8 << 2 | 1 << 7 | 6 << 9 | 7 << 15 | 8 << 21,
+        )
+        .unwrap();
+        write(&mut adc, t, CR, ADVREGEN | ADEN | JADSTART).unwrap();
+        assert!(adc.listens_to(8) && !adc.listens_to(0));
+        adc.start_injected(t, 24, Ok(24), &code).unwrap();
+        let one = 25 * 96;
+        assert_eq!(adc.due(), t + one);
+        adc.advance(t + 3 * one - 1);
+        assert_eq!(adc.read(t, ISR).unwrap() & (JEOC | JEOS), JEOC);
+        adc.start_injected(t + 2 * one, 24, Ok(24), &code).unwrap();
+        assert_eq!(adc.missed, 1);
+        adc.advance(t + 3 * one);
+        assert_eq!(adc.read(t, ISR).unwrap() & JEOS, JEOS);
+        let results: Vec<u32> = (0..3).map(|k| adc.read(t, JDR1 + 4 * k).unwrap()).collect();
+        assert_eq!(results, [600, 700, 800]);
+        assert!(adc.listens_to(8), "armed for the next trigger");
+    }
+
+    #[test]
+    fn a_clock_too_fast_is_refused() {
+        let mut adc = Adc::default();
+        write(&mut adc, 0, COMMON, 2 << 16).unwrap();
+        assert!(adc.clock(24, Ok(24)).is_err(), "85 MHz");
+    }
+}

@@ -1,0 +1,210 @@
+//! DMA controller (RM0440 section 12.6): memory to peripheral and back, one item a request.
+//!
+//! Left out: memory to memory, bus time, priorities between channels (requests are served as they come).
+
+use super::{Refusal, told};
+use crate::map::RAM;
+
+const EN: u32 = 1;
+const TCIE: u32 = 1 << 1;
+const HTIE: u32 = 1 << 2;
+const TEIE: u32 = 1 << 3;
+const DIR: u32 = 1 << 4;
+const CIRC: u32 = 1 << 5;
+const PINC: u32 = 1 << 6;
+const MINC: u32 = 1 << 7;
+const MEM2MEM: u32 = 1 << 14;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Channel {
+    control: u32,
+    count: u32,
+    peripheral: u32,
+    memory: u32,
+    /// Items of a whole transfer, and how many are done.
+    length: u32,
+    done: u32,
+    flags: u32,
+}
+
+/// One item to move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Item {
+    /// Address in memory.
+    pub memory: u32,
+    /// Address of the peripheral's register.
+    pub peripheral: u32,
+    /// Bytes in memory.
+    pub size: u32,
+    /// From memory to the peripheral.
+    pub to_peripheral: bool,
+}
+
+/// A controller of eight channels.
+#[derive(Clone, Debug, Default)]
+pub struct Dma([Channel; 8]);
+
+impl Dma {
+    /// Whether a channel waits for requests, and in which direction it moves: true towards the peripheral.
+    pub fn armed(&self, channel: usize) -> Option<bool> {
+        let channel = self.0.get(channel)?;
+        (channel.control & EN != 0 && channel.count > 0).then_some(channel.control & DIR != 0)
+    }
+
+    /// Serves one request of a channel: what is to be moved.
+    ///
+    /// # Errors
+    /// Addresses outside RAM.
+    pub fn serve(&mut self, number: usize) -> Result<Option<Item>, Refusal> {
+        let Some(channel) = self.0.get_mut(number) else {
+            return Ok(None);
+        };
+        if channel.control & EN == 0 || channel.count == 0 {
+            return Ok(None);
+        }
+        let size = 1 << (channel.control >> 10 & 3);
+        let peripheral_size = 1 << (channel.control >> 8 & 3);
+        let step = |on: u32, size: u32| if channel.control & on != 0 { size } else { 0 };
+        let item = Item {
+            memory: channel.memory + channel.done * step(MINC, size),
+            peripheral: channel.peripheral + channel.done * step(PINC, peripheral_size),
+            size,
+            to_peripheral: channel.control & DIR != 0,
+        };
+        if !RAM.contains(&item.memory) || !RAM.contains(&(item.memory + size - 1)) {
+            return told(format!(
+                "DMA channel {} moves to or from {:#010x}, which is not RAM",
+                number + 1,
+                item.memory
+            ));
+        }
+        channel.done += 1;
+        channel.count -= 1;
+        if channel.done == channel.length / 2 {
+            channel.flags |= 4;
+        }
+        if channel.count == 0 {
+            channel.flags |= 2;
+            if channel.control & CIRC != 0 {
+                channel.count = channel.length;
+                channel.done = 0;
+            }
+        }
+        Ok(Some(item))
+    }
+
+    /// Whether a channel requests an interrupt.
+    pub fn requests(&self, number: usize) -> bool {
+        self.0
+            .get(number)
+            .is_some_and(|c| c.flags & c.control & (TCIE | HTIE | TEIE) != 0)
+    }
+
+    /// A load.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn read(&self, offset: u32) -> Result<u32, Refusal> {
+        if offset == 0 {
+            return Ok(self.0.iter().enumerate().fold(0, |all, (k, c)| {
+                let any = u32::from(c.flags != 0);
+                all | (c.flags | any) << (4 * k)
+            }));
+        }
+        if offset == 4 {
+            return Ok(0);
+        }
+        let (number, register) = place(offset)?;
+        let channel = self.0.get(number).ok_or(Refusal::NoRegister)?;
+        Ok(match register {
+            0 => channel.control,
+            4 => channel.count,
+            8 => channel.peripheral,
+            _ => channel.memory,
+        })
+    }
+
+    /// A store.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        if offset == 4 {
+            for (k, channel) in self.0.iter_mut().enumerate() {
+                let clear = value >> (4 * k) & 0xF;
+                // The global flag clears all.
+                channel.flags &= if clear & 1 != 0 { 0 } else { !clear };
+            }
+            return Ok(());
+        }
+        let (number, register) = place(offset)?;
+        let channel = self.0.get_mut(number).ok_or(Refusal::NoRegister)?;
+        let running = channel.control & EN != 0;
+        match register {
+            0 => {
+                if value & MEM2MEM != 0 || value >> 15 != 0 {
+                    return told(format!(
+                        "DMA_CCR{} has bits without a model: {value:#x}",
+                        number + 1
+                    ));
+                }
+                if value & EN != 0 && !running {
+                    channel.length = channel.count;
+                    channel.done = 0;
+                }
+                channel.control = value;
+            }
+            _ if running => {
+                return told(format!(
+                    "a register of DMA channel {} was written while it runs",
+                    number + 1
+                ));
+            }
+            4 => channel.count = value & 0xFFFF,
+            8 => channel.peripheral = value,
+            _ => channel.memory = value,
+        }
+        Ok(())
+    }
+}
+
+/// Channel from 0, and register within it.
+fn place(offset: u32) -> Result<(usize, u32), Refusal> {
+    let from = offset.checked_sub(8).ok_or(Refusal::NoRegister)?;
+    let (number, register) = (from as usize / 20, from % 20);
+    if number < 8 && register < 16 && register.is_multiple_of(4) {
+        Ok((number, register))
+    } else {
+        Err(Refusal::NoRegister)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod test {
+    use super::*;
+
+    #[test]
+    fn a_circular_transfer_flags_its_half_and_its_end() {
+        let mut dma = Dma::default();
+        dma.write(0x0C, 4).unwrap();
+        dma.write(0x10, 0x4000_8024).unwrap();
+        dma.write(0x14, 0x2000_0100).unwrap();
+        dma.write(0x08, EN | TCIE | HTIE | CIRC | MINC).unwrap();
+        let mut seen = Vec::new();
+        for _ in 0..5 {
+            let item = dma.serve(0).unwrap().unwrap();
+            seen.push((
+                item.memory - 0x2000_0100,
+                dma.read(0).unwrap(),
+                dma.read(0x0C).unwrap(),
+            ));
+            dma.write(4, 0xF).unwrap();
+        }
+        assert_eq!(
+            seen,
+            [(0, 0, 3), (1, 5, 2), (2, 0, 1), (3, 3, 4), (0, 0, 3)]
+        );
+        assert!(dma.write(0x0C, 1).is_err(), "count while running");
+    }
+}

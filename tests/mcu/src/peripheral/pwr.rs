@@ -1,0 +1,53 @@
+//! Power control (RM0440 section 6.4): storage; regulators settle at once.
+
+use super::{Bank, Refusal, Register};
+
+#[rustfmt::skip]
+const REGISTERS: &[Register] = &[
+    Register(0x00, "PWR_CR1", 0x0000_0200, 0x0000_4707),
+    Register(0x04, "PWR_CR2", 0, 0x0000_00FF),
+    Register(0x08, "PWR_CR3", 0x0000_8000, 0x0000_E51F),
+    Register(0x0C, "PWR_CR4", 0, 0x0000_031F),
+    Register(0x10, "PWR_SR1", 0, 0),
+    Register(0x14, "PWR_SR2", 0, 0),
+    Register(0x18, "PWR_SCR", 0, 0x0000_011F),
+    Register(0x80, "PWR_CR5", 0x0000_0100, 0x0000_0100),
+];
+
+/// The power controller.
+#[derive(Clone, Debug)]
+pub struct Pwr(Bank);
+
+impl Default for Pwr {
+    fn default() -> Self {
+        Self(Bank::new(REGISTERS))
+    }
+}
+
+impl Pwr {
+    /// A load.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn read(&self, offset: u32) -> Result<u32, Refusal> {
+        self.0.read(offset)
+    }
+
+    /// A store.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
+        self.0.write(offset, value).map(|_| ())
+    }
+
+    /// Highest system clock that the core's voltage allows, Hz (section 6.1.5): range 1 boost 170 MHz, range 1
+    /// normal 150 MHz, range 2 26 MHz.
+    pub fn fastest(&self) -> u64 {
+        match (self.0.get(0) >> 9 & 3, self.0.get(0x80) & 0x100) {
+            (1, 0) => 170_000_000,
+            (1, _) => 150_000_000,
+            _ => 26_000_000,
+        }
+    }
+}

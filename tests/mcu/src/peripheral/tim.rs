@@ -1,0 +1,632 @@
+//! Timers (RM0440 sections 28 to 31): up-counting and centre-aligned time base with repetition counter and
+//! preload, compare flags, PWM outputs, encoder mode with index, break input, update trigger.
+//!
+//! Left out: slave modes other than encoder, input capture, dead time, DMA requests, dithering, complementary
+//! outputs. Asking for one of them is refused.
+
+use super::{Bank, Refusal, Register, told};
+use crate::time::{Instant, NEVER};
+
+const CR1: u32 = 0x00;
+const CR2: u32 = 0x04;
+const SMCR: u32 = 0x08;
+const DIER: u32 = 0x0C;
+const SR: u32 = 0x10;
+const EGR: u32 = 0x14;
+const CCMR1: u32 = 0x18;
+const CCMR2: u32 = 0x1C;
+const CCER: u32 = 0x20;
+const CNT: u32 = 0x24;
+const PSC: u32 = 0x28;
+const ARR: u32 = 0x2C;
+const RCR: u32 = 0x30;
+const CCR1: u32 = 0x34;
+const BDTR: u32 = 0x44;
+const ECR: u32 = 0x58;
+const AF1: u32 = 0x60;
+
+const CEN: u32 = 1;
+const UDIS: u32 = 1 << 1;
+const OPM: u32 = 1 << 3;
+const ARPE: u32 = 1 << 7;
+const UIF: u32 = 1;
+const BIF: u32 = 1 << 7;
+const IDXF: u32 = 1 << 20;
+const BKE: u32 = 1 << 12;
+const BKP: u32 = 1 << 13;
+const AOE: u32 = 1 << 14;
+const MOE: u32 = 1 << 15;
+
+#[rustfmt::skip]
+const REGISTERS: &[Register] = &[
+    Register(0x00, "TIM_CR1", 0, 0x0000_0BFF),
+    Register(0x04, "TIM_CR2", 0, 0x02F5_FFFD),
+    Register(0x08, "TIM_SMCR", 0, 0x0331_FFFF),
+    Register(0x0C, "TIM_DIER", 0, 0x00F0_00FF),
+    Register(0x10, "TIM_SR", 0, 0),
+    Register(0x14, "TIM_EGR", 0, 0x0000_00FF),
+    Register(0x18, "TIM_CCMR1", 0, 0x0101_FFFF),
+    Register(0x1C, "TIM_CCMR2", 0, 0x0101_FFFF),
+    Register(0x20, "TIM_CCER", 0, 0x0033_FFFF),
+    Register(0x24, "TIM_CNT", 0, 0xFFFF_FFFF),
+    Register(0x28, "TIM_PSC", 0, 0x0000_FFFF),
+    Register(0x2C, "TIM_ARR", 0x0000_FFFF, 0xFFFF_FFFF),
+    Register(0x30, "TIM_RCR", 0, 0x0000_FFFF),
+    Register(0x34, "TIM_CCR1", 0, 0xFFFF_FFFF),
+    Register(0x38, "TIM_CCR2", 0, 0xFFFF_FFFF),
+    Register(0x3C, "TIM_CCR3", 0, 0xFFFF_FFFF),
+    Register(0x40, "TIM_CCR4", 0, 0xFFFF_FFFF),
+    Register(0x44, "TIM_BDTR", 0, 0x3FFF_FFFF),
+    Register(0x48, "TIM_CCR5", 0, 0xE00F_FFFF),
+    Register(0x4C, "TIM_CCR6", 0, 0x000F_FFFF),
+    Register(0x50, "TIM_CCMR3", 0, 0x0101_FCFC),
+    Register(0x54, "TIM_DTR2", 0, 0x0003_00FF),
+    Register(0x58, "TIM_ECR", 0, 0x0000_00FF),
+    Register(0x5C, "TIM_TISEL", 0, 0x0F0F_0F0F),
+    // Break by the pin alone: BKINE, BKINP, and the ETR source.
+    Register(0x60, "TIM_AF1", 0x0000_0001, 0x0003_C201),
+    Register(0x64, "TIM_AF2", 0x0000_0001, 0x0000_0201),
+];
+
+/// What has taken effect, as against what is preloaded.
+#[derive(Clone, Copy, Debug)]
+struct Active {
+    prescaler: u32,
+    reload: u32,
+    compare: [u32; 4],
+}
+
+/// A timer.
+#[derive(Clone, Debug)]
+pub struct Tim {
+    number: u8,
+    bank: Bank,
+    /// Period of the kernel clock.
+    clock: u64,
+    active: Active,
+    /// When the run up or down under way began.
+    base: Instant,
+    /// Compare matches up to here are flagged.
+    checked: Instant,
+    down: bool,
+    repetitions: u32,
+    /// Counter while it does not run by the clock.
+    held: u32,
+    update: Option<Instant>,
+    indexed: bool,
+    break_active: bool,
+    /// Update events so far.
+    pub updates: u64,
+}
+
+impl Tim {
+    /// Timer `number` after reset, by a clock of this period.
+    pub fn new(number: u8, clock: u64) -> Self {
+        let mut bank = Bank::new(REGISTERS);
+        let reload = if matches!(number, 2 | 5) {
+            u32::MAX
+        } else {
+            0xFFFF
+        };
+        bank.put(ARR, reload);
+        Self {
+            number,
+            bank,
+            clock,
+            active: Active {
+                prescaler: 0,
+                reload,
+                compare: [0; 4],
+            },
+            base: 0,
+            checked: 0,
+            down: false,
+            repetitions: 0,
+            held: 0,
+            update: None,
+            indexed: false,
+            break_active: false,
+            updates: 0,
+        }
+    }
+
+    /// Sets the period of the kernel clock; the count goes on from where it is.
+    pub fn set_clock(&mut self, now: Instant, period: u64) {
+        if period != self.clock {
+            let count = self.count(now);
+            self.clock = period;
+            self.rebase(now, count);
+        }
+    }
+
+    fn is_wide(&self) -> bool {
+        matches!(self.number, 2 | 5)
+    }
+
+    fn is_encoder(&self) -> bool {
+        let smcr = self.bank.get(SMCR);
+        matches!(smcr & 7, 1..=3) && smcr & 1 << 16 == 0
+    }
+
+    fn counts_by_clock(&self) -> bool {
+        self.bank.get(CR1) & CEN != 0 && !self.is_encoder()
+    }
+
+    fn is_centred(&self) -> bool {
+        self.bank.get(CR1) & 0x60 != 0
+    }
+
+    fn tick(&self) -> u64 {
+        self.clock * (u64::from(self.active.prescaler) + 1)
+    }
+
+    /// Length of a run up or down, ticks.
+    fn run(&self) -> u64 {
+        if self.is_centred() {
+            u64::from(self.active.reload).max(1)
+        } else {
+            u64::from(self.active.reload) + 1
+        }
+    }
+
+    fn count(&self, now: Instant) -> u32 {
+        if !self.counts_by_clock() {
+            return self.held;
+        }
+        let ticks = (now.saturating_sub(self.base) / self.tick()).min(self.run()) as u32;
+        if self.down {
+            self.active.reload.saturating_sub(ticks)
+        } else {
+            ticks.min(self.active.reload)
+        }
+    }
+
+    fn rebase(&mut self, now: Instant, count: u32) {
+        self.held = count;
+        let into = if self.down {
+            self.active.reload.saturating_sub(count)
+        } else {
+            count
+        };
+        self.base = now.saturating_sub(u64::from(into) * self.tick());
+        self.checked = now;
+    }
+
+    /// Time of compare match of channel `k` in the run under way, if it has one there.
+    fn match_time(&self, k: usize) -> Option<Instant> {
+        let compare = *self.active.compare.get(k)?;
+        if compare > self.active.reload {
+            return None;
+        }
+        if self.is_centred() {
+            // CMS: 1 flags on the way down, 2 on the way up, 3 on both.
+            let wanted = if self.down { 1 } else { 2 };
+            if self.bank.get(CR1) >> 5 & wanted == 0 {
+                return None;
+            }
+        }
+        let ticks = if self.down {
+            self.active.reload - compare
+        } else {
+            compare
+        };
+        Some(self.base + u64::from(ticks) * self.tick())
+    }
+
+    /// When something happens here next that anybody waits for.
+    pub fn due(&self) -> Instant {
+        if !self.counts_by_clock() {
+            return NEVER;
+        }
+        let run = self.run() * self.tick();
+        // Runs to come before the update: the repetition counter has to come down first.
+        let update = self.base + run * (u64::from(self.repetitions) + 1);
+        let mut due = update;
+        for k in 0..4 {
+            if self.bank.get(DIER) & 2 << k != 0 && self.bank.get(SR) & 2 << k == 0 {
+                let next = match self.match_time(k) {
+                    Some(time) if time > self.checked => time,
+                    // In a later run: look again when this one is over.
+                    _ => self.base + run,
+                };
+                due = due.min(next);
+            }
+        }
+        due
+    }
+
+    /// Lets happen what is due up to `now`.
+    pub fn advance(&mut self, now: Instant) {
+        while self.counts_by_clock() {
+            let end = self.base + self.run() * self.tick();
+            let until = now.min(end - 1);
+            for k in 0..4 {
+                if let Some(time) = self.match_time(k)
+                    && time > self.checked
+                    && time <= until
+                {
+                    self.flag(2 << k);
+                }
+            }
+            self.checked = until;
+            if end > now {
+                break;
+            }
+            self.base = end;
+            if self.is_centred() {
+                self.down = !self.down;
+            }
+            if self.repetitions == 0 {
+                self.update_event(end);
+                if self.bank.get(CR1) & OPM != 0 {
+                    let control = self.bank.get(CR1) & !CEN;
+                    self.bank.put(CR1, control);
+                    self.held = 0;
+                }
+            } else {
+                self.repetitions -= 1;
+            }
+        }
+    }
+
+    fn flag(&mut self, bits: u32) {
+        let status = self.bank.get(SR) | bits;
+        self.bank.put(SR, status);
+    }
+
+    fn update_event(&mut self, at: Instant) {
+        self.repetitions = self.bank.get(RCR);
+        if self.bank.get(CR1) & UDIS != 0 {
+            return;
+        }
+        self.load();
+        if self.bank.get(BDTR) & AOE != 0 && !self.break_active {
+            let bdtr = self.bank.get(BDTR) | MOE;
+            self.bank.put(BDTR, bdtr);
+        }
+        self.flag(UIF);
+        self.updates += 1;
+        self.update = Some(at);
+    }
+
+    /// Takes the preloaded values over.
+    fn load(&mut self) {
+        self.active.prescaler = self.bank.get(PSC);
+        self.active.reload = self.bank.get(ARR);
+        for k in 0..4 {
+            self.active.compare[k] = self.bank.get(CCR1 + 4 * k as u32);
+        }
+    }
+
+    /// The update event since the last call, where it goes out as TRGO2 (CR2.MMS2 = 2).
+    pub fn take_trgo2(&mut self) -> Option<Instant> {
+        let at = self.update.take()?;
+        (self.bank.get(CR2) >> 20 & 0xF == 2).then_some(at)
+    }
+
+    /// Counts by the encoder's edges.
+    pub fn quadrature(&mut self, counts: i64) {
+        if self.is_encoder() && self.bank.get(CR1) & CEN != 0 {
+            let span = i64::from(self.active.reload) + 1;
+            self.held = (i64::from(self.held) + counts).rem_euclid(span) as u32;
+        }
+    }
+
+    /// The encoder's index has passed `since` counts ago: it set the counter to 0 counting up, to its top counting
+    /// down.
+    pub fn index(&mut self, upwards: bool, since: u32) {
+        let control = self.bank.get(ECR);
+        if !self.is_encoder() || control & 1 == 0 || control & 0x20 != 0 && self.indexed {
+            return;
+        }
+        self.indexed = true;
+        self.held = if upwards {
+            since
+        } else {
+            self.active.reload - since
+        };
+        self.flag(IDXF);
+    }
+
+    /// Level of the break input's pin.
+    pub fn set_break_pin(&mut self, high: bool) {
+        let bdtr = self.bank.get(BDTR);
+        let inverted = self.bank.get(AF1) & 0x200 != 0;
+        let active_high = (bdtr & BKP != 0) != inverted;
+        self.break_active = bdtr & BKE != 0 && self.bank.get(AF1) & 1 != 0 && high == active_high;
+        if self.break_active {
+            self.trip();
+        }
+    }
+
+    /// A break from inside the chip.
+    pub fn trip(&mut self) {
+        let bdtr = self.bank.get(BDTR) & !MOE;
+        self.bank.put(BDTR, bdtr);
+        self.flag(BIF);
+    }
+
+    /// Share of the time for which output `channel` (0 for CH1) is high; none while it is not driven.
+    ///
+    /// # Errors
+    /// An output mode that is not PWM.
+    pub fn output(&self, channel: usize) -> Result<Option<f64>, Refusal> {
+        let enable = self.bank.get(CCER) >> (4 * channel);
+        let advanced = matches!(self.number, 1 | 8 | 15 | 16 | 17 | 20);
+        if enable & 1 == 0 || advanced && self.bank.get(BDTR) & MOE == 0 {
+            return Ok(None);
+        }
+        let modes = self.bank.get(if channel < 2 { CCMR1 } else { CCMR2 }) >> (8 * (channel % 2));
+        let mode = (modes >> 4 & 7) | (modes >> 13 & 8);
+        let top = if self.is_centred() {
+            u64::from(self.active.reload)
+        } else {
+            u64::from(self.active.reload) + 1
+        };
+        let compare = self.active.compare.get(channel).copied().unwrap_or(0);
+        let share = if self.bank.get(CR1) & CEN == 0 {
+            // A counter that stands holds its output at the level of its count.
+            f64::from(u8::from(self.held < compare))
+        } else {
+            (f64::from(compare) / top.max(1) as f64).min(1.0)
+        };
+        let active = match mode {
+            6 => share,
+            7 => 1.0 - share,
+            // Forced inactive and active; frozen outputs stay where reset left them.
+            0 | 4 => 0.0,
+            5 => 1.0,
+            other => {
+                return told(format!(
+                    "TIM{} channel {} has output mode {other}, which is not modelled",
+                    self.number,
+                    channel + 1
+                ));
+            }
+        };
+        Ok(Some(if enable & 2 != 0 {
+            1.0 - active
+        } else {
+            active
+        }))
+    }
+
+    /// Interrupt lines: break, update, trigger, compare.
+    pub fn requests(&self) -> [bool; 4] {
+        let pending = self.bank.get(SR) & self.bank.get(DIER);
+        [
+            pending & BIF != 0,
+            pending & UIF != 0,
+            pending & 0x0010_0060 != 0,
+            pending & 0x1E != 0,
+        ]
+    }
+
+    /// Whether the main output is enabled.
+    pub fn main_output(&self) -> bool {
+        self.bank.get(BDTR) & MOE != 0
+    }
+
+    /// A load.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn read(&self, now: Instant, offset: u32) -> Result<u32, Refusal> {
+        match offset {
+            CNT => Ok(self.count(now)),
+            CR1 => {
+                let direction = u32::from(self.down && self.is_centred()) << 4;
+                Ok((self.bank.get(CR1) & !0x10) | direction)
+            }
+            _ => self.bank.read(offset),
+        }
+    }
+
+    /// A store.
+    ///
+    /// # Errors
+    /// An access that is not modelled.
+    pub fn write(&mut self, now: Instant, offset: u32, value: u32) -> Result<(), Refusal> {
+        match offset {
+            SR => {
+                // Cleared by zeros, save the bits that cannot be set.
+                let status = self.bank.get(SR) & value;
+                self.bank.put(SR, status);
+                return Ok(());
+            }
+            EGR => return self.generate(now, value),
+            CNT => {
+                let limited = if self.is_wide() {
+                    value
+                } else {
+                    value & 0xFFFF
+                };
+                self.rebase(now, limited);
+                return Ok(());
+            }
+            _ => {}
+        }
+        let count = self.count(now);
+        let before = self.bank.write(offset, value)?;
+        match offset {
+            CR1 => {
+                if value & 0x60 == 0 && value & 0x10 != 0 {
+                    return told("a timer that counts down only is not modelled");
+                }
+                if (before ^ value) & CEN != 0 {
+                    if !self.is_centred() {
+                        self.down = false;
+                    }
+                    self.rebase(now, count);
+                    // A match at the very value that the count starts from counts.
+                    self.checked = now.saturating_sub(1);
+                }
+            }
+            SMCR => {
+                if value & 7 != 0 && !self.is_encoder() {
+                    return told(format!(
+                        "TIM{} slave mode {:#x} is not modelled",
+                        self.number,
+                        value & 0x1_0007
+                    ));
+                }
+            }
+            PSC => {}
+            ARR => {
+                if self.bank.get(CR1) & ARPE == 0 {
+                    self.active.reload = self.bank.get(ARR);
+                    self.rebase(now, count.min(self.active.reload));
+                }
+            }
+            0x34..=0x40 => {
+                let k = (offset - CCR1) as usize / 4;
+                if !self.is_preloaded(k) {
+                    self.active.compare[k] = self.bank.get(offset);
+                }
+            }
+            BDTR => {
+                if self.break_active && value & MOE != 0 {
+                    let bdtr = self.bank.get(BDTR) & !MOE;
+                    self.bank.put(BDTR, bdtr);
+                }
+                if value & 0x0100_0000 != 0 {
+                    return told("the second break input is not modelled");
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn is_preloaded(&self, channel: usize) -> bool {
+        let modes = self.bank.get(if channel < 2 { CCMR1 } else { CCMR2 }) >> (8 * (channel % 2));
+        modes & 8 != 0 && modes & 3 == 0
+    }
+
+    fn generate(&mut self, now: Instant, value: u32) -> Result<(), Refusal> {
+        if value & !0x9F != 0 {
+            return told("EGR.TG and EGR.COMG are not modelled");
+        }
+        if value & 1 != 0 {
+            self.down = false;
+            self.repetitions = self.bank.get(RCR);
+            self.load();
+            self.rebase(now, 0);
+            self.checked = now.saturating_sub(1);
+            if self.bank.get(CR1) & (UDIS | 4) == 0 {
+                self.flag(UIF);
+            }
+            if self.bank.get(CR1) & UDIS == 0 {
+                self.update = Some(now);
+            }
+        }
+        self.flag(value & 0x1E);
+        if value & 0x80 != 0 {
+            self.trip();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod test {
+    use super::*;
+
+    const CLOCK: u64 = 24;
+
+    #[test]
+    fn centre_aligned_with_repetition_updates_once_in_two_periods() {
+        let mut tim = Tim::new(1, CLOCK);
+        for (offset, value) in [
+            (ARR, 4250),
+            (RCR, 3),
+            (CCMR1, 0x6868),
+            (CCER, 0x11),
+            (BDTR, MOE),
+            (CR2, 2 << 20),
+            (EGR, 1),
+            (SR, 0),
+            (CR1, 0x20 | ARPE),
+        ] {
+            tim.write(0, offset, value).unwrap();
+        }
+        tim.take_trgo2();
+        tim.write(1000, CR1, 0x20 | ARPE | CEN).unwrap();
+        // Two periods of 2 · 4250 ticks.
+        let period = 4 * 4250 * CLOCK;
+        assert_eq!(tim.due(), 1000 + period);
+        // Preloaded: no effect before the update.
+        tim.write(2000, CCR1, 2125).unwrap();
+        tim.advance(1000 + period - 1);
+        assert_eq!(tim.take_trgo2(), None);
+        assert_eq!(tim.output(0).unwrap(), Some(0.0));
+        assert_eq!(tim.read(1000 + period - 1, CNT).unwrap(), 1, "nearly down");
+        tim.advance(1000 + period);
+        assert_eq!(tim.take_trgo2(), Some(1000 + period));
+        assert_eq!(tim.output(0).unwrap(), Some(0.5));
+        assert_eq!(tim.read(1000 + period + 10 * CLOCK, CNT).unwrap(), 10);
+        assert_eq!(tim.updates, 1);
+    }
+
+    #[test]
+    fn compare_flags_of_a_free_running_timer() {
+        let mut tim = Tim::new(3, CLOCK);
+        for (offset, value) in [(PSC, 169), (EGR, 1), (SR, 0), (CCR1, 0x8000), (DIER, 2)] {
+            tim.write(0, offset, value).unwrap();
+        }
+        tim.write(0, CR1, CEN).unwrap();
+        let tick = 170 * CLOCK;
+        assert_eq!(tim.due(), 0x8000 * tick);
+        tim.advance(0x8000 * tick - 1);
+        assert_eq!(tim.read(0, SR).unwrap() & 2, 0);
+        tim.advance(0x8000 * tick);
+        assert_eq!(tim.read(0, SR).unwrap() & 2, 2);
+        tim.write(0, SR, !2).unwrap();
+        tim.advance(0x10000 * tick);
+        assert_eq!(tim.read(0x10000 * tick, CNT).unwrap(), 0);
+        // CC1 waits for the next round, the others match at 0.
+        assert_eq!(tim.read(0, SR).unwrap() & 3, 1);
+        assert_eq!(tim.due(), 0x18000 * tick);
+    }
+
+    #[test]
+    fn break_takes_the_outputs_and_holds_them() {
+        let mut tim = Tim::new(1, CLOCK);
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        tim.set_break_pin(true);
+        assert!(tim.main_output());
+        tim.set_break_pin(false);
+        assert!(!tim.main_output());
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        assert!(!tim.main_output(), "while the pin is low");
+        tim.set_break_pin(true);
+        assert!(!tim.main_output(), "not by itself");
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        assert!(tim.main_output());
+        assert!(tim.read(0, SR).unwrap() & BIF != 0);
+    }
+
+    #[test]
+    fn encoder_wraps_both_ways_and_index_sets_zero() {
+        let mut tim = Tim::new(2, CLOCK);
+        tim.write(0, SMCR, 3).unwrap();
+        tim.write(0, CR1, CEN).unwrap();
+        tim.quadrature(-5);
+        assert_eq!(tim.read(0, CNT).unwrap(), u32::MAX - 4);
+        tim.quadrature(7);
+        assert_eq!(tim.read(0, CNT).unwrap(), 2);
+        tim.index(true, 0);
+        assert_eq!(tim.read(0, CNT).unwrap(), 2, "index is not enabled");
+        tim.write(0, ECR, 0x21).unwrap();
+        tim.index(true, 0);
+        assert_eq!(tim.read(0, CNT).unwrap(), 0);
+        tim.quadrature(9);
+        tim.index(true, 0);
+        assert_eq!(tim.read(0, CNT).unwrap(), 9, "the first only");
+        tim.write(0, ECR, 1).unwrap();
+        tim.index(false, 3);
+        assert_eq!(tim.read(0, CNT).unwrap(), u32::MAX - 3);
+        assert!(tim.write(0, SMCR, 4).is_err());
+    }
+}

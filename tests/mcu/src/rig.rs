@@ -1,0 +1,54 @@
+//! The emulated board as a test or a host meets it.
+
+use std::time::Duration;
+
+use rig_host::link::Device;
+use rig_host::plant::PlantConfig;
+
+use crate::board::Board;
+use crate::chip::Chip;
+use crate::emulation::Emulation;
+use crate::image::Image;
+use crate::unicorn::{EngineError, UnicornCpu};
+
+/// A board run by unicorn.
+pub type EmulatedBoard = Emulation<UnicornCpu<Chip>>;
+
+/// An image on a board with this rig, at power on. `seed` is for the rig's noise.
+///
+/// # Errors
+/// What the engine says.
+pub fn power_on(image: Image, plant: PlantConfig, seed: u64) -> Result<EmulatedBoard, EngineError> {
+    let cpu = UnicornCpu::new(Chip::new(Board::new(plant, seed)))?;
+    Ok(Emulation::new(cpu, image))
+}
+
+/// The far end of a line whose time is the board's. A board that has failed says nothing more; what it failed
+/// of is told once on the standard error stream, and kept in [`Emulation::failure`].
+pub struct Line {
+    /// The board.
+    pub board: EmulatedBoard,
+    /// Everything that came from it, where kept.
+    pub heard: Option<Vec<u8>>,
+}
+
+impl Device for Line {
+    fn exchange(&mut self, from_host: &[u8], to_host: &mut Vec<u8>) {
+        let silent = self.board.failure().is_some();
+        self.board.with_chip(|chip| chip.send(from_host));
+        if let Err(failure) = self.board.run_for(self.slice().as_secs_f64())
+            && !silent
+        {
+            eprintln!("The emulated board stopped: {failure}.");
+        }
+        let sent = self.board.with_chip(Chip::take_sent);
+        if let Some(heard) = &mut self.heard {
+            heard.extend(&sent);
+        }
+        to_host.extend(sent);
+    }
+
+    fn slice(&self) -> Duration {
+        Duration::from_millis(1)
+    }
+}

@@ -1,0 +1,144 @@
+//! Power on, determinism, standstill.
+
+use std::time::Duration;
+
+use rig_host::link::{EmulatedPort, Session, SessionSettings};
+use rig_mcu::cpu::Memory;
+use rig_mcu::map;
+use rig_mcu::rig::{EmulatedBoard, Line};
+use rig_shared::wire::message::{Report, RequestBody, ResetCause, SettingsOrigin};
+use rig_tests::{calibrated, wait};
+
+use crate::{bench, board, greeted, health, powered};
+
+#[test]
+fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
+    let mut board = powered(1);
+    board.run_for(0.1).unwrap();
+    let (before, _) = board.with_chip(|chip| (chip.triggers, chip.adc.missed));
+    board.run_for(1.0).unwrap();
+    let (after, missed) = board.with_chip(|chip| (chip.triggers, chip.adc.missed));
+    assert_eq!(after - before, 10_000, "triggers in a second");
+    assert_eq!(missed, 0);
+    assert_eq!(board.with_board(|b| b.enable_edges.clone()), []);
+    let baud = board.with_chip(|chip| chip.lpuart.baud()).unwrap();
+    assert!((baud / 921_600.0 - 1.0).abs() < 0.01, "{baud} bit/s");
+    assert_eq!(board.resets, []);
+    let mut line = greeted(board);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Power);
+    assert_eq!(report.settings, SettingsOrigin::Defaults);
+    assert!(report.crystal);
+}
+
+/// Bytes of a short conversation with motion.
+fn conversation(seed: u64) -> Vec<u8> {
+    let line = Line {
+        board: powered(seed),
+        heard: Some(Vec::new()),
+    };
+    let mut port = EmulatedPort::new(line);
+    port.device_mut().board.run_for(0.05).unwrap();
+    let mut line = Session::open(port, SessionSettings::default()).unwrap();
+    calibrated(&mut line);
+    line.request(RequestBody::StartStream).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.3);
+    assert_eq!(board(&mut line).failure(), None);
+    line.port_mut().device_mut().heard.take().unwrap()
+}
+
+#[test]
+fn two_runs_give_the_same_bytes_and_another_rig_gives_others() {
+    let first = conversation(2);
+    assert!(first.len() > 5000, "{} bytes", first.len());
+    assert!(first == conversation(2));
+    assert!(first != conversation(3));
+}
+
+/// A minute at rest under control: the cycle counter wraps (25 s), telemetry loses nothing, nothing drifts away.
+#[test]
+fn a_minute_at_rest() {
+    let mut line = bench(4);
+    line.request(RequestBody::StartStream).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    let before = board(&mut line).with_board(|b| b.plant().truth().position);
+    wait(&mut line, 60.0);
+    let after = board(&mut line).with_board(|b| b.plant().truth().position);
+    assert!((after - before).abs() < 2e-3, "{before} to {after} rad");
+    let report = health(&mut line);
+    assert_eq!((report.bad_requests, report.dropped), (0, 0));
+    assert!(
+        line.next_report(Duration::from_millis(100))
+            .unwrap()
+            .is_some()
+    );
+    assert_eq!(line.frames().bad_crc + line.frames().bad_cobs, 0);
+    assert_eq!(board(&mut line).resets, []);
+    let longest = board(&mut line).with_chip(|chip| chip.iwdg.longest());
+    assert!(rig_mcu::time::to_seconds(longest) < 0.1);
+}
+
+/// Places in RAM whose value follows `expected` from one look to the next, a second apart: counters of time.
+fn counters(
+    board: &mut EmulatedBoard,
+    size: usize,
+    expected: impl Fn(&mut EmulatedBoard) -> u64,
+) -> Vec<u32> {
+    let mut found: Vec<u32> = (map::RAM).step_by(size).collect();
+    for _ in 0..3 {
+        let now = expected(board);
+        found.retain(|address| {
+            let mut bytes = [0; 8];
+            let known = board.cpu().load(*address, &mut bytes[..size]);
+            known && u64::from_le_bytes(bytes).abs_diff(now) <= 1
+        });
+        board.run_for(1.0).unwrap();
+    }
+    found
+}
+
+/// The control tick's counter and the clock of the tasks (microseconds in periods of 2¹⁵), put shortly before 2³¹:
+/// the rig works on across it.
+#[test]
+fn two_to_the_thirty_first_ticks_pass_unnoticed() {
+    let mut line = bench(6);
+    let emulated = board(&mut line);
+    let first = emulated.with_chip(|chip| chip.triggers);
+    let ticks = counters(emulated, 8, |board| board.with_chip(|chip| chip.triggers));
+    println!("{ticks:x?}");
+    assert!(!ticks.is_empty() && first > 5000);
+    let near = (1_u64 << 31) - 3000;
+    let periods = counters(emulated, 4, |board| {
+        (board.seconds() * 1e6 / 32768.0) as u64
+    });
+    assert_eq!(periods.len(), 1, "{periods:x?}");
+    // Even and odd periods are told apart by the timer's count.
+    let before = (1_u32 << 16) - 12 + (emulated.word(periods[0]) & 1);
+    assert!(emulated.cpu().store(periods[0], &before.to_le_bytes()));
+    for address in &ticks {
+        assert!(emulated.cpu().store(*address, &near.to_le_bytes()));
+    }
+    line.request(RequestBody::StartStream).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    let mut passed = Vec::new();
+    for _ in 0..150 {
+        if let Some(Report::Batch(batch)) = line.next_report(Duration::from_millis(100)).unwrap() {
+            passed.push(batch.first_tick);
+        }
+    }
+    assert!(
+        passed[0] < 1 << 31 && passed.last().is_some_and(|t| *t > 1 << 31),
+        "{passed:?}"
+    );
+    assert!(
+        passed.windows(2).all(|pair| pair[1] - pair[0] == 80),
+        "{passed:?}"
+    );
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+    assert_eq!(board(&mut line).resets, []);
+    // Two seconds on, the clock of the tasks is past 2³¹ µs too.
+    wait(&mut line, 1.0);
+    assert!(board(&mut line).word(periods[0]) > 1 << 16);
+    assert_eq!(health(&mut line).dropped, 0);
+}

@@ -1,0 +1,76 @@
+//! What the image costs: instructions and cycles of the control tick, flash, RAM, stack.
+
+use rig_mcu::chip::CONTROL_EXCEPTION;
+use rig_shared::wire::message::RequestBody;
+use rig_tests::{driven, excitation};
+use serde::Deserialize;
+
+use crate::{bench, board};
+
+/// The figures that may not grow: `tests/mcu/budget.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Budget {
+    tick_instructions_mean: f64,
+    tick_instructions_worst: u64,
+    tick_cycles_mean: f64,
+    tick_cycles_worst: u64,
+    flash_bytes: usize,
+    ram_bytes: usize,
+    stack_bytes: u32,
+}
+
+/// Cycles between two control ticks.
+const PERIOD: f64 = 17_000.0;
+
+#[test]
+fn the_image_keeps_to_its_budget() {
+    let text = include_str!("../../budget.toml");
+    let budget: Budget = toml::from_str(text).unwrap();
+    let mut line = bench(40);
+    board(&mut line).clear_costs();
+    let precompensation = {
+        let (_, settings) = rig_firmware::nameplate::one_link();
+        let mut precompensation = settings.precompensation;
+        precompensation.enabled = true;
+        precompensation
+    };
+    let run = driven(
+        &mut line,
+        vec![RequestBody::SetPrecompensation(precompensation)],
+        excitation(40, 5, 1),
+        0.2,
+    );
+    assert!(run.faults.is_empty(), "{:?}", run.faults);
+    let cost = board(&mut line).cost(CONTROL_EXCEPTION);
+    let (stack, room) = board(&mut line).stack();
+    let image = board(&mut line).image();
+    let mean = cost.instructions as f64 / cost.count as f64;
+    let cycles = cost.cycles as f64 / cost.count as f64;
+    let found = format!(
+        "{} ticks\ntick_instructions_mean = {mean:.1}\ntick_instructions_worst = {}\n\
+         tick_cycles_mean = {cycles:.1} # {:.1} % of the period\n\
+         tick_cycles_worst = {} # {:.1} %\nflash_bytes = {}\nram_bytes = {}\n\
+         stack_bytes = {stack} # of {room}\n",
+        cost.count,
+        cost.worst_instructions,
+        100.0 * cycles / PERIOD,
+        cost.worst_cycles,
+        100.0 * cost.worst_cycles as f64 / PERIOD,
+        image.flash_used,
+        image.ram_used,
+    );
+    println!("{found}");
+    assert!(
+        cycles <= 0.25 * PERIOD && cost.worst_cycles as f64 <= 0.5 * PERIOD,
+        "\n{found}"
+    );
+    let kept = mean <= budget.tick_instructions_mean
+        && cost.worst_instructions <= budget.tick_instructions_worst
+        && cycles <= budget.tick_cycles_mean
+        && cost.worst_cycles <= budget.tick_cycles_worst
+        && image.flash_used <= budget.flash_bytes
+        && image.ram_used <= budget.ram_bytes
+        && stack <= budget.stack_bytes;
+    assert!(kept, "more than tests/mcu/budget.toml allows:\n{found}");
+}

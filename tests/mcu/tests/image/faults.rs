@@ -1,0 +1,240 @@
+//! Faults injected at the hardware: the bridge is off in time, the right fault is latched, its snapshot can be had.
+
+use rig_host::link::LinkError;
+use rig_mcu::board::BoardFaults;
+use rig_mcu::chip::Chip;
+use rig_mcu::cpu::{Cpu, Memory, Register};
+use rig_mcu::peripheral::rcc::Cause;
+use rig_mcu::time::{NEVER, from_seconds, to_seconds};
+use rig_shared::safety::Fault;
+use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
+use rig_tests::wait;
+
+use crate::{BoardSession, bench, board, health, moving, snapshot};
+
+/// Seconds from now until the bridge is off for good; none if it is still on after `within`.
+fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
+    let board = board(line);
+    let begin = board.with_chip(|chip| chip.work.now);
+    let end = begin + from_seconds(within);
+    let step = from_seconds(2e-5);
+    let mut now = begin;
+    while now < end {
+        now += step;
+        board.run_until(now).unwrap();
+        if !board.with_board(|b| b.bridge().enabled) {
+            let edge = board.with_board(|b| b.enable_edges.last().copied());
+            return edge.map(|(at, _)| to_seconds(at.saturating_sub(begin)));
+        }
+    }
+    None
+}
+
+fn refused(line: &mut BoardSession, body: RequestBody) -> Refusal {
+    match line.request(body) {
+        Err(LinkError::Refused { refusal, .. }) => refusal,
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+fn cut(faults: &mut BoardFaults) {
+    faults.channel_a_cut = true;
+    faults.channel_b_cut = true;
+    faults.index_cut = true;
+}
+
+#[test]
+fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
+    type Injury = fn(&mut Chip);
+    // What is done, what must be latched, seconds until the bridge must be off.
+    let cases: [(&str, Injury, &[Fault], f64); 10] = [
+        (
+            "encoder's cable cut",
+            |c| cut(&mut c.board.faults),
+            &[Fault::EncoderLost],
+            1.0,
+        ),
+        (
+            "encoder's channel A cut",
+            |c| c.board.faults.channel_a_cut = true,
+            &[Fault::EncoderSignal, Fault::EncoderLost],
+            1.0,
+        ),
+        (
+            "current converter at its rail",
+            |c| c.board.faults.stuck[0] = Some(4095),
+            &[Fault::AdcStuck],
+            0.001,
+        ),
+        (
+            "current converter stuck",
+            |c| c.board.faults.stuck[0] = Some(2048),
+            &[Fault::AdcStuck],
+            0.1,
+        ),
+        (
+            "over-current",
+            |c| c.board.faults.stuck[0] = Some(2048 + 1500),
+            &[Fault::OverCurrent],
+            0.001,
+        ),
+        (
+            "supply breaks down",
+            |c| c.board.plant_mut().faults_mut().supply = Some(12.0),
+            &[Fault::Supply],
+            0.001,
+        ),
+        (
+            "driver fault",
+            |c| c.board.faults.driver = true,
+            &[Fault::Driver],
+            0.0003,
+        ),
+        (
+            "motor too hot",
+            |c| c.board.faults.stuck[2] = Some(2000),
+            &[Fault::Temperature],
+            0.001,
+        ),
+        (
+            "interrupt late",
+            |c| c.held_until = c.work.now + from_seconds(250e-6),
+            &[Fault::Deadline],
+            0.0006,
+        ),
+        (
+            "external torque",
+            |c| c.board.plant_mut().faults_mut().external_torque = 60.0,
+            &[
+                Fault::OverSpeed,
+                Fault::Position,
+                Fault::EncoderJump,
+                Fault::OverCurrent,
+            ],
+            0.5,
+        ),
+    ];
+    let mut wrong = Vec::new();
+    let mut text = String::new();
+    for (case, (name, injure, expected, within)) in cases.into_iter().enumerate() {
+        let mut line = moving(case as u64 + 10);
+        board(&mut line).with_chip(injure);
+        let Some(after) = off_after(&mut line, within) else {
+            wrong.push(format!("{name}: the bridge is on after {within} s"));
+            continue;
+        };
+        let (record, ticks) = snapshot(&mut line);
+        text += &format!(
+            "{name:<32} {:?} after {:.2} ms\n",
+            record.fault,
+            1e3 * after
+        );
+        if !expected.contains(&record.fault) {
+            wrong.push(format!("{name}: {record:?}"));
+        }
+        let place = ticks.iter().position(|tick| *tick == record.tick);
+        if !ticks.windows(2).all(|pair| pair[1] == pair[0] + 1) || place.is_none_or(|p| p < 400) {
+            wrong.push(format!(
+                "{name}: snapshot of {} ticks, fault at {place:?}",
+                ticks.len()
+            ));
+        }
+        assert_eq!(
+            refused(&mut line, RequestBody::Arm),
+            Refusal::FaultLatched,
+            "{name}"
+        );
+    }
+    println!("{text}");
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_break_input_acts_without_the_processor() {
+    let mut line = moving(30);
+    let off = board(&mut line).with_chip(|chip| {
+        // The driver reports, but goes on; nothing runs for a millisecond.
+        chip.board.faults.fault_line = true;
+        chip.held_until = chip.work.now + from_seconds(1e-3);
+        chip.work.now
+    });
+    board(&mut line)
+        .run_until(off + from_seconds(2e-4))
+        .unwrap();
+    assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
+    wait(&mut line, 0.01);
+    let (record, _) = snapshot(&mut line);
+    assert!(
+        matches!(record.fault, Fault::Driver | Fault::Deadline),
+        "{record:?}"
+    );
+}
+
+#[test]
+fn a_silent_host_is_waited_for_then_stopped_then_latched() {
+    let mut line = moving(31);
+    let after = off_after(&mut line, 2.0).unwrap();
+    assert!((1.4..=1.6).contains(&after), "{after} s of silence");
+    assert_eq!(snapshot(&mut line).0.fault, Fault::HostSilent);
+}
+
+#[test]
+fn a_corrupted_command_is_counted_and_changes_nothing() {
+    let mut line = bench(32);
+    let before = health(&mut line).bad_requests;
+    // A frame of the right form whose check sum is wrong, and bytes that are no frame at all.
+    board(&mut line).with_chip(|chip| chip.send(&[0, 5, 1, 2, 3, 4, 0, 0xFF, 0x37, 0]));
+    wait(&mut line, 0.1);
+    line.request(RequestBody::KeepAlive).unwrap();
+    let after = health(&mut line).bad_requests;
+    assert!(after > before, "{before} then {after}");
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+}
+
+#[test]
+fn a_stack_near_its_end_is_a_fault() {
+    let mut line = moving(33);
+    let (end, _) = board(&mut line).image().symbol("_stack_end").unwrap();
+    // As deep as if the stack had come down to its guard.
+    assert!(board(&mut line).cpu().store(end + 1024, &[0x11; 16]));
+    assert!(off_after(&mut line, 0.001).is_some());
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Stack);
+}
+
+#[test]
+fn a_stack_past_its_end_resets_the_chip_with_the_bridge_off() {
+    let mut line = moving(34);
+    let (end, _) = board(&mut line).image().symbol("_stack_end").unwrap();
+    let board_ = board(&mut line);
+    board_.faults_expected = true;
+    board_.cpu().set(Register::Sp, end + 16);
+    let from = board_.with_chip(|chip| chip.work.now);
+    let step = from_seconds(1e-4);
+    board_.run_until(from + step).unwrap();
+    let (resets, faults) = (board_.resets.clone(), board_.faults.clone());
+    assert!(!faults.is_empty());
+    let off = board_.with_chip(|chip| !chip.timer(1).main_output() || !chip.board.bridge().enabled);
+    assert!(off, "after 0.1 ms: {resets:?} {faults:?}");
+    board_.run_for(3.0).unwrap();
+    assert!(
+        !board_.resets.is_empty(),
+        "neither the firmware nor the watchdog started it anew"
+    );
+    assert!(!board_.with_board(|b| b.bridge().enabled));
+}
+
+#[test]
+fn a_processor_that_hangs_is_reset_by_the_watchdog() {
+    let mut line = moving(35);
+    board(&mut line).with_chip(|chip| chip.held_until = NEVER);
+    let after = off_after(&mut line, 3.0).unwrap();
+    println!("bridge off {after:.3} s after the processor stopped");
+    board(&mut line).with_chip(|chip| chip.held_until = 0);
+    assert!(matches!(
+        board(&mut line).resets[..],
+        [(_, Cause::Watchdog)]
+    ));
+    board(&mut line).run_for(0.1).unwrap();
+    assert_eq!(health(&mut line).reset, ResetCause::Watchdog);
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+}

@@ -1,0 +1,248 @@
+//! From power on to parameters, over the wire; and the estimates that the chip computes against those that the
+//! desktop computes from the same samples.
+#![allow(clippy::float_cmp)]
+
+use rig_firmware::examined::examine;
+use rig_firmware::nameplate;
+use rig_firmware::request::carry_out;
+use rig_firmware::sample::Sample;
+use rig_firmware::state::State;
+use rig_firmware::step::step;
+use rig_host::data::{Block, JointColumns};
+use rig_host::identify::{Options, identify};
+use rig_host::link::experiment::Experiment;
+use rig_host::prepare::InMemory;
+use rig_mcu::board::BoardFaults;
+use rig_mcu::time::from_seconds;
+use rig_shared::friction::Friction;
+use rig_shared::link::{LinkParameters, PARAMETER_NAMES};
+use rig_shared::safety::Mode;
+use rig_shared::trajectory::{SlowReversals, Trajectory};
+use rig_shared::units::{AdcCode, EncoderCount};
+use rig_shared::wire::message::{Estimate, Request, RequestBody};
+use rig_tests::{Recording, calibrated, driven, excitation, recorded, robot};
+
+use crate::{BoardSession, bench, board, greeted, place, powered};
+
+/// Gravity acceleration of description and plant, m/s².
+const GRAVITY: f64 = 9.81;
+
+fn as_recording(recording: &Recording, torque_per_ampere: f64) -> InMemory {
+    let of =
+        |f: &dyn Fn(&rig_host::link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
+    InMemory {
+        label: "emulated board".into(),
+        blocks: vec![Block {
+            t: of(&|row| row.t),
+            joints: vec![JointColumns {
+                q: of(&|row| row.q1),
+                tau: of(&|row| row.i1 * torque_per_ampere),
+                ..JointColumns::default()
+            }],
+            first_line: 2,
+            ..Block::default()
+        }],
+    }
+}
+
+#[test]
+fn an_excitation_recorded_over_the_wire_gives_the_rig_s_parameters() {
+    let mut line = bench(50);
+    let run = driven(&mut line, vec![], excitation(50, 5, 3), 0.3);
+    assert!(run.faults.is_empty(), "{:?}", run.faults);
+    assert_eq!(run.losses.lost, 0, "{}", run.losses);
+    let plant = board(&mut line).with_board(|b| b.plant().config().clone());
+    let torque_per_ampere = plant.mechanism.ratio * plant.motor.torque_constant;
+    let recording = as_recording(&run, torque_per_ampere);
+    let found = identify(&robot(), &[&recording], &[], &Options::default()).unwrap();
+    let [inertia, cos, sin, viscous, coulomb, offset] = plant.equivalent().to_array();
+    let truth = [
+        cos / GRAVITY,
+        -sin / GRAVITY,
+        inertia,
+        viscous,
+        coulomb,
+        offset,
+    ];
+    let mut text = String::new();
+    let mut fair = true;
+    for (base, truth) in found.base_parameters.iter().zip(truth) {
+        let inside = (base.interval[0]..=base.interval[1]).contains(&truth);
+        text += &format!(
+            "{:<12} {:>9.5} in {:>9.5}..{:<9.5} truth {truth:>9.5} {}\n",
+            base.expression,
+            base.value,
+            base.interval[0],
+            base.interval[1],
+            if inside { "" } else { "OUTSIDE" }
+        );
+        fair &= inside;
+    }
+    let estimate = run.estimate();
+    for (k, truth) in plant.equivalent().to_array().into_iter().enumerate() {
+        let z = (f64::from(estimate.value[k]) - truth) / f64::from(estimate.std[k]);
+        text += &format!(
+            "on line {:<8} {:>9.5} z {z:.2}\n",
+            PARAMETER_NAMES[k], estimate.value[k]
+        );
+        fair &= z.abs() <= 3.0;
+    }
+    println!("{text}");
+    assert!(fair, "\n{text}");
+}
+
+/// Raw samples as the control interrupt read them, by the converter trigger that they belong to. Without index
+/// the firmware's count is the counter's own.
+fn samples(line: &mut BoardSession) -> Vec<(u64, Sample)> {
+    let readings = board(line).with_chip(|chip| chip.readings.take()).unwrap();
+    let mut samples: Vec<(u64, Sample)> = Vec::new();
+    let mut sample = Sample::default();
+    for reading in readings {
+        match reading.address {
+            0x5000_0080 => sample.current = AdcCode(reading.value as u16),
+            0x5000_0084 => sample.supply = AdcCode(reading.value as u16),
+            0x5000_0088 => sample.temperature = AdcCode(reading.value as u16),
+            _ => {
+                // The counter is read last.
+                sample.encoder = EncoderCount(reading.value as u16);
+                samples.push((reading.trigger, sample));
+            }
+        }
+    }
+    samples
+}
+
+#[test]
+fn on_line_estimates_equal_the_desktop_s_bit_for_bit() {
+    let mut emulated = powered(51);
+    emulated.with_chip(|chip| {
+        chip.readings = Some(Vec::new());
+        chip.board.faults = BoardFaults {
+            index_cut: true,
+            ..BoardFaults::default()
+        };
+    });
+    let mut line = greeted(emulated);
+    calibrated(&mut line);
+    place(&mut line);
+    let at = board(&mut line).with_board(|b| b.plant().truth().position) as f32;
+    let motion = excitation(51, 5, 1);
+    let run = recorded(
+        &mut line,
+        &Experiment {
+            settings: vec![],
+            trajectory: Some(motion.clone()),
+            rest: 0.2,
+        },
+    );
+    assert!(run.faults.is_empty());
+    let (armed, disarmed) = board(&mut line).with_board(|b| {
+        let edges = &b.enable_edges;
+        assert_eq!(edges.len(), 2, "{edges:?}");
+        (edges[0].0, edges[1].0)
+    });
+    let samples = samples(&mut line);
+    // Tick of the first sample is 0; a tick lasts 0.1 ms from its trigger on.
+    let period = from_seconds(1e-4);
+    let last = board(&mut line).with_chip(|chip| (chip.work.now, chip.triggers));
+    let tick_at = |instant: u64| {
+        let back = (last.0 - instant) / period;
+        last.1 - back - samples[0].0
+    };
+    // Estimates that were sent while the bridge was on.
+    let sent: Vec<&Estimate> = run.estimates.iter().collect();
+    assert!(sent.len() > 80, "{} estimates", sent.len());
+
+    // Arming shows in the first tick after the request: which of the ticks around the edge that is, is tried.
+    let tried: Vec<usize> = (0..3_u64)
+        .map(|back| {
+            replay(
+                &samples,
+                tick_at(armed) - back,
+                tick_at(disarmed),
+                at,
+                &motion,
+                &sent,
+            )
+        })
+        .collect();
+    let best = tried.iter().max().copied().unwrap_or(0);
+    println!("{} estimates, equal bit for bit: {tried:?}", sent.len());
+    assert_eq!(best, sent.len());
+}
+
+/// Runs the desktop's library over the samples; gives how many of the estimates sent it equals bit for bit.
+fn replay(
+    samples: &[(u64, Sample)],
+    armed: u64,
+    disarmed: u64,
+    at: f32,
+    motion: &Trajectory<f32>,
+    sent: &[&Estimate],
+) -> usize {
+    let (config, settings) = nameplate::one_link();
+    let mut state = State::new(&config, settings).unwrap();
+    let ask = |state: &mut State, body: RequestBody| {
+        carry_out(&config, state, &examine(Request { id: 0, body })).unwrap();
+    };
+    let mut next = sent.iter().peekable();
+    let mut equal = 0;
+    for (trigger, sample) in samples {
+        let tick = trigger - samples[0].0;
+        state.heard = state.tick;
+        let output = step(&config, &mut state, *sample);
+        if let Some(estimate) = output.estimate {
+            while next.peek().is_some_and(|e| e.tick < estimate.tick) {
+                next.next();
+            }
+            if next.peek().is_some_and(|e| ***e == estimate) {
+                equal += 1;
+                next.next();
+            }
+        }
+        if state.mode == Mode::Disarmed && tick + 1 == armed {
+            ask(&mut state, RequestBody::SetPosition(at));
+            ask(&mut state, RequestBody::SetTrajectory(motion.clone()));
+            ask(&mut state, RequestBody::Arm);
+            ask(&mut state, RequestBody::Start);
+        }
+        if tick + 1 == disarmed {
+            ask(&mut state, RequestBody::Disarm);
+        }
+    }
+    equal
+}
+
+#[test]
+fn what_was_learnt_and_uploaded_makes_slow_reversals_follow_better() {
+    let mut line = bench(52);
+    let run = driven(&mut line, vec![], excitation(52, 5, 3), 0.3);
+    let estimate = run.estimate();
+    assert_eq!(estimate.trusted, [true; 6]);
+    let reversals =
+        Trajectory::SlowReversals(SlowReversals::new(0.05_f32, 0.1, &[0.1], 1).unwrap());
+    let model = LinkParameters::from_array(estimate.value);
+    let learnt = vec![
+        RequestBody::SetModel(model),
+        RequestBody::SetFriction(Friction {
+            coulomb: model.coulomb,
+            viscous: model.viscous,
+            ..Friction::default()
+        }),
+    ];
+    let without = driven(&mut line, learnt, reversals.clone(), 0.2);
+    let (_, settings) = nameplate::one_link();
+    let mut precompensation = settings.precompensation;
+    precompensation.enabled = true;
+    let on = vec![RequestBody::SetPrecompensation(precompensation)];
+    let with = driven(&mut line, on, reversals, 0.2);
+    assert!(without.faults.is_empty() && with.faults.is_empty());
+    let rms = |run: &Recording| run.tracking_rms(0.0, f64::MAX);
+    let (before, after) = (rms(&without), rms(&with));
+    println!(
+        "RMS {:.3} mrad without, {:.3} with",
+        1e3 * before,
+        1e3 * after
+    );
+    assert!(after < before / 3.0, "{before} to {after} rad");
+}

@@ -1,0 +1,133 @@
+//! The firmware's own image on the emulated board, as `firmware/build` makes it.
+//!
+//! The image is taken from RIG_FIRMWARE_ELF or, without it, from where the build puts it.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod boot;
+mod budget;
+mod faults;
+mod identification;
+mod storage;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use rig_host::link::{EmulatedPort, Session, SessionSettings};
+use rig_host::plant::PlantConfig;
+use rig_mcu::image::Image;
+use rig_mcu::rig::{EmulatedBoard, Line, power_on};
+use rig_shared::safety::FaultRecord;
+use rig_shared::wire::message::{Health, Report, RequestBody};
+use rig_tests::{calibrated, excitation, wait};
+
+/// A session with the emulated board.
+type BoardSession = Session<EmulatedPort<Line>>;
+
+/// The image under test.
+fn image() -> Image {
+    let path = std::env::var_os("RIG_FIRMWARE_ELF").map_or_else(
+        || {
+            let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
+                || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../target"),
+                PathBuf::from,
+            );
+            target.join("thumbv7em-none-eabihf/chip/rig-firmware")
+        },
+        PathBuf::from,
+    );
+    Image::read(&path).unwrap_or_else(|error| panic!("{error} Build it with firmware/build first."))
+}
+
+/// A laboratory rig whose torque constant the firmware knows: no motion of the rig could show an error in it.
+fn plant(seed: u64) -> PlantConfig {
+    let mut plant = PlantConfig::laboratory(seed);
+    let (config, _) = rig_firmware::nameplate::one_link();
+    plant.motor.torque_constant = f64::from(config.drive.torque_constant);
+    plant
+}
+
+/// A board that has just been powered up.
+fn powered(seed: u64) -> EmulatedBoard {
+    power_on(image(), plant(seed), seed).unwrap()
+}
+
+/// Greets a board.
+fn greeted(board: EmulatedBoard) -> BoardSession {
+    let line = Line { board, heard: None };
+    let mut port = EmulatedPort::new(line);
+    // The port listens once the firmware has set it up.
+    port.device_mut().board.run_for(0.05).unwrap();
+    Session::open(port, SessionSettings::default()).unwrap()
+}
+
+/// A board, calibrated, told where its link hangs.
+fn bench(seed: u64) -> BoardSession {
+    let mut line = greeted(powered(seed));
+    calibrated(&mut line);
+    place(&mut line);
+    line
+}
+
+/// Tells the rig where its link hangs.
+fn place(line: &mut BoardSession) {
+    let at = board(line).with_board(|board| board.plant().truth().position);
+    line.request(RequestBody::SetPosition(at as f32)).unwrap();
+}
+
+/// The board behind a session.
+fn board(line: &mut BoardSession) -> &mut EmulatedBoard {
+    &mut line.port_mut().device_mut().board
+}
+
+/// A board in the middle of an excitation.
+fn moving(seed: u64) -> BoardSession {
+    let mut line = bench(seed);
+    line.request(RequestBody::SetTrajectory(excitation(seed, 5, 2)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 1.6);
+    assert!(board(&mut line).with_board(|board| board.bridge().enabled));
+    line
+}
+
+/// Waits for a report.
+fn awaited<T>(line: &mut BoardSession, wanted: impl Fn(&Report) -> Option<T>) -> T {
+    for _ in 0..5000 {
+        let report = line.next_report(Duration::from_secs(3)).unwrap();
+        if let Some(found) = report.as_ref().and_then(&wanted) {
+            return found;
+        }
+    }
+    panic!("the report never came");
+}
+
+/// The next health report.
+fn health(line: &mut BoardSession) -> Health {
+    awaited(line, |report| match report {
+        Report::Health(health) => Some(*health),
+        _ => None,
+    })
+}
+
+/// The latched fault and the ticks of its snapshot, over the wire.
+fn snapshot(line: &mut BoardSession) -> (FaultRecord, Vec<u64>) {
+    line.request(RequestBody::GetSnapshot).unwrap();
+    let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
+    while ticks.len() < total {
+        match line
+            .next_report(Duration::from_millis(500))
+            .unwrap()
+            .unwrap()
+        {
+            Report::Fault(found) => record = Some(found),
+            Report::Snapshot(part) => {
+                assert_eq!(usize::from(part.first), ticks.len());
+                total = usize::from(part.total);
+                ticks.extend(part.samples.iter().map(|sample| sample.tick));
+            }
+            _ => {}
+        }
+    }
+    (record.unwrap(), ticks)
+}

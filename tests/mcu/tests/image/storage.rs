@@ -1,0 +1,78 @@
+//! Settings that survive a power cycle, and flash that does not.
+
+use rig_host::link::LinkError;
+use rig_mcu::cpu::Memory;
+use rig_mcu::map;
+use rig_mcu::peripheral::rcc::Cause;
+use rig_shared::wire::message::{Refusal, RequestBody, ResetCause, SettingsOrigin};
+use rig_tests::{calibrated, wait};
+
+use crate::{BoardSession, bench, board, health};
+
+/// Resets the board and waits until it has calibrated itself.
+fn again(mut line: BoardSession, cause: Cause) -> BoardSession {
+    board(&mut line).reset(cause);
+    wait(&mut line, 0.05);
+    calibrated(&mut line);
+    line
+}
+
+/// First address at which settings are stored, two pages in all.
+const STORE: u32 = 0x0807_F000;
+
+fn damage(line: &mut BoardSession, page: u32) {
+    let address = STORE + 0x800 * page + 40;
+    let cpu = board(line).cpu();
+    let mut byte = [0];
+    assert!(map::FLASH.contains(&address) && cpu.load(address, &mut byte));
+    assert!(cpu.store(address, &[byte[0] ^ 0x10]));
+}
+
+#[test]
+fn stored_settings_come_back_and_damaged_ones_do_not() {
+    let mut line = bench(5);
+    let (_, settings) = rig_firmware::nameplate::one_link();
+    let mut limits = settings.limits;
+    limits.velocity = 1.0;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::Store).unwrap();
+    // Page erase and programming took place, the tick went on meanwhile.
+    let (pages, words) = board(&mut line).with_chip(|chip| chip.flash.work);
+    assert!(
+        pages == 1 && words > 10,
+        "{pages} pages, {words} double words"
+    );
+    assert_eq!(board(&mut line).with_chip(|chip| chip.adc.missed), 0);
+
+    let mut line = again(line, Cause::PowerOn);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Power);
+    assert_eq!(report.settings, SettingsOrigin::Stored);
+    // A trajectory of 3 rad/s fits the firmware's own limit of 6 rad/s, not the stored one of 1 rad/s.
+    let fast = RequestBody::SetTrajectory(rig_tests::excitation(5, 5, 1));
+    assert!(matches!(
+        line.request(fast.clone()),
+        Err(LinkError::Refused {
+            refusal: Refusal::OutsideLimits,
+            ..
+        })
+    ));
+
+    // A second copy, then the newer one damaged: the older stands.
+    limits.velocity = 0.9;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::Store).unwrap();
+    damage(&mut line, 1);
+    let mut line = again(line, Cause::Pin);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Pin);
+    assert_eq!(report.settings, SettingsOrigin::OlderCopy);
+
+    // Both damaged: the firmware's own.
+    damage(&mut line, 0);
+    let mut line = again(line, Cause::Software);
+    let report = health(&mut line);
+    assert_eq!(report.reset, ResetCause::Software);
+    assert_eq!(report.settings, SettingsOrigin::Damaged);
+    line.request(fast).unwrap();
+}

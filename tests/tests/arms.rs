@@ -1,0 +1,272 @@
+//! Recordings of real arms, made by others: the figures that were published for them, with one set of defaults for all.
+//!
+//! Where the recordings are not at hand the tests say so and pass. `docs/arms.md` has the tables.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rig_host::data::{Source, data_dir};
+use rig_host::identify::{Estimator, Identification, ModelKind, Options, identify};
+use rig_host::prepare::Recording;
+use rig_host::robot::Robot;
+
+const BOTH: [ModelKind; 2] = [ModelKind::Differential, ModelKind::Integral];
+
+/// The folder of one robot's recordings, or a plain word that it is missing.
+fn folder(name: &str) -> Option<PathBuf> {
+    let found = data_dir().map(|d| d.join(name)).filter(|d| d.is_dir());
+    if found.is_none() {
+        println!("SKIPPED: the recordings {name} are not there; set RIG_DATA to their folder.");
+    }
+    found
+}
+
+fn described(file: &str) -> Robot {
+    Robot::load(
+        &Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../host/robots")
+            .join(file),
+    )
+    .unwrap()
+}
+
+fn fit(
+    robot: &Robot,
+    training: &[PathBuf],
+    holdout: &[PathBuf],
+    model: ModelKind,
+    estimator: Estimator,
+) -> Identification {
+    let open = |list: &[PathBuf]| -> Vec<Source> {
+        list.iter()
+            .map(|p| Source::open(p, robot).unwrap())
+            .collect()
+    };
+    let (training, holdout) = (open(training), open(holdout));
+    let training: Vec<&dyn Recording> = training.iter().map(|s| s as &dyn Recording).collect();
+    let holdout: Vec<&dyn Recording> = holdout.iter().map(|s| s as &dyn Recording).collect();
+    let options = Options {
+        model,
+        estimator,
+        ..Default::default()
+    };
+    identify(robot, &training, &holdout, &options).unwrap()
+}
+
+/// Relative errors on the hold-out, percent.
+fn errors(found: &Identification) -> Vec<f64> {
+    found
+        .joints
+        .iter()
+        .map(|j| 100.0 * j.holdout_relative_error.unwrap())
+        .collect()
+}
+
+/// No joint worse than `published` (to the digit that is published) but for `excepted`, and most of them better.
+fn no_worse(what: &str, found: &[f64], published: &[f64], excepted: &[usize]) {
+    println!("{what}: {found:.1?} %, published {published:?} %");
+    let mut better = 0;
+    for (j, (f, p)) in found.iter().zip(published).enumerate() {
+        better += usize::from(f < p);
+        assert!(
+            excepted.contains(&(j + 1)) || *f < p + 0.05,
+            "{what}: joint {} is left at {f:.2} %, published {p} %",
+            j + 1
+        );
+    }
+    assert!(2 * better > found.len(), "{what}: only {better} are better");
+}
+
+#[test]
+fn double_pendulum() {
+    let Some(data) = folder("dfki_double_pendulum") else {
+        return;
+    };
+    let robot = described("double-pendulum.toml");
+    for model in BOTH {
+        let found = fit(
+            &robot,
+            &[data.join("train.csv")],
+            &[data.join("test.csv")],
+            model,
+            Estimator::default(),
+        );
+        no_worse(
+            &format!("double pendulum, {model:?}"),
+            &errors(&found),
+            &[24.7, 16.7],
+            &[],
+        );
+    }
+}
+
+fn lwr() -> Option<(Robot, PathBuf)> {
+    let data = folder("kuka_lwr4")?;
+    Some((Robot::load(&data.join("kuka_lwr4.urdf")).unwrap(), data))
+}
+
+#[test]
+fn lwr_repeats_its_motion() {
+    let Some((robot, data)) = lwr() else { return };
+    for model in BOTH {
+        let found = fit(
+            &robot,
+            &[data.join("run1.csv")],
+            &[data.join("run2.csv")],
+            model,
+            Estimator::default(),
+        );
+        no_worse(
+            &format!("LWR4+ 1 → 2, {model:?}"),
+            &errors(&found),
+            &[18.0, 1.2, 8.5, 1.8, 28.1, 29.4, 58.2],
+            &[],
+        );
+    }
+}
+
+/// Another motion than that learnt from: what runs 1 and 2 do not show must come from the description.
+#[test]
+fn lwr_predicts_another_motion_better_with_what_the_description_says() {
+    let Some((robot, data)) = lwr() else { return };
+    for model in BOTH {
+        for training in [
+            vec![data.join("run1.csv")],
+            vec![data.join("run1.csv"), data.join("run2.csv")],
+        ] {
+            let of = |estimator| {
+                errors(&fit(
+                    &robot,
+                    &training,
+                    &[data.join("run3.csv")],
+                    model,
+                    estimator,
+                ))
+            };
+            let plain = of(Estimator::Weighted);
+            for estimator in [Estimator::Ridge, Estimator::Consistent] {
+                let found = of(estimator);
+                println!(
+                    "LWR4+ {} → 3, {model:?}: weighted {plain:.0?} %, {estimator:?} {found:.0?} %",
+                    training.len()
+                );
+                for (j, (f, p)) in found.iter().zip(&plain).enumerate() {
+                    assert!(f < p, "joint {}: {f:.1} against {p:.1} %", j + 1);
+                }
+            }
+        }
+    }
+}
+
+/// Rows `range` of the TX40's recording as a file of their own.
+fn tx40_part(data: &Path, to: &Path, name: &str, range: std::ops::Range<usize>) -> PathBuf {
+    let text = fs::read_to_string(data.join("motor_1kHz.csv")).unwrap();
+    let mut lines = text.lines();
+    let mut part = vec![lines.next().unwrap()];
+    part.extend(lines.skip(range.start).take(range.len()));
+    let path = to.join(name);
+    fs::write(&path, part.join("\n") + "\n").unwrap();
+    path
+}
+
+/// Terms of an expression as sorted (name, coefficient), both ways of writing: `1.0*Ia1`, `0.45 mz4`, `fs1` for `fc1`.
+fn terms(expression: &str) -> Vec<(String, f64)> {
+    let mut sign = 1.0;
+    let mut factor = 1.0;
+    let mut list = Vec::new();
+    for word in expression.replace('*', " ").split_whitespace() {
+        match (word, word.parse::<f64>()) {
+            ("+", _) => sign = 1.0,
+            ("-" | "−", _) => sign = -1.0,
+            (_, Ok(number)) => factor = number,
+            _ => {
+                let name = word.replace("fs", "fc");
+                list.push((name, sign * factor));
+                (sign, factor) = (1.0, 1.0);
+            }
+        }
+    }
+    list.sort_by(|a, b| a.0.cmp(&b.0));
+    list
+}
+
+#[test]
+fn tx40_has_the_published_expressions_and_values() {
+    let Some(data) = folder("staubli_tx40") else {
+        return;
+    };
+    let robot = described("tx40.toml");
+    let published = fs::read_to_string(data.join("published_base_parameters.csv")).unwrap();
+    for model in BOTH {
+        let found = fit(
+            &robot,
+            &[data.join("motor_1kHz.csv")],
+            &[],
+            model,
+            Estimator::default(),
+        );
+        let (mut same, mut near, mut all) = (0, 0, 0);
+        for line in published.lines() {
+            let cells: Vec<&str> = line.rsplitn(5, ',').collect();
+            let number = |k: usize| cells[k].parse::<f64>().unwrap();
+            // From behind: WLS std %, WLS value, OLS std %, OLS value, expression.
+            let (value, std) = (number(1), number(0) / 100.0 * number(1).abs());
+            let wanted = terms(cells[4]);
+            all += 1;
+            let Some(ours) = found.base_parameters.iter().find(|b| {
+                let ours = terms(&b.expression);
+                ours.len() == wanted.len()
+                    && ours
+                        .iter()
+                        .zip(&wanted)
+                        .all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-6)
+            }) else {
+                println!("not found as published: {}", cells[4]);
+                continue;
+            };
+            same += 1;
+            let off = (ours.value - value) / std;
+            near += usize::from(off.abs() <= 2.0);
+            if off.abs() > 2.0 {
+                println!("{}: {} is {off:.1} std off {value}", cells[4], ours.value);
+            }
+        }
+        println!(
+            "TX40, {model:?}: {same} of {all} expressions as published, {near} values within two standard deviations"
+        );
+        assert_eq!(same, all);
+        assert_eq!(found.base_parameters.len(), all);
+        assert!(near >= 55, "{near}");
+    }
+}
+
+#[test]
+fn tx40_predicts_the_rest_of_its_motion() {
+    let Some(data) = folder("staubli_tx40") else {
+        return;
+    };
+    let robot = described("tx40.toml");
+    let place = tempfile::tempdir().unwrap();
+    let published = [8.4, 8.3, 15.6, 12.2, 45.1, 19.3];
+    // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file.
+    for (until, end) in [(5250, 7500), (6300, 9000)] {
+        let train = tx40_part(&data, place.path(), &format!("train{until}.csv"), 0..until);
+        let rest = tx40_part(&data, place.path(), &format!("rest{until}.csv"), until..end);
+        for model in BOTH {
+            let found = fit(
+                &robot,
+                std::slice::from_ref(&train),
+                std::slice::from_ref(&rest),
+                model,
+                Estimator::default(),
+            );
+            no_worse(
+                &format!("TX40 up to row {until}, {model:?}"),
+                &errors(&found),
+                &published,
+                &[],
+            );
+        }
+    }
+}
