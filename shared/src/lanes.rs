@@ -18,6 +18,31 @@ use crate::scalar::{Mask, Real};
 /// fit into the 16 bits that the first two parts of π/2 leave free.
 pub const ANGLE_LIMIT: f64 = 1.0e5;
 
+/// How a product is added to a number.
+pub trait MulAdd: Copy {
+    /// Whether the product goes into the sum unrounded.
+    const FUSED: bool;
+
+    /// a·b + c
+    fn mul_add(a: f64, b: f64, c: f64) -> f64;
+}
+
+/// Product and sum rounded one after the other: the same bits on every machine.
+///
+/// The fused kind is left to the caller, who knows whether the machine has an instruction for it: without one it is
+/// a slow function.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounded;
+
+impl MulAdd for Rounded {
+    const FUSED: bool = false;
+
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+}
+
 /// `N` real numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
@@ -129,6 +154,13 @@ const HALF_PI: [f64; 3] = [
     1.0562999066987428e-23,
 ];
 
+/// π/2 in three parts of 53 bits, for products that go into the sum unrounded.
+const HALF_PI_FUSED: [f64; 3] = [
+    core::f64::consts::FRAC_PI_2,
+    6.123233995736766e-17,
+    -1.4973849048591698e-33,
+];
+
 /// 1.5·2⁵²: adding it rounds to the nearest integer and leaves that integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
 
@@ -154,8 +186,13 @@ const COSINE: [f64; 6] = [
 ];
 
 #[inline(always)]
-fn horner(c: &[f64; 6], z: f64) -> f64 {
-    c[0] + z * (c[1] + z * (c[2] + z * (c[3] + z * (c[4] + z * c[5]))))
+fn horner<F: MulAdd>(c: &[f64; 6], z: f64) -> f64 {
+    let (last, others) = (c[5], &c[..5]);
+    let mut sum = last;
+    for c in others.iter().rev() {
+        sum = F::mul_add(z, sum, *c);
+    }
+    sum
 }
 
 #[inline(always)]
@@ -164,25 +201,34 @@ fn pick(mask: u64, yes: f64, no: f64) -> f64 {
 }
 
 #[inline(always)]
-pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
-    let rounded = x * core::f64::consts::FRAC_2_PI + ROUND;
+pub(crate) fn sin_cos<F: MulAdd>(x: f64) -> (f64, f64) {
+    let rounded = F::mul_add(x, core::f64::consts::FRAC_2_PI, ROUND);
     let count = rounded - ROUND;
     let quadrant = rounded.to_bits();
     // The remainder as a sum r + tail: near multiples of π/2 the leading digits cancel and the tail carries them.
-    let first = x - count * HALF_PI[0];
-    let second = count * HALF_PI[1];
-    let difference = first - second;
-    let shadow = first - difference;
-    let lost = (first - (difference + shadow)) + (shadow - second);
-    let low = lost - count * HALF_PI[2];
-    let r = difference + low;
-    let tail = (difference - r) + low;
+    let (r, tail) = if F::FUSED {
+        // Exact: x and the product are multiples of 2⁻⁵³ or finer ones of x, and their difference is below 1.
+        let first = F::mul_add(-count, HALF_PI_FUSED[0], x);
+        let r = F::mul_add(-count, HALF_PI_FUSED[1], first);
+        let lost = F::mul_add(-count, HALF_PI_FUSED[1], first - r);
+        (r, F::mul_add(-count, HALF_PI_FUSED[2], lost))
+    } else {
+        let first = x - count * HALF_PI[0];
+        let second = count * HALF_PI[1];
+        let difference = first - second;
+        let shadow = first - difference;
+        let lost = (first - (difference + shadow)) + (shadow - second);
+        let low = lost - count * HALF_PI[2];
+        let r = difference + low;
+        (r, (difference - r) + low)
+    };
 
     let z = r * r;
-    let sine = r + (r * z * horner(&SINE, z) + tail * (1.0 - 0.5 * z));
-    let half = 0.5 * z;
-    let head = 1.0 - half;
-    let cosine = head + (((1.0 - head) - half) + (z * z * horner(&COSINE, z) - r * tail));
+    let head = F::mul_add(-0.5, z, 1.0);
+    let sine = r + F::mul_add(r * z, horner::<F>(&SINE, z), tail * head);
+    let rest = F::mul_add(-0.5, z, 1.0 - head);
+    let rest = F::mul_add(-r, tail, rest);
+    let cosine = head + F::mul_add(z * z, horner::<F>(&COSINE, z), rest);
 
     let odd = 0u64.wrapping_sub(quadrant & 1);
     let sine_sign = (quadrant & 2) << 62;
@@ -209,7 +255,7 @@ impl<const N: usize> Real for Lanes<N> {
         let mut sine = self;
         let mut cosine = self;
         for k in 0..N {
-            let (s, c) = sin_cos(self.0[k]);
+            let (s, c) = sin_cos::<Rounded>(self.0[k]);
             sine.0[k] = s;
             cosine.0[k] = c;
         }

@@ -4,60 +4,97 @@
 //! there is AVX2. Both versions are the same source without fused operations and give the same bits (tested). Processors of other kinds take
 //! the portable version, which for 64-bit Arm already is a vector one.
 
-use multiversion::multiversion;
+use multiversion::{multiversion, target::match_target};
+use rig_shared::lanes::{MulAdd, Rounded};
 use rig_shared::multibody::block::{
     self, AxisBlock, Body, Frame, JointBlock, LANES, Lane, NotPositive,
 };
 
+/// Products that go into sums unrounded, for processors that have an instruction for it.
+#[derive(Clone, Copy)]
+struct Fused;
+
+impl MulAdd for Fused {
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn mul_add(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+}
+
 /// Makes a function that takes the best version for the machine, and the portable version for comparison in tests.
 macro_rules! versions {
-    ($(#[$doc:meta])* $name:ident, $portable:ident ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block) => {
+    ($(#[$doc:meta])* $name:ident, $portable:ident <$arithmetic:ident> ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block) => {
         $(#[$doc])*
-        #[multiversion(targets("x86_64+avx2"))]
-        pub(super) fn $name($($argument: $type),*) $(-> $result)? $body
+        #[multiversion(targets("x86_64+avx2+fma"))]
+        pub(super) fn $name($($argument: $type),*) $(-> $result)? {
+            #[inline(always)]
+            fn of<$arithmetic: MulAdd>($($argument: $type),*) $(-> $result)? $body
+
+            match_target! {
+                "x86_64+avx2+fma" => of::<Fused>($($argument),*),
+                _ => of::<Rounded>($($argument),*),
+            }
+        }
 
         #[cfg(test)]
-        pub(super) fn $portable($($argument: $type),*) $(-> $result)? $body
+        pub(super) fn $portable($($argument: $type),*) $(-> $result)? {
+            type $arithmetic = Rounded;
+            $body
+        }
     };
 }
 
 versions! {
     /// [`block::inverse_dynamics`].
-    inverse_dynamics, inverse_dynamics_portable(
+    inverse_dynamics, inverse_dynamics_portable<F>(
         frames: &[Frame], gravity: [f64; 3], bodies: &[Body], q: &[Lane], qd: &[Lane], qdd: Option<&[Lane]>,
         work: &mut [JointBlock], tau: &mut [Lane],
     ) {
-        block::inverse_dynamics(frames, gravity, bodies, q, qd, qdd, work, tau);
+        block::inverse_dynamics::<F>(frames, gravity, bodies, q, qd, qdd, work, tau);
     }
 }
 
 versions! {
-    /// [`block::inertia_matrix`].
-    inertia_matrix, inertia_matrix_portable(
-        frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock], out: &mut [Lane],
+    /// [`block::inertia_matrix`]: the first `len` samples of entry (i, j), and of its mirror image, go to
+    /// `out[(i * n + j) * stride + at..]`. `matrix` holds n(n + 1)/2.
+    inertia_matrix, inertia_matrix_portable<F>(
+        frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock], matrix: &mut [Lane],
+        out: &mut [f64], stride: usize, at: usize, len: usize,
     ) {
-        block::inertia_matrix(frames, bodies, q, work, out);
+        block::inertia_matrix::<F>(frames, bodies, q, work, matrix);
+        let n = frames.len();
+        for i in 0..n {
+            for j in 0..=i {
+                let lane = &matrix[block::lower(i, j)];
+                store(lane, out, (i * n + j) * stride + at, len);
+                if i != j {
+                    store(lane, out, (j * n + i) * stride + at, len);
+                }
+            }
+        }
     }
 }
 
 versions! {
     /// [`block::forward_dynamics`].
-    forward_dynamics, forward_dynamics_portable(
+    forward_dynamics, forward_dynamics_portable<F>(
         frames: &[Frame], gravity: [f64; 3], bodies: &[Body], q: &[Lane], qd: &[Lane], tau: &[Lane],
         work: &mut [JointBlock], matrix: &mut [Lane], qdd: &mut [Lane],
     ) -> Result<(), NotPositive> {
-        block::forward_dynamics(frames, gravity, bodies, q, qd, tau, work, matrix, qdd)
+        block::forward_dynamics::<F>(frames, gravity, bodies, q, qd, tau, work, matrix, qdd)
     }
 }
 
 versions! {
     /// [`block::differential_regressor`]: the first `len` samples of entry (joint, c) go to
     /// `out[(joint * width + c) * stride + at..]`.
-    differential_regressor, differential_regressor_portable(
+    differential_regressor, differential_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], qdd: &[Lane], axes: &mut [AxisBlock],
         out: &mut [f64], width: usize, stride: usize, at: usize, len: usize,
     ) {
-        block::differential_regressor(frames, gravity, q, qd, qdd, axes, &mut |joint, c, lane| {
+        block::differential_regressor::<F>(frames, gravity, q, qd, qdd, axes, &mut |joint, c, lane| {
             store(lane, out, (joint * width + c) * stride + at, len);
         });
     }
@@ -65,11 +102,11 @@ versions! {
 
 versions! {
     /// [`block::energy_regressor`]: the first `len` samples of column c go to `out[c * stride + at..]`.
-    energy_regressor, energy_regressor_portable(
+    energy_regressor, energy_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane],
         out: &mut [f64], stride: usize, at: usize, len: usize,
     ) {
-        block::energy_regressor(frames, gravity, q, qd, &mut |c, lane| {
+        block::energy_regressor::<F>(frames, gravity, q, qd, &mut |c, lane| {
             store(lane, out, c * stride + at, len);
         });
     }

@@ -137,12 +137,17 @@ impl ModelBatch {
         let mut work = vec![JointBlock::ZERO; n];
         for range in stretches(0..count) {
             load(q, &range, &mut a);
-            dispatch::inertia_matrix(&self.frames, &self.bodies, &a, &mut work, &mut matrix);
-            for (entry, column) in out.chunks_exact_mut(count).enumerate() {
-                let (i, j) = (entry / n, entry % n);
-                let lane = &matrix[lower(i.max(j), i.min(j))];
-                column[range.clone()].copy_from_slice(&lane[..range.len()]);
-            }
+            dispatch::inertia_matrix(
+                &self.frames,
+                &self.bodies,
+                &a,
+                &mut work,
+                &mut matrix,
+                out,
+                count,
+                range.start,
+                range.len(),
+            );
         }
         Ok(())
     }

@@ -9,7 +9,9 @@ use crate::scalar::{Mask, Real};
 /// Accelerations q̈ (length n) under the torques `tau` by the articulated-body algorithm (Featherstone 2008, table
 /// 7.1), drive inertias, friction and offsets included as in [`super::forward_dynamics`], which it agrees with.
 ///
-/// Takes O(n) operations. On chains of up to some nine joints [`super::forward_dynamics`] is the faster one (`host/benches/dynamics.rs` prints both).
+/// Takes O(n) operations, and sample by sample a tenth less time than [`super::forward_dynamics`] with six joints, a
+/// quarter less with twelve (`host/benches/dynamics.rs` prints both). Blocks of samples ([`super::block`]) use composite
+/// bodies, which share the work of the inverse dynamics before them.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`] where the links from some joint outwards,

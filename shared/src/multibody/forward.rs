@@ -8,9 +8,9 @@ use super::with_capacity;
 use crate::scalar::{Mask, Real};
 
 /// Accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix from the
-/// composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2). Preferred to the
-/// articulated-body algorithm because the factorisation says when A is not positive definite, which identified
-/// parameters need not give; O(n³), with n at most [`MAX_JOINTS`].
+/// composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2). The factorisation
+/// says when A is not positive definite, which identified parameters need not give; O(n³), with n at most [`MAX_JOINTS`].
+/// [`super::articulated_forward_dynamics`] gives the same in O(n).
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`], also where a number is NaN. `qdd` is

@@ -3,6 +3,7 @@
 use super::inertia::{composite_bodies, lower};
 use super::inverse::inverse_dynamics;
 use super::{Body, Frame, JointBlock, LANES, Lane, ZERO};
+use crate::lanes::MulAdd;
 
 /// Sample and joint at which a pivot of the inertia matrix was not positive, the first sample of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub struct NotPositive {
 /// `frames`, `bodies`, `work` and the signals have one entry a joint, `matrix` has n(n + 1)/2. Returns the first lane
 /// whose matrix is not positive definite (or holds a NaN); the accelerations of such lanes mean nothing.
 #[inline(always)]
-pub fn forward_dynamics(
+pub fn forward_dynamics<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     bodies: &[Body],
@@ -31,8 +32,8 @@ pub fn forward_dynamics(
     qdd: &mut [Lane],
 ) -> Result<(), NotPositive> {
     let n = frames.len();
-    inverse_dynamics(frames, gravity, bodies, q, qd, None, work, qdd);
-    composite_bodies(frames, bodies, q, work, matrix);
+    inverse_dynamics::<F>(frames, gravity, bodies, q, qd, None, work, qdd);
+    composite_bodies::<F>(frames, bodies, q, work, matrix);
     for (x, tau) in qdd.iter_mut().zip(tau) {
         for k in 0..LANES {
             x[k] = tau[k] - x[k];
@@ -58,12 +59,12 @@ pub fn forward_dynamics(
             // Rows up to i still hold the column without the division, below them it is not needed again.
             for r in j + 1..i {
                 let above = matrix[lower(r, j)];
-                subtract(&mut matrix[lower(i, r)], &column, &above);
+                subtract::<F>(&mut matrix[lower(i, r)], &column, &above);
             }
-            subtract(&mut matrix[lower(i, i)], &column, &factor);
+            subtract::<F>(&mut matrix[lower(i, i)], &column, &factor);
             matrix[lower(i, j)] = factor;
             let (before, after) = qdd.split_at_mut(i);
-            subtract(&mut after[0], &before[j], &factor);
+            subtract::<F>(&mut after[0], &before[j], &factor);
         }
     }
     for j in (0..n).rev() {
@@ -73,7 +74,7 @@ pub fn forward_dynamics(
             x[k] *= matrix[lower(j, j)][k];
         }
         for (i, later) in (j + 1..n).zip(after) {
-            subtract(x, later, &matrix[lower(i, j)]);
+            subtract::<F>(x, later, &matrix[lower(i, j)]);
         }
     }
     match failed.iter().position(|joint| *joint != u64::MAX) {
@@ -87,8 +88,8 @@ pub fn forward_dynamics(
 
 /// x −= a·b
 #[inline(always)]
-fn subtract(x: &mut Lane, a: &Lane, b: &Lane) {
+fn subtract<F: MulAdd>(x: &mut Lane, a: &Lane, b: &Lane) {
     for k in 0..LANES {
-        x[k] -= a[k] * b[k];
+        x[k] = F::mul_add(-a[k], b[k], x[k]);
     }
 }

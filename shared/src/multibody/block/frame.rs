@@ -3,7 +3,8 @@
 use super::super::chain::{Chain, JointKind};
 use super::super::spatial::Vector3;
 use super::{LANES, Lane};
-use crate::lanes;
+use crate::lanes::{self, MulAdd};
+use core::marker::PhantomData;
 
 /// A joint of the chain with what is known of it before any sample.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +56,7 @@ impl Frame {
 
     /// Sine and cosine of the angle about z.
     #[inline(always)]
-    pub(super) fn angle(&self, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
+    pub(super) fn angle<F: MulAdd>(&self, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
         if self.prismatic {
             sin.fill(self.sin_theta);
             cos.fill(self.cos_theta);
@@ -66,7 +67,7 @@ impl Frame {
         for k in 0..LANES {
             let angle = self.theta + q[k];
             beyond |= u64::from(angle.abs() > lanes::ANGLE_LIMIT);
-            (sin[k], cos[k]) = lanes::sin_cos(angle);
+            (sin[k], cos[k]) = lanes::sin_cos::<F>(angle);
         }
         if beyond != 0 {
             large_angles(self.theta, q, sin, cos);
@@ -88,7 +89,8 @@ fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
 /// Between frames i − 1 and i lies the frame that α alone has turned; the origin of frame i has there the
 /// coordinates (a, 0, d) whatever the twist, and offsets are therefore applied there.
 #[derive(Clone, Copy)]
-pub(super) struct Place<const TWIST: u8, const A: bool, const D: bool> {
+pub(super) struct Place<F, const TWIST: u8, const A: bool, const D: bool> {
+    arithmetic: PhantomData<F>,
     pub(super) sin_alpha: f64,
     pub(super) cos_alpha: f64,
     pub(super) a: f64,
@@ -100,10 +102,11 @@ pub(super) const QUARTER: u8 = 1;
 pub(super) const MINUS_QUARTER: u8 = 2;
 pub(super) const GENERAL: u8 = 3;
 
-impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
+impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A, D> {
     #[inline(always)]
     pub(super) fn new(frame: &Frame) -> Self {
         Self {
+            arithmetic: PhantomData,
             sin_alpha: frame.sin_alpha,
             cos_alpha: frame.cos_alpha,
             a: frame.a,
@@ -120,7 +123,7 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
             NONE => v,
             QUARTER => Vector3([x, z, -y]),
             MINUS_QUARTER => Vector3([x, -z, y]),
-            _ => Vector3([x, c * y + s * z, c * z - s * y]),
+            _ => Vector3([x, F::mul_add(c, y, s * z), F::mul_add(c, z, -(s * y))]),
         }
     }
 
@@ -133,7 +136,7 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
             NONE => v,
             QUARTER => Vector3([x, -z, y]),
             MINUS_QUARTER => Vector3([x, z, -y]),
-            _ => Vector3([x, c * y - s * z, s * y + c * z]),
+            _ => Vector3([x, F::mul_add(c, y, -(s * z)), F::mul_add(c, z, s * y)]),
         }
     }
 
@@ -143,14 +146,14 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
     pub(super) fn carry(&self, v: Vector3<f64>, w: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz], [ex, ey, ez]) = (v.0, w.0, e.0);
         if A {
-            x -= (wy * wy + wz * wz) * self.a;
-            y += (wx * wy + ez) * self.a;
-            z += (wx * wz - ey) * self.a;
+            x = F::mul_add(-self.a, F::mul_add(wy, wy, wz * wz), x);
+            y = F::mul_add(self.a, F::mul_add(wx, wy, ez), y);
+            z = F::mul_add(self.a, F::mul_add(wx, wz, -ey), z);
         }
         if D {
-            x += (wx * wz + ey) * self.d;
-            y += (wy * wz - ex) * self.d;
-            z -= (wx * wx + wy * wy) * self.d;
+            x = F::mul_add(self.d, F::mul_add(wx, wz, ey), x);
+            y = F::mul_add(self.d, F::mul_add(wy, wz, -ex), y);
+            z = F::mul_add(-self.d, F::mul_add(wx, wx, wy * wy), z);
         }
         Vector3([x, y, z])
     }
@@ -160,12 +163,12 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
     pub(super) fn sweep(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);
         if A {
-            y += wz * self.a;
-            z -= wy * self.a;
+            y = F::mul_add(self.a, wz, y);
+            z = F::mul_add(-self.a, wy, z);
         }
         if D {
-            x += wy * self.d;
-            y -= wx * self.d;
+            x = F::mul_add(self.d, wy, x);
+            y = F::mul_add(-self.d, wx, y);
         }
         Vector3([x, y, z])
     }
@@ -179,8 +182,8 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
         force: Vector3<f64>,
         moment: Vector3<f64>,
     ) -> (Vector3<f64>, Vector3<f64>) {
-        let f = spin_back(s, c, force);
-        let m = self.lever(spin_back(s, c, moment), f);
+        let f = spin_back::<F>(s, c, force);
+        let m = self.lever(spin_back::<F>(s, c, moment), f);
         (self.turn_back(f), self.turn_back(m))
     }
 
@@ -189,12 +192,12 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
     pub(super) fn lever(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [fx, fy, fz]) = (m.0, f.0);
         if A {
-            y -= self.a * fz;
-            z += self.a * fy;
+            y = F::mul_add(-self.a, fz, y);
+            z = F::mul_add(self.a, fy, z);
         }
         if D {
-            x -= self.d * fy;
-            y += self.d * fx;
+            x = F::mul_add(-self.d, fy, x);
+            y = F::mul_add(self.d, fx, y);
         }
         Vector3([x, y, z])
     }
@@ -202,7 +205,7 @@ impl<const TWIST: u8, const A: bool, const D: bool> Place<TWIST, A, D> {
 
 /// The constant part of a prismatic joint's place at position `q`.
 #[inline(always)]
-pub(super) fn slid(frame: &Frame, q: f64) -> Place<GENERAL, true, true> {
+pub(super) fn slid<F: MulAdd>(frame: &Frame, q: f64) -> Place<F, GENERAL, true, true> {
     Place {
         d: frame.d + q,
         ..Place::new(frame)
@@ -211,29 +214,29 @@ pub(super) fn slid(frame: &Frame, q: f64) -> Place<GENERAL, true, true> {
 
 /// A direction before the turn about z, written after it.
 #[inline(always)]
-pub(super) fn spin(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn spin<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
-    Vector3([c * x + s * y, c * y - s * x, z])
+    Vector3([F::mul_add(c, x, s * y), F::mul_add(c, y, -(s * x)), z])
 }
 
 /// A direction after the turn about z, written before it.
 #[inline(always)]
-pub(super) fn spin_back(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
+pub(super) fn spin_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
-    Vector3([c * x - s * y, s * x + c * y, z])
+    Vector3([F::mul_add(c, x, -(s * y)), F::mul_add(c, y, s * x), z])
 }
 
 /// Runs an expression with a function that gives the [`Place`] of a joint at a lane, its kind of twist and zeros known to the
 /// compiler: one copy of the expression for each kind of revolute joint and one for prismatic joints, whose position is `q`.
 macro_rules! at_each_lane {
-    ($frame:expr, $q:expr, $place:ident => $body:expr) => {{
+    ($arithmetic:ty, $frame:expr, $q:expr, $place:ident => $body:expr) => {{
         let frame: &$crate::multibody::block::Frame = $frame;
         if frame.prismatic {
             let q: &$crate::multibody::block::Lane = $q;
-            let $place = |k: usize| $crate::multibody::block::frame::slid(frame, q[k]);
+            let $place = |k: usize| $crate::multibody::block::frame::slid::<$arithmetic>(frame, q[k]);
             $body
         } else {
-            $crate::multibody::block::frame::placed!(frame, place => {
+            $crate::multibody::block::frame::placed!($arithmetic, frame, place => {
                 let $place = |_: usize| place;
                 $body
             })
@@ -244,14 +247,14 @@ pub(super) use at_each_lane;
 
 /// Runs an expression with the [`Place`] of a revolute joint whose kind of twist and zeros are known to the compiler.
 macro_rules! placed {
-    ($frame:expr, $place:ident => $body:expr) => {{
+    ($arithmetic:ty, $frame:expr, $place:ident => $body:expr) => {{
         use $crate::multibody::block::frame::{
             GENERAL, MINUS_QUARTER, NONE, Place, QUARTER, Twist,
         };
         let frame: &$crate::multibody::block::Frame = $frame;
         macro_rules! run {
             ($twist:ident, $a:literal, $d:literal) => {{
-                let $place = Place::<$twist, $a, $d>::new(frame);
+                let $place = Place::<$arithmetic, $twist, $a, $d>::new(frame);
                 $body
             }};
         }

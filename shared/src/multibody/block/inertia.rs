@@ -2,7 +2,8 @@
 
 use super::super::spatial::Vector3;
 use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
-use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO3, get, set};
+use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use crate::lanes::MulAdd;
 
 /// The links from one joint outwards as one body in that joint's frame; its mass does not depend on the sample.
 struct Composite {
@@ -23,74 +24,74 @@ pub const fn lower(i: usize, j: usize) -> usize {
 ///
 /// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2.
 #[inline(always)]
-pub fn inertia_matrix(
+pub fn inertia_matrix<F: MulAdd>(
     frames: &[Frame],
     bodies: &[Body],
     q: &[Lane],
     work: &mut [JointBlock],
     out: &mut [Lane],
 ) {
-    for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work) {
-        frame.angle(q, &mut joint.sin, &mut joint.cos);
+    // Where the first joint stands does not matter.
+    for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work).skip(1) {
+        frame.angle::<F>(q, &mut joint.sin, &mut joint.cos);
     }
-    composite_bodies(frames, bodies, q, work, out);
+    composite_bodies::<F>(frames, bodies, q, work, out);
 }
 
 /// The same with the sines and cosines already in `work`.
 #[inline(always)]
-pub(super) fn composite_bodies(
+pub(super) fn composite_bodies<F: MulAdd>(
     frames: &[Frame],
     bodies: &[Body],
     q: &[Lane],
     work: &[JointBlock],
     out: &mut [Lane],
 ) {
-    let Some(tip) = bodies.last() else {
+    let (Some(tip), Some(last)) = (bodies.last(), frames.last()) else {
         return;
     };
     let mut composite = Composite {
         mass: tip.mass,
-        first_moment: tip.first_moment.map(|x| [x; LANES]),
-        inertia: six(tip).map(|x| [x; LANES]),
+        first_moment: ZERO3,
+        inertia: [ZERO; 6],
     };
+    let n = frames.len();
+    out[lower(n - 1, n - 1)].fill(own_diagonal(last, tip));
+    if n == 2 {
+        composite.first_moment = tip.first_moment.map(|x| [x; LANES]);
+        composite.inertia = six(tip).map(|x| [x; LANES]);
+    }
     let (mut force, mut moment) = (ZERO3, ZERO3);
-    for (i, frame) in frames.iter().enumerate().rev() {
-        diagonal(
-            frame.prismatic,
-            &bodies[i],
-            &composite,
-            &mut out[lower(i, i)],
-        );
-        if i == 0 {
-            break;
-        }
-        let (joint, slides) = (&work[i], frames[i - 1].prismatic);
-        let entry = &mut out[lower(i, i - 1)];
+    for i in (1..n).rev() {
+        let (frame, joint, slides) = (&frames[i], &work[i], frames[i - 1].prismatic);
+        let (before, row) = out.split_at_mut(lower(i, 0));
+        let (Some(diagonal), entry) = (before.last_mut(), &mut row[i - 1]) else {
+            return;
+        };
+        let own = &bodies[i - 1];
         if i == 1 {
-            at_each_lane!(frame, &q[i], place => begin::<_, _, _, true>(
-                place, frame.prismatic, slides, joint, &composite, &mut force, &mut moment, entry));
+            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, true>(
+                place, frame.prismatic, slides, joint, tip, own,
+                &mut composite, &mut force, &mut moment, entry, diagonal));
+        } else if i == n - 1 {
+            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, true, false>(
+                place, frame.prismatic, slides, joint, tip, own,
+                &mut composite, &mut force, &mut moment, entry, diagonal));
         } else {
-            at_each_lane!(frame, &q[i], place => begin::<_, _, _, false>(
-                place, frame.prismatic, slides, joint, &composite, &mut force, &mut moment, entry));
+            at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, false>(
+                place, frame.prismatic, slides, joint, tip, own,
+                &mut composite, &mut force, &mut moment, entry, diagonal));
         }
         for j in (0..i - 1).rev() {
             let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
-            let entry = &mut out[lower(i, j)];
+            let entry = &mut row[j];
             if j == 0 {
-                at_each_lane!(between, &q[j + 1], place =>
-                    onwards::<_, _, _, true>(place, slides, joint, &mut force, &mut moment, entry));
+                at_each_lane!(F, between, &q[j + 1], place =>
+                    onwards::<_, _, _, _, true>(place, slides, joint, &mut force, &mut moment, entry));
             } else {
-                at_each_lane!(between, &q[j + 1], place =>
-                    onwards::<_, _, _, false>(place, slides, joint, &mut force, &mut moment, entry));
+                at_each_lane!(F, between, &q[j + 1], place =>
+                    onwards::<_, _, _, _, false>(place, slides, joint, &mut force, &mut moment, entry));
             }
-        }
-        // Of the whole arm as one body the turn about the first axis is all that is asked for.
-        if i == 1 && !frames[0].prismatic {
-            at_each_lane!(frame, &q[i], place =>
-                to_parent::<_, _, _, true>(place, joint, &bodies[i - 1], &mut composite));
-        } else {
-            at_each_lane!(frame, &q[i], place =>
-                to_parent::<_, _, _, false>(place, joint, &bodies[i - 1], &mut composite));
         }
     }
 }
@@ -102,53 +103,160 @@ fn six(body: &Body) -> [f64; 6] {
     [i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
 }
 
-/// The entry on the diagonal.
+/// What a body and its drive oppose to the body's own joint.
 #[inline(always)]
-fn diagonal(prismatic: bool, body: &Body, composite: &Composite, entry: &mut Lane) {
-    if prismatic {
-        entry.fill(composite.mass + body.drive);
+fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
+    let inertia = if frame.prismatic {
+        body.mass
     } else {
-        for k in 0..LANES {
-            entry[k] = composite.inertia[5][k] + body.drive;
-        }
-    }
+        body.inertia.zz
+    };
+    inertia + body.drive
 }
 
-/// Wrench of the composite body at unit acceleration along its joint, in the frame before, and its part along that
-/// frame's joint; that part alone where it is the `LAST`.
+/// Over a joint to the one before: the wrench of the composite body at unit acceleration along the joint, in the frame before,
+/// with its part along that frame's joint (`entry`); the composite body in that frame with the frame's `own`; and
+/// what it opposes to that frame's joint (`diagonal`).
+///
+/// The body is the `TIP` itself or `composite`; where the frame before is the `LAST`, the entries are all that is asked for.
+/// The turn about z is made once for both.
 #[inline(always)]
-fn begin<const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
+fn inwards<
+    F: MulAdd,
+    const TWIST: u8,
+    const A: bool,
+    const D: bool,
+    const TIP: bool,
+    const LAST: bool,
+>(
+    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     prismatic: bool,
     slides: bool,
     joint: &JointBlock,
-    composite: &Composite,
+    tip: &Body,
+    own: &Body,
+    composite: &mut Composite,
     force: &mut Lane3,
     moment: &mut Lane3,
     entry: &mut Lane,
+    diagonal: &mut Lane,
 ) {
-    let [hx, hy, _] = &composite.first_moment;
-    let [_, _, xz, _, yz, zz] = &composite.inertia;
+    let mass = composite.mass;
+    composite.mass += own.mass;
+    let total = composite.mass + own.drive;
+    let (first_moment, inertia) = (own.first_moment, six(own));
+    let (tip_moment, tip_inertia) = (tip.first_moment, six(tip));
+    let [h, i] = [&mut composite.first_moment[..], &mut composite.inertia[..]];
+    let ([hx, hy, hz], [xx, xy, xz, yy, yz, zz]) = (h, i) else {
+        return;
+    };
     for k in 0..LANES {
-        let (f, m) = if prismatic {
-            ([0.0, 0.0, composite.mass], [hy[k], -hx[k], 0.0])
-        } else {
-            ([-hy[k], hx[k], 0.0], [xz[k], yz[k], zz[k]])
-        };
+        let place = place(k);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let (f, m) = place(k).wrench_back(s, c, Vector3(f), Vector3(m));
+        let ([hxk, hyk, hzk], [xxk, xyk, xzk, yyk, yzk, zzk]) = if TIP {
+            (tip_moment, tip_inertia)
+        } else {
+            (
+                [hx[k], hy[k], hz[k]],
+                [xx[k], xy[k], xz[k], yy[k], yz[k], zz[k]],
+            )
+        };
+        let Vector3([mx, my, mz]) = spin_back::<F>(s, c, Vector3([hxk, hyk, hzk]));
+        let Vector3([mut ixz, mut iyz, mut izz]) = spin_back::<F>(s, c, Vector3([xzk, yzk, zzk]));
+
+        let (f, m) = if prismatic {
+            place.wrench_back(s, c, Vector3([0.0, 0.0, mass]), Vector3([hyk, -hxk, 0.0]))
+        } else {
+            let (mut x, mut y, mut z) = (ixz, iyz, izz);
+            if A {
+                z = F::mul_add(place.a, mx, z);
+            }
+            if D {
+                x = F::mul_add(-place.d, mx, x);
+                y = F::mul_add(-place.d, my, y);
+            }
+            (
+                place.turn_back(Vector3([-my, mx, 0.0])),
+                place.turn_back(Vector3([x, y, z])),
+            )
+        };
         entry[k] = if slides { f.z() } else { m.z() };
         if !LAST {
             set(force, k, f);
             set(moment, k, m);
         }
+
+        let [mut ixx, mut ixy, mut iyy] = turned::<F>(s, c, xxk, xyk, yyk);
+        // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
+        let bx = F::mul_add(0.5 * mass, place.a, mx);
+        let bz = F::mul_add(0.5 * mass, place.d, mz);
+        if A {
+            ixy = F::mul_add(-place.a, my, ixy);
+            ixz = F::mul_add(-place.a, bz, ixz);
+            iyy = F::mul_add(2.0 * place.a, bx, iyy);
+            izz = F::mul_add(2.0 * place.a, bx, izz);
+        }
+        if D {
+            ixx = F::mul_add(2.0 * place.d, bz, ixx);
+            ixz = F::mul_add(-place.d, bx, ixz);
+            iyy = F::mul_add(2.0 * place.d, bz, iyy);
+            iyz = F::mul_add(-place.d, my, iyz);
+        }
+        let [ixx, ixy, ixz, iyy, iyz, izz] = match TWIST {
+            NONE => [ixx, ixy, ixz, iyy, iyz, izz],
+            QUARTER => [ixx, -ixz, ixy, izz, -iyz, iyy],
+            MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
+            _ => {
+                let (s, c) = (place.sin_alpha, place.cos_alpha);
+                let [iyy, iyz, izz] = turned::<F>(s, c, iyy, iyz, izz);
+                [
+                    ixx,
+                    F::mul_add(c, ixy, -(s * ixz)),
+                    F::mul_add(s, ixy, c * ixz),
+                    iyy,
+                    iyz,
+                    izz,
+                ]
+            }
+        };
+        let about_z = izz + inertia[5];
+        diagonal[k] = if slides { total } else { about_z + own.drive };
+        if !LAST {
+            let moved = Vector3([
+                F::mul_add(mass, place.a, mx),
+                my,
+                F::mul_add(mass, place.d, mz),
+            ]);
+            let [x, y, z] = place.turn_back(moved).0;
+            hx[k] = x + first_moment[0];
+            hy[k] = y + first_moment[1];
+            hz[k] = z + first_moment[2];
+            xx[k] = ixx + inertia[0];
+            xy[k] = ixy + inertia[1];
+            xz[k] = ixz + inertia[2];
+            // Gathered bodies have no yy.
+            yy[k] = iyy;
+            yz[k] = iyz + inertia[4];
+            zz[k] = about_z;
+        }
     }
+}
+
+/// The entries xx, xy, yy of a tensor whose frame is turned back by an angle about z, given its sine and cosine.
+#[inline(always)]
+fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
+    let u = F::mul_add(s, xx - yy, c * (xy + xy));
+    [
+        F::mul_add(-s, u, xx),
+        F::mul_add(c, u, -xy),
+        F::mul_add(s, u, yy),
+    ]
 }
 
 /// The wrench one frame further.
 #[inline(always)]
-fn onwards<const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
+fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
+    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     slides: bool,
     joint: &JointBlock,
     force: &mut Lane3,
@@ -162,85 +270,6 @@ fn onwards<const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
         if !LAST {
             set(force, k, f);
             set(moment, k, m);
-        }
-    }
-}
-
-/// The composite body in the frame before, with that frame's own; of it, no more than the inertia about z where `ZZ`.
-#[inline(always)]
-fn to_parent<const TWIST: u8, const A: bool, const D: bool, const ZZ: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
-    joint: &JointBlock,
-    own: &Body,
-    composite: &mut Composite,
-) {
-    let mass = composite.mass;
-    let (first_moment, inertia) = (own.first_moment, six(own));
-    composite.mass += own.mass;
-    let [h, i] = [&mut composite.first_moment[..], &mut composite.inertia[..]];
-    let ([hx, hy, hz], [xx, xy, xz, yy, yz, zz]) = (h, i) else {
-        return;
-    };
-    for k in 0..LANES {
-        let place = place(k);
-        let (s, c) = (joint.sin[k], joint.cos[k]);
-        let Vector3([mx, my, mz]) = spin_back(s, c, Vector3([hx[k], hy[k], hz[k]]));
-        // The turn about z acts on the upper left of the tensor with twice the angle.
-        let (s2, c2) = (2.0 * (s * c), (c - s) * (c + s));
-        let (mean, half) = (0.5 * (xx[k] + yy[k]), 0.5 * (xx[k] - yy[k]));
-        let difference = c2 * half - s2 * xy[k];
-        let [mut ixx, mut ixy, mut iyy] =
-            [mean + difference, s2 * half + c2 * xy[k], mean - difference];
-        let (mut ixz, mut iyz) = (c * xz[k] - s * yz[k], s * xz[k] + c * yz[k]);
-        let mut izz = zz[k];
-        // Parallel axes with p = (a, 0, d): the mixed term of p with m·c + m·p/2.
-        let (bx, bz) = (mx + 0.5 * mass * place.a, mz + 0.5 * mass * place.d);
-        if A {
-            let twice = 2.0 * place.a * bx;
-            ixy -= place.a * my;
-            ixz -= place.a * bz;
-            iyy += twice;
-            izz += twice;
-        }
-        if D {
-            let twice = 2.0 * place.d * bz;
-            ixx += twice;
-            ixz -= place.d * bx;
-            iyy += twice;
-            iyz -= place.d * my;
-        }
-        let moved = Vector3([mx + mass * place.a, my, mz + mass * place.d]);
-        let moved = place.turn_back(moved);
-        let turned = match TWIST {
-            NONE => [ixx, ixy, ixz, iyy, iyz, izz],
-            QUARTER => [ixx, -ixz, ixy, izz, -iyz, iyy],
-            MINUS_QUARTER => [ixx, ixz, -ixy, izz, -iyz, iyy],
-            _ => {
-                let (s, c) = (place.sin_alpha, place.cos_alpha);
-                let (s2, c2) = (2.0 * (s * c), (c - s) * (c + s));
-                let (mean, half) = (0.5 * (iyy + izz), 0.5 * (iyy - izz));
-                let difference = c2 * half - s2 * iyz;
-                [
-                    ixx,
-                    c * ixy - s * ixz,
-                    s * ixy + c * ixz,
-                    mean + difference,
-                    s2 * half + c2 * iyz,
-                    mean - difference,
-                ]
-            }
-        };
-        zz[k] = turned[5] + inertia[5];
-        if !ZZ {
-            let [x, y, z] = moved.0;
-            hx[k] = x + first_moment[0];
-            hy[k] = y + first_moment[1];
-            hz[k] = z + first_moment[2];
-            xx[k] = turned[0] + inertia[0];
-            xy[k] = turned[1] + inertia[1];
-            xz[k] = turned[2] + inertia[2];
-            yy[k] = turned[3] + inertia[3];
-            yz[k] = turned[4] + inertia[4];
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::super::spatial::Vector3;
 use super::frame::{GENERAL, Place, at_each_lane, placed, slid, spin};
 use super::{Body, Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use crate::lanes::MulAdd;
 use crate::scalar::Real;
 
 /// What the way outwards leaves at a joint for the way back.
@@ -37,7 +38,7 @@ struct MotionBlock {
 ///
 /// `frames`, `bodies`, `work` and the signals have one entry a joint; without `qdd` the accelerations are zero.
 #[inline(always)]
-pub fn inverse_dynamics(
+pub fn inverse_dynamics<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     bodies: &[Body],
@@ -56,9 +57,9 @@ pub fn inverse_dynamics(
     };
     for (i, frame) in frames.iter().enumerate() {
         let joint = &mut work[i];
-        frame.angle(&q[i], &mut joint.sin, &mut joint.cos);
+        frame.angle::<F>(&q[i], &mut joint.sin, &mut joint.cos);
         if i == 0 && !frame.prismatic {
-            first_revolute(
+            first_revolute::<F>(
                 frame,
                 gravity,
                 &bodies[i],
@@ -68,9 +69,9 @@ pub fn inverse_dynamics(
                 joint,
             );
         } else if frame.prismatic {
-            outwards_prismatic(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
+            outwards_prismatic::<F>(frame, &bodies[i], &q[i], &qd[i], qdd(i), &mut motion, joint);
         } else {
-            placed!(frame, place => outwards(place, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
+            placed!(F, frame, place => outwards(place, &bodies[i], &qd[i], qdd(i), &mut motion, joint));
         }
     }
     for (i, frame) in frames.iter().enumerate().rev() {
@@ -92,9 +93,9 @@ pub fn inverse_dynamics(
         }
         if let Some(parent) = before.last_mut() {
             if i == 1 && !frames[0].prismatic {
-                at_each_lane!(frame, &q[i], place => inwards_along_axis(place, joint, parent));
+                at_each_lane!(F, frame, &q[i], place => inwards_along_axis(place, joint, parent));
             } else {
-                at_each_lane!(frame, &q[i], place => inwards(place, joint, parent));
+                at_each_lane!(F, frame, &q[i], place => inwards(place, joint, parent));
             }
         }
     }
@@ -102,8 +103,8 @@ pub fn inverse_dynamics(
 
 /// Over a revolute joint to the next link outwards, and that link's inertial wrench.
 #[inline(always)]
-fn outwards<const TWIST: u8, const A: bool, const D: bool>(
-    place: Place<TWIST, A, D>,
+fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: Place<F, TWIST, A, D>,
     body: &Body,
     qd: &Lane,
     qdd: &Lane,
@@ -117,9 +118,9 @@ fn outwards<const TWIST: u8, const A: bool, const D: bool>(
         let e = place.turn(get(&motion.turning, k));
         let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let [wx, wy, wz] = spin(s, c, w).0;
-        let [ex, ey, ez] = spin(s, c, e).0;
-        let v = spin(s, c, v);
+        let [wx, wy, wz] = spin::<F>(s, c, w).0;
+        let [ex, ey, ez] = spin::<F>(s, c, e).0;
+        let v = spin::<F>(s, c, v);
         let (ex, ey, ez) = (ex + wy * qd[k], ey - wx * qd[k], ez + qdd[k]);
         let wz = wz + qd[k];
         set(&mut motion.spin, k, Vector3([wx, wy, wz]));
@@ -152,7 +153,7 @@ fn outwards<const TWIST: u8, const A: bool, const D: bool>(
 /// Over the first joint, where it is revolute: the base does not move, and of the link's wrench only the moment along
 /// the joint is ever asked for.
 #[inline(always)]
-fn first_revolute(
+fn first_revolute<F: MulAdd>(
     frame: &Frame,
     gravity: [f64; 3],
     body: &Body,
@@ -162,9 +163,9 @@ fn first_revolute(
     joint: &mut JointBlock,
 ) {
     let [mx, my, _] = body.first_moment;
-    let up = Place::<GENERAL, true, true>::new(frame).turn(-Vector3(gravity));
+    let up = Place::<F, GENERAL, true, true>::new(frame).turn(-Vector3(gravity));
     for k in 0..LANES {
-        let v = spin(joint.sin[k], joint.cos[k], up);
+        let v = spin::<F>(joint.sin[k], joint.cos[k], up);
         set(&mut motion.spin, k, Vector3([0.0, 0.0, qd[k]]));
         set(&mut motion.turning, k, Vector3([0.0, 0.0, qdd[k]]));
         set(&mut motion.proper, k, v);
@@ -175,7 +176,7 @@ fn first_revolute(
 
 /// Over a prismatic joint likewise.
 #[inline(always)]
-fn outwards_prismatic(
+fn outwards_prismatic<F: MulAdd>(
     frame: &Frame,
     body: &Body,
     q: &Lane,
@@ -186,14 +187,14 @@ fn outwards_prismatic(
 ) {
     let [mx, my, mz] = body.first_moment;
     for k in 0..LANES {
-        let place = slid(frame, q[k]);
+        let place = slid::<F>(frame, q[k]);
         let w = place.turn(get(&motion.spin, k));
         let e = place.turn(get(&motion.turning, k));
         let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
         let (s, c) = (joint.sin[k], joint.cos[k]);
-        let w = spin(s, c, w);
-        let e = spin(s, c, e);
-        let v = (spin(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
+        let w = spin::<F>(s, c, w);
+        let e = spin::<F>(s, c, e);
+        let v = (spin::<F>(s, c, v) + w.cross_z(qd[k] + qd[k])).plus_z(qdd[k]);
         set(&mut motion.spin, k, w);
         set(&mut motion.turning, k, e);
         set(&mut motion.proper, k, v);
@@ -209,8 +210,8 @@ fn outwards_prismatic(
 
 /// Adds a link's wrench to that of the link before.
 #[inline(always)]
-fn inwards<const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
+fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     joint: &JointBlock,
     parent: &mut JointBlock,
 ) {
@@ -225,8 +226,8 @@ fn inwards<const TWIST: u8, const A: bool, const D: bool>(
 
 /// Likewise, where only the moment along the parent's axis is asked for.
 #[inline(always)]
-fn inwards_along_axis<const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
+fn inwards_along_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     joint: &JointBlock,
     parent: &mut JointBlock,
 ) {

@@ -3,6 +3,7 @@
 use super::super::parameters::{COLUMNS, column};
 use super::frame::{Place, at_each_lane, spin};
 use super::{Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
+use crate::lanes::MulAdd;
 use crate::scalar::Real;
 
 /// How a link moves: what all its columns are made of.
@@ -36,7 +37,7 @@ impl AxisBlock {
 /// zero for every motion are written: those of the links from j outwards, and of drive, friction and offset
 /// those of joint j itself. `frames`, `axes` and the signals have one entry a joint.
 #[inline(always)]
-pub fn differential_regressor(
+pub fn differential_regressor<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     q: &[Lane],
@@ -53,8 +54,8 @@ pub fn differential_regressor(
     let (mut sin, mut cos) = (ZERO, ZERO);
     let mut block = [ZERO; 10];
     for (i, frame) in frames.iter().enumerate() {
-        frame.angle(&q[i], &mut sin, &mut cos);
-        at_each_lane!(frame, &q[i], place => {
+        frame.angle::<F>(&q[i], &mut sin, &mut cos);
+        at_each_lane!(F, frame, &q[i], place => {
             next_link(&place, frame.prismatic, &sin, &cos, &qd[i], &qdd[i], &mut motion);
             for (j, axis) in axes[..i].iter_mut().enumerate() {
                 carried_axis(&place, &sin, &cos, axis, &motion, &mut block);
@@ -80,8 +81,8 @@ pub fn differential_regressor(
 
 /// Over a joint to the next link outwards (Luh, Walker & Paul 1980).
 #[inline(always)]
-fn next_link<const TWIST: u8, const A: bool, const D: bool>(
-    place: &impl Fn(usize) -> Place<TWIST, A, D>,
+fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
     prismatic: bool,
     sin: &Lane,
     cos: &Lane,
@@ -97,7 +98,7 @@ fn next_link<const TWIST: u8, const A: bool, const D: bool>(
         let e = place.turn(get(&motion.turning, k));
         let v = place.carry(place.turn(get(&motion.proper, k)), w, e);
         let (s, c) = (sin[k], cos[k]);
-        let (w, e, v) = (spin(s, c, w), spin(s, c, e), spin(s, c, v));
+        let (w, e, v) = (spin::<F>(s, c, w), spin::<F>(s, c, e), spin::<F>(s, c, v));
         let (turn, slide) = (turns * qd[k], slides * qd[k]);
         set(&mut motion.spin, k, w.plus_z(turn));
         set(
@@ -115,8 +116,8 @@ fn next_link<const TWIST: u8, const A: bool, const D: bool>(
 
 /// Carries a joint's axis over to this link, and the power of the link's ten unit wrenches along it.
 #[inline(always)]
-fn carried_axis<const TWIST: u8, const A: bool, const D: bool>(
-    place: &impl Fn(usize) -> Place<TWIST, A, D>,
+fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
     sin: &Lane,
     cos: &Lane,
     axis: &mut AxisBlock,
@@ -129,7 +130,7 @@ fn carried_axis<const TWIST: u8, const A: bool, const D: bool>(
         let (s, c) = (sin[k], cos[k]);
         let turned = place.turn(get(&axis.angular, k));
         let swept = place.sweep(place.turn(get(&axis.linear, k)), turned);
-        let (angular, linear) = (spin(s, c, turned), spin(s, c, swept));
+        let (angular, linear) = (spin::<F>(s, c, turned), spin::<F>(s, c, swept));
         set(&mut axis.angular, k, angular);
         set(&mut axis.linear, k, linear);
         let ([sx, sy, sz], [lx, ly, lz]) = (angular.0, linear.0);
@@ -247,7 +248,7 @@ impl Field {
 
 /// Row of the total mechanical energy, column by column of the 14·n: `out(c, …)`. Friction and offset columns are not written.
 #[inline(always)]
-pub fn energy_regressor(
+pub fn energy_regressor<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     q: &[Lane],
@@ -260,8 +261,8 @@ pub fn energy_regressor(
     let (mut sin, mut cos) = (ZERO, ZERO);
     let mut block = [ZERO; 11];
     for (i, frame) in frames.iter().enumerate() {
-        frame.angle(&q[i], &mut sin, &mut cos);
-        at_each_lane!(frame, &q[i], place => link_energy(
+        frame.angle::<F>(&q[i], &mut sin, &mut cos);
+        at_each_lane!(F, frame, &q[i], place => link_energy(
             place, frame.prismatic, &sin, &cos, &qd[i],
             &mut angular, &mut linear, &mut field, &mut depth, &mut block,
         ));
@@ -273,8 +274,8 @@ pub fn energy_regressor(
 
 /// Over a joint to the next link outwards, and the columns of that link's energy and of the drive's.
 #[inline(always)]
-fn link_energy<const TWIST: u8, const A: bool, const D: bool>(
-    place: impl Fn(usize) -> Place<TWIST, A, D>,
+fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
+    place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     prismatic: bool,
     sin: &Lane,
     cos: &Lane,
@@ -292,11 +293,11 @@ fn link_energy<const TWIST: u8, const A: bool, const D: bool>(
         let (s, c) = (sin[k], cos[k]);
         let w = place.turn(get(angular, k));
         let v = place.sweep(place.turn(get(linear, k)), w);
-        let w = spin(s, c, w).plus_z(turns * qd[k]);
-        let v = spin(s, c, v).plus_z(slides * qd[k]);
+        let w = spin::<F>(s, c, w).plus_z(turns * qd[k]);
+        let v = spin::<F>(s, c, v).plus_z(slides * qd[k]);
         let down = place.turn(get(gravity, k));
         depth[k] += down.0[0] * place.a + down.0[2] * place.d;
-        let down = spin(s, c, down);
+        let down = spin::<F>(s, c, down);
         set(angular, k, w);
         set(linear, k, v);
         set(gravity, k, down);
