@@ -4,10 +4,12 @@
 //! taken at its worst where the manual gives a range: loads 2, but 1 right behind another load or store, with
 //! which they pipeline (section 3.3.2); division 12, multiply with
 //! accumulate 2, load and store multiple 1+N, a taken branch refills the pipeline in 3 (P = 1 to 3), VDIV and
-//! VSQRT 14, VMLA and VFMA 3, VLDM 1+N. Loads of literals from flash pay the wait states each time, as if
-//! there were no data cache. Left out: contention of DMA and processor for the bus.
+//! VSQRT 14, VMLA and VFMA 3, VLDM 1+N. Literals of code in flash pay the wait states each time, as if
+//! there were no data cache; those of code in the CCM SRAM wait for nothing (RM0440 rev 8, section 2.4). Left out:
+//! contention of DMA and processor for the bus, and of a literal's load and the next fetch for the CCM SRAM.
 
 use crate::cpu::Block;
+use crate::map;
 
 /// Wait states of the flash at 170 MHz, boost range (RM0440 rev 8, table 29).
 pub const WAIT_STATES: u64 = 4;
@@ -26,6 +28,12 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
         size: code.len() as u16,
         ..Block::default()
     };
+    // A literal lies beside the code that loads it.
+    let literal = if map::FLASH.contains(&address) {
+        2 + WAIT_STATES
+    } else {
+        2
+    };
     let mut at = 0;
     let mut pipelined = false;
     while let Some(&[a, b]) = code.get(at..at + 2) {
@@ -36,9 +44,9 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
             _ => 0,
         };
         let (cycles, float) = if wide {
-            wide_cycles(first, second)
+            wide_cycles(first, second, literal)
         } else {
-            (narrow_cycles(first), false)
+            (narrow_cycles(first, literal), false)
         };
         let single = is_single_access(first);
         let cycles = if single && pipelined {
@@ -66,11 +74,11 @@ fn is_single_access(first: u16) -> bool {
     }
 }
 
-fn narrow_cycles(op: u16) -> u64 {
+fn narrow_cycles(op: u16, literal: u64) -> u64 {
     let registers = u64::from((op & 0xFF).count_ones());
     match op >> 12 {
         // LDR literal.
-        4 if op & 0x0800 != 0 => 2 + WAIT_STATES,
+        4 if op & 0x0800 != 0 => literal,
         // Load and store with register offset: STR 1, LDR 2.
         5 if (op >> 9) & 7 < 3 => 1,
         5 => 2,
@@ -89,12 +97,12 @@ fn narrow_cycles(op: u16) -> u64 {
 }
 
 /// Cycles, and whether it is a floating-point instruction.
-fn wide_cycles(a: u16, b: u16) -> (u64, bool) {
+fn wide_cycles(a: u16, b: u16, literal: u64) -> (u64, bool) {
     let op1 = a >> 11 & 3;
     let op2 = a >> 4 & 0x7F;
     // Coprocessor space with coprocessors 10 and 11: floating point.
     if a & 0xEC00 == 0xEC00 && matches!(b >> 8 & 0xF, 0xA | 0xB) {
-        return (float_cycles(a, b), true);
+        return (float_cycles(a, b, literal), true);
     }
     let cycles = match op1 {
         1 => match op2 {
@@ -135,7 +143,7 @@ fn wide_cycles(a: u16, b: u16) -> (u64, bool) {
                 }
             } else if a & 0xFE10 == 0xF810 {
                 // Loads; by literal where the base is PC.
-                if a & 0xF == 0xF { 2 + WAIT_STATES } else { 2 }
+                if a & 0xF == 0xF { literal } else { 2 }
             } else {
                 1
             }
@@ -145,7 +153,7 @@ fn wide_cycles(a: u16, b: u16) -> (u64, bool) {
     (cycles, false)
 }
 
-fn float_cycles(a: u16, b: u16) -> u64 {
+fn float_cycles(a: u16, b: u16, by_literal: u64) -> u64 {
     if a & 0xFE00 == 0xEC00 {
         // VLDM, VSTM, VPUSH, VPOP 1+N; VLDR and VSTR 2; VMOV of a pair 2.
         let p = a >> 8 & 1;
@@ -156,7 +164,7 @@ fn float_cycles(a: u16, b: u16) -> u64 {
         let words = u64::from(b & 0xFF);
         return if p == 1 && w == 0 {
             let literal = a & 0x1F == 0x1D || a & 0x001F == 0x1F;
-            if literal { 2 + WAIT_STATES } else { 2 }
+            if literal { by_literal } else { 2 }
         } else {
             1 + words
         };
@@ -210,6 +218,22 @@ mod test {
         assert_eq!(cycles(&[0xED90, 0x0A00]), (1, 2), "vldr s0, [r0]");
         assert_eq!(cycles(&[0xED2D, 0x8B10]), (1, 17), "vpush {{d8-d15}}");
         assert_eq!(cycles(&[0xBF40, 0x1840]), (2, 2), "sev; adds");
+    }
+
+    /// `ldr r0, [pc, #4]`, `ldr.w r0, [pc, #4]` and `vldr s0, [pc, #4]` wait in flash alone.
+    #[test]
+    fn literals_wait_in_flash_alone() {
+        for code in [
+            &[0x01, 0x48][..],
+            &[0xDF, 0xF8, 4, 0],
+            &[0x9F, 0xED, 1, 0x0A],
+        ] {
+            assert_eq!(
+                u64::from(of_block(map::FLASH.start, code).cycles),
+                2 + WAIT_STATES
+            );
+            assert_eq!(of_block(map::CCM.start, code).cycles, 2);
+        }
     }
 
     #[test]

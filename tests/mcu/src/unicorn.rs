@@ -34,6 +34,21 @@ impl From<uc_error> for EngineError {
 /// An address at which no code can lie: the engine runs "until" it.
 const NOWHERE: u64 = 0x3000_0000;
 
+const HALVES_OF_FLASH: usize = (map::FLASH.end - map::FLASH.start) as usize / 2;
+
+/// Place of a block's costs: those in flash first, then those in the CCM SRAM, where code is written once, before it
+/// runs; a block of another size is read anew.
+fn place(address: u32) -> Option<usize> {
+    let within = |region: core::ops::Range<u32>| (address - region.start) as usize / 2;
+    if map::FLASH.contains(&address) {
+        Some(within(map::FLASH))
+    } else if map::CCM.contains(&address) {
+        Some(HALVES_OF_FLASH + within(map::CCM))
+    } else {
+        None
+    }
+}
+
 /// A Cortex-M4F run by unicorn.
 pub struct UnicornCpu<B: Bus + 'static> {
     engine: Unicorn<'static, ()>,
@@ -109,9 +124,10 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             stop: Rc::default(),
             blocks: Rc::new(RefCell::new(vec![
                 Block::default();
-                (map::FLASH.end - map::FLASH.start)
-                    as usize
-                    / 2
+                HALVES_OF_FLASH
+                    + (map::CCM.end - map::CCM.start)
+                        as usize
+                        / 2
             ])),
         };
         for region in [map::PERIPHERALS, map::CORE] {
@@ -152,7 +168,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             .add_block_hook(1, 0, move |engine, address, size| {
                 let address = address as u32;
                 let mut blocks = blocks.borrow_mut();
-                let place = address.wrapping_sub(map::FLASH.start) as usize / 2;
+                let place = place(address);
                 let read = |engine: &Unicorn<'_, ()>| {
                     let mut code = vec![0; size as usize];
                     match engine.mem_read(address.into(), &mut code) {
@@ -160,7 +176,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
                         Err(_) => Block::default(),
                     }
                 };
-                let block = match blocks.get_mut(place) {
+                let block = match place.and_then(|place| blocks.get_mut(place)) {
                     Some(known) => {
                         if u32::from(known.size) != size {
                             *known = read(engine);
