@@ -56,14 +56,25 @@ fn two_runs_give_the_same_bytes_and_another_rig_gives_others() {
     assert!(first != conversation(3));
 }
 
-/// A minute at rest under control: the cycle counter wraps (25 s), telemetry loses nothing, nothing drifts away.
+/// Half a minute at rest: the cycle counter wraps (25 s).
 #[test]
-fn a_minute_at_rest() {
+fn half_a_minute_at_rest() {
+    at_rest(30.0);
+}
+
+#[test]
+#[ignore = "takes about as long as it says; cargo test -p rig-mcu --features unicorn hour -- --ignored"]
+fn an_hour_at_rest() {
+    at_rest(3600.0);
+}
+
+/// At rest under control: telemetry loses nothing, nothing drifts away.
+fn at_rest(seconds: f64) {
     let mut line = bench(4);
     line.request(RequestBody::StartStream).unwrap();
     line.request(RequestBody::Arm).unwrap();
     let before = board(&mut line).with_board(|b| b.plant().truth().position);
-    wait(&mut line, 60.0);
+    wait(&mut line, seconds);
     let after = board(&mut line).with_board(|b| b.plant().truth().position);
     assert!((after - before).abs() < 2e-3, "{before} to {after} rad");
     let report = health(&mut line);

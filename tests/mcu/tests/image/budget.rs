@@ -68,5 +68,10 @@ fn the_image_keeps_to_its_budget() {
         && image.flash_used <= budget.flash_bytes
         && image.ram_used <= budget.ram_bytes
         && stack <= budget.stack_bytes;
+    // What the project promises, however the budget is raised.
+    assert!(
+        cycles <= 0.25 * PERIOD && cost.worst_cycles as f64 <= 0.5 * PERIOD,
+        "the tick takes too much of its period:\n{found}"
+    );
     assert!(kept, "more than tests/mcu/budget.toml allows:\n{found}");
 }
