@@ -22,7 +22,7 @@ mod regressor;
 pub use body::Body;
 pub use forward::{NotPositive, forward_dynamics};
 pub use frame::Frame;
-pub use inertia::{inertia_matrix, lower};
+pub use inertia::{CompositeBlock, inertia_matrix, lower};
 pub use inverse::{JointBlock, inverse_dynamics};
 pub use regressor::{AxisBlock, differential_regressor, energy_regressor};
 
