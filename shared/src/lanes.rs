@@ -5,7 +5,8 @@
 //!
 //! [`Real::sin_cos`] is branch-free (Cody and Waite 1980: reduction by π/2 in three parts, then polynomials of
 //! degree 13 and 14) with an error of at most 2 units in the last place for |x| ≤ [`ANGLE_LIMIT`] (measured: it
-//! differs from libm by at most 1, also at the doubles nearest to the multiples of π/2); beyond it the error grows, and from 2³¹ on the result means nothing. `exp`, `tanh` and `powf` go lane by lane through libm.
+//! differs from libm by at most 1, also at the doubles nearest to the multiples of π/2); beyond it the error grows, and from 2³¹ on the result means nothing.
+//! With fused operations ([`MulAdd`]), as the kernels over blocks use them where they can, the same bound holds. `exp`, `tanh` and `powf` go lane by lane through libm.
 
 use core::array;
 use core::ops::{

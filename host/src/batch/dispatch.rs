@@ -1,8 +1,9 @@
 //! The kernels, compiled for the vector instructions of the machine and chosen when the program runs.
 //!
-//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 besides runs nearly twice as fast where
-//! there is AVX2. Both versions are the same source without fused operations and give the same bits (tested). Processors of other kinds take
-//! the portable version, which for 64-bit Arm already is a vector one.
+//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 and FMA besides runs about twice as
+//! fast where there are both. There products go into sums unrounded ([`MulAdd`]), so the two versions differ by rounding (tested):
+//! results are the same to the last bit on one kind of machine, not between kinds. Processors of other kinds take the portable
+//! version, which for 64-bit Arm already is a vector one.
 
 use multiversion::{multiversion, target::match_target};
 use rig_shared::lanes::{MulAdd, Rounded};
