@@ -1,13 +1,14 @@
 //! The kernels, compiled for the vector instructions of the machine and chosen when the program runs.
 //!
-//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 besides runs nearly twice as fast where
-//! there is AVX2. Both versions are the same source without fused operations and give the same bits (tested). Processors of other kinds take
-//! the portable version, which for 64-bit Arm already is a vector one.
+//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 and FMA besides runs about twice as
+//! fast where there are both. There products go into sums unrounded ([`MulAdd`]), so the two versions differ by rounding (tested):
+//! results are the same to the last bit on one kind of machine, not between kinds. Processors of other kinds take the portable
+//! version, which for 64-bit Arm already is a vector one.
 
 use multiversion::{multiversion, target::match_target};
 use rig_shared::lanes::{MulAdd, Rounded};
 use rig_shared::multibody::block::{
-    self, AxisBlock, Body, Frame, JointBlock, LANES, Lane, NotPositive,
+    self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES, Lane, NotPositive,
 };
 
 /// Products that go into sums unrounded, for processors that have an instruction for it.
@@ -60,10 +61,10 @@ versions! {
     /// [`block::inertia_matrix`]: the first `len` samples of entry (i, j), and of its mirror image, go to
     /// `out[(i * n + j) * stride + at..]`. `matrix` holds n(n + 1)/2.
     inertia_matrix, inertia_matrix_portable<F>(
-        frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock], matrix: &mut [Lane],
-        out: &mut [f64], stride: usize, at: usize, len: usize,
+        frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock],
+        composite: &mut CompositeBlock, matrix: &mut [Lane], out: &mut [f64], stride: usize, at: usize, len: usize,
     ) {
-        block::inertia_matrix::<F>(frames, bodies, q, work, matrix);
+        block::inertia_matrix::<F>(frames, bodies, q, work, composite, matrix);
         let n = frames.len();
         for i in 0..n {
             for j in 0..=i {
@@ -81,9 +82,9 @@ versions! {
     /// [`block::forward_dynamics`].
     forward_dynamics, forward_dynamics_portable<F>(
         frames: &[Frame], gravity: [f64; 3], bodies: &[Body], q: &[Lane], qd: &[Lane], tau: &[Lane],
-        work: &mut [JointBlock], matrix: &mut [Lane], qdd: &mut [Lane],
+        work: &mut [JointBlock], composite: &mut CompositeBlock, matrix: &mut [Lane], qdd: &mut [Lane],
     ) -> Result<(), NotPositive> {
-        block::forward_dynamics::<F>(frames, gravity, bodies, q, qd, tau, work, matrix, qdd)
+        block::forward_dynamics::<F>(frames, gravity, bodies, q, qd, tau, work, composite, matrix, qdd)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Torques, accelerations and inertia matrices of many samples.
 
-use rig_shared::multibody::block::{Body, Frame, JointBlock, lower};
+use rig_shared::multibody::block::{Body, CompositeBlock, Frame, JointBlock, lower};
 use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
 use super::signals::{lanes, load, output, samples, store, stretches};
@@ -135,6 +135,7 @@ impl ModelBatch {
         output(n * n, count, out)?;
         let (mut a, mut matrix) = (lanes(n), lanes(lower(n, 0)));
         let mut work = vec![JointBlock::ZERO; n];
+        let mut composite = CompositeBlock::ZERO;
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             dispatch::inertia_matrix(
@@ -142,6 +143,7 @@ impl ModelBatch {
                 &self.bodies,
                 &a,
                 &mut work,
+                &mut composite,
                 &mut matrix,
                 out,
                 count,
@@ -170,6 +172,7 @@ impl ModelBatch {
         let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| lanes(n));
         let mut matrix = lanes(lower(n, 0));
         let mut work = vec![JointBlock::ZERO; n];
+        let mut composite = CompositeBlock::ZERO;
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             load(qd, &range, &mut b);
@@ -183,6 +186,7 @@ impl ModelBatch {
                 &b,
                 &c,
                 &mut work,
+                &mut composite,
                 &mut matrix,
                 &mut d,
             )

@@ -270,12 +270,26 @@ fn the_first_sample_whose_inertia_matrix_is_not_positive_definite_is_named() {
     ));
 }
 
-/// The version chosen for this machine does the same operations in the same order as the portable one.
+/// Entry by entry against the portable version's, relative to the largest.
+fn alike(what: &str, chosen: &[f64], portable: &[f64], tolerance: f64) {
+    let scale = portable.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+    assert_eq!(chosen.len(), portable.len());
+    for (k, (a, b)) in chosen.iter().zip(portable).enumerate() {
+        assert!(
+            (a - b).abs() <= tolerance * scale,
+            "{what}, entry {k}: {a} is not {b}"
+        );
+    }
+}
+
+/// The version chosen for this machine may leave products unrounded; nothing else sets it apart from the portable one.
 #[test]
-fn every_version_gives_the_same_bits() {
+fn every_version_gives_the_same_results_but_for_rounding() {
     use super::dispatch::*;
     use super::signals::{lanes, load};
-    use rig_shared::multibody::block::{AxisBlock, Body, Frame, JointBlock, LANES, lower};
+    use rig_shared::multibody::block::{
+        AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES, lower,
+    };
     for n in LENGTHS {
         let made = made(n, LANES, 7);
         let frames: Vec<Frame> = Frame::of(&made.chain).collect();
@@ -291,22 +305,28 @@ fn every_version_gives_the_same_bits() {
         let [mut a, mut b] = [(); 2].map(|()| lanes(n));
         inverse_dynamics(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut a);
         inverse_dynamics_portable(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut b);
-        assert_eq!(a, b);
+        alike("torque", a.as_flattened(), b.as_flattened(), 1e-13);
         let tau = a;
         let [mut ma, mut mb] = [(); 2].map(|()| lanes(lower(n, 0)));
-        inertia_matrix(&frames, &bodies, &q, &mut work, &mut ma);
-        inertia_matrix_portable(&frames, &bodies, &q, &mut work, &mut mb);
-        assert_eq!(ma, mb);
+        let mut room = CompositeBlock::ZERO;
+        let [mut a, mut b] = [(); 2].map(|()| vec![f64::NAN; n * n * LANES]);
+        inertia_matrix(
+            &frames, &bodies, &q, &mut work, &mut room, &mut ma, &mut a, LANES, 0, LANES,
+        );
+        inertia_matrix_portable(
+            &frames, &bodies, &q, &mut work, &mut room, &mut mb, &mut b, LANES, 0, LANES,
+        );
+        alike("inertia", &a, &b, 1e-13);
         let [mut a, mut b] = [(); 2].map(|()| lanes(n));
         forward_dynamics(
-            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut ma, &mut a,
+            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut room, &mut ma, &mut a,
         )
         .unwrap();
         forward_dynamics_portable(
-            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut mb, &mut b,
+            &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut room, &mut mb, &mut b,
         )
         .unwrap();
-        assert_eq!(a, b);
+        alike("acceleration", a.as_flattened(), b.as_flattened(), 1e-9);
         let width = n * COLUMNS;
         let mut axes = vec![AxisBlock::ZERO; n];
         let [mut a, mut b] = [(); 2].map(|()| vec![0.0; n * width * LANES]);
@@ -316,11 +336,11 @@ fn every_version_gives_the_same_bits() {
         differential_regressor_portable(
             &frames, g, &q, &qd, &qdd, &mut axes, &mut b, width, LANES, 0, LANES,
         );
-        assert_eq!(a, b);
+        alike("regressor", &a, &b, 1e-13);
         let [mut a, mut b] = [(); 2].map(|()| vec![0.0; width * LANES]);
         energy_regressor(&frames, g, &q, &qd, &mut a, LANES, 0, LANES);
         energy_regressor_portable(&frames, g, &q, &qd, &mut b, LANES, 0, LANES);
-        assert_eq!(a, b);
+        alike("energy", &a, &b, 1e-13);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Forward dynamics of a block.
 
-use super::inertia::{composite_bodies, lower};
+use super::inertia::{CompositeBlock, composite_bodies, lower};
 use super::inverse::inverse_dynamics;
 use super::{Body, Frame, JointBlock, LANES, Lane, ZERO};
 use crate::lanes::MulAdd;
@@ -28,12 +28,13 @@ pub fn forward_dynamics<F: MulAdd>(
     qd: &[Lane],
     tau: &[Lane],
     work: &mut [JointBlock],
+    composite: &mut CompositeBlock,
     matrix: &mut [Lane],
     qdd: &mut [Lane],
 ) -> Result<(), NotPositive> {
     let n = frames.len();
     inverse_dynamics::<F>(frames, gravity, bodies, q, qd, None, work, qdd);
-    composite_bodies::<F>(frames, bodies, q, work, matrix);
+    composite_bodies::<F>(frames, bodies, q, work, composite, matrix);
     for (x, tau) in qdd.iter_mut().zip(tau) {
         for k in 0..LANES {
             x[k] = tau[k] - x[k];

@@ -66,7 +66,11 @@ impl Frame {
         let mut beyond = 0;
         for k in 0..LANES {
             let angle = self.theta + q[k];
-            beyond |= u64::from(angle.abs() > lanes::ANGLE_LIMIT);
+            beyond |= if angle.abs() > lanes::ANGLE_LIMIT {
+                !0_u64
+            } else {
+                0
+            };
             (sin[k], cos[k]) = lanes::sin_cos::<F>(angle);
         }
         if beyond != 0 {

@@ -5,12 +5,24 @@ use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back}
 use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 
-/// The links from one joint outwards as one body in that joint's frame; its mass does not depend on the sample.
-struct Composite {
-    mass: f64,
+/// Room for the links from one joint outwards as one body in that joint's frame, and for its wrench at unit acceleration.
+#[derive(Clone, Copy, Debug)]
+pub struct CompositeBlock {
     first_moment: Lane3,
     /// xx xy xz yy yz zz
     inertia: [Lane; 6],
+    force: Lane3,
+    moment: Lane3,
+}
+
+impl CompositeBlock {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        first_moment: ZERO3,
+        inertia: [ZERO; 6],
+        force: ZERO3,
+        moment: ZERO3,
+    };
 }
 
 /// Place of the entry (i, j), j ≤ i, of a lower triangle stored row by row.
@@ -22,20 +34,21 @@ pub const fn lower(i: usize, j: usize) -> usize {
 /// Lower triangle of the inertia matrix, row by row, drive inertias included: composite-rigid-body algorithm (Walker &
 /// Orin 1982) on gathered bodies.
 ///
-/// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2.
+/// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2; what `composite` holds does not matter.
 #[inline(always)]
 pub fn inertia_matrix<F: MulAdd>(
     frames: &[Frame],
     bodies: &[Body],
     q: &[Lane],
     work: &mut [JointBlock],
+    composite: &mut CompositeBlock,
     out: &mut [Lane],
 ) {
     // Where the first joint stands does not matter.
     for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work).skip(1) {
         frame.angle::<F>(q, &mut joint.sin, &mut joint.cos);
     }
-    composite_bodies::<F>(frames, bodies, q, work, out);
+    composite_bodies::<F>(frames, bodies, q, work, composite, out);
 }
 
 /// The same with the sines and cosines already in `work`.
@@ -45,15 +58,11 @@ pub(super) fn composite_bodies<F: MulAdd>(
     bodies: &[Body],
     q: &[Lane],
     work: &[JointBlock],
+    composite: &mut CompositeBlock,
     out: &mut [Lane],
 ) {
     let (Some(tip), Some(last)) = (bodies.last(), frames.last()) else {
         return;
-    };
-    let mut composite = Composite {
-        mass: tip.mass,
-        first_moment: ZERO3,
-        inertia: [ZERO; 6],
     };
     let n = frames.len();
     out[lower(n - 1, n - 1)].fill(own_diagonal(last, tip));
@@ -61,7 +70,8 @@ pub(super) fn composite_bodies<F: MulAdd>(
         composite.first_moment = tip.first_moment.map(|x| [x; LANES]);
         composite.inertia = six(tip).map(|x| [x; LANES]);
     }
-    let (mut force, mut moment) = (ZERO3, ZERO3);
+    // It does not depend on the sample.
+    let mut mass = tip.mass;
     for i in (1..n).rev() {
         let (frame, joint, slides) = (&frames[i], &work[i], frames[i - 1].prismatic);
         let (before, row) = out.split_at_mut(lower(i, 0));
@@ -71,28 +81,26 @@ pub(super) fn composite_bodies<F: MulAdd>(
         let own = &bodies[i - 1];
         if i == 1 {
             at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, true>(
-                place, frame.prismatic, slides, joint, tip, own,
-                &mut composite, &mut force, &mut moment, entry, diagonal));
+                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else if i == n - 1 {
             at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, true, false>(
-                place, frame.prismatic, slides, joint, tip, own,
-                &mut composite, &mut force, &mut moment, entry, diagonal));
+                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         } else {
             at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, false>(
-                place, frame.prismatic, slides, joint, tip, own,
-                &mut composite, &mut force, &mut moment, entry, diagonal));
+                place, frame.prismatic, slides, joint, mass, tip, own, composite, entry, diagonal));
         }
         for j in (0..i - 1).rev() {
             let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
             let entry = &mut row[j];
             if j == 0 {
                 at_each_lane!(F, between, &q[j + 1], place =>
-                    onwards::<_, _, _, _, true>(place, slides, joint, &mut force, &mut moment, entry));
+                    onwards::<_, _, _, _, true>(place, slides, joint, composite, entry));
             } else {
                 at_each_lane!(F, between, &q[j + 1], place =>
-                    onwards::<_, _, _, _, false>(place, slides, joint, &mut force, &mut moment, entry));
+                    onwards::<_, _, _, _, false>(place, slides, joint, composite, entry));
             }
         }
+        mass += own.mass;
     }
 }
 
@@ -118,7 +126,7 @@ fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
 /// with its part along that frame's joint (`entry`); the composite body in that frame with the frame's `own`; and
 /// what it opposes to that frame's joint (`diagonal`).
 ///
-/// The body is the `TIP` itself or `composite`; where the frame before is the `LAST`, the entries are all that is asked for.
+/// The body, of the given `mass`, is the `TIP` itself or `composite`; where the frame before is the `LAST`, the entries are all that is asked for.
 /// The turn about z is made once for both.
 #[inline(always)]
 fn inwards<
@@ -133,23 +141,22 @@ fn inwards<
     prismatic: bool,
     slides: bool,
     joint: &JointBlock,
+    mass: f64,
     tip: &Body,
     own: &Body,
-    composite: &mut Composite,
-    force: &mut Lane3,
-    moment: &mut Lane3,
+    composite: &mut CompositeBlock,
     entry: &mut Lane,
     diagonal: &mut Lane,
 ) {
-    let mass = composite.mass;
-    composite.mass += own.mass;
-    let total = composite.mass + own.drive;
+    let total = mass + own.mass + own.drive;
     let (first_moment, inertia) = (own.first_moment, six(own));
     let (tip_moment, tip_inertia) = (tip.first_moment, six(tip));
-    let [h, i] = [&mut composite.first_moment[..], &mut composite.inertia[..]];
-    let ([hx, hy, hz], [xx, xy, xz, yy, yz, zz]) = (h, i) else {
-        return;
-    };
+    let CompositeBlock {
+        first_moment: [hx, hy, hz],
+        inertia: [xx, xy, xz, yy, yz, zz],
+        force,
+        moment,
+    } = composite;
     for k in 0..LANES {
         let place = place(k);
         let (s, c) = (joint.sin[k], joint.cos[k]);
@@ -259,10 +266,10 @@ fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST:
     place: impl Fn(usize) -> Place<F, TWIST, A, D>,
     slides: bool,
     joint: &JointBlock,
-    force: &mut Lane3,
-    moment: &mut Lane3,
+    composite: &mut CompositeBlock,
     entry: &mut Lane,
 ) {
+    let CompositeBlock { force, moment, .. } = composite;
     for k in 0..LANES {
         let (s, c) = (joint.sin[k], joint.cos[k]);
         let (f, m) = place(k).wrench_back(s, c, get(force, k), get(moment, k));

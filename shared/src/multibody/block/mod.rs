@@ -3,8 +3,9 @@
 //! A block holds [`LANES`] samples, every quantity as a [`Lane`]: one array, one entry a sample. Each step of a recursion is one
 //! loop over the lanes whose body is the formula for one sample without branches, which compilers turn into vector
 //! instructions of whatever width the CALLER is compiled for: every function here is inlined into it, so a caller compiled for a
-//! wider instruction set gets it throughout. No operation is contracted into a fused one, so results are the same to the last bit
-//! whatever the instruction set.
+//! wider instruction set gets it throughout. Whether a product is rounded before it goes into a sum is the caller's choice
+//! ([`MulAdd`](crate::lanes::MulAdd)): with [`Rounded`](crate::lanes::Rounded) results are the same to the last bit whatever the
+//! instruction set.
 //!
 //! What is known before the samples come saves work in every one of them: which twists are quarter turns and which
 //! lengths are zero picks one of a few loop bodies for each joint ([`Frame`]), and parameters that act alike are gathered
@@ -22,7 +23,7 @@ mod regressor;
 pub use body::Body;
 pub use forward::{NotPositive, forward_dynamics};
 pub use frame::Frame;
-pub use inertia::{inertia_matrix, lower};
+pub use inertia::{CompositeBlock, inertia_matrix, lower};
 pub use inverse::{JointBlock, inverse_dynamics};
 pub use regressor::{AxisBlock, differential_regressor, energy_regressor};
 
