@@ -48,6 +48,16 @@ pub enum NameplateError {
     /// Not a revolute joint.
     #[error("joint \"{0}\" is prismatic: the rig's link turns, so its kind must be \"revolute\".")]
     Prismatic(String),
+    /// A drive without one ratio for all positions.
+    #[error(
+        "the drive of joint \"{joint}\" {what}: the firmware of the one-link rig knows one gear ratio only; give drive.gear_ratio a finite value other than 0, and no drive.screw or drive.couples."
+    )]
+    Drive {
+        /// Name of the joint.
+        joint: String,
+        /// What is in the way.
+        what: String,
+    },
     /// A value that the firmware cannot do without.
     #[error("joint \"{joint}\" has no {what}: the firmware needs it to run the rig.")]
     Missing {
@@ -93,6 +103,19 @@ impl Nameplate {
             .drive
             .as_ref()
             .ok_or_else(|| missing("[joint.drive]"))?;
+        let unfit = |what: String| NameplateError::Drive {
+            joint: joint.name.clone(),
+            what,
+        };
+        if drive.screw.is_some() {
+            return Err(unfit("turns by a screw, at a changing ratio".into()));
+        }
+        if drive.couples.values().any(|ratio| *ratio != 0.0) {
+            return Err(unfit("is coupled to a joint".into()));
+        }
+        if drive.gear_ratio == 0.0 || !drive.gear_ratio.is_finite() {
+            return Err(unfit(format!("has gear_ratio = {}", drive.gear_ratio)));
+        }
         let rates = Rates::default();
         let counts = drive
             .encoder_counts_per_rev
@@ -287,6 +310,32 @@ mod tests {
     use crate::robot::ONE_LINK_TEMPLATE;
     use rig_firmware::nameplate::one_link;
     use std::path::Path;
+
+    #[test]
+    fn a_drive_without_one_ratio_is_refused() {
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+        let arm = Robot::from_toml(crate::robot::IRP6_TEMPLATE, Path::new("irp6.toml")).unwrap();
+        let screw = arm
+            .joints
+            .iter()
+            .find_map(|j| j.drive.as_ref()?.screw.clone())
+            .unwrap();
+        let refused = |change: &dyn Fn(&mut crate::robot::Drive)| {
+            let mut robot = robot.clone();
+            change(robot.joints[0].drive.as_mut().unwrap());
+            Nameplate::from_robot(&robot).unwrap_err().to_string()
+        };
+        let by_screw = refused(&|d| {
+            d.gear_ratio = 0.0;
+            d.screw = Some(screw.clone());
+        });
+        assert!(
+            by_screw.contains("screw, at a changing ratio"),
+            "{by_screw}"
+        );
+        let by_ratio = refused(&|d| d.gear_ratio = 0.0);
+        assert!(by_ratio.contains("gear_ratio = 0"), "{by_ratio}");
+    }
 
     /// The board must start as the emulated rig does: else their recordings would differ.
     #[test]

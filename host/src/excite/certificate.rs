@@ -8,11 +8,13 @@
 
 use rig_shared::multibody::{COLUMNS, Chain, inverse_dynamics, point_position};
 use rig_shared::scalar::Real;
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::ExciteError;
 use super::frame::Frame;
 use super::interval::Interval;
 use super::schedule::JointMotion;
+use crate::simulate::SimulateError;
 
 /// Cells per period of the fastest harmonic: what the proof takes away from a limit is then below 1 %.
 const CELLS: usize = 512;
@@ -45,6 +47,8 @@ pub struct Reach {
 pub(super) struct Reached {
     /// Joint by joint.
     pub joints: Vec<Reach>,
+    /// Per crank of the frame the lowest and highest sum of its joints' angles, rad.
+    pub combined: Vec<[f64; 2]>,
     /// Per plane of the frame the least distance along its normal, m.
     pub heights: Vec<f64>,
 }
@@ -93,6 +97,8 @@ pub(super) fn reach(
             torque: rows.as_ref().map(|_| 0.0),
         })
         .collect();
+    let mut combined = vec![[f64::INFINITY, f64::NEG_INFINITY]; frame.combined.len()];
+    let mut motors = vec![Interval::default(); n * n * MOTOR_COLUMNS];
     let mut heights = vec![f64::INFINITY; frame.planes.len()];
     let ramp = f64::from(schedule.ramp_us) * 1e-6;
     let period = f64::from(schedule.period_us) * 1e-6;
@@ -149,10 +155,28 @@ pub(super) fn reach(
                 reach.velocity = reach.velocity.max(qd.magnitude());
                 reach.acceleration = reach.acceleration.max(qdd.magnitude());
             }
+            for ([low, high], limit) in combined.iter_mut().zip(&frame.combined) {
+                let mut sum = Interval::default();
+                for (weight, s) in limit.weights.iter().zip(&state) {
+                    sum += Interval::from_f64(*weight) * s[0];
+                }
+                (*low, *high) = (low.min(sum.low), high.max(sum.high));
+            }
             if let Some(rows) = &rows {
                 let [q, qd, qdd] =
                     [0, 1, 2].map(|d| state.iter().map(|s| s[d]).collect::<Vec<_>>());
                 inverse_dynamics(chain, rows, &q, &qd, &qdd, &mut tau)?;
+                if let Some(drives) = &frame.drives {
+                    drives
+                        .enclosing
+                        .motor_columns(&q, &qd, &qdd, &mut motors)
+                        .map_err(SimulateError::from)?;
+                    for (t, row) in tau.iter_mut().zip(motors.chunks_exact(n * MOTOR_COLUMNS)) {
+                        for (column, value) in row.iter().zip(&drives.parameters) {
+                            *t += *column * Interval::from_f64(*value);
+                        }
+                    }
+                }
                 for (reach, t) in reaches.iter_mut().zip(&tau) {
                     reach.torque = reach.torque.map(|most| most.max(t.magnitude()));
                 }
@@ -171,6 +195,7 @@ pub(super) fn reach(
     }
     Ok(Reached {
         joints: reaches,
+        combined,
         heights,
     })
 }

@@ -38,7 +38,7 @@ pub enum ExciteError {
     Infeasible {
         /// Its name.
         joint: String,
-        /// position, velocity, acceleration or torque
+        /// position, velocity, acceleration, torque, crank or workspace
         limit: &'static str,
     },
     /// A staged motion that the limits leave no room for.

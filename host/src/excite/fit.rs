@@ -61,6 +61,19 @@ fn worst(
         ]);
     }
     let base: Vec<f64> = motions.iter().map(|m| m.base).collect();
+    for (limit, [low, high]) in frame.combined.iter().zip(&reached.combined) {
+        let start = limit.at(base.iter().copied());
+        rooms.extend([
+            (
+                share(high - start, limit.high - start),
+                (limit.joint, "crank"),
+            ),
+            (
+                share(start - low, start - limit.low),
+                (limit.joint, "crank"),
+            ),
+        ]);
+    }
     let mut unused = vec![[0.0; 3]; base.len()];
     for (plane, lowest) in frame.planes.iter().zip(&reached.heights) {
         let at = point_position(&frame.plain, &base, plane.link, plane.point, &mut unused)?;

@@ -5,8 +5,10 @@ use rand::{RngExt, SeedableRng};
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, Chain, column, differential_regressor};
 use rig_shared::trajectory::HARMONICS;
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::criterion::Values;
+use super::drives::{Combined, Drives};
 use super::problem::LANES;
 use super::schedule::{JointMotion, Schedule};
 use super::workspace::{Plane, planes_of};
@@ -55,7 +57,11 @@ pub(super) struct Frame {
     pub weights: Vec<f64>,
     /// Prior parameters, where the description has them all.
     pub parameters: Option<Vec<[f64; COLUMNS]>>,
+    /// Drives that are coupled or of changing ratio.
+    pub drives: Option<Drives>,
     pub bounds: Vec<Bounds>,
+    /// Ranges of cranks.
+    pub combined: Vec<Combined>,
     /// Where points of the links must stay.
     pub planes: Vec<Plane>,
     pub schedule: Schedule,
@@ -132,9 +138,36 @@ pub(super) fn prior(robot: &Robot, model: &Model) -> Result<Vec<[f64; COLUMNS]>,
     }
 }
 
+/// Columns of the motors, n × 3n; empty where there are none.
+fn motors_at(
+    drives: Option<&Drives>,
+    q: &[f64],
+    qd: &[f64],
+    qdd: &[f64],
+) -> Result<Vec<f64>, ExciteError> {
+    let Some(drives) = drives else {
+        return Ok(Vec::new());
+    };
+    let mut out = vec![0.0; q.len() * q.len() * MOTOR_COLUMNS];
+    drives
+        .plain
+        .motor_columns(q, qd, qdd, &mut out)
+        .map_err(SimulateError::from)?;
+    Ok(out)
+}
+
+/// Entry of base column `c` in the row of joint `j`: behind the joints' own columns come the motors'.
+fn entry(own: &[f64], motors: &[f64], n: usize, j: usize, c: usize) -> f64 {
+    match c.checked_sub(n * COLUMNS) {
+        Some(m) => motors[j * n * MOTOR_COLUMNS + m],
+        None => own[j * n * COLUMNS + c],
+    }
+}
+
 /// Root mean square of each base column over states within the limits.
 fn column_sizes(
     chain: &Chain<f64>,
+    drives: Option<&Drives>,
     columns: &[usize],
     bounds: &[Bounds],
     weights: &[f64],
@@ -156,9 +189,10 @@ fn column_sizes(
             qdd[j] = symmetric(b.acceleration.map_or(reachable, |a| a.min(reachable)));
         }
         differential_regressor(chain, &q, &qd, &qdd, &mut out)?;
+        let motors = motors_at(drives, &q, &qd, &qdd)?;
         for (sum, c) in squares.iter_mut().zip(columns) {
             *sum += (0..n)
-                .map(|j| (weights[j] * out[j * width + c]).powi(2))
+                .map(|j| (weights[j] * entry(&out, &motors, n, j, *c)).powi(2))
                 .sum::<f64>();
         }
     }
@@ -194,9 +228,10 @@ pub(super) fn values_of(
             qdd[j] = at.acceleration;
         }
         differential_regressor(&frame.plain, &q, &qd, &qdd, &mut out)?;
+        let motors = motors_at(frame.drives.as_ref(), &q, &qd, &qdd)?;
         for j in 0..n {
             for (c, source) in frame.columns.iter().enumerate() {
-                let entry = out[j * width + source];
+                let entry = entry(&out, &motors, n, j, *source);
                 plain[(s * n + j, c)] = entry;
                 scaled[(s * n + j, c)] = entry * frame.weights[j] / frame.sizes[c];
             }
@@ -271,7 +306,12 @@ fn schedule_of(robot: &Robot, options: &Options) -> Result<Schedule, ExciteError
     })
 }
 
-fn check_start(robot: &Robot, start: &[f64], bounds: &[Bounds]) -> Result<(), ExciteError> {
+fn check_start(
+    robot: &Robot,
+    start: &[f64],
+    bounds: &[Bounds],
+    combined: &[Combined],
+) -> Result<(), ExciteError> {
     if start.len() != robot.joints.len() {
         return Err(wrong(
             "start",
@@ -287,6 +327,19 @@ fn check_start(robot: &Robot, start: &[f64], bounds: &[Bounds]) -> Result<(), Ex
                 format!(
                     "joint \"{}\" can move between {} and {}",
                     joint.name, b.low, b.high
+                ),
+            ));
+        }
+    }
+    for limit in combined {
+        let value = limit.at(start.iter().copied());
+        if !(limit.low < value && value < limit.high) {
+            return Err(wrong(
+                "start",
+                format!("{start:?}"),
+                format!(
+                    "it puts the crank of joint \"{}\" at {value} rad, which can move between {} and {} (joint angles added up, without the crank's offset)",
+                    robot.joints[limit.joint].name, limit.low, limit.high
                 ),
             ));
         }
@@ -337,10 +390,12 @@ pub(super) fn frame_of(
 ) -> Result<(Frame, Base, Vec<String>), ExciteError> {
     let (bounds, mut notes) = bounds_of(robot)?;
     let schedule = schedule_of(robot, options)?;
+    let combined = Combined::of(robot);
     if let Some(start) = &options.start {
-        check_start(robot, start, &bounds)?;
+        check_start(robot, start, &bounds, &combined)?;
     }
-    let model = Model::from_robot(robot)?;
+    let mut model = Model::from_robot(robot)?;
+    let drives = Drives::of(robot, model.motors.take(), &bounds)?;
     let parameters = match prior(robot, &model) {
         Ok(parameters) => Some(parameters),
         Err(joint) => {
@@ -371,17 +426,17 @@ pub(super) fn frame_of(
         // left without the drives' is a base of the links alone.
         base = base.restricted(|c| c < own && c % COLUMNS < column::DRIVE_INERTIA);
     }
-    if base.columns.iter().any(|c| *c >= own) {
-        notes.push(
-            "The parameters of the coupled motors themselves (Iam, fvm, fcm) are not among those that the motion is optimal for, and their part of the torque was not checked against its limit."
-                .into(),
-        );
-        base = base.restricted(|c| c < own);
-    }
     let weights = weights_of(robot, options, &bounds)?;
     let fastest = schedule.omega() * options.harmonics as f64;
     let sizes = match options.scaling {
-        Scaling::Sizes => column_sizes(&model.chain, &base.columns, &bounds, &weights, fastest)?,
+        Scaling::Sizes => column_sizes(
+            &model.chain,
+            drives.as_ref(),
+            &base.columns,
+            &bounds,
+            &weights,
+            fastest,
+        )?,
         Scaling::None => vec![1.0; base.columns.len()],
     };
     let frame = Frame {
@@ -392,7 +447,9 @@ pub(super) fn frame_of(
         sizes,
         weights,
         parameters,
+        drives,
         bounds,
+        combined,
         schedule,
         fixed: options.start.clone(),
         criterion: options.criterion,

@@ -20,6 +20,7 @@
 
 mod certificate;
 mod criterion;
+mod drives;
 mod error;
 mod fit;
 mod frame;

@@ -11,6 +11,7 @@ use rig_shared::multibody::Chain;
 
 use super::certificate::Reached;
 use super::criterion::{Smoothing, Values};
+use super::drives::into_cranks;
 use super::fit::{Blame, fit_within};
 use super::frame::{Frame, values_of};
 use super::interval::Interval;
@@ -114,6 +115,13 @@ pub(super) fn random_motion(
         // Within the middle half of the range.
         x[j * block] = random.random::<f64>() - 0.5;
     }
+    let mut motions = problem.decode(&x);
+    let mut base: Vec<f64> = motions.iter().map(|m| m.base).collect();
+    into_cranks(&frame.combined, &mut base, 0.5);
+    for (motion, at) in motions.iter_mut().zip(base) {
+        motion.base = at;
+    }
+    let x = problem.encode(&motions);
     problem.shrunk(&x, 0.9)
 }
 

@@ -5,11 +5,13 @@ use rig_shared::safety::Limits;
 use rig_shared::trajectory::{
     Chirp, Extremes, FrictionSweep, SlowReversals, Staircase, Sweep, Trajectory,
 };
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
+use super::drives::{Combined, into_cranks};
 use super::frame::{Bounds, bounds_of, prior};
 use super::{ExciteError, JointTrajectory, TrajectoryFile};
 use crate::robot::Robot;
-use crate::simulate::Model;
+use crate::simulate::{Model, SimulateError};
 
 /// Share of each limit that these motions use.
 const SHARE: f64 = 0.8;
@@ -138,16 +140,41 @@ fn torque_share(
     }
     let mut tau = vec![0.0; n];
     let mut share = 0.0_f64;
+    // Coulomb friction of the motors counts in full as well.
+    let width = n * MOTOR_COLUMNS;
+    let mut motors = vec![0.0; n * width];
     let duration = trajectory.duration();
     for k in 0..=TORQUE_SAMPLES {
         let at = trajectory.at(duration * k as f64 / TORQUE_SAMPLES as f64);
         q[moving] = start[moving] + at.position;
         (qd[moving], qdd[moving]) = (at.velocity, at.acceleration);
         inverse_dynamics(&model.chain, &rows, &q, &qd, &qdd, &mut tau)?;
+        let mut coulomb: Vec<f64> = model
+            .parameters
+            .iter()
+            .map(|row| row[column::COULOMB].abs())
+            .collect();
+        if let Some(drives) = &model.motors {
+            let at = |e| ExciteError::from(SimulateError::from(e));
+            let t = &drives.transmission;
+            t.motor_columns(&q, &qd, &qdd, &mut motors).map_err(at)?;
+            for (c, value) in drives.parameters.as_flattened().iter().enumerate() {
+                if c % MOTOR_COLUMNS != motor_column::COULOMB {
+                    for (j, torque) in tau.iter_mut().enumerate() {
+                        *torque += motors[j * width + c] * value;
+                    }
+                }
+            }
+            t.motor_directions(&q, &mut motors[..n * n]).map_err(at)?;
+            for (row, own) in motors[..n * n].chunks_exact(n).zip(&drives.parameters) {
+                for (sum, along) in coulomb.iter_mut().zip(row) {
+                    *sum += (along * own[motor_column::COULOMB]).abs();
+                }
+            }
+        }
         for j in 0..n {
             if let Some(limit) = bounds[j].torque {
-                let coulomb = model.parameters[j][column::COULOMB].abs();
-                share = share.max((tau[j].abs() + coulomb) / limit);
+                share = share.max((tau[j].abs() + coulomb[j]) / limit);
             }
         }
     }
@@ -169,6 +196,7 @@ pub fn staged(
     start: Option<&[f64]>,
 ) -> Result<(TrajectoryFile, Vec<String>), ExciteError> {
     let (bounds, mut notes) = bounds_of(robot)?;
+    let combined = Combined::of(robot);
     if !robot.workspace.is_empty() {
         notes.push(
             "The regions in [[workspace]] were not checked: only a motion of kind fourier is designed within them."
@@ -192,7 +220,11 @@ pub fn staged(
         })?,
     };
     let start = match start {
-        None => bounds.iter().map(|b| 0.5 * (b.low + b.high)).collect(),
+        None => {
+            let mut middle: Vec<f64> = bounds.iter().map(|b| 0.5 * (b.low + b.high)).collect();
+            into_cranks(&combined, &mut middle, 0.5);
+            middle
+        }
         Some(given) if given.len() == bounds.len() => given.to_vec(),
         Some(given) => {
             return Err(ExciteError::Option {
@@ -208,10 +240,18 @@ pub fn staged(
         why,
     };
     let b = bounds[moving];
-    let distance = SHARE * (b.high - start[moving]).min(start[moving] - b.low);
+    let mut distance = (b.high - start[moving]).min(start[moving] - b.low);
+    for limit in &combined {
+        let now = limit.at(start.iter().copied());
+        let turn = limit.weights[moving].abs();
+        if turn > 0.0 {
+            distance = distance.min((limit.high - now).min(now - limit.low) / turn);
+        }
+    }
+    let distance = SHARE * distance;
     if distance.is_nan() || distance <= 0.0 {
         return Err(no_room(format!(
-            "it starts at {}, which leaves nothing between {} and {}; start it elsewhere",
+            "it starts at {}, which leaves nothing between {} and {} or within the range of a crank; start it elsewhere",
             start[moving], b.low, b.high
         )));
     }

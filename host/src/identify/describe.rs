@@ -34,7 +34,8 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
     } else if let Ok(inverse) = pseudo_inverse(k) {
         let step = inverse * (&values - k * &pi);
         pi += step;
-        remarks.push("The split of the combinations over the links is the smallest change of the description; single masses and inertias need not be physical.".into());
+        remarks.push("No physically consistent set of standard parameters was found for these values: the split of the combinations over the links is the smallest change of the description, and single masses and inertias need not be those of a body. Use the combinations, not single parameters.".into());
+        without_negative_masses(robot, k, &mut pi, &mut remarks);
     }
     let (joints, motors) = pi.as_slice().split_at(links);
     let mut motors = motors.to_vec();
@@ -45,6 +46,58 @@ pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robo
     );
     remarks.extend(said);
     (result, remarks)
+}
+
+/// Raises masses below zero, which no description can hold, to zero along directions that leave every identified
+/// combination as it is (mass of a link that turns is no combination of its own: the links before take it up). Where
+/// there is no such direction the links keep what the description said of them, and the remark says so.
+fn without_negative_masses(
+    robot: &Robot,
+    k: &DMatrix<f64>,
+    pi: &mut DVector<f64>,
+    remarks: &mut Vec<String>,
+) {
+    let masses: Vec<usize> = (0..robot.joints.len())
+        .map(|j| j * COLUMNS + column::MASS)
+        .collect();
+    let lacking = DVector::from_iterator(masses.len(), masses.iter().map(|&c| -pi[c].min(0.0)));
+    if lacking.amax() == 0.0 {
+        return;
+    }
+    let Ok(inverse) = pseudo_inverse(k) else {
+        return;
+    };
+    // The projection onto what the data do not see, its columns those of the masses.
+    let seen = inverse * k;
+    let free = DMatrix::from_fn(pi.len(), masses.len(), |i, m| {
+        f64::from(u8::from(i == masses[m])) - seen[(i, masses[m])]
+    });
+    let own = free.select_rows(masses.iter());
+    let step = own
+        .clone()
+        .svd(true, true)
+        .solve(&lacking, 1e-9)
+        .ok()
+        .filter(|y| (&own * y - &lacking).amax() <= 1e-9 * lacking.amax());
+    if let Some(y) = step {
+        *pi += free * y;
+        for &c in &masses {
+            // What rounding has left below zero.
+            if pi[c] < 0.0 && pi[c] > -1e-9 * (1.0 + lacking.amax()) {
+                pi[c] = 0.0;
+            }
+        }
+        remarks.push("Masses that came out below zero were raised to zero by shifting mass between links in a way that changes no identified combination.".into());
+    }
+    if masses.iter().any(|&c| pi[c] < 0.0) {
+        let prior = robot.standard_parameters();
+        for (j, row) in prior.iter().enumerate() {
+            for c in column::MASS..column::DRIVE_INERTIA {
+                pi[j * COLUMNS + c] = row[c];
+            }
+        }
+        remarks.push("An identified mass is below zero, which no description can hold: identified.toml keeps the masses, moments and inertias that the links had before, so its dynamics are NOT those identified; these stand in identification.json.".into());
+    }
 }
 
 fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {

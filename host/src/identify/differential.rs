@@ -9,6 +9,7 @@ use rig_shared::multibody::COLUMNS;
 use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::slow::{SlowMotor, slow_motors};
 use crate::batch::{BatchError, ChainBatch, RegressorBlock};
 use crate::prepare::{Decimator, JointMotion, Motion, PrepareError};
 
@@ -158,7 +159,7 @@ impl<'a> Differential<'a> {
     pub(super) fn rows(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
         let picked = self.picked(motion);
         let p = self.plan.columns.len();
-        let mut result = self.used(motion, tally);
+        let mut result = self.used(motion, tally)?;
         result.t = picked.iter().map(|&k| motion.t[k]).collect();
         result.q = picks(motion, &picked, |j| &j.q);
         result.qd = picks(motion, &picked, |j| &j.qd);
@@ -173,16 +174,20 @@ impl<'a> Differential<'a> {
     }
 
     /// Which rows of the piece are used, and nothing else.
-    pub(super) fn used(&self, motion: &Motion, tally: &mut Tally) -> Rows {
+    ///
+    /// # Errors
+    /// Lengths that do not fit the drives.
+    pub(super) fn used(&self, motion: &Motion, tally: &mut Tally) -> Result<Rows, PrepareError> {
+        let motors = slow_motors(motion, self.plan)?;
         let (picked, step) = (self.picked(motion), self.decimator.step());
         let equations = motion.joints.iter().enumerate().map(|(j, joint)| Equation {
-            keep: kept(joint, &picked, step, j, tally),
+            keep: kept(joint, &motors, &picked, step, j, tally),
             ..Default::default()
         });
-        Rows {
+        Ok(Rows {
             equations: equations.collect(),
             ..Default::default()
-        }
+        })
     }
 
     fn filter(&self, motion: &Motion, first: usize, result: &mut Rows) -> Result<(), PrepareError> {
@@ -293,14 +298,19 @@ fn running_count(list: &[bool]) -> Vec<u32> {
 /// Whether each picked row of joint `j` is used.
 fn kept(
     joint: &JointMotion,
+    motors: &[SlowMotor],
     picked: &[usize],
     step: usize,
     j: usize,
     tally: &mut Tally,
 ) -> Vec<bool> {
     let rows = joint.slow.len();
-    let (slow_before, saturated_before) =
-        (running_count(&joint.slow), running_count(&joint.saturated));
+    // The joint's own slow rows, then those of the motors whose friction is in its torque.
+    let slow: Vec<(&[bool], Vec<u32>)> = std::iter::once(joint.slow.as_slice())
+        .chain(motors.iter().filter(|m| m.moves[j]).map(|m| &*m.slow))
+        .map(|list| (list, running_count(list)))
+        .collect();
+    let saturated_before = running_count(&joint.saturated);
     // How many of the rows within `reach` of k are marked, and how many rows these are.
     let around = |before: &[u32], k: usize, reach: usize| {
         let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(rows));
@@ -311,9 +321,11 @@ fn kept(
         .map(|&k| {
             // A passing reversal is the model's business; where the joint is slow for longer than the
             // low-pass remembers, its neighbours carry the torque of standing still too.
-            let (near, all) = around(&slow_before, k, step);
-            let dwells = near == all || around(&slow_before, k, 2 * step).0 > 3 * step.max(2);
-            let slow = joint.slow[k] || dwells;
+            let slow = slow.iter().any(|(list, before)| {
+                let (near, all) = around(before, k, step);
+                let dwells = near == all || around(before, k, 2 * step).0 > 3 * step.max(2);
+                list[k] || dwells
+            });
             let saturated = around(&saturated_before, k, step).0 > 0;
             if saturated {
                 Tally::count(&mut tally.saturated, j);

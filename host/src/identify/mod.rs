@@ -44,6 +44,7 @@ mod pseudo_inertia;
 mod residual;
 mod ridge;
 mod robust;
+mod slow;
 mod solve;
 mod speed;
 mod standard;

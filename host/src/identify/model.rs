@@ -136,7 +136,7 @@ impl Tally {
         };
         let mut all = entries(
             &self.slow,
-            "speed below the threshold: friction there is not Coulomb and viscous, or its sign is not known",
+            "speed of the joint, or of a motor coupled to it, below the threshold: friction there is not Coulomb and viscous, or its sign is not known",
         );
         all.extend(entries(&self.saturated, "torque at its limit"));
         if self.short > 0 {
@@ -188,8 +188,7 @@ fn make_rows(
         ModelKind::Differential => {
             let maker = Differential::new(plan)?;
             if let Some(mut earlier) = plan.cache.earlier(recording, model)? {
-                let work =
-                    |motion: Motion| counted(&motion, |tally| Ok(maker.used(&motion, tally)));
+                let work = |motion: Motion| counted(&motion, |tally| maker.used(&motion, tally));
                 let mut renew = |(used, part): (Rows, Tally)| {
                     let mut rows = earlier.next()?.unwrap_or_default();
                     for (equation, used) in rows.equations.iter_mut().zip(used.equations) {

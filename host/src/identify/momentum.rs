@@ -16,6 +16,7 @@ use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
+use super::slow::slow_motors;
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// Regressors at one instant: momentum P and loss R, each joint × wanted column.
@@ -194,6 +195,10 @@ pub(super) fn momentum_rows(
         .iter()
         .map(|j| count(&|k| j.slow[k]))
         .collect();
+    let slow_motors: Vec<(Vec<bool>, Vec<u32>)> = slow_motors(motion, plan)?
+        .into_iter()
+        .map(|m| (m.moves, count(&|k| m.slow[k])))
+        .collect();
     let saturated: Vec<Vec<u32>> = motion
         .joints
         .iter()
@@ -234,7 +239,9 @@ pub(super) fn momentum_rows(
                     .push((torque[j][k] - torque[j][done.start]) / duration);
                 let over = |c: &[u32]| c[k + 1] - c[done.start];
                 // Half a window without a sign of the velocity says little of friction.
-                let still = 2 * over(&slow[j]) as usize > plan.window;
+                let most = |c: &[u32]| 2 * over(c) as usize > plan.window;
+                let still =
+                    most(&slow[j]) || slow_motors.iter().any(|(moves, c)| moves[j] && most(c));
                 let saturated = over(&saturated[j]) > 0;
                 if saturated {
                     Tally::count(&mut tally.saturated, j);

@@ -246,13 +246,20 @@ fn the_friction_of_the_motors_takes_its_power_at_the_motors() {
     }
     let start = energy_with_rotors(&robot, &robot.middle_position(), &THROWN);
     let transmission = robot.transmission().unwrap();
+    // The rate of loss is continuous where a motor reverses, so that the sum of steps holds there too.
+    let (mut fastest, mut slowest) = ([0.0_f64; 5], [f64::INFINITY; 5]);
     let (q, v, lost) = throw(&robot, 1e-4, 0.2, |q, v| {
         let mut psid = [0.0; 5];
         transmission.motor_velocity(q, v, &mut psid).unwrap();
-        // A motor that reverses would make the sum of steps inexact.
-        assert!(psid.iter().all(|w| w.abs() > 1.0), "{psid:?}");
+        for (k, w) in psid.iter().enumerate() {
+            fastest[k] = fastest[k].max(w.abs());
+            slowest[k] = slowest[k].min(w.abs());
+        }
         psid.iter().map(|w| 3e-4 * w * w + 0.01 * w.abs()).sum()
     });
+    assert!(fastest.iter().all(|w| *w > 50.0), "{fastest:?}");
+    // The screw of the forearm comes to rest and turns back.
+    assert!(slowest[2] < 1.0, "{slowest:?}");
     let after = energy_with_rotors(&robot, &q, &v);
     assert!(lost > 1.0);
     assert!(

@@ -5,6 +5,7 @@ use rig_shared::multibody::{
     COLUMNS, column, inverse_dynamics, point_position, regressor_gradient,
 };
 use rig_shared::scalar::Real;
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::{L, LANES, Problem, soft_sign, soft_sign_slope};
 use crate::excite::ExciteError;
@@ -74,6 +75,25 @@ impl Problem<'_> {
         sum
     }
 
+    /// Penalties of the cranks' ranges.
+    fn cranks(&mut self, pass: Pass) -> f64 {
+        let (n, samples) = (self.joints(), self.basis.samples());
+        let mut sum = 0.0;
+        for (number, limit) in self.frame.combined.iter().enumerate() {
+            for s in 0..samples {
+                let angle = limit.at((0..n).map(|j| self.motion[0][(s, j)]));
+                let share = (angle - limit.middle()) / limit.half();
+                let multipliers = &mut self.crank_multipliers[number * samples + s];
+                let (value, force) = both_sides(share, multipliers, self.weight, pass);
+                sum += value;
+                for (j, weight) in limit.weights.iter().enumerate() {
+                    self.adjoint[0][(s, j)] += force * weight / limit.half();
+                }
+            }
+        }
+        sum
+    }
+
     /// Penalties of the torque, and the derivatives of these and of the criterion by the motion.
     fn torque_and_rows(&mut self, pass: Pass) -> Result<f64, ExciteError> {
         let (n, frame, samples) = (self.joints(), self.frame, self.basis.samples());
@@ -94,6 +114,7 @@ impl Problem<'_> {
         let mut sum = 0.0;
         let mut tau = vec![L::ZERO; n];
         let mut by = [(); 3].map(|()| vec![L::ZERO; n]);
+        let motor_width = n * MOTOR_COLUMNS;
         for s in (0..samples).step_by(LANES) {
             let within = s < self.basis.whole && pass == Pass::Penalise;
             if !within && prior.is_none() {
@@ -104,6 +125,14 @@ impl Problem<'_> {
             let mut pushed = false;
             if let (Some(prior), Some(parameters)) = (&prior, &frame.parameters) {
                 inverse_dynamics(&frame.lanes, prior, &q, &qd, &qdd, &mut tau)?;
+                if let Some(drives) = &frame.drives {
+                    drives.columns([&q, &qd, &qdd], &mut self.motors)?;
+                    for (t, row) in tau.iter_mut().zip(self.motors.chunks_exact(motor_width)) {
+                        for (column, value) in row.iter().zip(&drives.parameters) {
+                            *t += *column * L::splat(*value);
+                        }
+                    }
+                }
                 for j in 0..n {
                     let Some(limit) = frame.bounds[j].torque else {
                         continue;
@@ -126,6 +155,7 @@ impl Problem<'_> {
             }
             // Weights on the entries of the regressor.
             self.out.fill(L::ZERO);
+            self.motors.fill(L::ZERO);
             for j in 0..n {
                 let velocity = frame.bounds[j].velocity;
                 let mut coulomb = L::ZERO;
@@ -136,7 +166,9 @@ impl Problem<'_> {
                         let pull = Lanes(core::array::from_fn(|k| {
                             factor * self.pulls[j][(c - first, s + k)]
                         }));
-                        if *source == j * COLUMNS + column::COULOMB {
+                        if let Some(motor) = source.checked_sub(width) {
+                            self.motors[j * motor_width + motor] = pull;
+                        } else if *source == j * COLUMNS + column::COULOMB {
                             coulomb += pull;
                         } else {
                             self.out[j * width + source] = pull;
@@ -152,6 +184,12 @@ impl Problem<'_> {
                         }
                     }
                     coulomb += forces[j] * L::splat(parameters[j][column::COULOMB]);
+                    if let Some(drives) = &frame.drives {
+                        let weights = &mut self.motors[j * motor_width..(j + 1) * motor_width];
+                        for (weight, value) in weights.iter_mut().zip(&drives.parameters) {
+                            *weight += forces[j] * L::splat(*value);
+                        }
+                    }
                 }
                 let slope = coulomb * soft_sign_slope(qd[j], velocity);
                 for k in 0..LANES {
@@ -160,6 +198,9 @@ impl Problem<'_> {
             }
             let [by_q, by_qd, by_qdd] = &mut by;
             regressor_gradient(&frame.lanes, &q, &qd, &qdd, &self.out, by_q, by_qd, by_qdd)?;
+            if let Some(drives) = &frame.drives {
+                drives.add_gradient([&q, &qd, &qdd], &self.motors, &mut by)?;
+            }
             for (adjoint, by) in self.adjoint.iter_mut().zip(&by) {
                 for j in 0..n {
                     for k in 0..LANES {
@@ -201,7 +242,7 @@ impl Problem<'_> {
     }
 
     pub(super) fn penalties(&mut self, pass: Pass) -> Result<f64, ExciteError> {
-        let kinematic = self.kinematic(pass);
+        let kinematic = self.kinematic(pass) + self.cranks(pass);
         Ok(kinematic + self.torque_and_rows(pass)? + self.cartesian(pass)?)
     }
 }

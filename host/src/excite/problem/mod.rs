@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, column, differential_regressor};
 use rig_shared::scalar::Real;
+use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::ExciteError;
 use super::criterion::{Smoothing, criterion_of};
@@ -21,11 +22,11 @@ use constraints::Pass;
 
 /// Samples computed side by side.
 pub(super) const LANES: usize = 4;
-type L = Lanes<LANES>;
+pub(super) type L = Lanes<LANES>;
 
 /// Within this share of the velocity limit the sign of the velocity is rounded off for the optimiser alone, so
 /// that its gradient sees the Coulomb column; the values that are reported use the sign itself.
-const SIGN_WIDTH: f64 = 0.01;
+pub(super) const SIGN_WIDTH: f64 = 0.01;
 
 /// One start's view of the frame.
 pub(super) struct Problem<'a> {
@@ -37,6 +38,8 @@ pub(super) struct Problem<'a> {
     multipliers: [Vec<[f64; 2]>; 4],
     /// By plane and sample.
     plane_multipliers: Vec<f64>,
+    /// By crank and sample: one for each side.
+    crank_multipliers: Vec<[f64; 2]>,
     /// Position, velocity, acceleration: samples × joints.
     motion: [DMatrix<f64>; 3],
     /// Derivative of the objective by each of them.
@@ -48,6 +51,8 @@ pub(super) struct Problem<'a> {
     /// First base column of each joint's rows.
     first: Vec<usize>,
     out: Vec<L>,
+    /// The same of the motors, n × 3n.
+    motors: Vec<L>,
 }
 
 impl<'a> Problem<'a> {
@@ -68,6 +73,7 @@ impl<'a> Problem<'a> {
             smoothing,
             weight: 0.0,
             multipliers: [(); 4].map(|()| vec![[0.0; 2]; samples * n]),
+            crank_multipliers: vec![[0.0; 2]; frame.combined.len() * samples],
             plane_multipliers: vec![0.0; frame.planes.len() * samples],
             motion: [(); 3].map(|()| DMatrix::zeros(samples, n)),
             adjoint: [(); 3].map(|()| DMatrix::zeros(samples, n)),
@@ -75,6 +81,7 @@ impl<'a> Problem<'a> {
             rows,
             first,
             out: vec![L::ZERO; n * n * COLUMNS],
+            motors: vec![L::ZERO; n * n * MOTOR_COLUMNS],
             basis,
         }
     }
@@ -151,7 +158,18 @@ impl<'a> Problem<'a> {
     fn room(&mut self, x: &DVector<f64>) -> f64 {
         self.place(x);
         let mut room = f64::INFINITY;
-        for (j, motion) in self.decode(x).iter().enumerate() {
+        let motions = self.decode(x);
+        for limit in &self.frame.combined {
+            let start = limit.at(motions.iter().map(|m| m.base));
+            for s in 0..self.basis.samples() {
+                let away = limit.at((0..motions.len()).map(|j| self.motion[0][(s, j)])) - start;
+                if away != 0.0 {
+                    let edge = if away > 0.0 { limit.high } else { limit.low };
+                    room = room.min((edge - start) / away);
+                }
+            }
+        }
+        for (j, motion) in motions.iter().enumerate() {
             let bounds = &self.frame.bounds[j];
             let (up, down) = (bounds.high - motion.base, bounds.low - motion.base);
             for s in 0..self.basis.samples() {
@@ -207,13 +225,19 @@ impl<'a> Problem<'a> {
         for s in (0..self.basis.whole).step_by(LANES) {
             let [q, qd, qdd] = [0, 1, 2].map(|order| self.state(order, s));
             differential_regressor(&frame.lanes, &q, &qd, &qdd, &mut self.out)?;
+            if let Some(drives) = &frame.drives {
+                drives.columns([&q, &qd, &qdd], &mut self.motors)?;
+            }
             for j in 0..n {
                 self.out[j * width + j * COLUMNS + column::COULOMB] =
                     soft_sign(qd[j], frame.bounds[j].velocity);
                 let first = self.first[j];
                 for (c, source) in frame.columns.iter().enumerate().skip(first) {
                     let factor = frame.weights[j] / frame.sizes[c];
-                    let entry = self.out[j * width + source].0;
+                    let entry = match source.checked_sub(width) {
+                        Some(motor) => self.motors[j * n * MOTOR_COLUMNS + motor].0,
+                        None => self.out[j * width + source].0,
+                    };
                     for k in 0..LANES {
                         self.rows[j][(c - first, s + k)] = factor * entry[k];
                     }
@@ -325,5 +349,6 @@ impl Problem<'_> {
             list.fill([multiplier, 0.7 * multiplier]);
         }
         self.plane_multipliers.fill(multiplier);
+        self.crank_multipliers.fill([multiplier, 0.7 * multiplier]);
     }
 }
