@@ -90,7 +90,7 @@ fn double_pendulum() {
             &[data.join("train.csv")],
             &[data.join("test.csv")],
             model,
-            Estimator::default(),
+            Estimator::for_robot(&robot),
         );
         no_worse(
             &format!("double pendulum, {model:?}"),
@@ -115,7 +115,7 @@ fn lwr_repeats_its_motion() {
             &[data.join("run1.csv")],
             &[data.join("run2.csv")],
             model,
-            Estimator::default(),
+            Estimator::for_robot(&robot),
         );
         no_worse(
             &format!("LWR4+ 1 → 2, {model:?}"),
@@ -204,7 +204,7 @@ fn tx40_has_the_published_expressions_and_values() {
             &[data.join("motor_1kHz.csv")],
             &[],
             model,
-            Estimator::default(),
+            Estimator::for_robot(&robot),
         );
         let (mut same, mut near, mut all) = (0, 0, 0);
         for line in published.lines() {
@@ -259,7 +259,7 @@ fn tx40_predicts_the_rest_of_its_motion() {
                 std::slice::from_ref(&train),
                 std::slice::from_ref(&rest),
                 model,
-                Estimator::default(),
+                Estimator::for_robot(&robot),
             );
             no_worse(
                 &format!("TX40 up to row {until}, {model:?}"),
