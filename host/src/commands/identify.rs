@@ -129,9 +129,9 @@ pub(crate) struct Args {
     /// Which equations are fitted
     #[arg(long, value_enum, default_value = "differential")]
     model: Model,
-    /// How they are fitted
-    #[arg(long, value_enum, default_value = "weighted")]
-    estimator: Fit,
+    /// How they are fitted [default: weighted; for several joints whose description states all inertial values, ridge]
+    #[arg(long, value_enum)]
+    estimator: Option<Fit>,
     /// Compare estimators on stretches of time left out of the fit, and say which to trust
     #[arg(long, value_enum, default_value = "auto")]
     compare: Compare,
@@ -166,10 +166,12 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn options(&self, bytes: u64) -> Options {
+    fn options(&self, robot: &Robot, bytes: u64) -> Options {
         Options {
             model: self.model.into(),
-            estimator: self.estimator.into(),
+            estimator: self
+                .estimator
+                .map_or_else(|| Estimator::for_robot(robot), Into::into),
             loss: Loss::default(),
             prepare: PrepareOptions {
                 cutoff: self.cutoff,
@@ -213,7 +215,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &robot,
         &recordings(&training.watched(&progress)),
         &recordings(&holdout.watched(&progress)),
-        &args.options(training.bytes()),
+        &args.options(&robot, training.bytes()),
     )?;
     drop(progress);
     refuse_driving_friction(&robot, &identification)?;

@@ -141,8 +141,16 @@ fn distance(
 ) -> Result<f64, IdentifyError> {
     let mut loose = prior.clone();
     loose.strength = PULL_OF_DISTANCE;
-    let found = consistent(&quadratic_about(tempered, problem.base, full), &loose)?;
-    Ok(found.squares.sqrt())
+    let about = quadratic_about(tempered, problem.base, full);
+    loop {
+        match consistent(&about, &loose) {
+            Ok(found) => return Ok(found.squares.sqrt()),
+            // Far from every body, and with combinations that the data hardly touch, rounding hides the last of the
+            // path. What is found before it lies as far or, by the pull's own size, farther.
+            Err(_) if loose.strength < 1.0 => loose.strength *= 10.0,
+            Err(e) => return Err(e),
+        }
+    }
 }
 
 /// Fits with every estimator of `list` and judges.

@@ -7,6 +7,8 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 use super::NotExcited;
 use super::base::{Base, Independent, independent_columns, preference};
 use super::factor::TriangularFactor;
+use super::least::triangle;
+use super::prior::Prior;
 use crate::robot::JointKind;
 
 /// A base parameter counts as not excited when its column, scaled to length one, differs from a combination of
@@ -60,9 +62,6 @@ pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
                 .filter(|(row, _)| data.combination[(*row, k)].abs() > 1e-6)
                 .map(|(_, &c)| base.column_name(base.columns[c]))
                 .collect();
-            let links = base.kinds.len() * COLUMNS;
-            let motor = base.columns[k].checked_sub(links);
-            let joint = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS) + 1;
             let why = if partners.is_empty() {
                 "It has no effect on the torque in these data.".to_owned()
             } else {
@@ -72,20 +71,73 @@ pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
                     partners.join(", ")
                 )
             };
-            let revolute = base.kinds[joint - 1] == JointKind::Revolute;
-            let motion = match base.columns[k] % COLUMNS {
-                _ if motor.is_some() => format!("Move joint {joint} and the joints that its drive is coupled to together and against each other, at several speeds and with changing accelerations."),
-                column::VISCOUS => format!("Move joint {joint} at several clearly different speeds, in both directions."),
-                column::COULOMB => format!("Move joint {joint} slowly in both directions, with reversals."),
-                column::OFFSET => format!("Move joint {joint} in both directions and, where it lifts, over a wider range of positions."),
-                1..=3 if revolute => format!("Move joint {joint} over a wider range of positions, at best half a turn."),
-                _ => format!("Accelerate joint {joint} and its neighbours harder, in different postures."),
-            };
             NotExcited {
                 combination: base.expression(k),
                 why,
-                motion,
+                motion: motion(base, k),
             }
+        })
+        .collect()
+}
+
+/// A motion that would show base parameter `k` better.
+fn motion(base: &Base, k: usize) -> String {
+    let links = base.kinds.len() * COLUMNS;
+    let motor = base.columns[k].checked_sub(links);
+    let joint = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS) + 1;
+    let revolute = base.kinds[joint - 1] == JointKind::Revolute;
+    match base.columns[k] % COLUMNS {
+        _ if motor.is_some() => format!(
+            "Move joint {joint} and the joints that its drive is coupled to together and against each other, at several speeds and with changing accelerations."
+        ),
+        column::VISCOUS => {
+            format!("Move joint {joint} at several clearly different speeds, in both directions.")
+        }
+        column::COULOMB => format!("Move joint {joint} slowly in both directions, with reversals."),
+        column::OFFSET => format!(
+            "Move joint {joint} in both directions and, where it lifts, over a wider range of positions."
+        ),
+        1..=3 if revolute => {
+            format!("Move joint {joint} over a wider range of positions, at best half a turn.")
+        }
+        _ => format!("Accelerate joint {joint} and its neighbours harder, in different postures."),
+    }
+}
+
+/// What is identified on its own, but of which the data alone know less than is known without them: more than half of
+/// an estimate that allows for both would be prior. `factor` has the residual's noise as unit, its memory allowed for.
+pub(super) fn hardly_excited(
+    base: &Base,
+    data: &Independent,
+    prior: &Prior,
+    factor: &TriangularFactor,
+    names: &[(String, String)],
+) -> Vec<NotExcited> {
+    let Some(inverse) = triangle(factor, data).try_inverse() else {
+        return Vec::new();
+    };
+    let own = prior.own(&(&data.combination * &base.combination));
+    (0..data.kept.len())
+        .filter_map(|k| {
+            let known = inverse.row(k).norm();
+            let plausible = own
+                .row(k)
+                .iter()
+                .enumerate()
+                .map(|(c, share)| {
+                    let u = prior.uncertainty[c];
+                    (share * prior.size[c] * if u.is_finite() { u } else { 1.0 }).powi(2)
+                })
+                .sum::<f64>()
+                .sqrt();
+            let (name, unit) = names.get(k)?;
+            (known > plausible).then(|| NotExcited {
+                combination: name.clone(),
+                why: format!(
+                    "These data alone know it to {known:.2e} {unit} (standard deviation), less well than the {plausible:.2e} {unit} within which it is plausible without them."
+                ),
+                motion: motion(base, data.kept[k]),
+            })
         })
         .collect()
 }

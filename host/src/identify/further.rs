@@ -5,12 +5,13 @@ use super::compare::{Comparison, compare, fit};
 use super::consistent::consistent;
 use super::covariance::Estimate;
 use super::essential::{EssentialSet, essential};
+use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
 use super::parts::Parts;
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{StandardSet, prior_of, quadratic, quadratic_about, standard_set};
-use super::{BaseParameter, Estimator, IdentifyError, Options};
+use super::{BaseParameter, Estimator, IdentifyError, NotExcited, Options};
 use crate::prepare::Recording;
 
 /// A residual that is so many times that of the weighted fit calls for a warning.
@@ -74,6 +75,7 @@ pub(super) struct Further {
     pub essential: Option<EssentialSet>,
     pub standard: Option<StandardSet>,
     pub comparison: Option<Comparison>,
+    pub hardly_excited: Vec<NotExcited>,
     pub procedure: Vec<String>,
     pub warnings: Vec<String>,
 }
@@ -116,11 +118,14 @@ pub(super) fn further(
     let estimator = problem.options.estimator;
     let wanted = problem.robot.joints.len() > 1
         || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
+    let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
+    if problem.robot.joints.len() > 1 {
+        further.hardly_excited = hardly_excited(base, data, &prior, &tempered, &names);
+    }
     if wanted {
         let found = match own.as_ref().and_then(|o| o.fitted.standard.as_ref()) {
             Some(standard) if estimator == Estimator::Consistent => Ok(standard.clone()),
             _ => {
-                let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
                 let problem = match estimator {
                     // Rows know a little of what counts as not excited, too.
                     Estimator::Ols | Estimator::Weighted => quadratic(&tempered, base),

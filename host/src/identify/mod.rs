@@ -78,6 +78,7 @@ pub use solve::identify;
 pub use standard::{StandardParameter, StandardSet};
 
 use crate::prepare::{Masked, PrepareError, PrepareOptions, Survey, Treatment};
+use crate::robot::Robot;
 
 /// Which equations are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -129,6 +130,23 @@ impl Estimator {
         Self::Ridge,
         Self::Consistent,
     ];
+
+    /// The estimator that is used for `robot` where none is asked for: weighted least squares, which needs no prior. Several
+    /// joints are seldom all excited; where the description states the inertial values of every link, `ridge` takes from
+    /// it what the data do not say, as far as the data themselves speak for the description.
+    pub fn for_robot(robot: &Robot) -> Self {
+        let stated = robot.joints.iter().all(|joint| {
+            joint
+                .inertial
+                .as_ref()
+                .is_some_and(|inertial| inertial.mass > 0.0)
+        });
+        if robot.joints.len() > 1 && stated {
+            Self::Ridge
+        } else {
+            Self::Weighted
+        }
+    }
 
     /// As the command line and `identification.json` name it.
     pub fn name(self) -> &'static str {
@@ -375,10 +393,10 @@ pub struct JointFigures {
     pub holdout_relative_error: Option<f64>,
 }
 
-/// A combination that these data say nothing about.
+/// A combination that these data say nothing about, or less than the description does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotExcited {
-    /// The base parameter that was not identified on its own.
+    /// The base parameter that was not identified on its own, or that the data hardly touch.
     pub combination: String,
     /// Why.
     pub why: String,

@@ -34,6 +34,9 @@ pub(super) struct Prior {
     pub centre: Vec<f64>,
     /// Natural size of each column: what "100 %" means.
     pub scale: Vec<f64>,
+    /// What a column's value can plausibly be: `scale`, for unstated friction, drive inertia and offset what would make all
+    /// of the joint's torque.
+    pub size: Vec<f64>,
     /// Relative uncertainty of each column; infinite where nothing is known.
     pub uncertainty: Vec<f64>,
     /// Rules.
@@ -77,6 +80,7 @@ impl Prior {
         let mut prior = Self {
             centre: described.clone(),
             scale: vec![1.0; columns],
+            size: Vec::new(),
             uncertainty: vec![given; columns],
             rules: vec![Rule::NotNegative; columns],
             shares,
@@ -88,6 +92,7 @@ impl Prior {
         for i in 0..n {
             prior.link(robot, i, given);
         }
+        let mut sizes = vec![0.0; columns];
         for c in 0..columns {
             // Motor columns follow the standard ones, three a joint: inertia, viscous, Coulomb.
             let (joint, place) = if c < n * COLUMNS {
@@ -134,7 +139,11 @@ impl Prior {
                 SMALL_SHARE * size
             };
             prior.scale[c] = prior.centre[c];
+            sizes[c] = size;
         }
+        prior.size = (prior.scale.iter().zip(&sizes))
+            .map(|(scale, size)| scale.max(*size))
+            .collect();
         prior
     }
 

@@ -93,8 +93,11 @@ pub fn identify(
     };
     let wide = decided;
     let explained = match options.prepare.decimation {
-        Choice::Auto => explained_band(training, &plan_with(&wide, 1))?,
-        Choice::Fixed(_) => None,
+        // A narrow band smears the rows that a robust fit is to leave out over their neighbours.
+        Choice::Auto if options.estimator != Estimator::Robust => {
+            explained_band(training, &plan_with(&wide, 1))?
+        }
+        _ => None,
     };
     let decided = match explained {
         Some(band) => {
@@ -275,7 +278,7 @@ pub fn identify(
                 / estimate.values[k].abs(),
         })
         .collect();
-    let not_excited = not_excited(&base, &data);
+    let mut not_excited = not_excited(&base, &data);
     let beyond = further(
         &problem,
         own,
@@ -294,6 +297,7 @@ pub fn identify(
         },
         holdout,
     )?;
+    not_excited.extend(beyond.hardly_excited);
     let mut warnings = beyond.warnings;
     warnings.extend(
         surveys

@@ -207,10 +207,10 @@ fn not_excited(found: &Identification) -> Section {
     Section::new(
         "not-excited",
         "What was not excited",
-        "These data do not tell the following combinations apart from others, so no value is given for them.",
+        "These data do not tell the following combinations apart from others, or say less of them than is known without data. A value given for one of the latter is noise with least squares, and mostly the description's with ridge and consistent.",
     )
     .with(Block::Table(Table {
-        caption: "Combinations without a value of their own".into(),
+        caption: "Combinations that the motion does not show".into(),
         columns: vec![
             Column::text("Combination"),
             Column::text("Why"),
