@@ -5,8 +5,8 @@
 
 use rig_shared::safety::SnapshotSample;
 
-/// Control ticks that the capture keeps: 0.2 s at 10 kHz.
-pub const CAPTURE_TICKS: usize = 2048;
+/// Control ticks that the capture keeps: 0.15 s at 10 kHz.
+pub const CAPTURE_TICKS: usize = 1536;
 
 /// A tick in less memory: its number follows from its place, its position from the trigger's.
 #[derive(Clone, Copy, Debug)]

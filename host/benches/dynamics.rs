@@ -13,7 +13,7 @@ use rig_shared::multibody::{
 };
 
 /// Samples of a call of the batch; criterion prints the rate in samples, and the time of the whole call.
-const SAMPLES: usize = 1024;
+const SAMPLES: usize = 1000;
 
 fn scalar(criterion: &mut Criterion) {
     for arm in [arms::ur5e(), arms::panda()] {

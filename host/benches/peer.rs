@@ -15,7 +15,7 @@ use rig_host::batch::{BatchError, ChainBatch, ModelBatch};
 use rig_shared::multibody::{COLUMNS, column};
 
 /// Samples of a call; the other side walks through as many. Results stay in the cache on both sides.
-const SAMPLES: usize = 1024;
+const SAMPLES: usize = 1000;
 /// Samples of a recording, for what is stored in memory.
 const RECORDING: usize = 10_000;
 /// Motions whose results are compared.
@@ -23,11 +23,14 @@ const CHECKED: usize = 64;
 /// Columns that both sides know: the inertial ones.
 const INERTIAL: usize = column::DRIVE_INERTIA;
 
-/// The least time of many calls, in ns a sample, over a quarter of a second: what else the machine does only ever adds.
+/// The least time of many calls, in ns a sample, over a quarter of a second and five calls at least: what else the
+/// machine does only ever adds.
 fn nanoseconds(samples: usize, mut call: impl FnMut()) -> f64 {
     let begin = Instant::now();
     let mut least = f64::INFINITY;
-    while begin.elapsed() < Duration::from_millis(250) {
+    let mut calls = 0;
+    while calls < 5 || begin.elapsed() < Duration::from_millis(250) {
+        calls += 1;
         let start = Instant::now();
         call();
         least = least.min(start.elapsed().as_secs_f64() * 1e9 / samples as f64);

@@ -279,13 +279,19 @@ fn a_recording_is_not_overwritten_and_a_strange_joint_is_not_moved() {
         fs::read_to_string(at("precious.csv")).unwrap(),
         "measured once"
     );
-    crate::run::succeed(
-        rig()
+    let excite = || {
+        let mut command = rig();
+        command
             .args(["excite", "--kind", "reversals", "--robot"])
             .arg(robot("one-link.toml"))
             .arg("--out")
-            .arg(at("motion.toml")),
-    );
+            .arg(at("motion.toml"));
+        command
+    };
+    crate::run::succeed(&mut excite());
+    // Nor is a designed motion.
+    names(&refuse(&mut excite()), &["motion.toml", "--force"]);
+    crate::run::succeed(excite().arg("--force"));
     let text = fs::read_to_string(at("motion.toml")).unwrap();
     fs::write(at("elbow.toml"), text.replace("\"link\"", "\"elbow\"")).unwrap();
     let mut command = record(&at("new.csv"));

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 namespace pin = pinocchio;
 
-constexpr int SAMPLES = 1024;
+constexpr int SAMPLES = 1000;
 constexpr int RECORDING = 10000;
 
 struct Check {
@@ -128,7 +128,7 @@ template <class F> void time(const Arm &arm, const char *function, int samples, 
     using clock = std::chrono::steady_clock;
     const auto begin = clock::now();
     double least = INFINITY;
-    while (clock::now() - begin < std::chrono::milliseconds(250)) {
+    for (int calls = 0; calls < 5 || clock::now() - begin < std::chrono::milliseconds(250); calls++) {
         const auto start = clock::now();
         walk();
         least = std::min(least, std::chrono::duration<double, std::nano>(clock::now() - start).count() / samples);

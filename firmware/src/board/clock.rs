@@ -45,6 +45,9 @@ pub(crate) fn boost() {
     PWR.cr5().modify(|w| w.0 &= !(1 << 8));
 }
 
+/// The tasks that may not wait for the others.
+pub(crate) const TASK_PRIORITY: Priority = Priority::P10;
+
 /// What the chip's start is told.
 pub(crate) fn config(crystal: bool) -> Config {
     let mut config = Config::default();

@@ -21,7 +21,7 @@ fn panic(_info: &PanicInfo) -> ! {
 /// `defmt`'s own assertions end here too.
 #[defmt::panic_handler]
 fn defmt_panic() -> ! {
-    core::panic!()
+    fault()
 }
 
 // A fault of the processor. The stack may be what has failed, so it is set to its beginning first, and nothing

@@ -104,17 +104,17 @@ fn hand_over(
     decoded: Option<Result<Request, DecodeError>>,
     requests: &mut Producer<'static, Examined>,
 ) {
-    match decoded {
-        None => {}
+    let taken = match decoded {
+        None => true,
         // Unanswered, the host repeats it.
         Some(Err(_)) => {
             BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
+            true
         }
-        Some(Ok(request)) => {
-            if requests.enqueue(examine(request)).is_err() {
-                defmt::warn!("more requests than can be served");
-            }
-        }
+        Some(Ok(request)) => requests.enqueue(examine(request)).is_ok(),
+    };
+    if !taken {
+        defmt::warn!("more requests than can be served");
     }
 }
 

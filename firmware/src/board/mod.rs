@@ -1,5 +1,6 @@
 //! Everything that knows the chip. `unsafe` stands only where hardware needs it, with the reason beside it.
 
+mod accelerated;
 mod adc;
 mod clock;
 mod cycles;

@@ -1,7 +1,8 @@
 //! From reset to the first tick.
 
-use embassy_executor::Executor;
-use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_executor::{Executor, InterruptExecutor};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::InterruptExt;
 use embassy_time::{Duration, Ticker};
 use heapless::spsc;
 use rig_firmware::capture::Capture;
@@ -15,7 +16,7 @@ use rig_shared::estimation::OneLinkEstimator;
 use static_cell::{ConstStaticCell, StaticCell};
 
 use super::adc::Converter;
-use super::clock::{self, LINK_PRIORITY};
+use super::clock::{self, LINK_PRIORITY, TASK_PRIORITY};
 use super::encoder::EncoderTimer;
 use super::health::{Checkup, Start};
 use super::pins::Pins;
@@ -34,6 +35,8 @@ static CAPTURE: ConstStaticCell<Capture> = ConstStaticCell::new(Capture::new());
 static NOTE_QUEUE: StaticCell<spsc::Queue<Note, { NOTES + 1 }>> = StaticCell::new();
 static REQUEST_QUEUE: StaticCell<spsc::Queue<Examined, { REQUESTS + 1 }>> = StaticCell::new();
 static STORE_QUEUE: StaticCell<spsc::Queue<Settings, 2>> = StaticCell::new();
+/// Tasks that may not wait while a trajectory is being examined, which takes some 0.1 s.
+static PUNCTUAL: InterruptExecutor = InterruptExecutor::new();
 static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
 /// Brings the board up and runs it.
@@ -87,22 +90,34 @@ pub(crate) fn run() -> ! {
         to_store: Inlet(to_store),
     });
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
+    // Each is spawned once, and its place is reserved at compile time.
+    let placed = (
+        link::telemetry(config, sender, probe_out, note_out),
+        indicator(watchdog, pins.led),
+        link::commands(receiver, probe_in, request_in),
+        keeper(storage, from_tick),
+    );
+    let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(keeper)) = placed else {
+        unreachable!()
+    };
+    interrupt::CORDIC.set_priority(TASK_PRIORITY);
+    let punctual = PUNCTUAL.start(interrupt::CORDIC);
+    punctual.spawn(telemetry);
+    punctual.spawn(indicator);
     EXECUTOR.init(Executor::new()).run(|spawner| {
-        // Each is spawned once, and its place is reserved at compile time.
-        let placed = (
-            link::telemetry(config, sender, probe_out, note_out),
-            link::commands(receiver, probe_in, request_in),
-            indicator(watchdog, pins.led),
-            keeper(storage, from_tick),
-        );
-        let (Ok(telemetry), Ok(commands), Ok(indicator), Ok(keeper)) = placed else {
-            unreachable!()
-        };
-        spawner.spawn(telemetry);
         spawner.spawn(commands);
-        spawner.spawn(indicator);
         spawner.spawn(keeper);
     })
+}
+
+/// Runs the punctual tasks: the interrupt of a peripheral that is not used, raised by software.
+#[interrupt]
+fn CORDIC() {
+    // This is the interrupt that the executor was started with.
+    #[allow(unsafe_code)]
+    unsafe {
+        PUNCTUAL.on_interrupt();
+    }
 }
 
 /// The state at power on, made in its place: it is half as large as the stack.

@@ -6,8 +6,11 @@ use embassy_stm32::Peri;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 
-/// Longest silence of any part, µs: a thousand control ticks, and several times the slowest part's own period.
+/// Longest silence of the tick or the telemetry, µs: a thousand control ticks.
 const PATIENCE_US: u32 = 100_000;
+/// Feedings in a row that the command task may miss: it examines a trajectory in up to 0.2 s. At 100 a second
+/// they are half a second.
+const COMMANDS_MAY_MISS: u32 = 50;
 
 /// Parts that report, one bit each.
 #[derive(Clone, Copy)]
@@ -33,6 +36,7 @@ pub(crate) fn report(part: Part) {
 
 /// The watchdog.
 pub(crate) struct Watchdog {
+    missed: u32,
     inner: IndependentWatchdog<'static, IWDG>,
 }
 
@@ -41,14 +45,19 @@ impl Watchdog {
     pub(crate) fn start(peripheral: Peri<'static, IWDG>) -> Self {
         let mut inner = IndependentWatchdog::new(peripheral, PATIENCE_US);
         inner.unleash();
-        Self { inner }
+        Self { missed: 0, inner }
     }
 
     /// Feeds it if every part has reported.
     pub(crate) fn feed(&mut self) {
-        if REPORTED.load(Ordering::Relaxed) == ALL {
-            REPORTED.store(0, Ordering::Relaxed);
-            self.inner.pet();
+        let reported = REPORTED.load(Ordering::Relaxed);
+        let commands = reported & Part::Commands as u8 != 0;
+        let all_but_commands = reported | Part::Commands as u8 == ALL;
+        if !all_but_commands || (!commands && self.missed >= COMMANDS_MAY_MISS) {
+            return;
         }
+        REPORTED.store(0, Ordering::Relaxed);
+        self.missed = if commands { 0 } else { self.missed + 1 };
+        self.inner.pet();
     }
 }

@@ -6,20 +6,20 @@ use std::f64::consts::FRAC_PI_2;
 use rig_shared::multibody::{COLUMNS, Chain, JointGeometry, JointKind};
 
 /// An arm and what is known of it.
-pub struct Arm {
-    pub name: &'static str,
-    pub geometry: Vec<JointGeometry>,
-    pub parameters: Vec<[f64; COLUMNS]>,
+pub(crate) struct Arm {
+    pub(crate) name: &'static str,
+    pub(crate) geometry: Vec<JointGeometry>,
+    pub(crate) parameters: Vec<[f64; COLUMNS]>,
 }
 
-pub const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+pub(crate) const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
 impl Arm {
-    pub fn chain(&self) -> Chain<f64> {
+    pub(crate) fn chain(&self) -> Chain<f64> {
         Chain::new(&self.geometry, GRAVITY).unwrap()
     }
 
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.geometry.len()
     }
 }
@@ -59,7 +59,7 @@ fn link(mass: f64, c: [f64; 3], at_centre: [f64; 6]) -> [f64; COLUMNS] {
 /// UR5e: lengths, masses and centres of mass as Universal Robots publishes them ("Parameters for calculations of
 /// kinematics and dynamics", article 45257), brought into modified Denavit–Hartenberg frames. The inertias, which the
 /// maker does not publish, are representative: solid cylinders of the link's mass.
-pub fn ur5e() -> Arm {
+pub(crate) fn ur5e() -> Arm {
     let geometry = [
         (0.0, 0.0, 0.1625),
         (FRAC_PI_2, 0.0, 0.0),
@@ -100,7 +100,7 @@ pub fn ur5e() -> Arm {
 /// Franka Emika Panda: lengths from the maker's documentation ("Robot and interface specifications"), inertial
 /// parameters identified by Gaz, Cognetti, Oliva, Robuffo Giordano & De Luca (2019), IEEE Robotics and Automation
 /// Letters 4(4), 4147–4154, as franka_description lists them.
-pub fn panda() -> Arm {
+pub(crate) fn panda() -> Arm {
     let geometry = [
         (0.0, 0.0, 0.333),
         (-FRAC_PI_2, 0.0, 0.0),
@@ -157,7 +157,7 @@ pub fn panda() -> Arm {
 }
 
 /// Positions, velocities and accelerations, one column a joint: three sines each, within ±2 rad.
-pub fn motion(joints: usize, samples: usize) -> [Vec<Vec<f64>>; 3] {
+pub(crate) fn motion(joints: usize, samples: usize) -> [Vec<Vec<f64>>; 3] {
     let mut signals = [(); 3].map(|()| vec![vec![0.0; samples]; joints]);
     for j in 0..joints {
         for k in 0..samples {

@@ -218,8 +218,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     refuse_driving_friction(&robot, &identification)?;
     folder(&args.out)?;
-    let (identified, remarks) = identified_robot(&robot, &identification);
+    let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
+    // A full set of parameters is a body each; combinations alone would not be.
+    let mut urdf = None;
+    if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
+        match identified.to_urdf() {
+            Ok(found) => {
+                remarks.extend(found.remarks);
+                urdf = Some(found.text);
+            }
+            Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
+        }
+    }
     let context = Context {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
@@ -232,10 +243,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     write_whole(&args.out.join("identified.toml"), text.as_bytes())?;
-    // A full set of parameters is a body each; combinations alone would not be.
-    if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
-        let urdf = identified.to_urdf()?;
-        write_whole(&args.out.join("identified.urdf"), urdf.text.as_bytes())?;
+    if let Some(urdf) = urdf {
+        write_whole(&args.out.join("identified.urdf"), urdf.as_bytes())?;
     }
     write_whole(
         &args.out.join("identification.json"),

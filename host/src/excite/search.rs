@@ -28,7 +28,7 @@ const FINALIST_SHARE: usize = 6;
 const LEAST_FINALISTS: usize = 3;
 /// Samples per period of the fastest harmonic for the first improvement: enough to rank the starts.
 const COARSE: usize = 16;
-/// And to the end; see `MARGIN` in [`super::problem`].
+/// And to the end; see `MARGIN` in `problem/constraints.rs`.
 const FINE: usize = 48;
 /// Samples per period of the fastest harmonic from which the reported values are computed.
 const REPORT_SAMPLES: usize = 200;

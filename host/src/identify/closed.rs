@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, Chain};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS};
 
 use super::IdentifyError;
 use super::consistent::{Quadratic, consistent};
@@ -12,7 +13,7 @@ use super::twin::Companion;
 use crate::data::Block;
 use crate::prepare::{LowPass, PrepareError};
 use crate::robot::{Controller, Robot};
-use crate::simulate::{Model, Stepper};
+use crate::simulate::{Model, Motors, Stepper};
 use crate::validate::added_torque;
 
 /// Rows through which a parabola is laid for the first state of a stretch.
@@ -54,10 +55,7 @@ impl Source {
             .iter()
             .filter_map(|j| j.controller.clone())
             .collect();
-        // Drives that act on several joints have columns after the standard ones; the simulation knows none of them.
-        let coupled = (n * COLUMNS..problem.base.combination.ncols())
-            .any(|c| problem.base.combination.column(c).iter().any(|k| *k != 0.0));
-        if referenced && controllers.len() == n && !coupled {
+        if referenced && controllers.len() == n {
             return Ok((
                 Self::Loop(controllers),
                 "the closed loop of the identified model and the description's controllers, driven by the recorded reference".into(),
@@ -66,14 +64,7 @@ impl Source {
         if referenced {
             return Ok((
                 Self::Reference,
-                format!(
-                    "the recorded reference, which the loop of the identified model and a computed-torque controller designed from it follows ({})",
-                    if coupled {
-                        "drives coupled to several joints are not simulated"
-                    } else {
-                        "the description has no [joint.controller] for every joint"
-                    }
-                ),
+                "the recorded reference, which the loop of the identified model and a computed-torque controller designed from it follows (the description has no [joint.controller] for every joint)".into(),
             ));
         }
         let treatment = problem.plan.treatment;
@@ -109,19 +100,31 @@ pub(super) fn nearest(
     Ok(consistent(&data, prior)?.parameters)
 }
 
-/// Standard parameters as a model to simulate.
-pub(super) fn model_of(chain: &Chain<f64>, standard: &[f64]) -> Model {
-    Model {
+/// Standard parameters as a model to simulate, with the drives of `robot`.
+///
+/// # Errors
+/// [`IdentifyError::Model`] where the drives make no transmission.
+pub(super) fn model_of(
+    robot: &Robot,
+    chain: &Chain<f64>,
+    standard: &[f64],
+) -> Result<Model, IdentifyError> {
+    let (joints, motors) = standard.split_at(robot.joints.len() * COLUMNS);
+    let motors = if robot.drive_kinds().iter().all(|k| *k == DriveKind::Simple) {
+        None
+    } else {
+        Some(Motors {
+            transmission: robot
+                .transmission()
+                .map_err(|e| IdentifyError::Model(e.to_string()))?,
+            parameters: motors.as_chunks::<MOTOR_COLUMNS>().0.to_vec(),
+        })
+    };
+    Ok(Model {
         chain: chain.clone(),
-        parameters: standard
-            .as_chunks::<COLUMNS>()
-            .0
-            .iter()
-            .take(chain.joint_count())
-            .copied()
-            .collect(),
-        motors: None,
-    }
+        parameters: joints.as_chunks::<COLUMNS>().0.to_vec(),
+        motors,
+    })
 }
 
 /// Simulates block after block; the state carries over where a block continues the one before.

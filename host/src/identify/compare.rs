@@ -228,10 +228,7 @@ pub(super) fn compare(
     let endogeneity = instrumental
         .as_ref()
         .and_then(|iv| endogeneity(&weighted, iv, names));
-    let weak = instrumental.as_ref().is_some_and(|iv| {
-        iv.warnings.iter().any(|w| w.contains("weak"))
-            || iv.said.iter().any(|s| s.contains("low-pass"))
-    });
+    let weak = instrumental.as_ref().is_some_and(|iv| iv.doubtful);
     let (recommended, recommendation) = recommend(&rows, endogeneity.as_ref(), weak);
     Ok(Comparison {
         folds: parts.count,
@@ -287,11 +284,18 @@ fn endogeneity(weighted: &Fitted, iv: &Fitted, names: &[String]) -> Option<Endog
     })
 }
 
-/// Mean square of the relative errors over the joints.
+/// Geometric mean of the relative errors over the joints, so that strong and weak ones count alike: on the hold-out
+/// where there is one, which a repeated motion cannot flatter, else cross-validated.
 fn score(row: &Compared) -> Option<f64> {
-    let errors = row.cross_validated_relative_error.as_ref()?;
-    let squares = DVector::from_column_slice(errors).norm_squared();
-    Some((squares / errors.len() as f64).sqrt())
+    let errors = row
+        .holdout_relative_error
+        .as_ref()
+        .or(row.cross_validated_relative_error.as_ref())?;
+    let logarithms = DVector::from_iterator(
+        errors.len(),
+        errors.iter().map(|e| e.max(f64::MIN_POSITIVE).ln()),
+    );
+    Some((logarithms.sum() / errors.len().max(1) as f64).exp())
 }
 
 /// The result to trust, and why.
@@ -302,6 +306,12 @@ fn recommend(
 ) -> (Estimator, String) {
     let of = |e: Estimator| rows.iter().find(|r| r.estimator == e);
     let error = |e: Estimator| of(e).and_then(score);
+    let held = rows.iter().any(|r| r.holdout_relative_error.is_some());
+    let judge = if held {
+        "error on the data held back"
+    } else {
+        "cross-validated error"
+    };
     let percent = |e: f64| format!("{:.2} %", 100.0 * e);
     let plain = error(Estimator::Weighted).unwrap_or(f64::INFINITY);
     let far = of(Estimator::Weighted).and_then(|r| r.distance_to_consistent);
@@ -315,7 +325,7 @@ fn recommend(
         return (
             Estimator::Iv,
             format!(
-                "Trust iv: least squares is biased by noise that passes into its regressor, instrumental variables are not; that their cross-validated error is {} against {} does not speak against them, because the bias helps to predict rows with the same noise.",
+                "Trust iv: least squares is biased by noise that passes into its regressor, instrumental variables are not; that their {judge} is {} against {} does not speak against them, because the bias helps to predict rows with the same noise.",
                 percent(iv),
                 percent(plain)
             ),
@@ -332,7 +342,7 @@ fn recommend(
             return (
                 Estimator::Consistent,
                 format!(
-                    "Trust consistent: it predicts stretches left out of the fit to {} against {} of the weighted fit, because what the motion leaves open is decided by what a body can be.{note}",
+                    "Trust consistent: its {judge} is {} against {} of the weighted fit, because what the motion leaves open is decided by what a body can be.{note}",
                     percent(bound),
                     percent(plain)
                 ),
@@ -353,7 +363,7 @@ fn recommend(
             return (
                 Estimator::Weighted,
                 format!(
-                    "Trust weighted for prediction only: no body has its parameters ({:.1} standard deviations from the nearest that one has), and requiring one raises the cross-validated error from {} to {}, so something is missing in the model.{note}",
+                    "Trust weighted for prediction only: no body has its parameters ({:.1} standard deviations from the nearest that one has), and requiring one raises the {judge} from {} to {}, so something is missing in the model.{note}",
                     far.unwrap_or(f64::NAN),
                     percent(plain),
                     percent(bound)
@@ -364,7 +374,7 @@ fn recommend(
     (
         Estimator::Weighted,
         format!(
-            "Trust weighted: its parameters are those of bodies that can exist, its cross-validated error is {}, and {}.{note}",
+            "Trust weighted: its parameters are those of bodies that can exist, its {judge} is {}, and {}.{note}",
             percent(plain),
             if biased.is_none() && endogeneity.is_some() {
                 "instrumental variables agree with it"

@@ -17,10 +17,14 @@
 //! where that is perpendicular to the first; that of a prismatic joint of fixed direction, perpendicular to the prismatic
 //! ones before it, is the mass it moves less what moves along, but for gravity, which its constant torque `off` states.
 //!
-//! Parameters of the motors of coupled drives are taken as independent of all others: no rules are published for them.
+//! No rules are published for motors of coupled drives. Here: the inertia of one of constant ratios is a fixed quadratic form
+//! in the joint velocities. It joins what has such a form too (`Ia`, and `Izz` of links whose turning about their own axis
+//! is a fixed sum of joint velocities: those that turn about one direction, and those that turn about a second one
+//! perpendicular to it), where the forms add up to it. Everything else of the motors is taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};
+use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission, motor_column};
 
 use super::base::chain_of;
 use super::{Base, IdentifyError};
@@ -58,6 +62,7 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     for j in 0..n {
         walk.link(j);
     }
+    let spins = walk.spins;
     let mut columns = walk.columns;
     for j in 0..n {
         if !transmission.has_joint_inertia(j) {
@@ -66,9 +71,11 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     }
     // Columns of the motors: zero where the drive is simple.
     for c in n * COLUMNS..width {
-        let simple = transmission.kind((c - n * COLUMNS) / 3)
-            == Some(rig_shared::transmission::DriveKind::Simple);
+        let simple = transmission.kind((c - n * COLUMNS) / 3) == Some(DriveKind::Simple);
         columns.push(unit(width, c, if simple { 0.0 } else { 1.0 }));
+    }
+    if motors > 0 {
+        join_motors(&transmission, &spins, &mut columns)?;
     }
     let kept: Vec<usize> = (0..width).filter(|&c| columns[c][c] == 1.0).collect();
     let combination = DMatrix::from_fn(kept.len(), width, |row, c| columns[c][kept[row]]);
@@ -78,6 +85,89 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
         kinds: robot.joints.iter().map(|j| j.kind).collect(),
         drives: robot.drive_kinds(),
     })
+}
+
+/// Replaces the inertia of coupled motors by what has the same quadratic form, where there is such.
+fn join_motors(
+    transmission: &Transmission<f64>,
+    spins: &[Option<Vec<f64>>],
+    columns: &mut [Combination],
+) -> Result<(), IdentifyError> {
+    let n = spins.len();
+    let square = |v: &[f64]| DMatrix::from_fn(n, n, |i, j| v[i] * v[j]);
+    // Columns of constant form, with their forms.
+    let mut forms: Vec<(usize, DMatrix<f64>)> = Vec::new();
+    for (j, spin) in spins.iter().enumerate() {
+        if let Some(spin) = spin {
+            forms.push((j * COLUMNS + ZZ, square(spin)));
+        }
+        if transmission.has_joint_inertia(j) {
+            let mut own = vec![0.0; n];
+            own[j] = 1.0;
+            forms.push((j * COLUMNS + column::DRIVE_INERTIA, square(&own)));
+        }
+    }
+    let mut directions = vec![0.0; n * n];
+    let coupled = |k: usize| transmission.kind(k) == Some(DriveKind::Coupled);
+    // A screw's direction is not asked for; its position need not be one that it can have.
+    transmission
+        .motor_directions(&vec![0.0; n], &mut directions)
+        .map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let ratios = |k: usize| &directions[k * n..(k + 1) * n];
+    for k in (0..n).filter(|k| coupled(*k)) {
+        let mut form = square(ratios(k));
+        for i in (0..n).filter(|i| *i != k) {
+            form[(i, i)] -= ratios(k)[i].powi(2);
+        }
+        let own = n * COLUMNS + MOTOR_COLUMNS * k + motor_column::INERTIA;
+        join(own, form, &mut forms, columns);
+    }
+    // Viscous friction is such a form too, of the joints' its squares.
+    let mut forms: Vec<(usize, DMatrix<f64>)> = Vec::new();
+    for j in 0..n {
+        let mut own = vec![0.0; n];
+        own[j] = 1.0;
+        forms.push((j * COLUMNS + column::VISCOUS, square(&own)));
+    }
+    for k in (0..n).filter(|k| coupled(*k)) {
+        let mut form = square(ratios(k));
+        for i in 0..n {
+            form[(i, i)] = 0.0;
+        }
+        let own = n * COLUMNS + MOTOR_COLUMNS * k + motor_column::VISCOUS;
+        join(own, form, &mut forms, columns);
+    }
+    Ok(())
+}
+
+/// Column `own` as a combination of others where their forms add up to its form; else it is one of them from now on.
+fn join(
+    own: usize,
+    form: DMatrix<f64>,
+    forms: &mut Vec<(usize, DMatrix<f64>)>,
+    columns: &mut [Combination],
+) {
+    let entries = form.len();
+    let wanted = DMatrix::from_column_slice(entries, 1, form.as_slice());
+    let there = DMatrix::from_fn(entries, forms.len(), |entry, c| {
+        forms[c].1.as_slice()[entry]
+    });
+    let scale = wanted.amax();
+    let found = there.clone().svd(true, true).solve(&wanted, EXACT).ok();
+    match found.filter(|x| (&there * x - &wanted).amax() < EXACT * scale) {
+        Some(factors) => {
+            let mut combination = vec![0.0; columns[own].len()];
+            for ((c, _), factor) in forms.iter().zip(factors.iter()) {
+                // Rounding of the solution.
+                if factor.abs() > EXACT {
+                    let from = columns[*c].clone();
+                    add(&mut combination, *factor, &from);
+                }
+            }
+            columns[own] = combination;
+        }
+        None => forms.push((own, form)),
+    }
 }
 
 /// Whether two sets of base parameters say the same: equally many, and each a combination of the others.
@@ -106,6 +196,7 @@ fn add(to: &mut Combination, factor: f64, from: &Combination) {
 }
 
 /// Which directions the links turn about so far.
+#[derive(Clone, Copy)]
 enum Turning {
     Nothing,
     /// About this direction of the base, by the first revolute joint.
@@ -126,6 +217,12 @@ struct Walk<'a> {
     slides: Vec<Vector3<f64>>,
     /// Axes of the revolute joints so far: point and direction in the base at q = 0.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// Joints of these axes.
+    turners: Vec<usize>,
+    /// Joint that first turned about another direction, while those after it turn about the same.
+    second: Option<usize>,
+    /// Per joint, factors of the joint velocities in its link's turning about its own axis, where they are constant.
+    spins: Vec<Option<Vec<f64>>>,
 }
 
 impl<'a> Walk<'a> {
@@ -139,6 +236,9 @@ impl<'a> Walk<'a> {
             pose: Isometry3::identity(),
             slides: Vec::new(),
             axes: Vec::new(),
+            turners: Vec::new(),
+            second: None,
+            spins: Vec::new(),
         }
     }
 
@@ -173,7 +273,7 @@ impl<'a> Walk<'a> {
         own[column::MASS] = self.carried(j, step, &[(column::MASS, 1.0)]);
         own[3] = self.carried(j, step, &[(3, 1.0)]);
         let round = self.carried(j, step, &[(XX, 1.0), (YY, 1.0)]);
-        let before = std::mem::replace(&mut self.turning, Turning::Many);
+        let before = self.turning;
         self.turning = match before {
             Turning::Nothing => {
                 own[column::DRIVE_INERTIA] = own[ZZ].clone();
@@ -189,6 +289,9 @@ impl<'a> Walk<'a> {
             Turning::Many => Turning::Many,
         };
         self.axes.push((self.pose.translation.vector, z));
+        self.turners.push(j);
+        let spin = self.spin(j, &before, z);
+        self.spins.push(spin);
         if let Turning::One(a) = &self.turning {
             for c in [XX, XY, XZ, YZ] {
                 own[c] = nothing.clone();
@@ -260,6 +363,7 @@ impl<'a> Walk<'a> {
             own[column::DRIVE_INERTIA] = combination;
         }
         self.slides.push(z);
+        self.spins.push(None);
         own
     }
 
@@ -280,6 +384,32 @@ impl<'a> Walk<'a> {
             }
         }
         result
+    }
+
+    /// Factors of the joint velocities in the turning of revolute link `j` about its own axis; none where they change
+    /// with the position.
+    fn spin(&mut self, j: usize, before: &Turning, z: Vector3<f64>) -> Option<Vec<f64>> {
+        let first = match (&self.turning, before) {
+            (Turning::Nothing | Turning::One(_), _) => 0,
+            (Turning::Many, Turning::One(a)) if a.dot(&z).abs() < EXACT => j,
+            (Turning::Many, Turning::Many) => self.second?,
+            (Turning::Many, _) => return None,
+        };
+        let mut factors = vec![0.0; self.geometry.len()];
+        for (&i, (_, axis)) in self.turners.iter().zip(&self.axes) {
+            if i < first {
+                continue;
+            }
+            if axis.cross(&z).norm() > EXACT {
+                self.second = None;
+                return None;
+            }
+            factors[i] = axis.dot(&z);
+        }
+        if first > 0 {
+            self.second = Some(first);
+        }
+        Some(factors)
     }
 
     /// Whether the origin of the link does not move across a, the one direction that links turn about.

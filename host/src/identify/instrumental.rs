@@ -36,7 +36,7 @@ pub(super) fn each_simulated(
 ) -> Result<(), IdentifyError> {
     match source {
         Source::Loop(controllers) => {
-            let model = model_of(problem.plan.chain, standard);
+            let model = model_of(problem.robot, problem.plan.chain, standard)?;
             let make = |r: usize| {
                 let period = 1.0 / problem.surveys[r].sample_rate;
                 Ok(
@@ -144,7 +144,10 @@ pub(super) fn instrumental(
                 if passes == 1 { "" } else { "es" }
             )];
             said.push(drift.words(problem));
-            return fitted(problem, &all.whole, kept, &measured, said, warnings);
+            let doubtful = strength < WEAK || matches!(source, Source::Smoothed(_));
+            return fitted(
+                problem, &all.whole, kept, &measured, said, warnings, doubtful,
+            );
         }
     }
 }
@@ -201,6 +204,7 @@ fn fitted(
     measured: &LeaveOut,
     said: Vec<String>,
     warnings: Vec<String>,
+    doubtful: bool,
 ) -> Result<Fitted, IdentifyError> {
     let size = kept.whole.len();
     let (r, _) = factor.system();
@@ -225,5 +229,6 @@ fn fitted(
         regressor: triangle(&measured.whole, data),
         said,
         warnings,
+        doubtful,
     })
 }

@@ -319,7 +319,7 @@ pub enum IdentifyError {
     },
     /// Output error without a closed loop.
     #[error(
-        "Estimator output-error simulates the closed loop: every joint needs a [joint.controller] in the description, no drive that acts on several joints, and a column ref<k> in every recording; use iv, which makes do with less."
+        "Estimator output-error simulates the closed loop: every joint needs a [joint.controller] in the description and a column ref<k> in every recording; use iv, which makes do with less."
     )]
     NoLoop,
     /// The identified model cannot be simulated.

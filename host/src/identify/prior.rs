@@ -226,7 +226,7 @@ impl Prior {
 }
 
 /// The description's standard parameters, those of motors behind them where there are columns for them.
-pub(super) fn described(robot: &Robot, columns: usize) -> DVector<f64> {
+fn described(robot: &Robot, columns: usize) -> DVector<f64> {
     let mut all = robot.standard_parameters().concat();
     all.extend(robot.motor_parameters().concat());
     all.truncate(columns);
@@ -235,7 +235,7 @@ pub(super) fn described(robot: &Robot, columns: usize) -> DVector<f64> {
 
 /// Where a drive moves other joints too, their columns hold its inertia and viscous friction by the square of the
 /// ratio; see [`rig_shared::transmission`].
-pub(super) fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
+fn shares(robot: &Robot, columns: usize) -> Option<DMatrix<f64>> {
     let n = robot.joints.len();
     if columns <= n * COLUMNS {
         return None;

@@ -77,6 +77,8 @@ pub(super) struct Fitted {
     pub said: Vec<String>,
     /// What the reader must know.
     pub warnings: Vec<String>,
+    /// Whether the estimate rests on something too weak to trust it over others (instruments only).
+    pub doubtful: bool,
 }
 
 impl Fitted {

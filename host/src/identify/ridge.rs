@@ -147,5 +147,6 @@ pub(super) fn ridge(
             100.0 * s
         )],
         warnings,
+        doubtful: false,
     })
 }

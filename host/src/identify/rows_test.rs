@@ -83,6 +83,7 @@ fn recording(robot: &Robot, seconds: f64, gap: usize) -> InMemory {
                 .as_ref()
                 .map(|l| l.position)
                 .unwrap_or([-1.5, 1.5]);
+            let range: [f64; 2] = range;
             let size = 0.35 * (range[1] - range[0]).min(3.0) / 2.0;
             (q[j], qd[j], qdd[j]) = (0.5 * (range[0] + range[1]), 0.0, 0.0);
             for (m, share) in [0.9, 0.5, 0.35, 0.25].iter().enumerate() {
@@ -194,7 +195,7 @@ fn plain_rows(motion: &Motion, plan: &Plan) -> Vec<(Vec<Vec<f64>>, Vec<f64>)> {
 fn rows_are_those_of_the_plain_way() {
     for (text, decimation, gap) in [(TX40, 9, 40), (TX40, 1, 0), (IRP6_TEMPLATE, 4, 3)] {
         let robot = robot(text);
-        let made = recording(&robot, 24.0, gap);
+        let made = recording(&robot, 48.0, gap);
         let (chain, transmission) = (chain_of(&robot).unwrap(), transmission_of(&robot).unwrap());
         let base = Base::structural(&robot, ModelKind::Differential, 1).unwrap();
         let n = robot.joints.len();

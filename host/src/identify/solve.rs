@@ -18,7 +18,7 @@ use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
-use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, threads};
+use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
 use crate::robot::Robot;
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
@@ -48,18 +48,19 @@ pub fn identify(
     // What is spooled has no references any more.
     let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
-    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
-    let (training, holdout) = (training.as_slice(), holdout.as_slice());
-    let survey = |list: &[&dyn Recording]| {
-        list.iter()
-            .map(|r| Survey::take(*r, joints))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let surveys = survey(training)?;
+    let (surveys, training) = surveyed(&training, joints)?;
     if surveys.is_empty() {
         return Err(IdentifyError::NoRecording);
     }
-    let holdout_surveys = survey(holdout)?;
+    let (holdout_surveys, holdout) = surveyed(&holdout, joints)?;
+    let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
+    let (training, holdout) = (training.as_slice(), holdout.as_slice());
+    // References do not line up with rows that were interpolated: what needs them then says that they are missing.
+    let sources = if surveys.iter().any(|survey| survey.note.is_some()) {
+        training
+    } else {
+        sources
+    };
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
         return Err(IdentifyError::NoTorque { joint: j + 1 });
     }
@@ -294,6 +295,12 @@ pub fn identify(
         holdout,
     )?;
     let mut warnings = beyond.warnings;
+    warnings.extend(
+        surveys
+            .iter()
+            .chain(&holdout_surveys)
+            .filter_map(|survey| survey.note.clone()),
+    );
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -384,8 +391,8 @@ pub fn identify(
     })
 }
 
-fn as_recordings<'a>(spooled: &'a [Spooled<'a>]) -> Vec<&'a dyn Recording> {
-    spooled.iter().map(|s| s as &dyn Recording).collect()
+fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
+    list.iter().map(AsRef::as_ref).collect()
 }
 
 /// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet

@@ -200,5 +200,6 @@ pub(super) fn consistent_fit(
             whole.steps
         )],
         warnings: Vec::new(),
+        doubtful: false,
     })
 }

@@ -246,6 +246,7 @@ pub(super) fn total(problem: &Problem, parts: &Parts) -> Result<Fitted, Identify
             torques.join(", ")
         )],
         warnings: Vec::new(),
+        doubtful: false,
     })
 }
 

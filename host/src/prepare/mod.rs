@@ -4,14 +4,17 @@
 //! [`Treatment`] is decided from it; then [`each_motion`] gives the motion piece by piece. Filters are
 //! zero-phase and the pieces overlap by what the filters remember, so the result does not depend on the cuts.
 //!
-//! Leaves out: resampling of irregularly sampled recordings (they are refused), correction of a delay between
-//! torque and position.
+//! Steps in time that differ by up to a fifth are taken as even; recordings whose steps differ by more are
+//! interpolated to an even step, and refused where two rows or more are missing ([`surveyed`]).
+//!
+//! Leaves out: correction of a delay between torque and position.
 
 mod decimate;
 mod filter;
 mod motion;
 mod pieces;
 pub(crate) mod record;
+mod resample;
 mod spectrum;
 mod spool;
 mod survey;
@@ -23,7 +26,7 @@ pub use filter::{LowPass, central_difference, decimator_edge, second_difference}
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
-pub use spool::Spooled;
+pub use spool::{Spooled, surveyed};
 pub use survey::{JointSurvey, Survey};
 pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
 pub(crate) use workers::{each_of, threads};
@@ -46,7 +49,7 @@ pub enum PrepareError {
     },
     /// The rows are not evenly spaced in time.
     #[error(
-        "{label} is not evenly sampled: near line {line} the time advances by {step} s where {mean} s is usual; resample it to a constant rate."
+        "{label} is not evenly sampled: near line {line} the time advances by {step} s where {mean} s is usual (the longest step is {longest} s); rows that vary that much are not interpolated, so record or resample it at a constant rate."
     )]
     Irregular {
         /// The recording.
@@ -57,6 +60,8 @@ pub enum PrepareError {
         step: f64,
         /// Usual step, s.
         mean: f64,
+        /// Longest step, s.
+        longest: f64,
     },
     /// A joint stands still throughout.
     #[error(

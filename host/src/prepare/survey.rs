@@ -54,6 +54,8 @@ pub struct Survey {
     pub sample_rate: f64,
     /// One entry a joint.
     pub joints: Vec<JointSurvey>,
+    /// What was done to its time stamps, a sentence; none where nothing was.
+    pub note: Option<String>,
 }
 
 struct Extreme {
@@ -231,6 +233,7 @@ impl Survey {
                     line,
                     step,
                     mean,
+                    longest: widest.0,
                 });
             }
         }
@@ -270,6 +273,7 @@ impl Survey {
             longest,
             sample_rate,
             joints,
+            note: None,
         })
     }
 }

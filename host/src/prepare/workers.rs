@@ -20,7 +20,7 @@ pub(crate) fn threads(wanted: usize) -> usize {
 /// What `work` gives for everything that `produce` hands over, to `take` in the order of handing over.
 ///
 /// `produce` and `take` run in the calling thread, `work` in `threads` others (in the calling one where `threads` is
-/// 1). At most `threads + 1` items are on their way. The results are the same for any number of threads as long as
+/// 1). At most `threads` items are on their way. The results are the same for any number of threads as long as
 /// `work` depends on its argument alone.
 ///
 /// # Errors
@@ -59,7 +59,7 @@ pub(super) fn in_order<T: Send, R: Send>(
             taken: 0,
         };
         let result = produce(&mut |item| {
-            while queue.sent - queue.taken > threads {
+            while queue.sent - queue.taken >= threads {
                 queue.take_next(take)?;
             }
             let number = queue.sent;

@@ -246,8 +246,6 @@ pub fn validate(
         });
     }
     let joints = robot.joints.len();
-    let spooled = crate::prepare::Spooled::all(recordings);
-    let recordings: Vec<&dyn Recording> = spooled.iter().map(|s| s as &dyn Recording).collect();
     let surveys = recordings
         .iter()
         .map(|r| Survey::take(*r, joints))

@@ -12,7 +12,8 @@
 //!
 //! Every function checks the lengths of its slices and answers [`MultibodyError::WrongLength`] where one is
 //! wrong; outputs are then untouched. No function allocates, and none branches on a value of `T` save
-//! [`forward_dynamics`], which stops where the inertia matrix of some lane is not positive definite.
+//! [`forward_dynamics`] and [`articulated_forward_dynamics`], which stop where some lane's inertia is not positive.
+//! [`block`] holds the functions that recordings ask for again, over blocks of samples.
 //!
 //! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of
 //! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction

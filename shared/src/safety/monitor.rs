@@ -176,13 +176,17 @@ pub fn step(
         (outside, Fault::Position, now.position),
         (bad_supply, Fault::Supply, now.supply),
         (hot, Fault::Temperature, now.temperature),
-        (state.overloaded, Fault::Overload, libm::sqrtf(state.heat)),
+        (state.overloaded, Fault::Overload, state.heat),
         (now.overrun && now.driving, Fault::Deadline, 0.0),
     ];
     faults
         .into_iter()
         .find(|(failing, _, _)| *failing)
-        .map(|(_, fault, value)| (fault, value))
+        .map(|(_, fault, value)| match fault {
+            // Worked out only where it is told: a square root a tick is too dear.
+            Fault::Overload => (fault, libm::sqrtf(value)),
+            _ => (fault, value),
+        })
 }
 
 /// A converter that is alive follows the duty; one that is stuck keeps its code whatever is applied.

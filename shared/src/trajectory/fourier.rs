@@ -44,8 +44,16 @@ impl<T: Real<Mask = bool>> Fourier<T> {
         let period = self.period_us.max(1);
         // Time since the end of the ramp, moved ahead by whole periods so that it is not negative.
         let ahead = period - self.ramp_us % period;
-        let within =
-            ((time.micros % u64::from(period) + u64::from(ahead)) % u64::from(period)) as u32;
+        // In 32 bits where they are enough, which the microcontroller divides by hardware.
+        let since = match u32::try_from(time.micros) {
+            Ok(micros) => micros % period,
+            Err(_) => (time.micros % u64::from(period)) as u32,
+        };
+        // The sum of two remainders is below two periods.
+        let within = match since.checked_sub(period - ahead) {
+            Some(over) => over,
+            None => since + ahead,
+        };
         // From −½ to ½ of a turn: twice the resolution of 0 to 1.
         let turns = if within > period / 2 {
             -(T::from_u32(period - within) - time.fraction) / T::from_u32(period)

@@ -102,6 +102,18 @@ struct Elapsed<T> {
 
 impl<T: Real> Elapsed<T> {
     fn from_tick(tick: u64, rate_hz: u32) -> Self {
+        // A period of whole microseconds, as the rig's: no division of 64 bits, which the microcontroller has no
+        // hardware for.
+        let (step, odd) = (
+            MICROS as u32 / rate_hz.max(1),
+            MICROS as u32 % rate_hz.max(1),
+        );
+        if odd == 0 {
+            return Self {
+                micros: tick.saturating_mul(u64::from(step)),
+                fraction: T::ZERO,
+            };
+        }
         let rate = u64::from(rate_hz.max(1));
         let within = (tick % rate) * MICROS;
         // The rate fits 32 bits, so does a remainder by it.

@@ -1,8 +1,8 @@
-//! The flash memory's instruction cache, for the estimate of cycles.
+//! The flash memory's instruction cache and prefetch, for the estimate of cycles.
 //!
 //! 32 lines of 32 bytes, replaced by least recent use (RM0440 rev 8, section 3.3.5 "Adaptive real-time memory
-//! accelerator"). A 64-bit word that is not there costs the wait states in full: what the prefetch may hide
-//! is not counted in its favour.
+//! accelerator"). A 64-bit word that is not there costs the wait states in full. With the prefetch on, the word
+//! after one that was fetched is under way while that one is executed: it costs what is then left of its time.
 
 use crate::cost::WAIT_STATES;
 
@@ -26,16 +26,33 @@ impl Default for Accelerator {
 }
 
 impl Accelerator {
-    /// Cycles lost to fetch `size` bytes from `address` on.
-    pub fn fetch(&mut self, address: u32, size: u32) -> u64 {
+    /// Cycles lost to fetch the block of `size` bytes at `address`, which takes `cycles` to execute. `follows`: it
+    /// was reached without a branch, so that a prefetch had begun.
+    pub fn fetch(
+        &mut self,
+        address: u32,
+        size: u32,
+        cycles: u64,
+        prefetch: bool,
+        follows: bool,
+    ) -> u64 {
         let last = address + size.max(2) - 1;
+        let words = u64::from(last / WORD - address / WORD + 1);
+        let hidden = if prefetch { cycles / words } else { 0 };
+        let mut ahead = follows;
         let mut lost = 0;
         for line in address / LINE..=last / LINE {
             let from = (address.max(line * LINE) % LINE) / WORD;
             let to = (last.min(line * LINE + LINE - 1) % LINE) / WORD;
             let wanted = ((1_u8 << (to + 1)) - 1) & !((1_u8 << from) - 1);
             let missing = wanted & !self.touch(line, wanted);
-            lost += u64::from(missing.count_ones()) * WAIT_STATES;
+            for word in from..=to {
+                if missing & 1 << word != 0 {
+                    let hidden = if ahead { hidden } else { 0 };
+                    lost += WAIT_STATES.saturating_sub(hidden);
+                }
+                ahead = true;
+            }
         }
         lost
     }
@@ -55,28 +72,42 @@ impl Accelerator {
 mod test {
     use super::*;
 
+    fn plain(cache: &mut Accelerator, address: u32, size: u32) -> u64 {
+        cache.fetch(address, size, 100, false, false)
+    }
+
+    /// Four words of three cycles each: the first waits in full, the others for what is left.
+    #[test]
+    fn the_prefetch_hides_what_is_executed_meanwhile() {
+        let mut cache = Accelerator::default();
+        let lost = cache.fetch(0x0800_0000, 32, 12, true, false);
+        assert_eq!(lost, WAIT_STATES + 3 * (WAIT_STATES - 3));
+        let lost = cache.fetch(0x0800_0020, 8, 3, true, true);
+        assert_eq!(lost, WAIT_STATES - 3);
+    }
+
     #[test]
     fn a_loop_misses_once_and_a_long_run_evicts_it() {
         let mut cache = Accelerator::default();
-        assert_eq!(cache.fetch(0x0800_0000, 16), 2 * WAIT_STATES);
-        assert_eq!(cache.fetch(0x0800_0000, 16), 0);
-        assert_eq!(cache.fetch(0x0800_0010, 16), 2 * WAIT_STATES);
+        assert_eq!(plain(&mut cache, 0x0800_0000, 16), 2 * WAIT_STATES);
+        assert_eq!(plain(&mut cache, 0x0800_0000, 16), 0);
+        assert_eq!(plain(&mut cache, 0x0800_0010, 16), 2 * WAIT_STATES);
         // 31 further lines: the first is still there; one more and it is gone.
         for line in 1..=31 {
-            cache.fetch(0x0800_0000 + 32 * line, 2);
+            plain(&mut cache, 0x0800_0000 + 32 * line, 2);
         }
-        assert_eq!(cache.fetch(0x0800_0000, 32), 0);
+        assert_eq!(plain(&mut cache, 0x0800_0000, 32), 0);
         for line in 1..=32 {
-            cache.fetch(0x0800_0000 + 32 * line, 2);
+            plain(&mut cache, 0x0800_0000 + 32 * line, 2);
         }
-        assert_eq!(cache.fetch(0x0800_0000, 32), 4 * WAIT_STATES);
+        assert_eq!(plain(&mut cache, 0x0800_0000, 32), 4 * WAIT_STATES);
     }
 
     #[test]
     fn a_block_across_two_lines() {
         let mut cache = Accelerator::default();
-        assert_eq!(cache.fetch(0x0800_001C, 8), 2 * WAIT_STATES);
-        assert_eq!(cache.fetch(0x0800_0018, 2), 0);
-        assert_eq!(cache.fetch(0x0800_0020, 2), 0);
+        assert_eq!(plain(&mut cache, 0x0800_001C, 8), 2 * WAIT_STATES);
+        assert_eq!(plain(&mut cache, 0x0800_0018, 2), 0);
+        assert_eq!(plain(&mut cache, 0x0800_0020, 2), 0);
     }
 }

@@ -36,6 +36,15 @@ pub struct BoardFaults {
     pub fault_line: bool,
 }
 
+/// The encoder's index has passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Index {
+    /// In the positive direction.
+    pub upwards: bool,
+    /// Counts since then.
+    pub since: u32,
+}
+
 /// The board.
 pub struct Board {
     plant: Plant,
@@ -192,16 +201,28 @@ impl Board {
         self.sampled + (phase + ahead * self.counts_per_radian).floor() as i64
     }
 
-    /// Counts that the timer sees up to `now` since the last call, and the direction of an index pulse if one
-    /// came.
+    /// Counts that the timer sees up to `now` since the last call, and the index if it passed. It stands where the
+    /// true count is a multiple of a turn.
     ///
     /// With one channel cut, the other's edges count to and fro: the timer sees a step and takes it back.
-    pub fn edges(&mut self, now: Instant) -> (i64, Option<bool>) {
+    pub fn edges(&mut self, now: Instant) -> (i64, Option<Index>) {
         let count = self.count(now);
         let before = self.true_count;
         self.true_count = count;
         let passed = count.div_euclid(self.turn) != before.div_euclid(self.turn);
-        let index = (passed && !self.faults.index_cut).then_some(count > before);
+        let upwards = count > before;
+        let within = count.rem_euclid(self.turn);
+        let since = if upwards {
+            within
+        } else {
+            self.turn - 1 - within
+        };
+        let broken = self.faults.channel_a_cut || self.faults.channel_b_cut;
+        let index = (passed && !self.faults.index_cut).then_some(Index {
+            upwards,
+            // With a channel cut nothing worth counting comes after it either.
+            since: if broken { 0 } else { since as u32 },
+        });
         // Quadrature: A is high in phases 1 and 2, B in phases 2 and 3.
         let seen = match (self.faults.channel_a_cut, self.faults.channel_b_cut) {
             (false, false) => return (count - before, index),

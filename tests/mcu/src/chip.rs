@@ -107,8 +107,8 @@ pub struct Chip {
     pub bitten: bool,
     /// Stores into the flash memory that wait for the controller.
     stores: Vec<(u32, u32, u32)>,
-    /// Code has changed in the flash memory.
-    pub code_changed: bool,
+    /// What has changed in the flash memory: first address and bytes, the emulation's to collect.
+    pub changed: Vec<(u32, u32)>,
     /// Converter triggers by the timer so far.
     pub triggers: u64,
     /// What surrounds the chip.
@@ -164,7 +164,7 @@ impl Chip {
             debug_unit: [0; 4],
             bitten: false,
             stores: Vec::new(),
-            code_changed: false,
+            changed: Vec::new(),
             triggers: 0,
             board,
             readings: None,
@@ -319,10 +319,9 @@ impl Chip {
         self.serve_dma(at, memory)?;
         self.nvic.advance(at);
         if self.flash.due() <= at
-            && let Some((address, _)) = self.flash.finish(memory)
+            && let Some(changed) = self.flash.finish(memory)
         {
-            let _ = address;
-            self.code_changed = true;
+            self.changed.push(changed);
         }
         if self.iwdg.bites() <= at {
             self.bitten = true;
@@ -463,8 +462,8 @@ impl Chip {
         if wired {
             let tim = &mut self.tim[1];
             tim.quadrature(counts);
-            if let Some(upwards) = index {
-                tim.index(upwards);
+            if let Some(index) = index {
+                tim.index(index.upwards, index.since);
             }
         }
     }
@@ -696,6 +695,7 @@ impl Chip {
     fn charge_bridge(&mut self, address: u32) {
         if address < 0xE000_0000 {
             self.work.cycles += BRIDGE;
+            self.work.bridge += BRIDGE;
             self.work.now += BRIDGE * self.period;
         }
     }
@@ -744,13 +744,22 @@ impl Bus for Chip {
         let mut cycles = u64::from(block.cycles);
         if block.address != self.expected {
             cycles += REFILL;
+            self.work.refills += REFILL;
         }
         if self.waits && map::FLASH.contains(&block.address) {
-            cycles += if self.flash.caches() {
-                self.accelerator.fetch(block.address, block.size.into())
+            let lost = if self.flash.caches() {
+                self.accelerator.fetch(
+                    block.address,
+                    block.size.into(),
+                    block.cycles.into(),
+                    self.flash.prefetches(),
+                    block.address == self.expected,
+                )
             } else {
                 u64::from(block.size).div_ceil(8) * WAIT_STATES
             };
+            cycles += lost;
+            self.work.fetches += lost;
         }
         self.expected = block.address + u32::from(block.size);
         self.block = block.address;

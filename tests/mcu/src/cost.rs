@@ -1,7 +1,8 @@
 //! What a block of Thumb-2 code costs: instructions exactly, cycles by class.
 //!
 //! Cycles are those of the Cortex-M4 Technical Reference Manual (ARM DDI 0439B, table 3-1 and table 7-1), each
-//! taken at its worst where the manual gives a range: loads 2 (never pipelined), division 12, multiply with
+//! taken at its worst where the manual gives a range: loads 2, but 1 right behind another load or store, with
+//! which they pipeline (section 3.3.2); division 12, multiply with
 //! accumulate 2, load and store multiple 1+N, a taken branch refills the pipeline in 3 (P = 1 to 3), VDIV and
 //! VSQRT 14, VMLA and VFMA 3, VLDM 1+N. Loads of literals from flash pay the wait states each time, as if
 //! there were no data cache. Left out: contention of DMA and processor for the bus.
@@ -26,6 +27,7 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
         ..Block::default()
     };
     let mut at = 0;
+    let mut pipelined = false;
     while let Some(&[a, b]) = code.get(at..at + 2) {
         let first = u16::from_le_bytes([a, b]);
         let wide = length(first) == 4;
@@ -38,6 +40,13 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
         } else {
             (narrow_cycles(first), false)
         };
+        let single = is_single_access(first);
+        let cycles = if single && pipelined {
+            cycles.max(2) - 1
+        } else {
+            cycles
+        };
+        pipelined = single;
         block.instructions += 1;
         block.cycles += cycles as u16;
         block.float |= float;
@@ -45,6 +54,16 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
         at += length(first);
     }
     block
+}
+
+/// Whether it loads or stores one word or less, not by a literal: such neighbours pipeline.
+fn is_single_access(first: u16) -> bool {
+    match first >> 12 {
+        5..=9 => true,
+        0xE => first & 0xFF20 == 0xED00 && first & 0x1F != 0x1F,
+        0xF => first & 0xFE00 == 0xF800 && first & 0x1F != 0x1F,
+        _ => false,
+    }
 }
 
 fn narrow_cycles(op: u16) -> u64 {
@@ -104,7 +123,7 @@ fn wide_cycles(a: u16, b: u16) -> (u64, bool) {
             }
         }
         3 => {
-            if a & 0xFF70 == 0xFB90 || a & 0xFF70 == 0xFBB0 {
+            if a & 0xFFF0 == 0xFB90 || a & 0xFFF0 == 0xFBB0 {
                 // SDIV, UDIV.
                 12
             } else if a & 0xFF00 == 0xFB00 {
@@ -176,6 +195,7 @@ mod test {
     fn classes_of_instructions() {
         assert_eq!(cycles(&[0x1840]), (1, 1), "adds r0, r0, r1");
         assert_eq!(cycles(&[0x6808]), (1, 2), "ldr r0, [r1]");
+        assert_eq!(cycles(&[0x6808, 0x6848]), (2, 3), "two loads in a row");
         assert_eq!(cycles(&[0x6008]), (1, 1), "str r0, [r1]");
         assert_eq!(cycles(&[0x4801]), (1, 6), "ldr r0, [pc, #4]");
         assert_eq!(cycles(&[0xB510]), (1, 3), "push {{r4, lr}}");

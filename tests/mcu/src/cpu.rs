@@ -116,8 +116,8 @@ pub trait Cpu<B: Bus>: Memory {
     fn run(&mut self) -> Stop;
     /// Has the bus act on memory from outside a run.
     fn with_memory<T>(&mut self, act: impl FnOnce(&mut B, &mut dyn Memory) -> T) -> T;
-    /// Code has changed: whatever was derived from it is forgotten.
-    fn forget_code(&mut self);
+    /// So many bytes from an address on have changed: whatever was derived from code there is forgotten.
+    fn forget_code(&mut self, address: u32, size: u32);
     /// The mask registers.
     fn masks(&self) -> Masks {
         Masks {
@@ -137,4 +137,10 @@ pub struct Work {
     pub instructions: u64,
     /// Cycles, estimated, without sleep.
     pub cycles: u64,
+    /// Of these, lost to refills of the pipeline after branches.
+    pub refills: u64,
+    /// Of these, lost to waits for code from the flash memory.
+    pub fetches: u64,
+    /// Of these, lost on the way to peripherals.
+    pub bridge: u64,
 }

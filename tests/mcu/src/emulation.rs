@@ -134,14 +134,12 @@ impl<C: Cpu<Chip>> Emulation<C> {
 
     /// Resets the chip. The flash memory and the RAM keep what they hold.
     pub fn reset(&mut self, cause: Cause) {
-        {
+        let now = {
             let mut chip = self.cpu.bus();
             chip.reset(cause);
-            let now = chip.work.now;
-            drop(chip);
-            self.resets.push((now, cause));
-        }
-        self.cpu.forget_code();
+            chip.work.now
+        };
+        self.resets.push((now, cause));
         self.start();
     }
 
@@ -285,7 +283,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
             chip.settle(memory);
             (
                 chip.failure.clone(),
-                core::mem::take(&mut chip.code_changed),
+                core::mem::take(&mut chip.changed),
                 chip.bitten,
                 chip.nvic.reset_requested,
             )
@@ -297,8 +295,8 @@ impl<C: Cpu<Chip>> Emulation<C> {
                 error,
             });
         }
-        if changed {
-            self.cpu.forget_code();
+        for (address, size) in changed {
+            self.cpu.forget_code(address, size);
         }
         if bitten {
             self.reset(Cause::Watchdog);
@@ -327,8 +325,12 @@ impl<C: Cpu<Chip>> Emulation<C> {
     }
 
     fn sleep(&mut self, for_event: bool, until: Instant) -> Result<(), EmulationError> {
+        let resets = self.resets.len();
         loop {
             self.settle()?;
+            if self.resets.len() > resets {
+                return Ok(());
+            }
             let masks = self.cpu.masks();
             let mut chip = self.cpu.bus();
             let awake = if for_event {
@@ -352,10 +354,6 @@ impl<C: Cpu<Chip>> Emulation<C> {
             }
             let next = chip.next_event().min(until);
             chip.skip_to(next);
-            drop(chip);
-            if self.resets.last().is_some_and(|(at, _)| *at == next) {
-                return Ok(());
-            }
         }
     }
 

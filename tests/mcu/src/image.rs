@@ -64,8 +64,6 @@ pub struct Image {
     /// Bytes of RAM that statics take.
     pub ram_used: usize,
     functions: Vec<Function>,
-    /// Where code and where data begins, by the mapping symbols: true for code.
-    mapping: BTreeMap<u32, bool>,
     symbols: BTreeMap<String, (u32, u32)>,
 }
 
@@ -119,7 +117,6 @@ impl Image {
         }
         let mut functions = Vec::new();
         let mut symbols = BTreeMap::new();
-        let mut mapping = BTreeMap::new();
         for symbol in file.symbols() {
             let Ok(name) = symbol.name() else { continue };
             let (address, size) = (symbol.address() as u32, symbol.size() as u32);
@@ -130,10 +127,6 @@ impl Image {
                     size,
                 });
             }
-            if name.starts_with("$t") || name.starts_with("$d") {
-                mapping.insert(address & !1, name.starts_with("$t"));
-                continue;
-            }
             symbols.insert(name.to_owned(), (address, size));
         }
         functions.sort_by_key(|f| (f.address, core::cmp::Reverse(f.size)));
@@ -142,26 +135,8 @@ impl Image {
             flash_used,
             ram_used,
             functions,
-            mapping,
             symbols,
         })
-    }
-
-    /// Where the data ends that lies at an address among the code; none where it is code.
-    pub fn data_until(&self, address: u32) -> Option<u32> {
-        let (_, code) = self.mapping.range(..=address).next_back()?;
-        if *code {
-            return None;
-        }
-        self.mapping
-            .range(address + 1..)
-            .find(|(_, code)| **code)
-            .map(|(at, _)| *at)
-    }
-
-    /// Functions by address.
-    pub fn functions(&self) -> &[Function] {
-        &self.functions
     }
 
     /// The function that an address lies in.
@@ -178,22 +153,5 @@ impl Image {
     /// Address and size of a symbol.
     pub fn symbol(&self, name: &str) -> Option<(u32, u32)> {
         self.symbols.get(name).copied()
-    }
-
-    /// Symbols whose names contain `part`.
-    pub fn symbols_with<'a>(
-        &'a self,
-        part: &'a str,
-    ) -> impl Iterator<Item = (&'a str, u32, u32)> + 'a {
-        self.symbols
-            .iter()
-            .filter(move |(name, _)| name.contains(part))
-            .map(|(name, (address, size))| (name.as_str(), *address, *size))
-    }
-
-    /// Code from an address on.
-    pub fn code(&self, address: u32, size: usize) -> Option<&[u8]> {
-        let from = address.checked_sub(map::FLASH.start)? as usize;
-        self.flash.get(from..from.checked_add(size)?)
     }
 }

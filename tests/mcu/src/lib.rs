@@ -11,7 +11,6 @@
 
 pub mod accelerator;
 pub mod board;
-pub mod callgraph;
 pub mod chip;
 pub mod cost;
 pub mod cpu;

@@ -161,5 +161,12 @@ fn summary(board: &mut EmulatedBoard, wall: Duration, bytes: usize) {
         mean(cost.cycles),
         cost.worst_cycles
     );
+    let share = |part: u64| 100.0 * part as f64 / work.cycles.max(1) as f64;
+    println!(
+        "of all cycles {:.0} % wait for code from flash, {:.0} % refill the pipeline, {:.0} % wait for peripherals",
+        share(work.fetches),
+        share(work.refills),
+        share(work.bridge)
+    );
     println!("stack {used} of {size} bytes; {bytes} bytes sent");
 }

@@ -6,6 +6,8 @@ use core::ops::Range;
 pub const FLASH: Range<u32> = 0x0800_0000..0x0808_0000;
 /// SRAM1, SRAM2 and the alias of the CCM SRAM, one after the other.
 pub const RAM: Range<u32> = 0x2000_0000..0x2002_0000;
+/// The CCM SRAM by its own bus, for code.
+pub const CCM: Range<u32> = 0x1000_0000..0x1000_8000;
 /// System memory, one-time programmable area, calibration values and option bytes.
 pub const SYSTEM: Range<u32> = 0x1FFF_0000..0x1FFF_8000;
 /// APB1 to AHB2.

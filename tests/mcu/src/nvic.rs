@@ -208,8 +208,8 @@ impl Nvic {
         }
         for word in 0..WORDS {
             self.pending[word] |= lines[word] & !self.level[word];
-            self.level[word] = lines[word];
         }
+        self.level = lines;
         self.choose();
     }
 

@@ -92,6 +92,12 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             u64::from(map::RAM.end - map::RAM.start),
             Prot::ALL,
         )?;
+        // Its alias behind SRAM2 is other memory here: no image uses both.
+        engine.mem_map(
+            map::CCM.start.into(),
+            u64::from(map::CCM.end - map::CCM.start),
+            Prot::ALL,
+        )?;
         engine.mem_map(
             map::SYSTEM.start.into(),
             u64::from(map::SYSTEM.end - map::SYSTEM.start),
@@ -284,8 +290,16 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
         act(&mut self.bus.borrow_mut(), &mut Ram(&mut self.engine))
     }
 
-    fn forget_code(&mut self) {
-        self.blocks.borrow_mut().fill(Block::default());
-        let _ = self.engine.ctl_flush_tb();
+    fn forget_code(&mut self, address: u32, size: u32) {
+        let from = address.wrapping_sub(map::FLASH.start) as usize / 2;
+        let mut blocks = self.blocks.borrow_mut();
+        let ran = blocks
+            .get(from..from + size as usize / 2)
+            .is_some_and(|part| part.iter().any(|block| block.size != 0));
+        if ran {
+            blocks.fill(Block::default());
+            // Fails only where there is no translator.
+            let _ = self.engine.ctl_flush_tb();
+        }
     }
 }

@@ -438,3 +438,46 @@ fn output_error_says_what_it_lacks() {
     let error = identify(&blank(&robot), &[&recording], &[], &options).unwrap_err();
     assert!(error.to_string().contains("ref<k>"), "{error}");
 }
+
+/// What is left out was not needed: the residual stays, and nothing that is known to a per cent goes.
+#[test]
+fn essential_parameters_are_few_and_enough() {
+    let robot = arm(3, 9);
+    let noise = Noise {
+        position: 1e-6,
+        torque: 0.5,
+        ..Default::default()
+    };
+    let recording = record(&robot, 20.0, 200.0, noise, 4);
+    let found = identify(&blank(&robot), &[&recording], &[], &Options::default()).unwrap();
+    let set = found.essential.as_ref().unwrap();
+    println!("{} of {}: {set:?}", set.parameters.len(), found.rank);
+    assert_eq!(set.parameters.len() + set.left_out.len(), found.rank);
+    assert!(!set.left_out.is_empty());
+    assert!(set.residual_increase_percent < 1.0);
+    for b in found
+        .base_parameters
+        .iter()
+        .filter(|b| b.relative_std_percent < 1.0)
+    {
+        assert!(
+            set.parameters.iter().any(|e| e.expression == b.expression),
+            "{b:?}"
+        );
+    }
+    let ratio = |list: &[f64]| {
+        list.iter().copied().fold(0.0, f64::max)
+            / list.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let before: Vec<f64> = found
+        .base_parameters
+        .iter()
+        .map(|b| b.classical_relative_std_percent)
+        .collect();
+    let after: Vec<f64> = set
+        .parameters
+        .iter()
+        .map(|e| e.relative_std_percent)
+        .collect();
+    assert!(ratio(&after) < ratio(&before));
+}

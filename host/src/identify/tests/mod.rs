@@ -4,6 +4,7 @@ mod arms;
 mod emps;
 mod exact;
 mod judged;
+mod lwr4;
 mod made;
 
 use super::*;

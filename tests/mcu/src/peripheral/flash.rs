@@ -88,6 +88,11 @@ impl Flash {
         self.bank.get(ACR) & 0x200 != 0
     }
 
+    /// Whether the prefetch is on.
+    pub fn prefetches(&self) -> bool {
+        self.bank.get(ACR) & 0x100 != 0
+    }
+
     /// When the job under way ends.
     pub fn due(&self) -> Instant {
         self.job.map_or(NEVER, |(end, _)| end)

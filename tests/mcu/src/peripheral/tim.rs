@@ -312,14 +312,19 @@ impl Tim {
         }
     }
 
-    /// The encoder's index passes.
-    pub fn index(&mut self, upwards: bool) {
+    /// The encoder's index has passed `since` counts ago: it set the counter to 0 counting up, to its top counting
+    /// down.
+    pub fn index(&mut self, upwards: bool, since: u32) {
         let control = self.bank.get(ECR);
         if !self.is_encoder() || control & 1 == 0 || control & 0x20 != 0 && self.indexed {
             return;
         }
         self.indexed = true;
-        self.held = if upwards { 0 } else { self.active.reload };
+        self.held = if upwards {
+            since
+        } else {
+            self.active.reload - since
+        };
         self.flag(IDXF);
     }
 
@@ -457,21 +462,17 @@ impl Tim {
                     self.checked = now.saturating_sub(1);
                 }
             }
-            SMCR => {
-                if value & 7 != 0 && !self.is_encoder() {
-                    return told(format!(
-                        "TIM{} slave mode {:#x} is not modelled",
-                        self.number,
-                        value & 0x1_0007
-                    ));
-                }
+            SMCR if value & 7 != 0 && !self.is_encoder() => {
+                return told(format!(
+                    "TIM{} slave mode {:#x} is not modelled",
+                    self.number,
+                    value & 0x1_0007
+                ));
             }
             PSC => {}
-            ARR => {
-                if self.bank.get(CR1) & ARPE == 0 {
-                    self.active.reload = self.bank.get(ARR);
-                    self.rebase(now, count.min(self.active.reload));
-                }
+            ARR if self.bank.get(CR1) & ARPE == 0 => {
+                self.active.reload = self.bank.get(ARR);
+                self.rebase(now, count.min(self.active.reload));
             }
             0x34..=0x40 => {
                 let k = (offset - CCR1) as usize / 4;
@@ -556,11 +557,7 @@ mod test {
         tim.advance(1000 + period - 1);
         assert_eq!(tim.take_trgo2(), None);
         assert_eq!(tim.output(0).unwrap(), Some(0.0));
-        assert_eq!(
-            tim.read(1000 + period / 4, CNT).unwrap(),
-            0,
-            "last run down, at its end"
-        );
+        assert_eq!(tim.read(1000 + period - 1, CNT).unwrap(), 1, "nearly down");
         tim.advance(1000 + period);
         assert_eq!(tim.take_trgo2(), Some(1000 + period));
         assert_eq!(tim.output(0).unwrap(), Some(0.5));
@@ -615,14 +612,17 @@ mod test {
         assert_eq!(tim.read(0, CNT).unwrap(), u32::MAX - 4);
         tim.quadrature(7);
         assert_eq!(tim.read(0, CNT).unwrap(), 2);
-        tim.index(true);
+        tim.index(true, 0);
         assert_eq!(tim.read(0, CNT).unwrap(), 2, "index is not enabled");
         tim.write(0, ECR, 0x21).unwrap();
-        tim.index(true);
+        tim.index(true, 0);
         assert_eq!(tim.read(0, CNT).unwrap(), 0);
         tim.quadrature(9);
-        tim.index(true);
+        tim.index(true, 0);
         assert_eq!(tim.read(0, CNT).unwrap(), 9, "the first only");
+        tim.write(0, ECR, 1).unwrap();
+        tim.index(false, 3);
+        assert_eq!(tim.read(0, CNT).unwrap(), u32::MAX - 3);
         assert!(tim.write(0, SMCR, 4).is_err());
     }
 }

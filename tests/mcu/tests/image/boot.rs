@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use rig_host::link::{EmulatedPort, Session, SessionSettings};
-use rig_mcu::rig::Line;
-use rig_shared::wire::message::{RequestBody, ResetCause, SettingsOrigin};
+use rig_mcu::cpu::Memory;
+use rig_mcu::map;
+use rig_mcu::rig::{EmulatedBoard, Line};
+use rig_shared::wire::message::{Report, RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, wait};
 
 use crate::{bench, board, greeted, health, powered};
@@ -75,4 +77,57 @@ fn a_minute_at_rest() {
     assert_eq!(board(&mut line).resets, []);
     let longest = board(&mut line).with_chip(|chip| chip.iwdg.longest());
     assert!(rig_mcu::time::to_seconds(longest) < 0.1);
+}
+
+/// Places in RAM whose value follows `expected` from one look to the next, a second apart: counters of time.
+fn counters(
+    board: &mut EmulatedBoard,
+    size: usize,
+    expected: impl Fn(&mut EmulatedBoard) -> u64,
+) -> Vec<u32> {
+    let mut found: Vec<u32> = (map::RAM).step_by(size).collect();
+    for _ in 0..3 {
+        let now = expected(board);
+        found.retain(|address| {
+            let mut bytes = [0; 8];
+            let known = board.cpu().load(*address, &mut bytes[..size]);
+            known && u64::from_le_bytes(bytes).abs_diff(now) <= 1
+        });
+        board.run_for(1.0).unwrap();
+    }
+    found
+}
+
+/// The control tick's counter, put shortly before 2³¹: the rig works on across it. The clock of the tasks is left
+/// alone: they would make up for every period that it jumped over.
+#[test]
+fn two_to_the_thirty_first_ticks_pass_unnoticed() {
+    let mut line = bench(6);
+    let emulated = board(&mut line);
+    let first = emulated.with_chip(|chip| chip.triggers);
+    let ticks = counters(emulated, 8, |board| board.with_chip(|chip| chip.triggers));
+    assert!(!ticks.is_empty() && first > 5000, "{ticks:x?}");
+    let near = (1_u64 << 31) - 3000;
+    for address in &ticks {
+        assert!(emulated.cpu().store(*address, &near.to_le_bytes()));
+    }
+    line.request(RequestBody::StartStream).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    let mut passed = Vec::new();
+    for _ in 0..150 {
+        if let Some(Report::Batch(batch)) = line.next_report(Duration::from_millis(100)).unwrap() {
+            passed.push(batch.first_tick);
+        }
+    }
+    assert!(
+        passed[0] < 1 << 31 && passed.last().is_some_and(|t| *t > 1 << 31),
+        "{passed:?}"
+    );
+    assert!(
+        passed.windows(2).all(|pair| pair[1] - pair[0] == 80),
+        "{passed:?}"
+    );
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+    assert_eq!(board(&mut line).resets, []);
+    assert_eq!(health(&mut line).dropped, 0);
 }

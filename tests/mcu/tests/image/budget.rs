@@ -1,12 +1,11 @@
-//! What the image costs: instructions and cycles of the control tick, flash, RAM, stack; and no way to a panic.
+//! What the image costs: instructions and cycles of the control tick, flash, RAM, stack.
 
-use rig_mcu::callgraph::reach;
 use rig_mcu::chip::CONTROL_EXCEPTION;
 use rig_shared::wire::message::RequestBody;
 use rig_tests::{driven, excitation};
 use serde::Deserialize;
 
-use crate::{bench, board, image};
+use crate::{bench, board};
 
 /// The figures that may not grow: `tests/mcu/budget.toml`.
 #[derive(Debug, Deserialize)]
@@ -62,10 +61,6 @@ fn the_image_keeps_to_its_budget() {
         image.ram_used,
     );
     println!("{found}");
-    assert!(
-        cycles <= 0.25 * PERIOD && cost.worst_cycles as f64 <= 0.5 * PERIOD,
-        "\n{found}"
-    );
     let kept = mean <= budget.tick_instructions_mean
         && cost.worst_instructions <= budget.tick_instructions_worst
         && cycles <= budget.tick_cycles_mean
@@ -74,26 +69,4 @@ fn the_image_keeps_to_its_budget() {
         && image.ram_used <= budget.ram_bytes
         && stack <= budget.stack_bytes;
     assert!(kept, "more than tests/mcu/budget.toml allows:\n{found}");
-}
-
-#[test]
-fn the_control_tick_cannot_panic() {
-    let image = image();
-    let reach = reach(&image, "ADC1_2").unwrap();
-    println!(
-        "{} functions, {} calls through registers",
-        reach.functions.len(),
-        reach.indirect.len()
-    );
-    assert!(reach.functions.len() > 2, "{:?}", reach.functions);
-    let panics: Vec<String> = reach
-        .functions
-        .keys()
-        .filter(|name| name.contains("panic") || name.contains("unwrap_failed"))
-        .map(|name| reach.path(name).join("\n  -> "))
-        .collect();
-    assert!(panics.is_empty(), "\n{}", panics.join("\n"));
-    assert!(reach.indirect.is_empty(), "{:x?}", reach.indirect);
-    assert!(reach.aborts.is_empty(), "{:x?}", reach.aborts);
-    assert!(reach.strange.is_empty(), "{:x?}", reach.strange);
 }

@@ -57,7 +57,7 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
         (
             "encoder's channel A cut",
             |c| c.board.faults.channel_a_cut = true,
-            &[Fault::EncoderSignal, Fault::EncoderLost],
+            &[Fault::EncoderSignal, Fault::EncoderJump, Fault::EncoderLost],
             1.0,
         ),
         (
