@@ -17,7 +17,7 @@ import numpy as np
 
 RATE = 500.0
 PERIOD = 20.0
-RECORDED = 40.0
+RECORDED = 100.0
 HARMONICS = 5
 NOISE_SHARE = 0.02
 NOISE_BAND = 2.0
@@ -66,7 +66,8 @@ def bodies(arm, generator):
     return result
 
 
-def urdf(name, arm, links):
+def urdf(name, arm, links, effort=None):
+    effort = [1e4] * len(arm) if effort is None else effort
     number = lambda values: " ".join(repr(float(v)) for v in values)
     text = [f'<?xml version="1.0"?>\n<robot name="{name}">\n  <link name="base"/>']
     before = "base"
@@ -76,7 +77,7 @@ def urdf(name, arm, links):
             f'  <joint name="joint{i}" type="{kind}">\n'
             f'    <origin xyz="{number(origin)}" rpy="{number((alpha, 0.0, 0.0))}"/>\n'
             f'    <parent link="{before}"/>\n    <child link="link{i}"/>\n    <axis xyz="0 0 1"/>\n'
-            f'    <limit lower="-3.2" upper="3.2" velocity="20" effort="10000"/>\n  </joint>\n'
+            f'    <limit lower="-3.2" upper="3.2" velocity="20" effort="{float(effort[i - 1])!r}"/>\n  </joint>\n'
             f'  <link name="link{i}">\n    <inertial>\n      <mass value="{mass!r}"/>\n'
             f'      <origin xyz="{number(centre)}" rpy="0 0 0"/>\n'
             f'      <inertia ixx="{float(inertia[0, 0])!r}" ixy="{float(inertia[0, 1])!r}" ixz="{float(inertia[0, 2])!r}" '
@@ -151,18 +152,20 @@ def main():
     viscous, coulomb, offset = generator.uniform(0.5, 3.0, n), generator.uniform(0.5, 3.0, n), generator.uniform(-0.5, 0.5, n)
     chosen.out.mkdir(parents=True, exist_ok=True)
     truth = {"engine": chosen.engine, "arm": chosen.arm, "seed": chosen.seed, "noise_share": NOISE_SHARE, "noise_rms": {}}
+    peak = np.zeros(n)
     for name in ("train", "holdout"):
         t, q, qd, qdd = motion(arm, generator)
         torque = engine(text, q, qd, qdd) + viscous * qd + coulomb * np.sign(qd) + offset
         sigma = NOISE_SHARE * np.sqrt(np.mean(torque**2, axis=0))
         torque = torque + sigma * noise(generator, len(t), n)
         truth["noise_rms"][name] = sigma.tolist()
+        peak = np.maximum(peak, np.abs(torque).max(axis=0))
         count = np.array([2.0 * np.pi / ENCODER if kind == "revolute" else 1.0 / ENCODER for *_, kind, _ in arm])
         table = np.column_stack([t, np.round(q / count) * count, torque])
         header = ",".join(["t"] + [f"q{i}" for i in range(1, n + 1)] + [f"tau{i}" for i in range(1, n + 1)])
         np.savetxt(chosen.out / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
     stand_in = [(1.0, np.zeros(3), np.eye(3) * 0.01)] * n
-    (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in))
+    (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in, 2.0 * peak))
     (chosen.out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
 
 

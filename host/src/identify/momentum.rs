@@ -228,7 +228,8 @@ pub(super) fn momentum_rows(
                 *sum += 0.5 * dt * (a + b);
             }
         }
-        if let Some(done) = open.pop_front_if(|o| o.start + plan.window == k) {
+        let due = open.front().is_some_and(|o| o.start + plan.window == k);
+        if let Some(done) = if due { open.pop_front() } else { None } {
             for (j, equation) in result.equations.iter_mut().enumerate() {
                 let of = j * p..(j + 1) * p;
                 equation.x.extend(of.map(|e| {
