@@ -195,3 +195,47 @@ fn emps_with_the_defaults_is_within_two_percent_by_both_models_and_they_agree() 
         );
     }
 }
+
+#[test]
+fn arms_with_coupled_drives_go_from_template_to_parameters() {
+    for template in ["irp6", "edda"] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        succeed(rig().args(["init", template, "--out"]).arg(at("arm.toml")));
+        succeed(
+            rig()
+                .args(["excite", "--starts", "1", "--harmonics", "2"])
+                .args(["--periods", "1", "--robot"])
+                .arg(at("arm.toml"))
+                .arg("--out")
+                .arg(at("motion.toml")),
+        );
+        succeed(
+            rig()
+                .args(["simulate", "--robot"])
+                .arg(at("arm.toml"))
+                .arg("--trajectory")
+                .arg(at("motion.toml"))
+                .arg("--out")
+                .arg(at("train.csv")),
+        );
+        succeed(
+            rig()
+                .args(["identify", "--robot"])
+                .arg(at("arm.toml"))
+                .arg("--data")
+                .arg(at("train.csv"))
+                .arg("--out")
+                .arg(at("found")),
+        );
+        let written = at("found").join("identified.toml");
+        let loaded = rig_host::robot::Robot::load(&written).unwrap();
+        assert!(loaded.joints.len() > 1);
+        let result = json(&at("found").join("identification.json"));
+        if template == "irp6" {
+            // Friction of the motors as the description states it, in motor units.
+            let (screw, _) = value(&result, "fcm3");
+            assert!((screw / 0.08 - 1.0).abs() < 0.05, "{screw}");
+        }
+    }
+}

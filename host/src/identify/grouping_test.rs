@@ -115,7 +115,9 @@ fn known_robots_have_their_published_counts() {
         [-R, 0.0, 0.0],
     ];
     assert_eq!(counts(&arm(DOWN, &rx90)), (36, 4));
-    // Franka Emika Panda: 43 inertial (Gaz, Cognetti, Oliva, Robuffo Giordano & De Luca 2019).
+    // Franka Emika Panda: 43 inertial (Gaz, Cognetti, Oliva, Robuffo Giordano & De Luca, "Dynamic Identification of the
+    // Franka Emika Panda Robot With Retrieval of Feasible Parameters Using Penalty-Based Optimization", IEEE Robotics and
+    // Automation Letters 4(4), 2019, pp. 4147-4154).
     let panda = [
         [0.0, 0.0, 0.333],
         [-R, 0.0, 0.0],

@@ -181,6 +181,50 @@ fn the_gradient_is_that_of_central_differences() {
 }
 
 #[test]
+fn coupled_motors_and_cranks_count_in_the_gradient_too() {
+    let path = std::path::Path::new("irp6.toml");
+    let robot = Robot::from_toml(crate::robot::IRP6_TEMPLATE, path).unwrap();
+    let options = Options {
+        harmonics: 2,
+        criterion: Criterion::Determinant,
+        ..few_starts()
+    };
+    let (frame, base, _) = frame_of(&robot, &options).unwrap();
+    let names: Vec<String> = (0..base.len()).map(|k| base.expression(k)).collect();
+    for name in ["fcm3", "fvm5"] {
+        assert!(names.iter().any(|n| n.contains(name)), "{name}: {names:?}");
+    }
+    assert_eq!(frame.combined.len(), 2);
+    let mut problem = Problem::new(&frame, 12, Smoothing(4));
+    let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+    let x = random_motion(&mut problem, &frame, &mut random);
+    let round = Round {
+        weight: 10.0,
+        smoothing: Smoothing(4),
+        steps: 1,
+    };
+    problem.update(&x, &round);
+    problem.press(30.0);
+    let mut gradient = DVector::zeros(x.len());
+    let mut unused = gradient.clone();
+    problem.value(&x, &mut gradient);
+    for k in 0..x.len() {
+        let h = 1e-6;
+        let mut moved = |by: f64| {
+            let mut x = x.clone();
+            x[k] += by;
+            problem.value(&x, &mut unused)
+        };
+        let difference = (moved(h) - moved(-h)) / (2.0 * h);
+        assert!(
+            (difference - gradient[k]).abs() < 1e-5 * (1.0 + gradient.amax()),
+            "{k}: {difference} {}",
+            gradient[k]
+        );
+    }
+}
+
+#[test]
 fn every_limit_holds_between_the_samples_too_and_is_used() {
     let robot = arm();
     let found = designed(&robot, &few_starts());
