@@ -258,7 +258,7 @@ fn tx40_predicts_the_rest_of_its_motion() {
     let place = tempfile::tempdir().unwrap();
     let published = [8.4, 8.3, 15.6, 12.2, 45.1, 19.3];
     // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file.
-    // After 7.5 s the arm rests: of joint 5 little but stiction is left there, which no model here has.
+    // After 7.5 s the arm rests, where no model here has its friction. Whether that is why joint 5 is worse is not shown.
     let moving: &[(usize, f64)] = &[(6, 19.5)];
     for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 52.5)])] {
         let train = tx40_part(&data, place.path(), &format!("train{until}.csv"), 0..until);
