@@ -2,7 +2,8 @@
 //!
 //! Backward elimination by relative standard deviation (Pham & Gautier 1991; Khalil & Dombre 2002, § 12.4.4): the
 //! least certain parameter goes, the others are fitted anew, until none is more than [`RATIO`] times as uncertain as
-//! the best known, or until an F-test, rows counted as what they are worth, says that one was needed.
+//! the best known, or until an F-test, rows counted as what they are worth, says that one was needed: of the last
+//! parameter alone, and of all that went together (many that were not needed would hide one that was).
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -107,12 +108,16 @@ pub(super) fn essential(
         let mut fewer = active.clone();
         let gone = fewer.remove(worst);
         let next = fit(&fewer)?;
-        let removed = (columns.len() - fewer.len()) as f64;
         // Where the residual remembers m rows, chance moves the squares m times as far.
         let variance =
             first.squares / (factor.rows() as f64 - columns.len() as f64).max(1.0) * memory;
-        let f = (next.squares - first.squares) / removed / variance.max(f64::MIN_POSITIVE);
-        let p = FisherSnedecor::new(removed, freedom).map_or(1.0, |d| d.sf(f.max(0.0)));
+        let chance = |grown: f64, removed: f64| {
+            let f = grown / removed / variance.max(f64::MIN_POSITIVE);
+            FisherSnedecor::new(removed, freedom).map_or(1.0, |d| d.sf(f.max(0.0)))
+        };
+        let removed = (columns.len() - fewer.len()) as f64;
+        let p = chance(next.squares - current.squares, 1.0)
+            .min(chance(next.squares - first.squares, removed));
         if p < NEEDED {
             break format!(
                 "Without {} the residual would grow by more than chance (F-test, p = {p:.1e}).",

@@ -467,6 +467,13 @@ fn essential_parameters_are_few_and_enough() {
     let by_chance = 100.0 * ((1.0 + gone * f / freedom).sqrt() - 1.0);
     println!("{rows:.0} rows: by chance up to {by_chance:.3} %");
     assert!(set.residual_increase_percent < by_chance);
+    // What the fit of all knows to differ from zero is not left out.
+    for b in &found.base_parameters {
+        assert!(
+            b.value.abs() < 5.0 * b.std || !set.left_out.contains(&b.expression),
+            "{b:?}"
+        );
+    }
     for b in found
         .base_parameters
         .iter()
