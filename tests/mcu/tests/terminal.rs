@@ -32,17 +32,21 @@ impl Board {
             },
             PathBuf::from,
         );
-        let mut process = Command::new(env!("CARGO_BIN_EXE_rig-mcu"))
+        let process = Command::new(env!("CARGO_BIN_EXE_rig-mcu"))
             .arg(image)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
+        let port = String::new();
+        // From here on it ends whatever happens.
+        let mut board = Self { process, port };
         let mut said = String::new();
-        for line in BufReader::new(process.stdout.take().unwrap()).lines() {
+        let stdout = board.process.stdout.take().unwrap();
+        for line in BufReader::new(stdout).lines() {
             let line = line.unwrap();
             if let Some(port) = line.strip_prefix("serial port ") {
-                let port = port.to_owned();
-                return Self { process, port };
+                port.clone_into(&mut board.port);
+                return board;
             }
             said += &line;
         }

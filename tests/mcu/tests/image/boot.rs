@@ -143,3 +143,23 @@ fn two_to_the_thirty_first_ticks_pass_unnoticed() {
     assert_eq!(board(&mut line).resets, []);
     assert_eq!(health(&mut line).dropped, 0);
 }
+
+/// Single control ticks around an instant that the host names, over the wire.
+#[test]
+fn a_capture_holds_every_tick_in_a_row() {
+    let mut line = bench(7);
+    line.request(RequestBody::Capture(100)).unwrap();
+    wait(&mut line, 0.1);
+    line.request(RequestBody::GetCapture).unwrap();
+    let (mut ticks, mut total) = (Vec::new(), usize::MAX);
+    while ticks.len() < total {
+        let report = line.next_report(Duration::from_millis(500)).unwrap();
+        if let Report::Capture(part) = report.unwrap() {
+            assert_eq!(usize::from(part.first), ticks.len());
+            total = usize::from(part.total);
+            ticks.extend(part.samples.iter().map(|sample| sample.tick));
+        }
+    }
+    assert!(total > 400, "{total} ticks");
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+}
