@@ -1,7 +1,7 @@
 //! The emulated microcontroller: runs the firmware's own image, down to the registers, closed around the
 //! emulated rig.
 //!
-//! [`cpu`] is the processor behind a trait, [`unicorn`] its implementation; [`nvic`] takes its exceptions,
+//! [`cpu`] is the processor behind a trait, `unicorn` its implementation; [`nvic`] takes its exceptions,
 //! [`chip`] holds time and the peripherals ([`peripheral`], a file each, from the reference manual), [`board`]
 //! the half bridges, the rig and its sensors, and [`emulation`] runs it all. An access that is not modelled ends
 //! the run by name.
