@@ -8,6 +8,7 @@ pub mod batch;
 pub mod commands;
 pub mod data;
 pub mod demo;
+pub mod diagnose;
 pub mod emulated;
 pub mod excite;
 pub mod files;

@@ -7,6 +7,7 @@ extern crate std;
 pub mod control;
 pub mod drive;
 pub mod dual;
+pub mod effects;
 pub mod encoder;
 pub mod estimation;
 pub mod friction;

@@ -3,6 +3,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
 use rand::RngExt;
 use rand::SeedableRng;
@@ -16,7 +17,7 @@ use rig_host::plant::PlantConfig;
 use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
 use rig_shared::safety::FaultRecord;
 use rig_shared::trajectory::{Fourier, Trajectory};
-use rig_shared::wire::message::{Estimate, Refusal, RequestBody};
+use rig_shared::wire::message::{Estimate, Refusal, Report, RequestBody};
 
 /// The one-link rig as its description has it.
 pub fn robot() -> Robot {
@@ -196,4 +197,26 @@ pub fn in_parallel<T: Send>(jobs: u64, job: impl Fn(u64) -> T + Sync) -> Vec<T> 
     let mut all: Vec<(u64, T)> = parts.drain(..).flatten().collect();
     all.sort_by_key(|(k, _)| *k);
     all.into_iter().map(|(_, value)| value).collect()
+}
+
+/// The latched fault and the ticks of its snapshot, over the wire.
+pub fn snapshot<P: Port>(line: &mut Session<P>) -> (FaultRecord, Vec<u64>) {
+    line.request(RequestBody::GetSnapshot).unwrap();
+    let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
+    while ticks.len() < total {
+        match line
+            .next_report(Duration::from_millis(500))
+            .unwrap()
+            .unwrap()
+        {
+            Report::Fault(found) => record = Some(found),
+            Report::Snapshot(part) => {
+                assert_eq!(usize::from(part.first), ticks.len());
+                total = usize::from(part.total);
+                ticks.extend(part.samples.iter().map(|sample| sample.tick));
+            }
+            _ => {}
+        }
+    }
+    (record.unwrap(), ticks)
 }

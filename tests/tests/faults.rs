@@ -1,14 +1,12 @@
 //! Faults injected at the plant: bridge off, the right one latched first, explained by its snapshot, cleared.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use std::time::Duration;
-
 use rig_host::link::LinkError;
 use rig_host::plant::{Faults, PlantConfig};
 use rig_shared::safety::{Fault, Mode};
 use rig_shared::trajectory::Trajectory;
-use rig_shared::wire::message::{Refusal, Report, RequestBody};
-use rig_tests::{Line, bench, calibrated, connect, excitation, nameplate, wait};
+use rig_shared::wire::message::{Refusal, RequestBody};
+use rig_tests::{Line, bench, calibrated, connect, excitation, nameplate, snapshot, wait};
 
 fn refused(line: &mut Line, body: RequestBody) -> Refusal {
     match line.request(body) {
@@ -39,24 +37,7 @@ fn moving(seed: u64) -> Line {
 
 /// The snapshot over the wire: consecutive ticks, the fault's among them with many before it.
 fn check_snapshot(line: &mut Line, fault: Fault) {
-    line.request(RequestBody::GetSnapshot).unwrap();
-    let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
-    while ticks.len() < total {
-        match line
-            .next_report(Duration::from_millis(500))
-            .unwrap()
-            .unwrap()
-        {
-            Report::Fault(found) => record = Some(found),
-            Report::Snapshot(part) => {
-                assert_eq!(usize::from(part.first), ticks.len());
-                total = usize::from(part.total);
-                ticks.extend(part.samples.iter().map(|sample| sample.tick));
-            }
-            _ => {}
-        }
-    }
-    let record = record.unwrap();
+    let (record, ticks) = snapshot(line);
     assert_eq!(record.fault, fault);
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
     let place = ticks.iter().position(|tick| *tick == record.tick).unwrap();

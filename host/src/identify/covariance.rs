@@ -173,6 +173,58 @@ pub struct Estimate {
     pub scaled_condition: f64,
 }
 
+impl Estimate {
+    /// From values with their covariance, `regressor` being the upper triangle that was fitted and `memory_rows` what
+    /// the residuals remember.
+    pub(super) fn of(
+        values: &[f64],
+        covariance: &DMatrix<f64>,
+        degrees_of_freedom: usize,
+        classical_std: Vec<f64>,
+        regressor: &DMatrix<f64>,
+        rows: u64,
+        memory_rows: f64,
+    ) -> Self {
+        let size = values.len();
+        let std: Vec<f64> = (0..size)
+            .map(|k| covariance[(k, k)].max(0.0).sqrt())
+            .collect();
+        let quantile = t_quantile(degrees_of_freedom);
+        let condition = |m: &DMatrix<f64>| {
+            let s = m.singular_values();
+            s.max() / s.min()
+        };
+        let mut scaled = regressor.clone();
+        for mut column in scaled.column_iter_mut() {
+            let norm = column.norm();
+            column /= norm;
+        }
+        let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
+            (0..size)
+                .map(|i| (0..size).map(|j| m(i, j)).collect())
+                .collect::<Vec<Vec<f64>>>()
+        };
+        Self {
+            values: values.to_vec(),
+            interval: (0..size)
+                .map(|k| [values[k] - quantile * std[k], values[k] + quantile * std[k]])
+                .collect(),
+            covariance: rows_of(&|i, j| covariance[(i, j)]),
+            correlation: rows_of(&|i, j| {
+                covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)
+            }),
+            std,
+            classical_std,
+            degrees_of_freedom,
+            rows,
+            effective_rows: rows as f64 / memory_rows,
+            memory_rows,
+            condition: condition(regressor),
+            scaled_condition: condition(&scaled),
+        }
+    }
+}
+
 /// A 95 % confidence region of two parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ellipse {

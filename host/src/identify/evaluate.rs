@@ -1,9 +1,9 @@
 //! Passes over recordings with fitted parameters: covariance and residuals.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::base::Independent;
-use super::covariance::{Estimate, Groups, Memory, t_quantile};
+use super::covariance::{Estimate, Groups, Memory};
 use super::factor::TriangularFactor;
 use super::linear::{classical, kept_columns, product, spread};
 use super::model::{Plan, each_rows};
@@ -71,41 +71,16 @@ pub(super) fn covariance(
         }
     })?;
     let covariance = &inverse * white * inverse.transpose();
-    let std: Vec<f64> = (0..size)
-        .map(|k| covariance[(k, k)].max(0.0).sqrt())
-        .collect();
-    let quantile = t_quantile(count - 1);
-    let (a, _) = kept_columns(factor, data);
-    let condition = |m: DMatrix<f64>| {
-        let s = m.singular_values();
-        s.max() / s.min()
-    };
-    let mut scaled = a.clone();
-    for mut column in scaled.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
-    }
-    let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
-        (0..size)
-            .map(|i| (0..size).map(|j| m(i, j)).collect())
-            .collect::<Vec<Vec<f64>>>()
-    };
-    Ok(Estimate {
-        interval: (0..size)
-            .map(|k| [beta[k] - quantile * std[k], beta[k] + quantile * std[k]])
-            .collect(),
-        covariance: rows_of(&|i, j| covariance[(i, j)]),
-        correlation: rows_of(&|i, j| covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)),
-        values: beta.to_vec(),
+    let (regressor, _) = kept_columns(factor, data);
+    Ok(Estimate::of(
+        beta,
+        &covariance,
+        count - 1,
         classical_std,
-        degrees_of_freedom: count - 1,
+        &regressor,
         rows,
-        effective_rows: rows as f64 / memory,
-        memory_rows: memory,
-        condition: condition(a),
-        scaled_condition: condition(scaled),
-        std,
-    })
+        memory,
+    ))
 }
 
 /// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models

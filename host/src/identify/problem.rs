@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::base::{Base, Independent};
-use super::covariance::{Estimate, t_quantile};
+use super::covariance::Estimate;
 use super::linear::spread;
 use super::model::Plan;
 use super::parts::{Parts, Refit};
@@ -85,69 +85,23 @@ impl Fitted {
     /// The estimate with its covariance.
     pub(super) fn estimate(&self, parts: &Parts) -> Estimate {
         let size = self.kept.whole.len();
+        let memory = parts.memory.iter().copied().fold(1.0, f64::max);
         let (covariance, freedom) = match &self.covariance {
             Some(own) => {
-                let memory = parts.memory.iter().copied().fold(1.0, f64::max);
                 let rows = parts.rows as f64 / memory;
                 (own.clone(), (rows as usize).saturating_sub(size).max(1))
             }
             None => (self.kept.covariance(), self.kept.without.len() - 1),
         };
-        assemble(
+        Estimate::of(
             &self.kept.whole,
-            covariance,
+            &covariance,
             freedom,
             self.classical_std.clone(),
             &self.regressor,
-            parts,
+            parts.rows,
+            memory,
         )
-    }
-}
-
-/// An [`Estimate`] of values and covariance.
-fn assemble(
-    values: &[f64],
-    covariance: DMatrix<f64>,
-    degrees_of_freedom: usize,
-    classical_std: Vec<f64>,
-    regressor: &DMatrix<f64>,
-    parts: &Parts,
-) -> Estimate {
-    let size = values.len();
-    let std: Vec<f64> = (0..size)
-        .map(|k| covariance[(k, k)].max(0.0).sqrt())
-        .collect();
-    let quantile = t_quantile(degrees_of_freedom);
-    let condition = |m: DMatrix<f64>| {
-        let s = m.singular_values();
-        s.max() / s.min()
-    };
-    let mut scaled = regressor.clone();
-    for mut column in scaled.column_iter_mut() {
-        let norm = column.norm();
-        column /= norm;
-    }
-    let rows_of = |m: &dyn Fn(usize, usize) -> f64| {
-        (0..size)
-            .map(|i| (0..size).map(|j| m(i, j)).collect())
-            .collect::<Vec<Vec<f64>>>()
-    };
-    let memory = parts.memory.iter().copied().fold(1.0, f64::max);
-    Estimate {
-        values: values.to_vec(),
-        interval: (0..size)
-            .map(|k| [values[k] - quantile * std[k], values[k] + quantile * std[k]])
-            .collect(),
-        covariance: rows_of(&|i, j| covariance[(i, j)]),
-        correlation: rows_of(&|i, j| covariance[(i, j)] / (std[i] * std[j]).max(f64::MIN_POSITIVE)),
-        std,
-        classical_std,
-        degrees_of_freedom,
-        rows: parts.rows,
-        effective_rows: parts.rows as f64 / memory,
-        memory_rows: memory,
-        condition: condition(regressor.clone()),
-        scaled_condition: condition(scaled),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rig_shared::trajectory::{Fourier, Trajectory};
 
 use super::*;
@@ -193,24 +193,7 @@ fn the_gradient_is_that_of_central_differences() {
         let x = random_start(&mut problem, &frame, 3, 0);
         problem.update(&x, &round(10.0));
         problem.press(0.3);
-        let mut gradient = DVector::zeros(x.len());
-        let mut unused = gradient.clone();
-        problem.value(&x, &mut gradient);
-        for k in 0..x.len() {
-            let h = 1e-6;
-            let mut moved = |by: f64| {
-                let mut x = x.clone();
-                x[k] += by;
-                problem.value(&x, &mut unused)
-            };
-            let difference = (moved(h) - moved(-h)) / (2.0 * h);
-            let error = (difference - gradient[k]).abs();
-            assert!(
-                error < 1e-5 * (1.0 + gradient.amax()),
-                "{k}: {difference} {}",
-                gradient[k]
-            );
-        }
+        gradient_is_that_of_differences(&mut problem, &x, 1e-5);
     }
 }
 

@@ -8,9 +8,12 @@ mod six_joints;
 
 use std::path::Path;
 
+use nalgebra::DVector;
 use rig_shared::multibody::inverse_dynamics;
 
 use super::*;
+use crate::excite::optimise::Objective;
+use crate::excite::problem::Problem;
 use crate::robot::ONE_LINK_TEMPLATE;
 use crate::simulate::Model;
 
@@ -71,4 +74,29 @@ pub(super) fn sampled_reach(robot: &Robot, file: &TrajectoryFile) -> Vec<[f64; 5
         }
     }
     most
+}
+
+/// Holds the problem's gradient at `x` against central differences, `tolerance` relative to its largest entry.
+pub(super) fn gradient_is_that_of_differences(
+    problem: &mut Problem,
+    x: &DVector<f64>,
+    tolerance: f64,
+) {
+    let mut gradient = DVector::zeros(x.len());
+    let mut unused = gradient.clone();
+    problem.value(x, &mut gradient);
+    for k in 0..x.len() {
+        let h = 1e-6;
+        let mut moved = |by: f64| {
+            let mut x = x.clone();
+            x[k] += by;
+            problem.value(&x, &mut unused)
+        };
+        let difference = (moved(h) - moved(-h)) / (2.0 * h);
+        assert!(
+            (difference - gradient[k]).abs() < tolerance * (1.0 + gradient.amax()),
+            "{k}: {difference} {}",
+            gradient[k]
+        );
+    }
 }

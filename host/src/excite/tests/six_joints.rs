@@ -160,23 +160,7 @@ fn the_gradient_is_that_of_central_differences() {
         problem.update(&x, &round);
         // Every constraint acts.
         problem.press(30.0);
-        let mut gradient = DVector::zeros(x.len());
-        let mut unused = gradient.clone();
-        problem.value(&x, &mut gradient);
-        for k in 0..x.len() {
-            let h = 1e-6;
-            let mut moved = |by: f64| {
-                let mut x = x.clone();
-                x[k] += by;
-                problem.value(&x, &mut unused)
-            };
-            let difference = (moved(h) - moved(-h)) / (2.0 * h);
-            assert!(
-                (difference - gradient[k]).abs() < 1e-6 * (1.0 + gradient.amax()),
-                "{criterion:?} {k}: {difference} {}",
-                gradient[k]
-            );
-        }
+        gradient_is_that_of_differences(&mut problem, &x, 1e-6);
     }
 }
 
@@ -205,23 +189,7 @@ fn coupled_motors_and_cranks_count_in_the_gradient_too() {
     };
     problem.update(&x, &round);
     problem.press(30.0);
-    let mut gradient = DVector::zeros(x.len());
-    let mut unused = gradient.clone();
-    problem.value(&x, &mut gradient);
-    for k in 0..x.len() {
-        let h = 1e-6;
-        let mut moved = |by: f64| {
-            let mut x = x.clone();
-            x[k] += by;
-            problem.value(&x, &mut unused)
-        };
-        let difference = (moved(h) - moved(-h)) / (2.0 * h);
-        assert!(
-            (difference - gradient[k]).abs() < 1e-5 * (1.0 + gradient.amax()),
-            "{k}: {difference} {}",
-            gradient[k]
-        );
-    }
+    gradient_is_that_of_differences(&mut problem, &x, 1e-5);
 }
 
 #[test]

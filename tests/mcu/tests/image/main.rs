@@ -18,7 +18,7 @@ use rig_mcu::image::Image;
 use rig_mcu::rig::{EmulatedBoard, Line, power_on};
 use rig_shared::safety::FaultRecord;
 use rig_shared::wire::message::{Health, Report, RequestBody};
-use rig_tests::{calibrated, excitation, wait};
+use rig_tests::{calibrated, excitation, snapshot, wait};
 
 /// A session with the emulated board.
 type BoardSession = Session<EmulatedPort<Line>>;
@@ -108,26 +108,4 @@ fn health(line: &mut BoardSession) -> Health {
         Report::Health(health) => Some(*health),
         _ => None,
     })
-}
-
-/// The latched fault and the ticks of its snapshot, over the wire.
-fn snapshot(line: &mut BoardSession) -> (FaultRecord, Vec<u64>) {
-    line.request(RequestBody::GetSnapshot).unwrap();
-    let (mut ticks, mut record, mut total) = (Vec::new(), None, usize::MAX);
-    while ticks.len() < total {
-        match line
-            .next_report(Duration::from_millis(500))
-            .unwrap()
-            .unwrap()
-        {
-            Report::Fault(found) => record = Some(found),
-            Report::Snapshot(part) => {
-                assert_eq!(usize::from(part.first), ticks.len());
-                total = usize::from(part.total);
-                ticks.extend(part.samples.iter().map(|sample| sample.tick));
-            }
-            _ => {}
-        }
-    }
-    (record.unwrap(), ticks)
 }

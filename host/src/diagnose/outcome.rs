@@ -1,0 +1,291 @@
+//! What a diagnosis says; serialises to `diagnosis.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// What became of the gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The model explains the data to the noise floor as it is.
+    NothingMissing,
+    /// Named effects close the gap to the noise floor.
+    Explained,
+    /// The structure holds; a nominal parameter has changed.
+    ParameterChange,
+    /// Something is left that no known effect explains.
+    Remainder,
+    /// The recording cannot be what it says; nothing was fitted.
+    DataFault,
+}
+
+/// Where part of the gap sits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Name of the joint.
+    pub joint: String,
+    /// What it depends on: `velocity`, `position`, `motor angle`, …
+    pub coordinate: String,
+    /// Interval of the coordinate that holds most of it.
+    pub interval: [f64; 2],
+    /// Unit of the interval.
+    pub unit: String,
+    /// Share of the excess over the noise floor that the coordinate alone explains.
+    pub share: f64,
+    /// Corrected for the number of coordinates.
+    pub p_value: f64,
+    /// One sentence.
+    pub text: String,
+}
+
+/// A fitted number.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Value {
+    /// SI
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// ASCII
+    pub unit: String,
+}
+
+/// One effect that was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Step {
+    /// Best name.
+    pub effect: String,
+    /// Which of several laws under that name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<String>,
+    /// Name of the joint.
+    pub joint: String,
+    /// Every name that these data support equally, `effect` among them.
+    pub set: Vec<String>,
+    /// Its parameters.
+    pub parameters: BTreeMap<String, Value>,
+    /// Corrected for all that was tried.
+    pub p_value: f64,
+    /// Best name outside the set.
+    pub runner_up: Option<String>,
+    /// Share of this step's gap that the runner-up would have closed.
+    pub runner_up_gap_closed: Option<f64>,
+    /// RMS of the torque residual of the joint, before and after this step, N·m or N.
+    pub train_rms: [f64; 2],
+    /// The same on the hold-out; null without one.
+    pub holdout_rms: Option<[f64; 2]>,
+    /// RMS of the simulated motion's error before and after this step, rad or m; null where it cannot be simulated.
+    pub motion_rms: Option<[f64; 2]>,
+    /// Share of the hold-out's (else the training) gap that this step closes.
+    pub gap_closed: f64,
+    /// Why to believe it, one sentence.
+    pub why: String,
+}
+
+/// A nominal parameter that moved when the effects came in.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Absorbed {
+    /// Name with the joint's number, or the base parameter's expression.
+    pub parameter: String,
+    /// ASCII
+    pub unit: String,
+    /// Identified without the effects.
+    pub before: f64,
+    /// Identified with them.
+    pub after: f64,
+    /// Difference in standard deviations of the latter.
+    pub sigmas: f64,
+}
+
+/// An effect that these data cannot show.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotTestable {
+    /// Its name.
+    pub effect: String,
+    /// Name of the joint.
+    pub joint: String,
+    /// What the data lack.
+    pub why: String,
+    /// What would show it.
+    pub experiment: String,
+}
+
+/// The smallest size of an effect that these data would have shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Detectable {
+    /// Its name.
+    pub effect: String,
+    /// Name of the joint.
+    pub joint: String,
+    /// Which parameter the size is of.
+    pub parameter: String,
+    /// SI
+    pub size: f64,
+    /// ASCII
+    pub unit: String,
+}
+
+/// What would separate a set, or make an effect testable.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NextExperiment {
+    /// Which primitive.
+    pub kind: String,
+    /// Names that it separates, or the one it makes testable.
+    pub separates: Vec<String>,
+    /// What to do, sentences.
+    pub text: String,
+    /// File for `rig` to run, beside `diagnosis.json`; none where hands are needed instead.
+    pub file: Option<String>,
+    /// Distance of the rivals' predictions in standard deviations of the noise, expected.
+    pub separation: Option<f64>,
+    /// s
+    pub duration: Option<f64>,
+}
+
+/// What no known effect explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remainder {
+    /// Name of the joint.
+    pub joint: String,
+    /// RMS beyond the noise floor, N·m or N.
+    pub rms: f64,
+    /// RMS over the noise floor.
+    pub ratio: f64,
+    /// Where it sits.
+    pub places: Vec<Place>,
+    /// In words.
+    pub text: String,
+}
+
+/// Something about a recording that no physics explains.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DataFault {
+    /// `sign`, `unit`, `ratio`, `clock`, `saturation`, `too-short`, `not-moving`.
+    pub kind: String,
+    /// Which recording.
+    pub recording: String,
+    /// Name of the joint.
+    pub joint: String,
+    /// What is wrong and what would be right, a sentence.
+    pub text: String,
+}
+
+/// RMS of the torque residual from model to model down to the floor, one joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Waterfall {
+    /// Name of the joint.
+    pub joint: String,
+    /// ASCII, N*m or N.
+    pub unit: String,
+    /// Names of the models: `frozen description`, `refitted`, then each effect.
+    pub models: Vec<String>,
+    /// RMS over the training recordings.
+    pub train: Vec<f64>,
+    /// RMS over the hold-out; empty without one.
+    pub holdout: Vec<f64>,
+    /// Noise floor.
+    pub floor: f64,
+}
+
+/// Residual before and after against one coordinate, for a plot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Map {
+    /// Name of the joint.
+    pub joint: String,
+    /// What is on the abscissa.
+    pub coordinate: String,
+    /// ASCII
+    pub unit: String,
+    /// ASCII, unit of the residual.
+    pub residual_unit: String,
+    /// Middles of the bins.
+    pub at: Vec<f64>,
+    /// Mean residual before, and half the width of its 95 % band.
+    pub before: Vec<[f64; 2]>,
+    /// Mean residual after, and half the width of its 95 % band.
+    pub after: Vec<[f64; 2]>,
+    /// The fitted law, without what the nominal model absorbs; empty where there is none.
+    pub law: Vec<f64>,
+    /// Which step it belongs to, from 0; none for what is left at the end.
+    pub step: Option<usize>,
+}
+
+/// Curves over time for a plot: a stretch of the hold-out (else training) recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Curves {
+    /// Name of the joint.
+    pub joint: String,
+    /// Which recording.
+    pub recording: String,
+    /// s
+    pub t: Vec<f64>,
+    /// Measured and what the models without and with the effects predict, N·m or N.
+    pub torque: [Vec<f64>; 3],
+    /// Measured and simulated positions without and with the effects, rad or m; empty where not simulated.
+    pub motion: [Vec<f64>; 3],
+}
+
+/// One candidate in the first round: what else was tried.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// Its name (and law).
+    pub effect: String,
+    /// Name of the joint.
+    pub joint: String,
+    /// Which step, from 0.
+    pub step: usize,
+    /// Share of the residual's RMS that it takes away on blocks it was not fitted to.
+    pub gain: f64,
+    /// That gain over its standard deviation.
+    pub gain_sigmas: f64,
+    /// Corrected for all that was tried.
+    pub p_value: f64,
+    /// Why it was not taken; empty for the one that was.
+    pub refused: String,
+}
+
+/// The result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// `rig-diagnosis/1`
+    pub schema: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// What became of the gap.
+    pub verdict: Verdict,
+    /// The verdict in words, sentences.
+    pub words: Vec<String>,
+    /// Per joint, N·m or N.
+    pub noise_floor_rms: Vec<f64>,
+    /// How it was estimated, a sentence.
+    pub noise_floor_how: String,
+    /// Where the gap sits, most of it first.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// What was found, in that order.
+    pub steps: Vec<Step>,
+    /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found.
+    pub gap_closed: Option<f64>,
+    /// Nominal parameters that had been lying.
+    pub absorbed: Vec<Absorbed>,
+    /// Effects that these data cannot show.
+    pub not_testable: Vec<NotTestable>,
+    /// The smallest size of each other effect that they would have shown.
+    pub detectable: Vec<Detectable>,
+    /// What to do next.
+    pub next_experiment: Option<NextExperiment>,
+    /// What is left.
+    pub remainder: Option<Remainder>,
+    /// What is wrong with the data.
+    pub data_faults: Vec<DataFault>,
+    /// RMS from model to model.
+    pub waterfall: Vec<Waterfall>,
+    /// Everything that was tried.
+    pub tried: Vec<Tried>,
+    /// Residual maps for plots.
+    #[serde(skip)]
+    pub maps: Vec<Map>,
+    /// Curves for plots.
+    #[serde(skip)]
+    pub curves: Vec<Curves>,
+}

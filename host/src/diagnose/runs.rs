@@ -1,0 +1,108 @@
+//! Recordings as the diagnosis works on them: whole stretches in memory, filtered and differentiated.
+
+use super::DiagnoseError;
+use crate::data::Block;
+use crate::prepare::{LowPass, Recording, central_difference, second_difference};
+
+/// One joint over a stretch, at the recording's own rate.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointRun {
+    /// Position as recorded, rad or m.
+    pub q_raw: Vec<f64>,
+    /// Torque as recorded, joint-side, N·m or N; empty where there is none.
+    pub tau: Vec<f64>,
+    /// Filtered position.
+    pub q: Vec<f64>,
+    /// Velocity, rad/s or m/s.
+    pub qd: Vec<f64>,
+    /// Acceleration, rad/s² or m/s².
+    pub qdd: Vec<f64>,
+    /// Reference position, where recorded.
+    pub reference: Option<Vec<f64>>,
+    /// Motor voltage, where recorded, V.
+    pub voltage: Option<Vec<f64>>,
+    /// Temperature, where recorded, °C.
+    pub temperature: Option<Vec<f64>>,
+}
+
+/// A stretch of a recording without a gap.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Run {
+    /// Name of the recording.
+    pub label: String,
+    /// Which of the recordings given, from 0.
+    pub recording: usize,
+    /// Hz
+    pub rate: f64,
+    /// s
+    pub t: Vec<f64>,
+    /// Joint by joint.
+    pub joints: Vec<JointRun>,
+}
+
+impl Run {
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+}
+
+/// Reads `recording` stretch by stretch; positions are filtered by `position` (zero phase) and differentiated.
+///
+/// # Errors
+/// What reading gives.
+pub fn runs_of(
+    recording: &dyn Recording,
+    number: usize,
+    rate: f64,
+    position: &LowPass,
+) -> Result<Vec<Run>, DiagnoseError> {
+    let mut runs: Vec<Run> = Vec::new();
+    recording.each_block(65_536, &mut |block| {
+        if !block.continues || runs.is_empty() {
+            runs.push(Run {
+                label: recording.label(),
+                recording: number,
+                rate,
+                joints: vec![JointRun::default(); block.joints.len()],
+                ..Run::default()
+            });
+        }
+        if let Some(run) = runs.last_mut() {
+            append(run, block);
+        }
+        Ok(())
+    })?;
+    for run in &mut runs {
+        for joint in &mut run.joints {
+            joint.q = position.zero_phase(&joint.q_raw);
+            joint.qd = central_difference(&joint.q, 1.0 / rate);
+            joint.qdd = second_difference(&joint.q, 1.0 / rate);
+        }
+    }
+    Ok(runs)
+}
+
+fn append(run: &mut Run, block: Block) {
+    fn join(to: &mut Option<Vec<f64>>, from: Option<Vec<f64>>, before: usize) {
+        match (to.as_mut(), from) {
+            (Some(to), Some(from)) => to.extend(from),
+            (None, Some(from)) if before == 0 => *to = Some(from),
+            _ => *to = None,
+        }
+    }
+    let before = run.t.len();
+    run.t.extend(block.t);
+    for (to, from) in run.joints.iter_mut().zip(block.joints) {
+        to.q_raw.extend(from.q);
+        to.tau.extend(from.tau);
+        join(&mut to.reference, from.reference, before);
+        join(&mut to.voltage, from.voltage, before);
+        join(&mut to.temperature, from.temperature, before);
+    }
+}

@@ -1,0 +1,161 @@
+//! Effects beyond the standard model: one file each, read alike by the simulator, the identifier, the diagnosis and the
+//! firmware's precompensation.
+//!
+//! An effect adds a torque to what the drive has to give: τ = Y·π + Σ βₖ·hₖ(η; motion). The βₖ (*gains*) enter linearly,
+//! the η (*shapes*) do not; hidden states are driven by the motion itself. A few effects act elsewhere ([`Channel`]): on
+//! what a sensor reads, between motor and link, or between command and voltage.
+//!
+//! Adding an effect is adding its file and one line to [`registry!`].
+
+mod about;
+mod asymmetric_coulomb;
+mod cogging;
+mod presliding_dahl;
+mod stribeck;
+
+pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::Real;
+
+/// Most gains of one effect.
+pub const GAINS: usize = 4;
+/// Most shapes of one effect.
+pub const SHAPES: usize = 3;
+/// Most hidden states of one effect.
+pub const MEMORY: usize = 6;
+
+/// What an effect sees at one instant. Joint-side, SI.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Instant<T> {
+    /// rad or m
+    pub position: T,
+    /// rad/s or m/s
+    pub velocity: T,
+    /// rad/s² or m/s²
+    pub acceleration: T,
+    /// Direction of motion, −1 to 1; stands apart from the velocity because near rest it is the caller's to know.
+    pub direction: T,
+    /// Angle of the motor, rad.
+    pub motor_angle: T,
+    /// Torque of the motor as its current and nominal constant say, times the ratio, N·m.
+    pub drive_torque: T,
+    /// Torque that the gear transmits, N·m.
+    pub load: T,
+    /// Running time, s.
+    pub time: T,
+    /// Temperature above that at the start, K; 0 where it is not measured.
+    pub warming: T,
+    /// Position, velocity and acceleration of the other joint that the effect names; 0 where it names none.
+    pub other: [T; 3],
+    /// Time since the last instant, s.
+    pub period: T,
+}
+
+/// The equations of one effect.
+trait Law {
+    /// What it is.
+    const ABOUT: About;
+
+    /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
+    fn terms<T: Real>(
+        shapes: &[T; SHAPES],
+        memory: &mut [T; MEMORY],
+        at: &Instant<T>,
+    ) -> [T; GAINS];
+}
+
+macro_rules! registry {
+    ($($(#[$meta:meta])* $kind:ident in $module:ident),+ $(,)?) => {
+        /// Which effect.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum Kind {
+            $($(#[$meta])* $kind),+
+        }
+
+        impl Kind {
+            /// All, in the order of the catalogue.
+            pub const ALL: &'static [Self] = &[$(Self::$kind),+];
+
+            /// What it is.
+            pub const fn about(self) -> &'static About {
+                match self {
+                    $(Self::$kind => &<$module::$kind as Law>::ABOUT),+
+                }
+            }
+
+            /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
+            #[inline(always)]
+            pub fn terms<T: Real>(
+                self,
+                shapes: &[T; SHAPES],
+                memory: &mut [T; MEMORY],
+                at: &Instant<T>,
+            ) -> [T; GAINS] {
+                match self {
+                    $(Self::$kind => $module::$kind::terms(shapes, memory, at)),+
+                }
+            }
+        }
+    };
+}
+
+registry! {
+    /// Friction that falls as the joint starts to slide.
+    Stribeck in stribeck,
+    /// Friction that differs with the direction.
+    AsymmetricCoulomb in asymmetric_coulomb,
+    /// Friction with memory of distance, after Dahl.
+    PreslidingDahl in presliding_dahl,
+    /// Detent torque of the motor's magnets.
+    Cogging in cogging,
+}
+
+impl Kind {
+    /// How many of the parameters are gains; they come first.
+    pub fn gains(self) -> usize {
+        self.about().gains.len()
+    }
+
+    /// The kind with this name and law, as a description writes them.
+    pub fn named(name: &str, law: Option<&str>) -> Option<Self> {
+        Self::ALL.iter().copied().find(|kind| {
+            let about = kind.about();
+            about.name == name && (law.is_none() || about.law == law)
+        })
+    }
+}
+
+/// One effect with its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Effect<T> {
+    /// Which.
+    pub kind: Kind,
+    /// In the order of [`About::gains`]; 0 beyond.
+    pub gains: [T; GAINS],
+    /// In the order of [`About::shapes`]; 0 beyond.
+    pub shapes: [T; SHAPES],
+}
+
+/// Hidden state of one effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory<T>(pub [T; MEMORY]);
+
+impl<T: Real> Default for Memory<T> {
+    fn default() -> Self {
+        Self([T::ZERO; MEMORY])
+    }
+}
+
+impl<T: Real> Effect<T> {
+    /// Torque that the drive has to give because of it, N·m, and the hidden state one period on.
+    #[inline(always)]
+    pub fn torque(&self, memory: &mut Memory<T>, at: &Instant<T>) -> T {
+        let terms = self.kind.terms(&self.shapes, &mut memory.0, at);
+        self.gains
+            .iter()
+            .zip(terms)
+            .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term)
+    }
+}
