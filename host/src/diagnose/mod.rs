@@ -1,8 +1,16 @@
 //! The gap workflow: where simulation and data disagree, which physical effect is missing, what it takes away on data not
 //! used, and when to stop.
 
+mod anchor;
+mod columns;
+mod fit;
+mod floor;
+mod locate;
 pub mod outcome;
+mod rows;
 pub mod runs;
+mod search;
+mod solve;
 
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};
