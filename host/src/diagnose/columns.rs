@@ -1,6 +1,6 @@
 //! Columns of an effect from the measured motion.
 
-use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, SHAPES};
+use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
 use super::rows::{Column, Nominal, Thinning, motion_of};
@@ -59,9 +59,8 @@ impl Source<'_> {
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
     ) -> Result<Vec<Column>, DiagnoseError> {
-        let gains = candidate.kind.about().gains.len();
         let n = self.nominal.joints();
-        let mut columns: Vec<Column> = vec![vec![None; n]; gains];
+        let mut columns: Vec<Column> = vec![vec![None; n]; self.gains(candidate.kind).len()];
         for (run, predicted) in self.runs.iter().zip(&self.predicted) {
             let full = self.at_full_rate(candidate, shapes, run, predicted)?;
             for (column, signals) in columns.iter_mut().zip(full) {
@@ -74,6 +73,26 @@ impl Source<'_> {
             }
         }
         Ok(columns)
+    }
+
+    /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
+    pub fn gains(&self, kind: Kind) -> Vec<Parameter> {
+        if kind != Kind::GravityTilt {
+            return kind.about().gains.to_vec();
+        }
+        let angle = |name| Parameter {
+            name,
+            unit: "rad",
+            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            range: [0.005, 0.2],
+            scale: Scale::Logarithmic,
+            meaning: "turn of the base",
+        };
+        match self.nominal.tilt_axes().len() {
+            0 => Vec::new(),
+            1 => vec![angle("angle")],
+            _ => vec![angle("angle_1"), angle("angle_2")],
+        }
     }
 
     /// One column a gain over one run, joint by joint, at the full rate.
@@ -98,16 +117,16 @@ impl Source<'_> {
                 })
                 .collect()
         };
-        match (about.channel, about.name) {
-            (_, "measurement_delay") => {
+        match (candidate.kind, about.channel) {
+            (Kind::MeasurementDelay, _) => {
                 let late = late(&predicted.torque[candidate.joint], DELAY * run.rate);
                 let change = (late.iter().zip(&predicted.torque[candidate.joint]))
                     .map(|(late, now)| (late - now) / DELAY)
                     .collect();
                 Ok(own(vec![change]))
             }
-            (_, "gravity_tilt") => self.tilted(candidate, run),
-            (Channel::Position, _) => {
+            (Kind::GravityTilt, _) => self.tilted(run),
+            (_, Channel::Position) => {
                 let errors = self.terms(candidate, shapes, run, predicted);
                 let mut columns = Vec::with_capacity(gains);
                 for error in errors.iter().take(gains) {
@@ -171,6 +190,9 @@ impl Source<'_> {
                     .map_or(0.0, |t| t[k] - first_temperature),
                 other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
                 period: 1.0 / run.rate,
+                // Delays and payloads have columns of their own.
+                drive_rate: 0.0,
+                gravity: 0.0,
             };
             let terms: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &at);
             for (list, term) in out.iter_mut().zip(terms) {
@@ -222,13 +244,11 @@ impl Source<'_> {
     }
 
     /// What a tilt of the base by a unit angle does to the torque: one column a horizontal axis that matters.
-    fn tilted(&self, candidate: &Candidate, run: &Run) -> Result<Vec<Column>, DiagnoseError> {
+    fn tilted(&self, run: &Run) -> Result<Vec<Column>, DiagnoseError> {
         let motion = motion_of(run);
         let motion = [&motion[0][..], &motion[1][..], &motion[2][..]];
-        let gains = candidate.kind.about().gains.len();
-        let axes = self.nominal.tilt_axes();
         let mut columns = Vec::new();
-        for axis in axes.into_iter().take(gains) {
+        for axis in self.nominal.tilt_axes() {
             let mut difference: Vec<Vec<f64>> = vec![vec![0.0; run.len()]; self.nominal.joints()];
             for side in [1.0, -1.0] {
                 self.nominal
@@ -240,10 +260,6 @@ impl Source<'_> {
                     })?;
             }
             columns.push(difference.into_iter().map(Some).collect());
-        }
-        // A gain without a column of its own.
-        while columns.len() < gains {
-            columns.push(vec![None; self.nominal.joints()]);
         }
         Ok(columns)
     }

@@ -3,6 +3,7 @@
 
 mod anchor;
 mod columns;
+mod engine;
 mod fit;
 mod floor;
 mod locate;
@@ -12,10 +13,24 @@ pub mod runs;
 mod search;
 mod solve;
 
+pub use engine::diagnose;
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};
 
+use rig_shared::effects::Kind;
+
 use crate::prepare::PrepareError;
+
+/// Settings of a diagnosis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Effects that are left out of the library.
+    pub without: Vec<Kind>,
+    /// Threads; 0 for as many as the machine has.
+    pub threads: usize,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
 
 /// Why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]

@@ -99,6 +99,7 @@ pub fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
                     .collect()
             }
             Scale::Linear => {
+                // Orders are whole; anything else linear is stepped through.
                 let whole = (high - low).floor() as usize + 1;
                 if whole <= MOST_POINTS && low.fract() == 0.0 {
                     (0..whole).map(|k| low + k as f64).collect()
@@ -168,7 +169,7 @@ impl<'a> Search<'a> {
     /// Share of the residual that a candidate explains at given shapes, with its columns projected.
     fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<(f64, Vec<Vec<f64>>)> {
         let projected = fit.distinct(columns)?;
-        let bounds = bounds_of(self.library[c].kind);
+        let bounds = self.bounds(self.library[c].kind);
         let (share, _) = fit.explained(&projected, &bounds)?;
         Some((share, projected))
     }
@@ -218,7 +219,7 @@ impl<'a> Search<'a> {
         let Some(projected) = fit.distinct(&best.2) else {
             return Ok(None);
         };
-        let Some(evidence) = fit.evidence(&projected, &bounds_of(kind)) else {
+        let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
             return Ok(None);
         };
         Ok(Some(Profile {
@@ -323,6 +324,11 @@ impl<'a> Search<'a> {
                 .then_with(|| a.candidate.kind.cmp(&b.candidate.kind))
         });
         Ok(profiles)
+    }
+
+    /// What physics allows the gains to be.
+    fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
+        self.source.gains(kind).iter().map(|g| g.bounds).collect()
     }
 
     /// Number of trials of a sweep.
@@ -442,11 +448,6 @@ pub fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -> Fit<'
         }
     }
     fit
-}
-
-/// What physics allows the gains to be.
-pub fn bounds_of(kind: Kind) -> Vec<[f64; 2]> {
-    kind.about().gains.iter().map(|g| g.bounds).collect()
 }
 
 /// Whether an effect's columns depend on what the model predicts.
