@@ -10,26 +10,26 @@ use super::rows::{Column, Nominal, Rows};
 use crate::robot::Robot;
 
 /// A free direction in the space of base parameters: parameters and factors.
-pub type Direction = Vec<(usize, f64)>;
+pub(super) type Direction = Vec<(usize, f64)>;
 
 /// Free and held nominal parameters.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Anchor {
+pub(super) struct Anchor {
     /// What a refit moves.
-    pub free: Vec<Direction>,
+    pub(super) free: Vec<Direction>,
     /// Base parameters as the description has them.
-    pub prior: Vec<f64>,
+    pub(super) prior: Vec<f64>,
     /// Base parameters that are held at the prior, wholly or but for one direction.
-    pub held: Vec<usize>,
+    pub(super) held: Vec<usize>,
     /// Whether the description states inertia and friction, so that a change against it means something.
-    pub stated: bool,
+    pub(super) stated: bool,
     /// Whether the direction of gravity is held.
-    pub gravity_held: bool,
+    pub(super) gravity_held: bool,
 }
 
 impl Anchor {
     /// For a robot.
-    pub fn of(robot: &Robot, nominal: &Nominal) -> Self {
+    pub(super) fn of(robot: &Robot, nominal: &Nominal) -> Self {
         let n = robot.joints.len();
         let mut standard = robot.standard_parameters().concat();
         standard.extend(robot.motor_parameters().as_flattened());
@@ -83,7 +83,7 @@ impl Anchor {
     }
 
     /// Columns of the free directions.
-    pub fn columns(&self, rows: &Rows) -> Vec<Column> {
+    pub(super) fn columns(&self, rows: &Rows) -> Vec<Column> {
         self.free
             .iter()
             .map(|direction| combined(rows, direction))
@@ -91,7 +91,7 @@ impl Anchor {
     }
 
     /// What the held parameters contribute at their prior, in the space that the free directions leave.
-    pub fn fixed(&self) -> Direction {
+    pub(super) fn fixed(&self) -> Direction {
         let mut rest: Vec<f64> = vec![0.0; self.prior.len()];
         for &k in &self.held {
             rest[k] = self.prior[k];
@@ -108,7 +108,7 @@ impl Anchor {
     }
 
     /// Base parameters from the free directions' coefficients.
-    pub fn values(&self, coefficients: &[f64]) -> Vec<f64> {
+    pub(super) fn values(&self, coefficients: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.prior.len()];
         for (k, x) in self.fixed() {
             values[k] += x;
@@ -122,7 +122,7 @@ impl Anchor {
     }
 
     /// Coefficients of the free directions at the prior.
-    pub fn prior_coefficients(&self) -> Vec<f64> {
+    pub(super) fn prior_coefficients(&self) -> Vec<f64> {
         self.free
             .iter()
             .map(|direction| direction.iter().map(|&(k, f)| self.prior[k] * f).sum())
@@ -131,7 +131,7 @@ impl Anchor {
 }
 
 /// The sum of nominal columns.
-pub fn combined(rows: &Rows, direction: &[(usize, f64)]) -> Column {
+pub(super) fn combined(rows: &Rows, direction: &[(usize, f64)]) -> Column {
     let mut sum: Column = vec![None; rows.joints()];
     for &(k, f) in direction {
         for (to, from) in sum.iter_mut().zip(&rows.nominal[k]) {

@@ -10,38 +10,38 @@ use crate::robot::Robot;
 
 /// What the present model says of a run at the full rate.
 #[derive(Clone, Debug, Default)]
-pub struct Predicted {
+pub(super) struct Predicted {
     /// Torque, joint by joint.
-    pub torque: Vec<Vec<f64>>,
+    pub(super) torque: Vec<Vec<f64>>,
     /// Torque that the gear transmits: without friction and the drive's own inertia.
-    pub load: Vec<Vec<f64>>,
+    pub(super) load: Vec<Vec<f64>>,
 }
 
 /// What columns are formed from.
-pub struct Source<'a> {
+pub(super) struct Source<'a> {
     /// The robot.
-    pub robot: &'a Robot,
+    pub(super) robot: &'a Robot,
     /// The recordings.
-    pub runs: &'a [Run],
+    pub(super) runs: &'a [Run],
     /// Base parameters and geometry.
-    pub nominal: &'a Nominal,
+    pub(super) nominal: &'a Nominal,
     /// What columns pass.
-    pub thinning: &'a Thinning,
+    pub(super) thinning: &'a Thinning,
     /// The present model's word, run by run.
-    pub predicted: Vec<Predicted>,
+    pub(super) predicted: Vec<Predicted>,
     /// Identified base parameters.
-    pub values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 /// An effect on a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Candidate {
+pub(super) struct Candidate {
     /// Which.
-    pub kind: Kind,
+    pub(super) kind: Kind,
     /// On which joint, from 0.
-    pub joint: usize,
+    pub(super) joint: usize,
     /// The other joint that it names.
-    pub other: Option<usize>,
+    pub(super) other: Option<usize>,
 }
 
 /// Reference delay at which the column of a delay is taken, s: first order would be 2 % off at 3 Hz and 10 ms.
@@ -54,7 +54,7 @@ impl Source<'_> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub fn columns(
+    pub(super) fn columns(
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
@@ -76,7 +76,7 @@ impl Source<'_> {
     }
 
     /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
-    pub fn gains(&self, kind: Kind) -> Vec<Parameter> {
+    pub(super) fn gains(&self, kind: Kind) -> Vec<Parameter> {
         if kind != Kind::GravityTilt {
             return kind.about().gains.to_vec();
         }
@@ -99,7 +99,7 @@ impl Source<'_> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub fn at_full_rate(
+    pub(super) fn at_full_rate(
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
@@ -282,7 +282,7 @@ fn late(signal: &[f64], samples: f64) -> Vec<f64> {
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
-pub fn predict(
+pub(super) fn predict(
     nominal: &Nominal,
     robot: &Robot,
     values: &[f64],

@@ -363,7 +363,7 @@ pub fn diagnose(
 }
 
 /// Name with its law.
-pub fn label(kind: Kind) -> String {
+pub(super) fn label(kind: Kind) -> String {
     let about = kind.about();
     match about.law {
         Some(law) => format!("{} ({law})", about.name),
@@ -553,7 +553,7 @@ fn absorbed(bench: &Bench, before: &Solution, after: &Solution) -> Vec<Absorbed>
 }
 
 /// An effect as a description and the firmware take it.
-pub fn effect_of(kind: Kind, gains: &[f64], shapes: &[f64; SHAPES]) -> Effect<f64> {
+pub(super) fn effect_of(kind: Kind, gains: &[f64], shapes: &[f64; SHAPES]) -> Effect<f64> {
     let mut all = [0.0; GAINS];
     for (to, from) in all.iter_mut().zip(gains) {
         *to = *from;

@@ -14,7 +14,7 @@ const DISTINCT: f64 = 0.02;
 
 /// Rows under weights, an orthonormal basis of the columns taken in, and what is left of the torque.
 #[derive(Clone)]
-pub struct Fit<'a> {
+pub(super) struct Fit<'a> {
     rows: &'a Rows,
     /// Per joint, one over the standard deviation of its residual.
     scale: Vec<f64>,
@@ -27,26 +27,26 @@ pub struct Fit<'a> {
 
 /// What candidates' columns would do.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Evidence {
+pub(super) struct Evidence {
     /// Coefficients of the columns.
-    pub gains: Vec<f64>,
+    pub(super) gains: Vec<f64>,
     /// Their standard deviations, robust to correlation within blocks.
-    pub stds: Vec<f64>,
+    pub(super) stds: Vec<f64>,
     /// Share of the residual's squares that they take away.
-    pub explained: f64,
+    pub(super) explained: f64,
     /// Share of the RMS that they take away on folds they were not fitted to.
-    pub gain: f64,
+    pub(super) gain: f64,
     /// That gain over its standard deviation between blocks.
-    pub gain_sigmas: f64,
+    pub(super) gain_sigmas: f64,
     /// Of all coefficients together being zero; not corrected for anything.
-    pub p_value: f64,
+    pub(super) p_value: f64,
     /// Squared error of each block without and with them, on folds not fitted to.
-    pub block_errors: Vec<[f64; 2]>,
+    pub(super) block_errors: Vec<[f64; 2]>,
 }
 
 impl<'a> Fit<'a> {
     /// Takes the rows in; `memory` is the time in seconds that residuals are correlated over, `scale` one weight a joint.
-    pub fn new(rows: &'a Rows, scale: Vec<f64>, memory: f64) -> Self {
+    pub(super) fn new(rows: &'a Rows, scale: Vec<f64>, memory: f64) -> Self {
         let length = ((5.0 * memory / rows.period).ceil() as usize)
             .max(1)
             .min((rows.count / FEWEST_BLOCKS).max(1));
@@ -72,7 +72,7 @@ impl<'a> Fit<'a> {
     }
 
     /// A column as the weighted rows of all joints one after the other; masked rows are zero.
-    pub fn weighted(&self, column: &Column) -> Vec<f64> {
+    pub(super) fn weighted(&self, column: &Column) -> Vec<f64> {
         let n = self.rows.count;
         let mut out = vec![0.0; n * self.rows.joints()];
         for (j, values) in column.iter().enumerate() {
@@ -88,7 +88,7 @@ impl<'a> Fit<'a> {
     }
 
     /// What is left of a weighted column beside those taken in.
-    pub fn projected(&self, mut column: Vec<f64>) -> Vec<f64> {
+    pub(super) fn projected(&self, mut column: Vec<f64>) -> Vec<f64> {
         for _ in 0..2 {
             for b in &self.basis {
                 let along = dot(b, &column);
@@ -99,7 +99,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Takes a column in; false (and nothing done) where it is a combination of the others.
-    pub fn push(&mut self, column: &Column) -> bool {
+    pub(super) fn push(&mut self, column: &Column) -> bool {
         let weighted = self.weighted(column);
         let length = dot(&weighted, &weighted).sqrt();
         let mut rest = self.projected(weighted);
@@ -117,14 +117,14 @@ impl<'a> Fit<'a> {
     }
 
     /// RMS of a joint's residual in its own unit, over the rows used.
-    pub fn rms(&self, joint: usize) -> f64 {
+    pub(super) fn rms(&self, joint: usize) -> f64 {
         let n = self.rows.count;
         let squares = dot_self(&self.residual[joint * n..(joint + 1) * n]);
         (squares / self.rows.used(joint).max(1) as f64).sqrt() / self.scale[joint]
     }
 
     /// Residual of a joint in its own unit; 0 on masked rows.
-    pub fn residual(&self, joint: usize) -> Vec<f64> {
+    pub(super) fn residual(&self, joint: usize) -> Vec<f64> {
         let n = self.rows.count;
         self.residual[joint * n..(joint + 1) * n]
             .iter()
@@ -133,23 +133,27 @@ impl<'a> Fit<'a> {
     }
 
     /// The weighted residual of all joints.
-    pub fn left(&self) -> &[f64] {
+    pub(super) fn left(&self) -> &[f64] {
         &self.residual
     }
 
     /// Number of blocks.
-    pub fn blocks(&self) -> usize {
+    pub(super) fn blocks(&self) -> usize {
         self.blocks
     }
 
     /// Block of each row of a joint.
-    pub fn block_of_rows(&self) -> &[usize] {
+    pub(super) fn block_of_rows(&self) -> &[usize] {
         &self.block
     }
 
     /// Share of the residual's squares that projected columns explain, with their coefficients; none where they are
     /// not distinct from what was taken in. `bounds` are those of the coefficients: outside them nothing is explained.
-    pub fn explained(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<(f64, Vec<f64>)> {
+    pub(super) fn explained(
+        &self,
+        columns: &[Vec<f64>],
+        bounds: &[[f64; 2]],
+    ) -> Option<(f64, Vec<f64>)> {
         let k = columns.len();
         let gram = DMatrix::from_fn(k, k, |a, b| dot(&columns[a], &columns[b]));
         let right = DVector::from_fn(k, |a, _| dot(&columns[a], &self.residual));
@@ -168,7 +172,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Weighted columns of a candidate projected; none where one of them is no column of its own.
-    pub fn distinct(&self, columns: &[Column]) -> Option<Vec<Vec<f64>>> {
+    pub(super) fn distinct(&self, columns: &[Column]) -> Option<Vec<Vec<f64>>> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
             let weighted = self.weighted(column);
@@ -184,7 +188,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Everything about projected columns.
-    pub fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
+    pub(super) fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
         let (explained, gains) = self.explained(columns, bounds)?;
         let (k, blocks) = (columns.len(), self.blocks);
         let n = self.rows.count;
@@ -318,7 +322,7 @@ impl<'a> Fit<'a> {
 }
 
 /// Inner product.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Eight sums at a time: the compiler does not reorder one.
     let mut sums = [0.0; 8];
     let (a8, a_rest) = a.as_chunks::<8>();
@@ -332,7 +336,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Sum of squares.
-pub fn dot_self(a: &[f64]) -> f64 {
+pub(super) fn dot_self(a: &[f64]) -> f64 {
     dot(a, a)
 }
 

@@ -10,7 +10,7 @@ const ALIKE: f64 = 0.02;
 const LONGEST_MEMORY: f64 = 2.0;
 
 /// Pairs of runs that repeat one motion.
-pub fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
+pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for a in 0..runs.len() {
         for b in a + 1..runs.len() {
@@ -44,7 +44,7 @@ fn alike(a: &Run, b: &Run) -> bool {
 }
 
 /// RMS of a joint's noise from residuals of repeated runs: what differs between them over √2. None without a repeat.
-pub fn from_repeats(
+pub(super) fn from_repeats(
     rows: &Rows,
     pairs: &[(usize, usize)],
     residual: &[f64],
@@ -67,7 +67,7 @@ pub fn from_repeats(
 
 /// Time over which a joint's residual is correlated, s: the integral of its autocorrelation up to the first zero, the
 /// longest over the joints.
-pub fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
+pub(super) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
     let lags = ((LONGEST_MEMORY / rows.period).ceil() as usize).min(rows.count / 4);
     let of = |residual: &Vec<f64>| {
         let squares: f64 = residual.iter().map(|r| r * r).sum();

@@ -13,24 +13,24 @@ use super::runs::Run;
 use crate::robot::Robot;
 
 /// Bins of equal numbers of rows.
-pub const BINS: usize = 24;
+pub(super) const BINS: usize = 24;
 /// Draws of the bootstrap.
 const DRAWS: usize = 999;
 /// Share of the explained squares that the interval has to hold.
 const MOST_OF_IT: f64 = 0.75;
 
 /// A coordinate of one joint on the kept rows.
-pub struct Coordinate {
+pub(super) struct Coordinate {
     /// In words.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// ASCII
-    pub unit: &'static str,
+    pub(super) unit: &'static str,
     /// One a row.
-    pub values: Vec<f64>,
+    pub(super) values: Vec<f64>,
 }
 
 /// All coordinates of a joint.
-pub fn coordinates(
+pub(super) fn coordinates(
     rows: &Rows,
     runs: &[Run],
     predicted: &[Predicted],
@@ -130,7 +130,7 @@ fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Equal-count bins of a coordinate over used rows: bin of each row (none where not used) and the bins' edges.
-pub fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
+pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
     let mut sorted: Vec<f64> = (values.iter().zip(keep))
         .filter(|(_, k)| **k)
         .map(|(v, _)| *v)
@@ -152,7 +152,7 @@ pub fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, 
 }
 
 /// Where the residual of a joint sits, most of the excess over `floor` first. `block` is the block of each row.
-pub fn locate(
+pub(super) fn locate(
     rows: &Rows,
     coordinates: &[Coordinate],
     residual: &[f64],

@@ -16,11 +16,11 @@ use crate::robot::Robot;
 const SPOILT: f64 = 0.1;
 
 /// A signal on the kept rows, joint by joint; absent where it is zero throughout.
-pub type Column = Vec<Option<Vec<f64>>>;
+pub(super) type Column = Vec<Option<Vec<f64>>>;
 
 /// Low-pass and thinning that torque and every regressor column pass alike.
 #[derive(Clone, Debug)]
-pub struct Thinning {
+pub(super) struct Thinning {
     low_pass: LowPass,
     step: usize,
     trimmed: usize,
@@ -31,7 +31,7 @@ impl Thinning {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] where there is no such filter.
-    pub fn of(treatment: &Treatment) -> Result<Self, DiagnoseError> {
+    pub(super) fn of(treatment: &Treatment) -> Result<Self, DiagnoseError> {
         let low_pass = treatment
             .parallel_low_pass()
             .ok_or_else(|| DiagnoseError::Model("its low-pass cannot be built.".into()))?;
@@ -48,39 +48,39 @@ impl Thinning {
     }
 
     /// What is kept of a signal at the full rate, appended to `out`.
-    pub fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
+    pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
         let smooth = self.low_pass.zero_phase(signal);
         out.extend(self.kept(signal.len()).map(|k| smooth[k]));
     }
 
     /// Kept samples as they are, without the low-pass.
-    pub fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
+    pub(super) fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
         out.extend(self.kept(signal.len()).map(|k| signal[k]));
     }
 }
 
 /// The regression: rows over all runs, one set a joint.
-pub struct Rows {
+pub(super) struct Rows {
     /// What the columns pass.
-    pub thinning: Thinning,
+    pub(super) thinning: Thinning,
     /// Rows a joint.
-    pub count: usize,
+    pub(super) count: usize,
     /// First row of each run, and one past the last.
-    pub starts: Vec<usize>,
+    pub(super) starts: Vec<usize>,
     /// Distance of the rows, s.
-    pub period: f64,
+    pub(super) period: f64,
     /// Torque, joint by joint.
-    pub torque: Vec<Vec<f64>>,
+    pub(super) torque: Vec<Vec<f64>>,
     /// Whether the row is used, joint by joint.
-    pub keep: Vec<Vec<bool>>,
+    pub(super) keep: Vec<Vec<bool>>,
     /// Nominal columns, one a base parameter.
-    pub nominal: Vec<Column>,
+    pub(super) nominal: Vec<Column>,
 }
 
 /// The base parameters with the geometry that they belong to.
-pub struct Nominal {
+pub(super) struct Nominal {
     /// Base parameters.
-    pub base: Base,
+    pub(super) base: Base,
     robot: Robot,
     batch: ChainBatch,
     transmission: rig_shared::transmission::Transmission<f64>,
@@ -91,7 +91,7 @@ impl Nominal {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
+    pub(super) fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
         let model = |e: crate::identify::IdentifyError| DiagnoseError::Model(e.to_string());
         Ok(Self {
             base: Base::structural(robot, ModelKind::Differential, 1).map_err(model)?,
@@ -105,7 +105,7 @@ impl Nominal {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub fn tilted(&self, axis: [f64; 3], angle: f64) -> Result<Self, DiagnoseError> {
+    pub(super) fn tilted(&self, axis: [f64; 3], angle: f64) -> Result<Self, DiagnoseError> {
         let turn = Rotation3::from_scaled_axis(angle * Vector3::from(axis));
         let mut robot = self.robot.clone();
         // The base turns one way, gravity as seen from it the other.
@@ -120,7 +120,7 @@ impl Nominal {
     }
 
     /// Axes of the base frame about which a tilt changes gravity: for one joint its own axis alone.
-    pub fn tilt_axes(&self) -> Vec<[f64; 3]> {
+    pub(super) fn tilt_axes(&self) -> Vec<[f64; 3]> {
         let g = Vector3::from(self.robot.gravity);
         if g.norm() == 0.0 {
             return Vec::new();
@@ -141,18 +141,18 @@ impl Nominal {
     }
 
     /// Whether a base parameter is Coulomb friction.
-    pub fn is_coulomb(&self, k: usize) -> bool {
+    pub(super) fn is_coulomb(&self, k: usize) -> bool {
         self.place(k).is_ok_and(|c| c == column::COULOMB)
             || self.place(k).is_err_and(|c| c == motor_column::COULOMB)
     }
 
     /// Whether a base parameter belongs to the drive: friction, offset or its own inertia.
-    pub fn is_drive(&self, k: usize) -> bool {
+    pub(super) fn is_drive(&self, k: usize) -> bool {
         self.place(k).map_or(true, |c| c >= column::DRIVE_INERTIA)
     }
 
     /// Whether the inertia of a joint's drive is a base parameter by itself.
-    pub fn has_own_drive_inertia(&self, joint: usize) -> bool {
+    pub(super) fn has_own_drive_inertia(&self, joint: usize) -> bool {
         self.base
             .columns
             .contains(&(joint * COLUMNS + column::DRIVE_INERTIA))
@@ -168,7 +168,7 @@ impl Nominal {
     }
 
     /// Joints.
-    pub fn joints(&self) -> usize {
+    pub(super) fn joints(&self) -> usize {
         self.batch.joint_count()
     }
 
@@ -177,7 +177,7 @@ impl Nominal {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] on lengths.
-    pub fn columns(
+    pub(super) fn columns(
         &self,
         motion: [&[Vec<f64>]; 3],
         visit: &mut dyn FnMut(usize, usize, &[f64]),
@@ -249,7 +249,7 @@ impl Nominal {
 }
 
 /// Position, velocity and acceleration of all joints over a run.
-pub fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
+pub(super) fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
     let of = |pick: fn(&super::runs::JointRun) -> &Vec<f64>| -> Vec<Vec<f64>> {
         run.joints.iter().map(|j| pick(j).clone()).collect()
     };
@@ -261,7 +261,7 @@ impl Rows {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub fn of(
+    pub(super) fn of(
         runs: &[Run],
         nominal: &Nominal,
         treatment: &Treatment,
@@ -309,12 +309,12 @@ impl Rows {
     }
 
     /// Joints.
-    pub fn joints(&self) -> usize {
+    pub(super) fn joints(&self) -> usize {
         self.torque.len()
     }
 
     /// Rows used of a joint.
-    pub fn used(&self, joint: usize) -> usize {
+    pub(super) fn used(&self, joint: usize) -> usize {
         self.keep[joint].iter().filter(|k| **k).count()
     }
 }

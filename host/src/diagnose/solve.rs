@@ -7,23 +7,23 @@ use super::rows::Column;
 
 /// Coefficients of columns fitted together.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub(super) struct Solution {
     /// One a column.
-    pub values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     /// Robust to correlation within blocks; columns that were only linearised take part.
-    pub covariance: DMatrix<f64>,
+    pub(super) covariance: DMatrix<f64>,
 }
 
 impl Solution {
     /// Standard deviation of a coefficient.
-    pub fn std(&self, k: usize) -> f64 {
+    pub(super) fn std(&self, k: usize) -> f64 {
         self.covariance[(k, k)].max(0.0).sqrt()
     }
 }
 
 /// Fits `columns` to the torque; `slopes` are derivatives with respect to parameters that do not enter linearly: they take
 /// part in the covariance alone, behind the columns. None where the columns are not independent.
-pub fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
+pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
     let weighted: Vec<Vec<f64>> = columns.iter().map(|c| plain.weighted(c)).collect();
     let torque = plain.left();
     let (values, inverse) = normal(&weighted, torque)?;
