@@ -3,6 +3,7 @@
 
 pub mod outcome;
 pub mod runs;
+pub mod scenario;
 
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};
@@ -21,4 +22,7 @@ pub enum DiagnoseError {
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
+    /// A scenario that cannot be made.
+    #[error("The scenario cannot be made: {0}")]
+    Scenario(String),
 }
