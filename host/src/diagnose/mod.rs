@@ -1,14 +1,37 @@
 //! The gap workflow: where simulation and data disagree, which physical effect is missing, what it takes away on data not
 //! used, and when to stop.
 
+mod anchor;
+mod columns;
+mod engine;
+mod fit;
+mod floor;
+mod locate;
 pub mod outcome;
+mod rows;
 pub mod runs;
 pub mod scenario;
+mod search;
+mod solve;
 
+pub use engine::diagnose;
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};
 
+use rig_shared::effects::Kind;
+
 use crate::prepare::PrepareError;
+
+/// Settings of a diagnosis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Effects that are left out of the library.
+    pub without: Vec<Kind>,
+    /// Threads; 0 for as many as the machine has.
+    pub threads: usize,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
 
 /// Why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]

@@ -1,0 +1,146 @@
+//! Which nominal parameters a refit may move.
+//!
+//! Gravity's direction, a zero angle and a constant torque can all be taken up by base parameters. Where the description
+//! states such a value, it is held: what the data add to it is then an effect with a name (a tilted base, an offset)
+//! instead of a silently wrong parameter. Where it states nothing, the parameter is free and the effect not testable.
+
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::rows::{Column, Nominal, Rows};
+use crate::robot::Robot;
+
+/// A free direction in the space of base parameters: parameters and factors.
+pub type Direction = Vec<(usize, f64)>;
+
+/// Free and held nominal parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Anchor {
+    /// What a refit moves.
+    pub free: Vec<Direction>,
+    /// Base parameters as the description has them.
+    pub prior: Vec<f64>,
+    /// Base parameters that are held at the prior, wholly or but for one direction.
+    pub held: Vec<usize>,
+    /// Whether the description states inertia and friction, so that a change against it means something.
+    pub stated: bool,
+    /// Whether the direction of gravity is held.
+    pub gravity_held: bool,
+}
+
+impl Anchor {
+    /// For a robot.
+    pub fn of(robot: &Robot, nominal: &Nominal) -> Self {
+        let n = robot.joints.len();
+        let mut standard = robot.standard_parameters().concat();
+        standard.extend(robot.motor_parameters().as_flattened());
+        standard.resize(nominal.base.combination.ncols(), 0.0);
+        let prior: Vec<f64> = (nominal.base.combination.row_iter())
+            .map(|row| row.iter().zip(&standard).map(|(k, p)| k * p).sum())
+            .collect();
+        let inertial = robot
+            .joints
+            .iter()
+            .all(|j| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
+        let friction = robot.joints.iter().all(|j| j.friction.is_some());
+        let mut held = Vec::new();
+        let mut free: Vec<Direction> = Vec::new();
+        let mut gravity = Direction::new();
+        let of_gravity = |c: usize| {
+            n == 1
+                && inertial
+                && (1..=2).contains(&c)
+                && robot.joints[0].kind == crate::robot::JointKind::Revolute
+        };
+        for (k, &c) in nominal.base.columns.iter().enumerate() {
+            let offset = c < n * COLUMNS
+                && c % COLUMNS == column::OFFSET
+                && robot.joints[c / COLUMNS].friction.is_some();
+            if offset {
+                held.push(k);
+            } else if of_gravity(c) {
+                held.push(k);
+                gravity.push((k, prior[k]));
+            } else {
+                free.push(vec![(k, 1.0)]);
+            }
+        }
+        let size = gravity.iter().map(|g| g.1 * g.1).sum::<f64>().sqrt();
+        let gravity_held = size > 0.0;
+        if gravity_held {
+            free.push(gravity.into_iter().map(|(k, g)| (k, g / size)).collect());
+        } else {
+            // A link said to be balanced: nothing to hold its gravity to.
+            held.retain(|k| !gravity.iter().any(|g| g.0 == *k));
+            free.extend(gravity.into_iter().map(|(k, _)| vec![(k, 1.0)]));
+        }
+        Self {
+            free,
+            prior,
+            held,
+            stated: inertial && friction,
+            gravity_held,
+        }
+    }
+
+    /// Columns of the free directions.
+    pub fn columns(&self, rows: &Rows) -> Vec<Column> {
+        self.free
+            .iter()
+            .map(|direction| combined(rows, direction))
+            .collect()
+    }
+
+    /// What the held parameters contribute at their prior, in the space that the free directions leave.
+    pub fn fixed(&self) -> Direction {
+        let mut rest: Vec<f64> = vec![0.0; self.prior.len()];
+        for &k in &self.held {
+            rest[k] = self.prior[k];
+        }
+        for direction in &self.free {
+            let along: f64 = direction.iter().map(|&(k, f)| rest[k] * f).sum();
+            for &(k, f) in direction {
+                rest[k] -= along * f;
+            }
+        }
+        (rest.into_iter().enumerate())
+            .filter(|(_, x)| x.abs() > 1e-12)
+            .collect()
+    }
+
+    /// Base parameters from the free directions' coefficients.
+    pub fn values(&self, coefficients: &[f64]) -> Vec<f64> {
+        let mut values = vec![0.0; self.prior.len()];
+        for (k, x) in self.fixed() {
+            values[k] += x;
+        }
+        for (direction, c) in self.free.iter().zip(coefficients) {
+            for &(k, f) in direction {
+                values[k] += c * f;
+            }
+        }
+        values
+    }
+
+    /// Coefficients of the free directions at the prior.
+    pub fn prior_coefficients(&self) -> Vec<f64> {
+        self.free
+            .iter()
+            .map(|direction| direction.iter().map(|&(k, f)| self.prior[k] * f).sum())
+            .collect()
+    }
+}
+
+/// The sum of nominal columns.
+pub fn combined(rows: &Rows, direction: &[(usize, f64)]) -> Column {
+    let mut sum: Column = vec![None; rows.joints()];
+    for &(k, f) in direction {
+        for (to, from) in sum.iter_mut().zip(&rows.nominal[k]) {
+            let Some(from) = from else { continue };
+            let to = to.get_or_insert_with(|| vec![0.0; from.len()]);
+            for (t, x) in to.iter_mut().zip(from) {
+                *t += f * x;
+            }
+        }
+    }
+    sum
+}

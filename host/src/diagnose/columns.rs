@@ -1,0 +1,319 @@
+//! Columns of an effect from the measured motion.
+
+use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAPES, Scale};
+
+use super::DiagnoseError;
+use super::rows::{Column, Nominal, Thinning, motion_of};
+use super::runs::Run;
+use crate::prepare::{central_difference, second_difference};
+use crate::robot::Robot;
+
+/// What the present model says of a run at the full rate.
+#[derive(Clone, Debug, Default)]
+pub struct Predicted {
+    /// Torque, joint by joint.
+    pub torque: Vec<Vec<f64>>,
+    /// Torque that the gear transmits: without friction and the drive's own inertia.
+    pub load: Vec<Vec<f64>>,
+}
+
+/// What columns are formed from.
+pub struct Source<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// The recordings.
+    pub runs: &'a [Run],
+    /// Base parameters and geometry.
+    pub nominal: &'a Nominal,
+    /// What columns pass.
+    pub thinning: &'a Thinning,
+    /// The present model's word, run by run.
+    pub predicted: Vec<Predicted>,
+    /// Identified base parameters.
+    pub values: Vec<f64>,
+}
+
+/// An effect on a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// Which.
+    pub kind: Kind,
+    /// On which joint, from 0.
+    pub joint: usize,
+    /// The other joint that it names.
+    pub other: Option<usize>,
+}
+
+/// Reference delay at which the column of a delay is taken, s: first order would be 2 % off at 3 Hz and 10 ms.
+const DELAY: f64 = 0.002;
+/// Error of the reading at which its column is taken, of the gains' unit: small against every wave of the motion.
+const NUDGE: f64 = 1e-5;
+
+impl Source<'_> {
+    /// One column a gain.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn columns(
+        &self,
+        candidate: &Candidate,
+        shapes: &[f64; SHAPES],
+    ) -> Result<Vec<Column>, DiagnoseError> {
+        let n = self.nominal.joints();
+        let mut columns: Vec<Column> = vec![vec![None; n]; self.gains(candidate.kind).len()];
+        for (run, predicted) in self.runs.iter().zip(&self.predicted) {
+            let full = self.at_full_rate(candidate, shapes, run, predicted)?;
+            for (column, signals) in columns.iter_mut().zip(full) {
+                for (j, signal) in signals.iter().enumerate() {
+                    if let Some(signal) = signal {
+                        self.thinning
+                            .push(signal, column[j].get_or_insert_with(Vec::new));
+                    }
+                }
+            }
+        }
+        Ok(columns)
+    }
+
+    /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
+    pub fn gains(&self, kind: Kind) -> Vec<Parameter> {
+        if kind != Kind::GravityTilt {
+            return kind.about().gains.to_vec();
+        }
+        let angle = |name| Parameter {
+            name,
+            unit: "rad",
+            bounds: [f64::NEG_INFINITY, f64::INFINITY],
+            range: [0.005, 0.2],
+            scale: Scale::Logarithmic,
+            meaning: "turn of the base",
+        };
+        match self.nominal.tilt_axes().len() {
+            0 => Vec::new(),
+            1 => vec![angle("angle")],
+            _ => vec![angle("angle_1"), angle("angle_2")],
+        }
+    }
+
+    /// One column a gain over one run, joint by joint, at the full rate.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn at_full_rate(
+        &self,
+        candidate: &Candidate,
+        shapes: &[f64; SHAPES],
+        run: &Run,
+        predicted: &Predicted,
+    ) -> Result<Vec<Column>, DiagnoseError> {
+        let about = candidate.kind.about();
+        let gains = about.gains.len();
+        let own = |signals: Vec<Vec<f64>>| -> Vec<Column> {
+            (signals.into_iter().take(gains))
+                .map(|signal| {
+                    let mut column: Column = vec![None; self.nominal.joints()];
+                    column[candidate.joint] = Some(signal);
+                    column
+                })
+                .collect()
+        };
+        match (candidate.kind, about.channel) {
+            (Kind::MeasurementDelay, _) => {
+                let late = late(&predicted.torque[candidate.joint], DELAY * run.rate);
+                let change = (late.iter().zip(&predicted.torque[candidate.joint]))
+                    .map(|(late, now)| (late - now) / DELAY)
+                    .collect();
+                Ok(own(vec![change]))
+            }
+            (Kind::GravityTilt, _) => self.tilted(run),
+            (_, Channel::Position) => {
+                let errors = self.terms(candidate, shapes, run, predicted);
+                let mut columns = Vec::with_capacity(gains);
+                for error in errors.iter().take(gains) {
+                    columns.push(self.misread(candidate.joint, error, run)?);
+                }
+                Ok(columns)
+            }
+            _ => Ok(own(self.terms(candidate, shapes, run, predicted))),
+        }
+    }
+
+    /// The effect's terms sample by sample.
+    fn terms(
+        &self,
+        candidate: &Candidate,
+        shapes: &[f64; SHAPES],
+        run: &Run,
+        predicted: &Predicted,
+    ) -> Vec<Vec<f64>> {
+        let joint = &run.joints[candidate.joint];
+        let ratio = self.robot.joints[candidate.joint]
+            .drive
+            .as_ref()
+            .map_or(1.0, |d| {
+                if d.gear_ratio == 0.0 {
+                    1.0
+                } else {
+                    d.gear_ratio
+                }
+            });
+        let other = candidate.other.and_then(|k| run.joints.get(k));
+        let (load, drive) = (
+            &predicted.load[candidate.joint],
+            &predicted.torque[candidate.joint],
+        );
+        let first_temperature = joint
+            .temperature
+            .as_ref()
+            .and_then(|t| t.first().copied())
+            .unwrap_or(0.0);
+        let gains = candidate.kind.about().gains.len();
+        let mut out = vec![Vec::with_capacity(run.len()); gains];
+        let mut memory = [0.0; MEMORY];
+        for k in 0..run.len() {
+            let at = Instant {
+                position: joint.q[k],
+                velocity: joint.qd[k],
+                acceleration: joint.qdd[k],
+                direction: if joint.qd[k] == 0.0 {
+                    0.0
+                } else {
+                    joint.qd[k].signum()
+                },
+                motor_angle: ratio * joint.q[k],
+                drive_torque: drive[k],
+                load: load[k],
+                time: run.t[k] - run.t[0],
+                warming: joint
+                    .temperature
+                    .as_ref()
+                    .map_or(0.0, |t| t[k] - first_temperature),
+                other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
+                period: 1.0 / run.rate,
+                // Delays and payloads have columns of their own.
+                drive_rate: 0.0,
+                gravity: 0.0,
+            };
+            let terms: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &at);
+            for (list, term) in out.iter_mut().zip(terms) {
+                list.push(term);
+            }
+        }
+        out
+    }
+
+    /// What a reading that is off by a unit of `error` does to the torque of all joints: the true position is less.
+    fn misread(&self, joint: usize, error: &[f64], run: &Run) -> Result<Column, DiagnoseError> {
+        let period = 1.0 / run.rate;
+        let mut motion = motion_of(run);
+        let rate = central_difference(error, period);
+        let second = second_difference(error, period);
+        for (to, change) in motion.iter_mut().zip([error, &rate, &second]) {
+            for (x, e) in to[joint].iter_mut().zip(change) {
+                *x -= NUDGE * e;
+            }
+        }
+        let moved = self.torque_of([&motion[0], &motion[1], &motion[2]])?;
+        let still = motion_of(run);
+        let before = self.torque_of([&still[0], &still[1], &still[2]])?;
+        Ok((moved.into_iter().zip(before))
+            .map(|(moved, before)| {
+                Some(
+                    (moved.iter().zip(&before))
+                        .map(|(m, b)| (m - b) / NUDGE)
+                        .collect(),
+                )
+            })
+            .collect())
+    }
+
+    /// Torque of the smooth part of the nominal model for a motion.
+    fn torque_of(&self, motion: [&[Vec<f64>]; 3]) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+        let samples = motion[0].first().map_or(0, Vec::len);
+        let mut torque = vec![vec![0.0; samples]; self.nominal.joints()];
+        self.nominal.columns(motion, &mut |k, j, column| {
+            // The direction does not change with a small error of the reading; its jump would.
+            if self.nominal.is_coulomb(k) {
+                return;
+            }
+            for (to, y) in torque[j].iter_mut().zip(column) {
+                *to += self.values[k] * y;
+            }
+        })?;
+        Ok(torque)
+    }
+
+    /// What a tilt of the base by a unit angle does to the torque: one column a horizontal axis that matters.
+    fn tilted(&self, run: &Run) -> Result<Vec<Column>, DiagnoseError> {
+        let motion = motion_of(run);
+        let motion = [&motion[0][..], &motion[1][..], &motion[2][..]];
+        let mut columns = Vec::new();
+        for axis in self.nominal.tilt_axes() {
+            let mut difference: Vec<Vec<f64>> = vec![vec![0.0; run.len()]; self.nominal.joints()];
+            for side in [1.0, -1.0] {
+                self.nominal
+                    .tilted(axis, side * NUDGE)?
+                    .columns(motion, &mut |k, j, column| {
+                        for (to, y) in difference[j].iter_mut().zip(column) {
+                            *to += side * self.values[k] * y / (2.0 * NUDGE);
+                        }
+                    })?;
+            }
+            columns.push(difference.into_iter().map(Some).collect());
+        }
+        Ok(columns)
+    }
+}
+
+/// A signal that comes `samples` (not whole) later; the first value holds before it begins.
+fn late(signal: &[f64], samples: f64) -> Vec<f64> {
+    let whole = samples.floor();
+    let part = samples - whole;
+    let at = |k: usize, back: usize| signal[k.saturating_sub(back)];
+    (0..signal.len())
+        .map(|k| {
+            let back = whole as usize;
+            (1.0 - part) * at(k, back) + part * at(k, back + 1)
+        })
+        .collect()
+}
+
+/// What the nominal model with these base parameters says of a run, and of the load on the gears.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub fn predict(
+    nominal: &Nominal,
+    robot: &Robot,
+    values: &[f64],
+    run: &Run,
+) -> Result<Predicted, DiagnoseError> {
+    let n = nominal.joints();
+    let mut predicted = Predicted {
+        torque: vec![vec![0.0; run.len()]; n],
+        load: vec![vec![0.0; run.len()]; n],
+    };
+    let motion = motion_of(run);
+    nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, column| {
+        for (to, y) in predicted.torque[j].iter_mut().zip(column) {
+            *to += values[k] * y;
+        }
+        if !nominal.is_drive(k) {
+            for (to, y) in predicted.load[j].iter_mut().zip(column) {
+                *to += values[k] * y;
+            }
+        }
+    })?;
+    let drives = robot.standard_parameters();
+    for j in 0..n {
+        // The drive's inertia is part of a combination with the link's: the description says how much is its own.
+        let own = drives[j][rig_shared::multibody::column::DRIVE_INERTIA];
+        let grouped = !nominal.has_own_drive_inertia(j);
+        if own != 0.0 && grouped {
+            for (to, a) in predicted.load[j].iter_mut().zip(&run.joints[j].qdd) {
+                *to -= own * a;
+            }
+        }
+    }
+    Ok(predicted)
+}

@@ -1,0 +1,343 @@
+//! Weighted least squares on the rows with columns taken in one by one, and what one more column would explain.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::rows::{Column, Rows};
+
+/// Blocks that evidence is counted in: long enough that the residual has forgotten, at least so many.
+const FEWEST_BLOCKS: usize = 12;
+/// Parts for cross-validation.
+const FOLDS: usize = 10;
+/// A column of which less than this share of its length is left beside the others is one of them in disguise.
+const DISTINCT: f64 = 0.02;
+
+/// Rows under weights, an orthonormal basis of the columns taken in, and what is left of the torque.
+#[derive(Clone)]
+pub struct Fit<'a> {
+    rows: &'a Rows,
+    /// Per joint, one over the standard deviation of its residual.
+    scale: Vec<f64>,
+    /// Block of each row of a joint (shared by all joints).
+    block: Vec<usize>,
+    blocks: usize,
+    basis: Vec<Vec<f64>>,
+    residual: Vec<f64>,
+}
+
+/// What candidates' columns would do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evidence {
+    /// Coefficients of the columns.
+    pub gains: Vec<f64>,
+    /// Their standard deviations, robust to correlation within blocks.
+    pub stds: Vec<f64>,
+    /// Share of the residual's squares that they take away.
+    pub explained: f64,
+    /// Share of the RMS that they take away on folds they were not fitted to.
+    pub gain: f64,
+    /// That gain over its standard deviation between blocks.
+    pub gain_sigmas: f64,
+    /// Of all coefficients together being zero; not corrected for anything.
+    pub p_value: f64,
+    /// Squared error of each block without and with them, on folds not fitted to.
+    pub block_errors: Vec<[f64; 2]>,
+}
+
+impl<'a> Fit<'a> {
+    /// Takes the rows in; `memory` is the time in seconds that residuals are correlated over, `scale` one weight a joint.
+    pub fn new(rows: &'a Rows, scale: Vec<f64>, memory: f64) -> Self {
+        let length = ((5.0 * memory / rows.period).ceil() as usize)
+            .max(1)
+            .min((rows.count / FEWEST_BLOCKS).max(1));
+        let mut block = Vec::with_capacity(rows.count);
+        let mut next = 0;
+        for pair in rows.starts.windows(2) {
+            let n = pair[1] - pair[0];
+            let parts = (n / length).max(1);
+            block.extend((0..n).map(|k| next + k * parts / n));
+            next += if n == 0 { 0 } else { parts };
+        }
+        let mut fit = Self {
+            rows,
+            scale,
+            block,
+            blocks: next,
+            basis: Vec::new(),
+            residual: Vec::new(),
+        };
+        let torque: Column = rows.torque.iter().cloned().map(Some).collect();
+        fit.residual = fit.weighted(&torque);
+        fit
+    }
+
+    /// A column as the weighted rows of all joints one after the other; masked rows are zero.
+    pub fn weighted(&self, column: &Column) -> Vec<f64> {
+        let n = self.rows.count;
+        let mut out = vec![0.0; n * self.rows.joints()];
+        for (j, values) in column.iter().enumerate() {
+            let Some(values) = values else { continue };
+            let keep = &self.rows.keep[j];
+            for (k, to) in out[j * n..(j + 1) * n].iter_mut().enumerate() {
+                if keep[k] {
+                    *to = self.scale[j] * values[k];
+                }
+            }
+        }
+        out
+    }
+
+    /// What is left of a weighted column beside those taken in.
+    pub fn projected(&self, mut column: Vec<f64>) -> Vec<f64> {
+        for _ in 0..2 {
+            for b in &self.basis {
+                let along = dot(b, &column);
+                axpy(-along, b, &mut column);
+            }
+        }
+        column
+    }
+
+    /// Takes a column in; false (and nothing done) where it is a combination of the others.
+    pub fn push(&mut self, column: &Column) -> bool {
+        let weighted = self.weighted(column);
+        let length = dot(&weighted, &weighted).sqrt();
+        let mut rest = self.projected(weighted);
+        let left = dot(&rest, &rest).sqrt();
+        if left.is_nan() || left <= 1e-9 * length {
+            return false;
+        }
+        for x in &mut rest {
+            *x /= left;
+        }
+        let along = dot(&rest, &self.residual);
+        axpy(-along, &rest, &mut self.residual);
+        self.basis.push(rest);
+        true
+    }
+
+    /// RMS of a joint's residual in its own unit, over the rows used.
+    pub fn rms(&self, joint: usize) -> f64 {
+        let n = self.rows.count;
+        let squares = dot_self(&self.residual[joint * n..(joint + 1) * n]);
+        (squares / self.rows.used(joint).max(1) as f64).sqrt() / self.scale[joint]
+    }
+
+    /// Residual of a joint in its own unit; 0 on masked rows.
+    pub fn residual(&self, joint: usize) -> Vec<f64> {
+        let n = self.rows.count;
+        self.residual[joint * n..(joint + 1) * n]
+            .iter()
+            .map(|r| r / self.scale[joint])
+            .collect()
+    }
+
+    /// The weighted residual of all joints.
+    pub fn left(&self) -> &[f64] {
+        &self.residual
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// Block of each row of a joint.
+    pub fn block_of_rows(&self) -> &[usize] {
+        &self.block
+    }
+
+    /// Share of the residual's squares that projected columns explain, with their coefficients; none where they are
+    /// not distinct from what was taken in. `bounds` are those of the coefficients: outside them nothing is explained.
+    pub fn explained(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<(f64, Vec<f64>)> {
+        let k = columns.len();
+        let gram = DMatrix::from_fn(k, k, |a, b| dot(&columns[a], &columns[b]));
+        let right = DVector::from_fn(k, |a, _| dot(&columns[a], &self.residual));
+        let beta = gram.cholesky()?.solve(&right);
+        let within = beta
+            .iter()
+            .zip(bounds)
+            .all(|(b, [low, high])| b >= low && b <= high);
+        if !within {
+            return None;
+        }
+        let share = beta.dot(&right) / dot_self(&self.residual);
+        share
+            .is_finite()
+            .then(|| (share, beta.iter().copied().collect()))
+    }
+
+    /// Weighted columns of a candidate projected; none where one of them is no column of its own.
+    pub fn distinct(&self, columns: &[Column]) -> Option<Vec<Vec<f64>>> {
+        let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+        for column in columns {
+            let weighted = self.weighted(column);
+            let length = dot_self(&weighted).sqrt();
+            let rest = self.projected(weighted);
+            let left = dot_self(&rest).sqrt();
+            if left.is_nan() || left <= DISTINCT * length || length == 0.0 {
+                return None;
+            }
+            own.push(rest);
+        }
+        Some(own)
+    }
+
+    /// Everything about projected columns.
+    pub fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
+        let (explained, gains) = self.explained(columns, bounds)?;
+        let (k, blocks) = (columns.len(), self.blocks);
+        let n = self.rows.count;
+        // Scores of the blocks under the alternative: what is left after the columns.
+        let mut rest = self.residual.clone();
+        for (column, gain) in columns.iter().zip(&gains) {
+            axpy(-gain, column, &mut rest);
+        }
+        let mut scores = vec![DVector::<f64>::zeros(k); blocks];
+        for j in 0..self.rows.joints() {
+            for (row, &b) in self.block.iter().enumerate() {
+                let at = j * n + row;
+                for (c, column) in columns.iter().enumerate() {
+                    scores[b][c] += column[at] * rest[at];
+                }
+            }
+        }
+        let mut meat = DMatrix::<f64>::zeros(k, k);
+        for s in &scores {
+            meat += s * s.transpose();
+        }
+        let g = blocks as f64;
+        meat *= g / (g - 1.0).max(1.0);
+        let gram = DMatrix::from_fn(k, k, |a, b| dot(&columns[a], &columns[b]));
+        let bread = gram.cholesky()?.inverse();
+        let covariance = &bread * meat * &bread;
+        let stds = (0..k).map(|c| covariance[(c, c)].max(0.0).sqrt()).collect();
+        let beta = DVector::from_column_slice(&gains);
+        let wald = beta.dot(&covariance.cholesky()?.solve(&beta));
+        let freedom = (g - k as f64).max(1.0);
+        let statistic = wald / k as f64 * freedom / (g - 1.0).max(1.0);
+        let p_value = FisherSnedecor::new(k as f64, freedom)
+            .map(|f| f.sf(statistic.max(0.0)))
+            .unwrap_or(1.0)
+            .max(f64::MIN_POSITIVE);
+        let block_errors = self.cross_validated(columns)?;
+        let (before, after) = block_errors
+            .iter()
+            .fold((0.0, 0.0), |(a, b), e| (a + e[0], b + e[1]));
+        let gain = 1.0 - (after / before).sqrt();
+        let mean = (before - after) / g;
+        let spread = block_errors
+            .iter()
+            .map(|e| (e[0] - e[1] - mean).powi(2))
+            .sum::<f64>()
+            / (g - 1.0).max(1.0);
+        let gain_sigmas = mean / (spread / g).sqrt().max(f64::MIN_POSITIVE);
+        Some(Evidence {
+            gains,
+            stds,
+            explained,
+            gain,
+            gain_sigmas,
+            p_value,
+            block_errors,
+        })
+    }
+
+    /// Squared errors of every block without and with the columns, everything refitted without the block's fold.
+    fn cross_validated(&self, columns: &[Vec<f64>]) -> Option<Vec<[f64; 2]>> {
+        let (n, p, k) = (self.rows.count, self.basis.len(), columns.len());
+        let folds = FOLDS.min(self.blocks.max(2));
+        let fold_of = |b: usize| b * folds / self.blocks.max(1);
+        let all: Vec<&Vec<f64>> = self.basis.iter().chain(columns).collect();
+        let size = p + k;
+        let mut own = vec![DMatrix::<f64>::zeros(size, size); folds];
+        let mut right = vec![DVector::<f64>::zeros(size); folds];
+        // Runs of rows of one fold, so that the sums go over slices.
+        let stretches = self.stretches(&fold_of);
+        for (range, fold) in &stretches {
+            for a in 0..size {
+                let left = &all[a][range.clone()];
+                right[*fold][a] += dot(left, &self.residual[range.clone()]);
+                for b in 0..=a {
+                    own[*fold][(a, b)] += dot(left, &all[b][range.clone()]);
+                }
+            }
+        }
+        let mut total = DMatrix::zeros(size, size);
+        let mut total_right = DVector::zeros(size);
+        for (matrix, right) in own.iter_mut().zip(&right) {
+            matrix.fill_upper_triangle_with_lower_triangle();
+            total += &*matrix;
+            total_right += right;
+        }
+        let mut errors = vec![[0.0; 2]; self.blocks];
+        for fold in 0..folds {
+            let gram = &total - &own[fold];
+            let rest = &total_right - &right[fold];
+            let with = gram.clone().cholesky()?.solve(&rest);
+            let without = if p == 0 {
+                DVector::zeros(0)
+            } else {
+                gram.view((0, 0), (p, p))
+                    .into_owned()
+                    .cholesky()?
+                    .solve(&rest.rows(0, p).into_owned())
+            };
+            for (range, f) in &stretches {
+                if *f != fold {
+                    continue;
+                }
+                for at in range.clone() {
+                    let plain: f64 = (0..p).map(|c| without[c] * self.basis[c][at]).sum();
+                    let more: f64 = (0..size).map(|c| with[c] * all[c][at]).sum();
+                    let y = self.residual[at];
+                    let entry = &mut errors[self.block[at % n]];
+                    entry[0] += (y - plain).powi(2);
+                    entry[1] += (y - more).powi(2);
+                }
+            }
+        }
+        Some(errors)
+    }
+
+    /// Ranges of the weighted rows that lie in one fold, with it.
+    fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(std::ops::Range<usize>, usize)> {
+        let n = self.rows.count;
+        let mut list: Vec<(std::ops::Range<usize>, usize)> = Vec::new();
+        for j in 0..self.rows.joints() {
+            for (row, &b) in self.block.iter().enumerate() {
+                let (at, fold) = (j * n + row, fold_of(b));
+                match list.last_mut() {
+                    Some((range, f)) if *f == fold && range.end == at => range.end = at + 1,
+                    _ => list.push((at..at + 1, fold)),
+                }
+            }
+        }
+        list
+    }
+}
+
+/// Inner product.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Eight sums at a time: the compiler does not reorder one.
+    let mut sums = [0.0; 8];
+    let (a8, a_rest) = a.as_chunks::<8>();
+    let (b8, b_rest) = b.as_chunks::<8>();
+    for (x, y) in a8.iter().zip(b8) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
+}
+
+/// Sum of squares.
+pub fn dot_self(a: &[f64]) -> f64 {
+    dot(a, a)
+}
+
+fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += factor * x;
+    }
+}

@@ -1,0 +1,319 @@
+//! Where the residual sits: its dependence on each coordinate of the motion, tested and put into words.
+//!
+//! Per coordinate the cumulated residual (a marked empirical process: Stute 1997, Ann. Statist. 25) against its wild block
+//! bootstrap (signs flipped block by block: Cameron, Gelbach & Miller 2008), the probabilities corrected for the number of
+//! coordinates under any dependence (Benjamini & Yekutieli 2001).
+
+use rand::{RngExt, SeedableRng};
+
+use super::columns::Predicted;
+use super::outcome::Place;
+use super::rows::Rows;
+use super::runs::Run;
+use crate::robot::Robot;
+
+/// Bins of equal numbers of rows.
+pub const BINS: usize = 24;
+/// Draws of the bootstrap.
+const DRAWS: usize = 999;
+/// Share of the explained squares that the interval has to hold.
+const MOST_OF_IT: f64 = 0.75;
+
+/// A coordinate of one joint on the kept rows.
+pub struct Coordinate {
+    /// In words.
+    pub name: &'static str,
+    /// ASCII
+    pub unit: &'static str,
+    /// One a row.
+    pub values: Vec<f64>,
+}
+
+/// All coordinates of a joint.
+pub fn coordinates(
+    rows: &Rows,
+    runs: &[Run],
+    predicted: &[Predicted],
+    robot: &Robot,
+    joint: usize,
+) -> Vec<Coordinate> {
+    let ratio = robot.joints[joint].drive.as_ref().map_or(1.0, |d| {
+        if d.gear_ratio == 0.0 {
+            1.0
+        } else {
+            d.gear_ratio
+        }
+    });
+    let mut list: Vec<Coordinate> = Vec::new();
+    let mut add = |name: &'static str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
+        let mut values = Vec::with_capacity(rows.count);
+        for (r, run) in runs.iter().enumerate() {
+            rows.thinning.pick(&of(r, run), &mut values);
+        }
+        list.push(Coordinate { name, unit, values });
+    };
+    let revolute = robot.joints[joint].kind == crate::robot::JointKind::Revolute;
+    let (p, v, a) = if revolute {
+        ("rad", "rad/s", "rad/s^2")
+    } else {
+        ("m", "m/s", "m/s^2")
+    };
+    let f = if revolute { "N*m" } else { "N" };
+    add("velocity", v, &|_, run| run.joints[joint].qd.clone());
+    add("position", p, &|_, run| run.joints[joint].q.clone());
+    add("acceleration", a, &|_, run| run.joints[joint].qdd.clone());
+    if ratio.abs() > 1.0 {
+        add("motor angle within a turn", "rad", &|_, run| {
+            let turn = std::f64::consts::TAU;
+            (run.joints[joint].q.iter())
+                .map(|q| (ratio * q).rem_euclid(turn))
+                .collect()
+        });
+    }
+    add("torque on the gear along the motion", f, &|r, run| {
+        (predicted[r].load[joint].iter().zip(&run.joints[joint].qd))
+            .map(|(l, v)| l * v.signum())
+            .collect()
+    });
+    add("torque of the drive", f, &|r, _| {
+        predicted[r].torque[joint].clone()
+    });
+    add("time since the start", "s", &|_, run| {
+        run.t.iter().map(|t| t - run.t[0]).collect()
+    });
+    add("way since the last reversal, by direction", p, &|_, run| {
+        since_reversal(run, joint).0
+    });
+    add(
+        "time since the last reversal, by direction",
+        "s",
+        &|_, run| since_reversal(run, joint).1,
+    );
+    add(
+        "change of the drive's torque",
+        if revolute { "N*m/s" } else { "N/s" },
+        &|r, run| crate::prepare::central_difference(&predicted[r].torque[joint], 1.0 / run.rate),
+    );
+    if runs.iter().all(|r| r.joints[joint].temperature.is_some()) {
+        add("temperature", "degC", &|_, run| {
+            run.joints[joint].temperature.clone().unwrap_or_default()
+        });
+    }
+    for other in 0..robot.joints.len() {
+        if other != joint {
+            list.push(Coordinate {
+                name: "velocity of another joint",
+                unit: v,
+                values: runs.iter().fold(Vec::new(), |mut values, run| {
+                    rows.thinning.pick(&run.joints[other].qd, &mut values);
+                    values
+                }),
+            });
+        }
+    }
+    list
+}
+
+/// Way and time since the last reversal, with the sign of the direction.
+fn since_reversal(run: &Run, joint: usize) -> (Vec<f64>, Vec<f64>) {
+    let j = &run.joints[joint];
+    let (mut from, mut at, mut sign) = (0.0, 0.0, 0.0);
+    let mut lists = (Vec::with_capacity(run.len()), Vec::with_capacity(run.len()));
+    for k in 0..run.len() {
+        if j.qd[k].signum() != sign {
+            (from, at, sign) = (j.q[k], run.t[k], j.qd[k].signum());
+        }
+        lists.0.push(j.q[k] - from);
+        lists.1.push(sign * (run.t[k] - at));
+    }
+    lists
+}
+
+/// Equal-count bins of a coordinate over used rows: bin of each row (none where not used) and the bins' edges.
+pub fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<usize>>, Vec<f64>) {
+    let mut sorted: Vec<f64> = (values.iter().zip(keep))
+        .filter(|(_, k)| **k)
+        .map(|(v, _)| *v)
+        .collect();
+    sorted.sort_by(f64::total_cmp);
+    if sorted.is_empty() {
+        return (vec![None; values.len()], vec![0.0, 0.0]);
+    }
+    let edges: Vec<f64> = (0..=bins)
+        .map(|b| sorted[(b * (sorted.len() - 1)) / bins])
+        .collect();
+    let inner = &edges[1..bins];
+    let place = values
+        .iter()
+        .zip(keep)
+        .map(|(v, k)| k.then(|| inner.partition_point(|e| e < v)))
+        .collect();
+    (place, edges)
+}
+
+/// Where the residual of a joint sits, most of the excess over `floor` first. `block` is the block of each row.
+pub fn locate(
+    rows: &Rows,
+    coordinates: &[Coordinate],
+    residual: &[f64],
+    block: &[usize],
+    joint: usize,
+    joint_name: &str,
+    floor: f64,
+    seed: u64,
+) -> Vec<Place> {
+    let keep = &rows.keep[joint];
+    let used = rows.used(joint).max(1) as f64;
+    let squares: f64 = residual.iter().map(|r| r * r).sum();
+    let excess = (squares - used * floor * floor).max(0.0);
+    let blocks = block.iter().max().map_or(0, |b| b + 1);
+    let mut places: Vec<Place> = Vec::new();
+    for coordinate in coordinates {
+        let (place, edges) = bins(&coordinate.values, keep, BINS);
+        let mut count = [0.0; BINS];
+        let mut sums = vec![[0.0; BINS]; blocks];
+        for ((b, r), blk) in place.iter().zip(residual).zip(block) {
+            if let Some(b) = b {
+                count[*b] += 1.0;
+                sums[*blk][*b] += r;
+            }
+        }
+        let total: [f64; BINS] = std::array::from_fn(|b| sums.iter().map(|s| s[b]).sum());
+        let p = process_p(&sums, seed);
+        // Squares that the bins' means explain, less what noise would by the blocks' spread.
+        let explained: [f64; BINS] = std::array::from_fn(|b| {
+            let noise: f64 = sums.iter().map(|s| s[b] * s[b]).sum();
+            if count[b] > 0.0 {
+                ((total[b] * total[b] - noise) / count[b]).max(0.0)
+            } else {
+                0.0
+            }
+        });
+        let all: f64 = explained.iter().sum();
+        let share = if excess > 0.0 {
+            (all / excess).min(1.0)
+        } else {
+            0.0
+        };
+        let (low, high) = narrowest(&explained, all);
+        let mean: [f64; BINS] = std::array::from_fn(|b| {
+            if count[b] > 0.0 {
+                total[b] / count[b]
+            } else {
+                0.0
+            }
+        });
+        places.push(Place {
+            joint: joint_name.to_owned(),
+            coordinate: coordinate.name.to_owned(),
+            interval: [edges[low], edges[high + 1]],
+            unit: coordinate.unit.to_owned(),
+            share,
+            p_value: p,
+            text: sentence(coordinate, share, &edges, low, high, &mean, &count),
+        });
+    }
+    // Benjamini–Yekutieli.
+    let m = places.len();
+    let harmonic: f64 = (1..=m).map(|k| 1.0 / k as f64).sum();
+    places.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    let mut least = 1.0_f64;
+    for (rank, place) in places.iter_mut().enumerate().rev() {
+        least = least.min(place.p_value * harmonic * m as f64 / (rank + 1) as f64);
+        place.p_value = least.min(1.0);
+    }
+    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places
+}
+
+/// Probability of the largest excursion of the cumulated residual, by the wild block bootstrap.
+fn process_p(sums: &[[f64; BINS]], seed: u64) -> f64 {
+    let excursion = |sign: &mut dyn FnMut() -> f64| {
+        let mut total = [0.0; BINS];
+        for s in sums {
+            let w = sign();
+            for (t, x) in total.iter_mut().zip(s) {
+                *t += w * x;
+            }
+        }
+        let (mut sum, mut most) = (0.0, 0.0_f64);
+        for t in total {
+            sum += t;
+            most = most.max(f64::abs(sum));
+        }
+        most
+    };
+    let found = excursion(&mut || 1.0);
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+    let beyond = (0..DRAWS)
+        .filter(|_| excursion(&mut || if rng.random::<bool>() { 1.0 } else { -1.0 }) >= found)
+        .count();
+    (beyond + 1) as f64 / (DRAWS + 1) as f64
+}
+
+/// The shortest run of bins that holds most of what is explained.
+fn narrowest(explained: &[f64; BINS], all: f64) -> (usize, usize) {
+    let mut best = (0, BINS - 1);
+    for low in 0..BINS {
+        let mut sum = 0.0;
+        for (high, e) in explained.iter().enumerate().skip(low) {
+            sum += e;
+            if sum >= MOST_OF_IT * all {
+                if high - low < best.1 - best.0 {
+                    best = (low, high);
+                }
+                break;
+            }
+        }
+    }
+    best
+}
+
+fn sentence(
+    coordinate: &Coordinate,
+    share: f64,
+    edges: &[f64],
+    low: usize,
+    high: usize,
+    mean: &[f64; BINS],
+    count: &[f64; BINS],
+) -> String {
+    let digits = crate::report::format_significant;
+    let unit = coordinate.unit;
+    let whole = low == 0 && high == BINS - 1;
+    let place = if whole {
+        "over its whole range".to_owned()
+    } else {
+        format!(
+            "mostly between {} and {} {unit}",
+            digits(edges[low], 3),
+            digits(edges[high + 1], 3)
+        )
+    };
+    let signed =
+        coordinate.values.iter().any(|v| *v < 0.0) && coordinate.values.iter().any(|v| *v > 0.0);
+    let parity = if signed {
+        // Bins of equal count mirror each other where the motion does.
+        let (mut odd, mut even) = (0.0, 0.0);
+        for b in 0..BINS / 2 {
+            let (x, y) = (mean[b], mean[BINS - 1 - b]);
+            let weight = count[b].min(count[BINS - 1 - b]);
+            odd += weight * (y - x) * (y - x);
+            even += weight * (y + x) * (y + x);
+        }
+        if odd > 4.0 * even {
+            ", odd in it"
+        } else if even > 4.0 * odd {
+            ", even in it"
+        } else {
+            ""
+        }
+    } else {
+        ""
+    };
+    format!(
+        "{:.0} % of the excess goes with the {}, {place}{parity}.",
+        100.0 * share,
+        coordinate.name
+    )
+}

@@ -1,0 +1,320 @@
+//! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
+
+use nalgebra::{Rotation3, Vector3};
+use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+
+use super::DiagnoseError;
+use super::runs::Run;
+use crate::batch::{ChainBatch, RegressorBlock};
+use crate::identify::{Base, ModelKind, chain_of, transmission_of};
+use crate::prepare::{LowPass, Treatment};
+use crate::robot::Robot;
+
+/// Share of a row's neighbourhood that may be slow or saturated before the row is left out: what the low-pass makes of an
+/// indicator that is 1 on such samples.
+const SPOILT: f64 = 0.1;
+
+/// A signal on the kept rows, joint by joint; absent where it is zero throughout.
+pub type Column = Vec<Option<Vec<f64>>>;
+
+/// Low-pass and thinning that torque and every regressor column pass alike.
+#[derive(Clone, Debug)]
+pub struct Thinning {
+    low_pass: LowPass,
+    step: usize,
+    trimmed: usize,
+}
+
+impl Thinning {
+    /// The treatment's own.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where there is no such filter.
+    pub fn of(treatment: &Treatment) -> Result<Self, DiagnoseError> {
+        let low_pass = treatment
+            .parallel_low_pass()
+            .ok_or_else(|| DiagnoseError::Model("its low-pass cannot be built.".into()))?;
+        Ok(Self {
+            low_pass,
+            step: treatment.decimation.max(1),
+            trimmed: treatment.trimmed,
+        })
+    }
+
+    /// Kept samples of a run of `samples`.
+    fn kept(&self, samples: usize) -> impl Iterator<Item = usize> {
+        (self.trimmed..samples.saturating_sub(self.trimmed)).step_by(self.step)
+    }
+
+    /// What is kept of a signal at the full rate, appended to `out`.
+    pub fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
+        let smooth = self.low_pass.zero_phase(signal);
+        out.extend(self.kept(signal.len()).map(|k| smooth[k]));
+    }
+
+    /// Kept samples as they are, without the low-pass.
+    pub fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
+        out.extend(self.kept(signal.len()).map(|k| signal[k]));
+    }
+}
+
+/// The regression: rows over all runs, one set a joint.
+pub struct Rows {
+    /// What the columns pass.
+    pub thinning: Thinning,
+    /// Rows a joint.
+    pub count: usize,
+    /// First row of each run, and one past the last.
+    pub starts: Vec<usize>,
+    /// Distance of the rows, s.
+    pub period: f64,
+    /// Torque, joint by joint.
+    pub torque: Vec<Vec<f64>>,
+    /// Whether the row is used, joint by joint.
+    pub keep: Vec<Vec<bool>>,
+    /// Nominal columns, one a base parameter.
+    pub nominal: Vec<Column>,
+}
+
+/// The base parameters with the geometry that they belong to.
+pub struct Nominal {
+    /// Base parameters.
+    pub base: Base,
+    robot: Robot,
+    batch: ChainBatch,
+    transmission: rig_shared::transmission::Transmission<f64>,
+}
+
+impl Nominal {
+    /// Those of a robot.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
+        let model = |e: crate::identify::IdentifyError| DiagnoseError::Model(e.to_string());
+        Ok(Self {
+            base: Base::structural(robot, ModelKind::Differential, 1).map_err(model)?,
+            robot: robot.clone(),
+            batch: ChainBatch::new(&chain_of(robot).map_err(model)?),
+            transmission: transmission_of(robot).map_err(model)?,
+        })
+    }
+
+    /// The same base parameters with the base turned by `angle` about a unit vector of the base frame.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn tilted(&self, axis: [f64; 3], angle: f64) -> Result<Self, DiagnoseError> {
+        let turn = Rotation3::from_scaled_axis(angle * Vector3::from(axis));
+        let mut robot = self.robot.clone();
+        // The base turns one way, gravity as seen from it the other.
+        robot.gravity = (turn.inverse() * Vector3::from(robot.gravity)).into();
+        let chain = chain_of(&robot).map_err(|e| DiagnoseError::Model(e.to_string()))?;
+        Ok(Self {
+            base: self.base.clone(),
+            batch: ChainBatch::new(&chain),
+            transmission: self.transmission.clone(),
+            robot,
+        })
+    }
+
+    /// Axes of the base frame about which a tilt changes gravity: for one joint its own axis alone.
+    pub fn tilt_axes(&self) -> Vec<[f64; 3]> {
+        let g = Vector3::from(self.robot.gravity);
+        if g.norm() == 0.0 {
+            return Vec::new();
+        }
+        if let [joint] = self.robot.joints.as_slice() {
+            // z of frame 1 in the base frame: RotX(alpha) alone turns it.
+            let (s, c) = joint.alpha.sin_cos();
+            return vec![[0.0, -s, c]];
+        }
+        let one = if g.normalize().x.abs() < 0.9 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let first = g.cross(&one).normalize();
+        let second = g.cross(&first).normalize();
+        vec![first.into(), second.into()]
+    }
+
+    /// Whether a base parameter is Coulomb friction.
+    pub fn is_coulomb(&self, k: usize) -> bool {
+        self.place(k).is_ok_and(|c| c == column::COULOMB)
+            || self.place(k).is_err_and(|c| c == motor_column::COULOMB)
+    }
+
+    /// Whether a base parameter belongs to the drive: friction, offset or its own inertia.
+    pub fn is_drive(&self, k: usize) -> bool {
+        self.place(k).map_or(true, |c| c >= column::DRIVE_INERTIA)
+    }
+
+    /// Whether the inertia of a joint's drive is a base parameter by itself.
+    pub fn has_own_drive_inertia(&self, joint: usize) -> bool {
+        self.base
+            .columns
+            .contains(&(joint * COLUMNS + column::DRIVE_INERTIA))
+    }
+
+    /// Place of a base parameter's column among its joint's, or (as the error) among its motor's.
+    fn place(&self, k: usize) -> Result<usize, usize> {
+        let c = self.base.columns[k];
+        match c.checked_sub(self.joints() * COLUMNS) {
+            None => Ok(c % COLUMNS),
+            Some(motor) => Err(motor % MOTOR_COLUMNS),
+        }
+    }
+
+    /// Joints.
+    pub fn joints(&self) -> usize {
+        self.batch.joint_count()
+    }
+
+    /// The regressor of a motion at the full rate: `visit(base parameter, joint, values)` for each column that is not
+    /// zero by structure.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] on lengths.
+    pub fn columns(
+        &self,
+        motion: [&[Vec<f64>]; 3],
+        visit: &mut dyn FnMut(usize, usize, &[f64]),
+    ) -> Result<(), DiagnoseError> {
+        let failed = |e: &dyn std::fmt::Display| DiagnoseError::Model(e.to_string());
+        let n = self.joints();
+        let samples = motion[0].first().map_or(0, Vec::len);
+        let standard = n * COLUMNS;
+        let wanted: Vec<(usize, usize, usize)> = (self.base.columns.iter().enumerate())
+            .filter(|(_, c)| **c < standard)
+            .flat_map(|(k, &c)| (0..n).map(move |j| (k, j, c)))
+            .filter(|&(_, j, c)| !RegressorBlock::is_zero(j, c))
+            .collect();
+        let mut values = vec![Vec::with_capacity(samples); wanted.len()];
+        let mut block = self.batch.block();
+        self.batch
+            .each_differential_block(motion[0], motion[1], motion[2], &mut block, |part| {
+                for (to, &(_, j, c)) in values.iter_mut().zip(&wanted) {
+                    to.extend_from_slice(part.column(j, c));
+                }
+                Ok::<(), crate::batch::BatchError>(())
+            })
+            .map_err(|e| failed(&e))?;
+        for (values, &(k, j, _)) in values.iter().zip(&wanted) {
+            visit(k, j, values);
+        }
+        self.motor_columns(motion, visit)
+    }
+
+    fn motor_columns(
+        &self,
+        motion: [&[Vec<f64>]; 3],
+        visit: &mut dyn FnMut(usize, usize, &[f64]),
+    ) -> Result<(), DiagnoseError> {
+        let n = self.joints();
+        let motors: Vec<(usize, usize)> = (self.base.columns.iter().enumerate())
+            .filter_map(|(k, &c)| Some((k, c.checked_sub(n * COLUMNS)?)))
+            .collect();
+        if motors.is_empty() {
+            return Ok(());
+        }
+        let samples = motion[0].first().map_or(0, Vec::len);
+        let width = n * MOTOR_COLUMNS;
+        let mut columns = vec![0.0; n * width];
+        let mut values = vec![vec![0.0; samples]; motors.len() * n];
+        let mut state = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for row in 0..samples {
+            for (now, lists) in state.iter_mut().zip(motion) {
+                for (to, list) in now.iter_mut().zip(lists) {
+                    *to = list[row];
+                }
+            }
+            self.transmission
+                .motor_columns(&state[0], &state[1], &state[2], &mut columns)
+                .map_err(|e| DiagnoseError::Model(e.to_string()))?;
+            for (m, &(_, c)) in motors.iter().enumerate() {
+                for j in 0..n {
+                    values[m * n + j][row] = columns[j * width + c];
+                }
+            }
+        }
+        for (m, &(k, _)) in motors.iter().enumerate() {
+            for j in 0..n {
+                visit(k, j, &values[m * n + j]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Position, velocity and acceleration of all joints over a run.
+pub fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
+    let of = |pick: fn(&super::runs::JointRun) -> &Vec<f64>| -> Vec<Vec<f64>> {
+        run.joints.iter().map(|j| pick(j).clone()).collect()
+    };
+    [of(|j| &j.q), of(|j| &j.qd), of(|j| &j.qdd)]
+}
+
+impl Rows {
+    /// Forms torque, masks and nominal columns of all runs.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn of(
+        runs: &[Run],
+        nominal: &Nominal,
+        treatment: &Treatment,
+    ) -> Result<Self, DiagnoseError> {
+        let thinning = Thinning::of(treatment)?;
+        let n = nominal.joints();
+        let mut starts = vec![0];
+        let mut torque = vec![Vec::new(); n];
+        let mut keep = vec![Vec::new(); n];
+        let mut columns: Vec<Column> = vec![vec![None; n]; nominal.base.len()];
+        for run in runs {
+            let before = starts.last().copied().unwrap_or(0);
+            let rows = thinning.kept(run.len()).count();
+            for (j, joint) in run.joints.iter().enumerate() {
+                thinning.push(&joint.tau, &mut torque[j]);
+                let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
+                let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
+                let spoilt: Vec<f64> = (joint.qd.iter().zip(&joint.tau))
+                    .map(|(v, tau)| {
+                        let limited =
+                            low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h);
+                        f64::from(u8::from(v.abs() < threshold || limited))
+                    })
+                    .collect();
+                let mut share = Vec::new();
+                thinning.push(&spoilt, &mut share);
+                keep[j].extend(share.iter().map(|s| *s < SPOILT));
+            }
+            let motion = motion_of(run);
+            nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, values| {
+                let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
+                thinning.push(values, list);
+            })?;
+            starts.push(before + rows);
+        }
+        Ok(Self {
+            thinning,
+            count: starts.last().copied().unwrap_or(0),
+            starts,
+            period: treatment.decimation.max(1) as f64 / treatment.sample_rate,
+            torque,
+            keep,
+            nominal: columns,
+        })
+    }
+
+    /// Joints.
+    pub fn joints(&self) -> usize {
+        self.torque.len()
+    }
+
+    /// Rows used of a joint.
+    pub fn used(&self, joint: usize) -> usize {
+        self.keep[joint].iter().filter(|k| **k).count()
+    }
+}

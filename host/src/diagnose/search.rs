@@ -1,0 +1,461 @@
+//! Which effect, one after the other: profile, evidence, gates; then joint refinement, removal and exchange.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rig_shared::effects::{Channel, Kind, SHAPES, Scale};
+
+use super::DiagnoseError;
+use super::columns::{Candidate, Source};
+use super::fit::{Evidence, Fit};
+use super::rows::Column;
+
+/// Family-wise probability of a name although nothing is there.
+pub const SIGNIFICANT: f64 = 0.01;
+/// Least share of the RMS that an effect must take away on folds it was not fitted to.
+pub const LEAST_GAIN: f64 = 0.02;
+/// … and that many standard deviations of it.
+pub const LEAST_SIGMAS: f64 = 3.0;
+/// An effect in the model stays while its own probability is below this.
+const STAYS: f64 = 1e-3;
+/// Most effects.
+const MOST_EFFECTS: usize = 6;
+/// Points of a grid per decade of a logarithmic range.
+const PER_DECADE: f64 = 4.0;
+/// Points of a linear range, most.
+const MOST_POINTS: usize = 96;
+/// Golden-section steps of the refinement.
+const REFINEMENTS: usize = 14;
+
+/// A candidate at its best shapes.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    /// Which.
+    pub candidate: Candidate,
+    /// Its shapes.
+    pub shapes: [f64; SHAPES],
+    /// Its columns.
+    pub columns: Arc<Vec<Column>>,
+    /// What they do.
+    pub evidence: Evidence,
+    /// Shapes tried.
+    pub tried: usize,
+}
+
+impl Profile {
+    /// Why it is not taken at a p-value corrected for `tried` trials; none where it passes.
+    pub fn refused(&self, tried: usize) -> Option<String> {
+        let e = &self.evidence;
+        let p = self.corrected(tried);
+        if p > SIGNIFICANT {
+            Some(format!("p = {p:.2}, corrected for {tried} trials"))
+        } else if e.gain < LEAST_GAIN {
+            Some(format!(
+                "takes away {:.1} % of the residual, less than {:.0} %",
+                100.0 * e.gain,
+                100.0 * LEAST_GAIN
+            ))
+        } else if e.gain_sigmas < LEAST_SIGMAS {
+            Some(format!(
+                "its gain is only {:.1} of its standard deviations",
+                e.gain_sigmas
+            ))
+        } else {
+            None
+        }
+    }
+
+    /// p-value corrected for `tried` trials.
+    pub fn corrected(&self, tried: usize) -> f64 {
+        (self.evidence.p_value * tried as f64).min(1.0)
+    }
+}
+
+/// The search over a library.
+pub struct Search<'a> {
+    /// What columns are formed from.
+    pub source: Source<'a>,
+    /// Candidates.
+    pub library: Vec<Candidate>,
+    /// Threads.
+    pub threads: usize,
+    cache: Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>,
+}
+
+/// Grid of shapes of an effect.
+pub fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
+    let shapes = kind.about().shapes;
+    let mut points = vec![[0.0; SHAPES]];
+    for (place, shape) in shapes.iter().enumerate() {
+        let [low, high] = shape.range;
+        let values: Vec<f64> = match shape.scale {
+            Scale::Logarithmic => {
+                let n = ((high / low).log10() * PER_DECADE / shapes.len() as f64)
+                    .ceil()
+                    .max(1.0);
+                (0..=n as usize)
+                    .map(|k| low * (high / low).powf(k as f64 / n))
+                    .collect()
+            }
+            Scale::Linear => {
+                // Orders are whole; anything else linear is stepped through.
+                let whole = (high - low).floor() as usize + 1;
+                if whole <= MOST_POINTS && low.fract() == 0.0 {
+                    (0..whole).map(|k| low + k as f64).collect()
+                } else {
+                    (0..=8)
+                        .map(|k| low + (high - low) * f64::from(k) / 8.0)
+                        .collect()
+                }
+            }
+        };
+        points = points
+            .into_iter()
+            .flat_map(|point| {
+                values.iter().map(move |v| {
+                    let mut point = point;
+                    point[place] = *v;
+                    point
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+impl<'a> Search<'a> {
+    /// A search.
+    pub fn new(source: Source<'a>, library: Vec<Candidate>, threads: usize) -> Self {
+        Self {
+            source,
+            library,
+            threads,
+            cache: Mutex::new(HashMap::new()),
+        }
+    }
+
+    /// Forgets columns that depend on what the model predicts.
+    pub fn model_changed(&self) {
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.retain(|(c, _), _| !depends_on_model(self.library[*c].kind));
+    }
+
+    fn cached(
+        &self,
+        c: usize,
+        point: usize,
+        shapes: &[f64; SHAPES],
+    ) -> Result<Arc<Vec<Column>>, DiagnoseError> {
+        let key = (c, point);
+        let held = |cache: &Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>| {
+            cache
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .get(&key)
+                .cloned()
+        };
+        if let Some(columns) = held(&self.cache) {
+            return Ok(columns);
+        }
+        let columns = Arc::new(self.source.columns(&self.library[c], shapes)?);
+        self.cache
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(key, columns.clone());
+        Ok(columns)
+    }
+
+    /// Share of the residual that a candidate explains at given shapes, with its columns projected.
+    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<(f64, Vec<Vec<f64>>)> {
+        let projected = fit.distinct(columns)?;
+        let bounds = self.bounds(self.library[c].kind);
+        let (share, _) = fit.explained(&projected, &bounds)?;
+        Some((share, projected))
+    }
+
+    /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn profile(
+        &self,
+        fit: &Fit,
+        c: usize,
+        start: Option<[f64; SHAPES]>,
+    ) -> Result<Option<Profile>, DiagnoseError> {
+        let kind = self.library[c].kind;
+        let points = grid(kind);
+        let mut best: Option<(f64, [f64; SHAPES], Arc<Vec<Column>>)> = None;
+        if let Some(shapes) = start {
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            if let Some((share, _)) = self.explained(fit, c, &columns) {
+                best = Some((share, shapes, columns));
+            }
+        } else {
+            for (place, shapes) in points.iter().enumerate() {
+                let columns = self.cached(c, place, shapes)?;
+                let Some((share, _)) = self.explained(fit, c, &columns) else {
+                    continue;
+                };
+                if best.as_ref().is_none_or(|b| share > b.0) {
+                    best = Some((share, *shapes, columns));
+                }
+            }
+        }
+        let Some(mut best) = best else {
+            return Ok(None);
+        };
+        let about = kind.about();
+        for _ in 0..if about.shapes.len() > 1 { 2 } else { 1 } {
+            for (place, shape) in about.shapes.iter().enumerate() {
+                if shape.scale == Scale::Linear {
+                    // Whole orders: nothing between them.
+                    continue;
+                }
+                self.refine(fit, c, place, &mut best)?;
+            }
+        }
+        let Some(projected) = fit.distinct(&best.2) else {
+            return Ok(None);
+        };
+        let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
+            return Ok(None);
+        };
+        Ok(Some(Profile {
+            candidate: self.library[c],
+            shapes: best.1,
+            columns: best.2,
+            evidence,
+            tried: points.len(),
+        }))
+    }
+
+    /// Golden section over one logarithmic shape about the best point.
+    fn refine(
+        &self,
+        fit: &Fit,
+        c: usize,
+        place: usize,
+        best: &mut (f64, [f64; SHAPES], Arc<Vec<Column>>),
+    ) -> Result<(), DiagnoseError> {
+        let shapes_count = self.library[c].kind.about().shapes.len() as f64;
+        let step = shapes_count / PER_DECADE * std::f64::consts::LN_10;
+        let middle = best.1[place].ln();
+        let (mut low, mut high) = (middle - step, middle + step);
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let mut at = |x: f64,
+                      best: &mut (f64, [f64; SHAPES], Arc<Vec<Column>>)|
+         -> Result<f64, DiagnoseError> {
+            let mut shapes = best.1;
+            shapes[place] = x.exp();
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            let Some((share, _)) = self.explained(fit, c, &columns) else {
+                return Ok(f64::NEG_INFINITY);
+            };
+            if share > best.0 {
+                *best = (share, shapes, columns);
+            }
+            Ok(share)
+        };
+        let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
+        let (mut fa, mut fb) = (at(a, best)?, at(b, best)?);
+        for _ in 0..REFINEMENTS {
+            if fa > fb {
+                (high, b, fb) = (b, a, fa);
+                a = high - golden * (high - low);
+                fa = at(a, best)?;
+            } else {
+                (low, a, fa) = (a, b, fb);
+                b = low + golden * (high - low);
+                fb = at(b, best)?;
+            }
+            if high - low < 0.01 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// All candidates at their best, best gain first.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn sweep(&self, fit: &Fit, without: &[Candidate]) -> Result<Vec<Profile>, DiagnoseError> {
+        let next = AtomicUsize::new(0);
+        let work = || -> Result<Vec<Profile>, DiagnoseError> {
+            let mut found = Vec::new();
+            loop {
+                let c = next.fetch_add(1, Ordering::Relaxed);
+                let Some(candidate) = self.library.get(c) else {
+                    return Ok(found);
+                };
+                // A second law under one name is no second effect.
+                let taken = without.iter().any(|w| {
+                    w.joint == candidate.joint
+                        && w.kind.about().name == candidate.kind.about().name
+                        && w.other == candidate.other
+                });
+                if taken {
+                    continue;
+                }
+                found.extend(self.profile(fit, c, None)?);
+            }
+        };
+        let mut profiles = Vec::new();
+        std::thread::scope(|scope| {
+            let others: Vec<_> = (1..self.threads.max(1))
+                .map(|_| scope.spawn(work))
+                .collect();
+            let mut all = work()?;
+            for other in others {
+                match other.join() {
+                    Ok(found) => all.extend(found?),
+                    Err(panic) => std::panic::resume_unwind(panic),
+                }
+            }
+            profiles = all;
+            Ok::<(), DiagnoseError>(())
+        })?;
+        profiles.sort_by(|a, b| {
+            b.evidence
+                .gain
+                .total_cmp(&a.evidence.gain)
+                .then_with(|| a.candidate.kind.cmp(&b.candidate.kind))
+        });
+        Ok(profiles)
+    }
+
+    /// What physics allows the gains to be.
+    fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
+        self.source.gains(kind).iter().map(|g| g.bounds).collect()
+    }
+
+    /// Number of trials of a sweep.
+    pub fn trials(&self) -> usize {
+        self.library.iter().map(|c| grid(c.kind).len()).sum()
+    }
+
+    /// Finds effects one by one. `base` holds the nominal columns; `told` hears of every sweep and of the effects in the
+    /// model at that time.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub fn run<'f>(
+        &self,
+        base: &Fit<'f>,
+        told: &mut dyn FnMut(usize, &[Profile], &Fit<'f>),
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let trials = self.trials();
+        let mut chosen: Vec<Profile> = Vec::new();
+        while chosen.len() < MOST_EFFECTS {
+            let fit = with(base, &chosen, None);
+            let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
+            let profiles = self.sweep(&fit, &present)?;
+            told(chosen.len(), &profiles, &fit);
+            let Some(best) = profiles.into_iter().find(|p| p.refused(trials).is_none()) else {
+                break;
+            };
+            let before = chosen.clone();
+            chosen.push(best);
+            self.settle(base, &mut chosen, trials)?;
+            if same(&before, &chosen) {
+                break;
+            }
+        }
+        Ok(chosen)
+    }
+
+    /// Refines all shapes together, drops what no longer stands by itself, exchanges what something else does better.
+    fn settle(
+        &self,
+        base: &Fit,
+        chosen: &mut Vec<Profile>,
+        trials: usize,
+    ) -> Result<(), DiagnoseError> {
+        for _ in 0..2 {
+            self.refine_all(base, chosen)?;
+        }
+        // Stand-ins go once the true effect is in.
+        let mut i = 0;
+        while chosen.len() > 1 && i < chosen.len() {
+            let e = &chosen[i].evidence;
+            if e.p_value > STAYS || e.gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
+                chosen.remove(i);
+                self.refine_all(base, chosen)?;
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+        // Something else in the place of an effect that was taken before the last.
+        if chosen.len() > 1 {
+            for i in 0..chosen.len() - 1 {
+                let fit = with(base, chosen, Some(i));
+                let others: Vec<Candidate> = (chosen.iter().enumerate())
+                    .filter(|(k, _)| *k != i)
+                    .map(|(_, p)| p.candidate)
+                    .collect();
+                let rival = self
+                    .sweep(&fit, &others)?
+                    .into_iter()
+                    .find(|p| p.refused(trials).is_none());
+                if let Some(rival) = rival
+                    && rival.candidate != chosen[i].candidate
+                    && rival.evidence.gain > chosen[i].evidence.gain
+                {
+                    chosen[i] = rival;
+                    self.refine_all(base, chosen)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Each effect's shapes beside all others; its evidence beside all others.
+    fn refine_all(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
+        for i in 0..chosen.len() {
+            let fit = with(base, chosen, Some(i));
+            let c = (self.library.iter()).position(|l| *l == chosen[i].candidate);
+            let Some(c) = c else { continue };
+            if let Some(better) = self.profile(&fit, c, Some(chosen[i].shapes))? {
+                chosen[i] = better;
+            } else {
+                // No column of its own any more.
+                chosen[i].evidence.gain = 0.0;
+                chosen[i].evidence.p_value = 1.0;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn same(a: &[Profile], b: &[Profile]) -> bool {
+    a.len() == b.len()
+        && a.iter()
+            .all(|p| b.iter().any(|q| q.candidate == p.candidate))
+}
+
+/// The nominal columns with those of the effects, but for one.
+pub fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -> Fit<'f> {
+    let mut fit = base.clone();
+    for (k, profile) in chosen.iter().enumerate() {
+        if Some(k) == but {
+            continue;
+        }
+        for column in profile.columns.iter() {
+            fit.push(column);
+        }
+    }
+    fit
+}
+
+/// Whether an effect's columns depend on what the model predicts.
+fn depends_on_model(kind: Kind) -> bool {
+    let about = kind.about();
+    matches!(about.channel, Channel::Position | Channel::Effort)
+        || matches!(
+            about.name,
+            "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
+        )
+}

@@ -1,0 +1,95 @@
+//! All coefficients together, with a covariance that survives correlated residuals.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::fit::{Fit, dot};
+use super::rows::Column;
+
+/// Coefficients of columns fitted together.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// One a column.
+    pub values: Vec<f64>,
+    /// Robust to correlation within blocks; columns that were only linearised take part.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Solution {
+    /// Standard deviation of a coefficient.
+    pub fn std(&self, k: usize) -> f64 {
+        self.covariance[(k, k)].max(0.0).sqrt()
+    }
+}
+
+/// Fits `columns` to the torque; `slopes` are derivatives with respect to parameters that do not enter linearly: they take
+/// part in the covariance alone, behind the columns. None where the columns are not independent.
+pub fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
+    let weighted: Vec<Vec<f64>> = columns.iter().map(|c| plain.weighted(c)).collect();
+    let torque = plain.left();
+    let (values, inverse) = normal(&weighted, torque)?;
+    let mut rest = torque.to_vec();
+    for (column, value) in weighted.iter().zip(&values) {
+        for (r, c) in rest.iter_mut().zip(column) {
+            *r -= value * c;
+        }
+    }
+    if slopes.is_empty() {
+        let covariance = sandwich(plain, &weighted, &inverse, &rest);
+        return Some(Solution { values, covariance });
+    }
+    let mut all = weighted;
+    all.extend(slopes.iter().map(|c| plain.weighted(c)));
+    let (_, inverse) = normal(&all, torque)?;
+    let covariance = sandwich(plain, &all, &inverse, &rest);
+    Some(Solution { values, covariance })
+}
+
+/// Solution and inverse of the normal matrix, by columns scaled to length one.
+fn normal(columns: &[Vec<f64>], torque: &[f64]) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let k = columns.len();
+    let lengths: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt()).collect();
+    if lengths.iter().any(|l| l.is_nan() || *l == 0.0) {
+        return None;
+    }
+    let mut gram = DMatrix::zeros(k, k);
+    for a in 0..k {
+        for b in 0..=a {
+            let entry = dot(&columns[a], &columns[b]) / (lengths[a] * lengths[b]);
+            gram[(a, b)] = entry;
+            gram[(b, a)] = entry;
+        }
+    }
+    let right = DVector::from_fn(k, |a, _| dot(&columns[a], torque) / lengths[a]);
+    let factor = gram.cholesky()?;
+    let solution = factor.solve(&right);
+    let mut inverse = factor.inverse();
+    for a in 0..k {
+        for b in 0..k {
+            inverse[(a, b)] /= lengths[a] * lengths[b];
+        }
+    }
+    let values = (0..k).map(|a| solution[a] / lengths[a]).collect();
+    Some((values, inverse))
+}
+
+/// Covariance from the scores of the blocks (Liang and Zeger 1986).
+fn sandwich(
+    plain: &Fit,
+    columns: &[Vec<f64>],
+    inverse: &DMatrix<f64>,
+    rest: &[f64],
+) -> DMatrix<f64> {
+    let k = columns.len();
+    let blocks = plain.blocks();
+    let of_row = plain.block_of_rows();
+    let mut scores = DMatrix::<f64>::zeros(k, blocks);
+    for (at, r) in rest.iter().enumerate() {
+        let b = of_row[at % of_row.len()];
+        for (c, column) in columns.iter().enumerate() {
+            scores[(c, b)] += column[at] * r;
+        }
+    }
+    let g = blocks as f64;
+    let meat = &scores * scores.transpose() * (g / (g - 1.0).max(1.0));
+    inverse * meat * inverse
+}
