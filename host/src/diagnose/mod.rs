@@ -2,6 +2,7 @@
 //! used, and when to stop.
 
 mod anchor;
+pub mod benchmark;
 mod columns;
 mod engine;
 mod fit;

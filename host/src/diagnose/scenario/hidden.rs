@@ -20,8 +20,6 @@ use crate::plant::effect::torque_saturation::TorqueSaturation;
 use crate::plant::effect::transmission::{Backlash, Elasticity};
 use crate::plant::{Body, PlantConfig, VelocityWeakening};
 
-/// Current at the rig's torque limit of 8 N·m, A.
-const PEAK_CURRENT: f64 = 3.2;
 /// Power that friction takes on average in the scenarios' motion, W: 0.8 N·m and 0.25 N·m·s/rad at some 0.7 rad/s.
 const FRICTION_POWER: f64 = 0.7;
 /// Rise of the gear's temperature at that power, K. Only its product with the rate of the friction shows.
@@ -202,6 +200,9 @@ const SIZES: [(&str, [f64; 2]); 21] = [
 ];
 
 impl Effect {
+    /// Current at the rig's torque limit of 8 N·m, A.
+    pub const PEAK_CURRENT: f64 = 3.2;
+
     /// All names, as the contract has them.
     pub fn names() -> impl Iterator<Item = &'static str> {
         SIZES.iter().map(|(name, _)| *name)
@@ -428,7 +429,7 @@ impl Effect {
             Self::CurrentOffset { current } => config.sensors.current.offset = current,
             Self::TorqueSaturation { loss } => {
                 motor.saturation = Some(TorqueSaturation {
-                    knee: PEAK_CURRENT * ((1.0 - loss) / loss).sqrt(),
+                    knee: Self::PEAK_CURRENT * ((1.0 - loss) / loss).sqrt(),
                 });
             }
             Self::MeasurementDelay { delay } => {

@@ -11,6 +11,7 @@ mod record;
 mod reference;
 mod rig;
 mod size;
+mod surrogate;
 #[cfg(test)]
 mod tests;
 
@@ -133,49 +134,46 @@ impl Scenario {
         })
     }
 
-    /// How large what is hidden is against the noise floor. Takes three more runs of the training reference.
+    /// How large each hidden effect is by itself against the noise floor, in the order of `hidden`. Takes two more runs of
+    /// the training reference and one for each effect.
     ///
     /// # Errors
     /// A motion that does not excite the nominal model.
-    pub fn size(&self) -> Result<Size, DiagnoseError> {
+    pub fn sizes(&self) -> Result<Vec<Size>, DiagnoseError> {
         let healthy = rig::healthy(self.seed, &self.noise);
         let robot = rig::description(&healthy, 0.0, self.seed)?;
         let motion = reference::reference(self.excitation, self.seconds[0], self.seed, 2);
         let quiet = rig::healthy(self.seed, &Noise::NONE);
-        let bare = Self {
-            hidden: Vec::new(),
-            intrusion: None,
-            ..self.clone()
+        let recorded = |hidden: &[Hidden], config: &PlantConfig| {
+            let scenario = Self {
+                hidden: hidden.to_vec(),
+                intrusion: None,
+                ..self.clone()
+            };
+            scenario.run(config, &robot, &motion, 0)
         };
-        let equation = if !self.hidden.is_empty()
-            && self
-                .hidden
-                .iter()
-                .all(|h| h.effect.name() == "drive_deadzone")
-        {
-            Equation::Voltage
-        } else {
-            Equation::Torque
+        let noisy = recorded(&[], &healthy)?;
+        let without = recorded(&[], &quiet)?;
+        let size = |hidden: &Hidden| {
+            let (equation, unit) = match hidden.effect {
+                Effect::DriveDeadzone { .. } => (Equation::Voltage, "V"),
+                _ => (Equation::Torque, "N*m"),
+            };
+            let noisy = Problem::of(&noisy, equation)?;
+            let without = Problem::of(&without, equation)?;
+            let with = Problem::of(&recorded(&[*hidden], &quiet)?, equation)?;
+            let known = without.refit()?;
+            let base = without.rms(&known);
+            Ok(Size {
+                excess_rms: beyond(with.rms(&with.refit()?), base),
+                frozen_rms: beyond(with.rms(&known), base),
+                floor_rms: noisy.rms(&noisy.refit()?),
+                base_rms: base,
+                unit,
+                parameter_change: matches!(hidden.effect, Effect::Payload { .. }),
+            })
         };
-        let problem = |scenario: &Self, config: &PlantConfig| {
-            Problem::of(&scenario.run(config, &robot, &motion, 0)?, equation)
-        };
-        let noisy = problem(&bare, &healthy)?;
-        let without = problem(&bare, &quiet)?;
-        let with = problem(self, &quiet)?;
-        let known = without.refit()?;
-        let base = without.rms(&known);
-        Ok(Size {
-            excess_rms: beyond(with.rms(&with.refit()?), base),
-            frozen_rms: beyond(with.rms(&known), base),
-            floor_rms: noisy.rms(&noisy.refit()?),
-            unit: match equation {
-                Equation::Torque => "N*m",
-                Equation::Voltage => "V",
-            },
-            parameter_change: !self.hidden.is_empty()
-                && self.hidden.iter().all(|h| h.effect.name() == "payload"),
-        })
+        self.hidden.iter().map(size).collect()
     }
 
     fn run(
@@ -253,6 +251,8 @@ pub struct Size {
     pub frozen_rms: f64,
     /// RMS that a refit leaves of a recording with noise and nothing hidden.
     pub floor_rms: f64,
+    /// The same without noise: what filtering and reversals leave.
+    pub base_rms: f64,
     /// ASCII; volts for what shows in the voltage alone.
     pub unit: &'static str,
     /// Whether what is hidden is a change of parameters, which a refit takes up.

@@ -33,10 +33,64 @@ pub(super) enum Equation {
 pub(super) struct Problem {
     columns: DMatrix<f64>,
     target: DVector<f64>,
+    equation: Equation,
 }
 
 impl Problem {
     pub(super) fn of(block: &Block, equation: Equation) -> Result<Self, DiagnoseError> {
+        let Signals {
+            columns,
+            target,
+            velocity,
+        } = Signals::of(block, equation)?;
+        let rows: Vec<usize> = (0..velocity.len())
+            .step_by(STRIDE)
+            .filter(|&k| velocity[k].abs() > MOVING)
+            .collect();
+        Ok(Self {
+            columns: DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][rows[k]]),
+            target: DVector::from_fn(rows.len(), |k, _| target[rows[k]]),
+            equation,
+        })
+    }
+
+    /// What the refitted model says at every sample.
+    pub(super) fn explained(&self, block: &Block) -> Result<Vec<f64>, DiagnoseError> {
+        let parameters = self.refit()?;
+        let signals = Signals::of(block, self.equation)?;
+        let at = |k: usize| {
+            let terms = signals.columns.iter().zip(&parameters);
+            terms.map(|(column, p)| column[k] * p).sum()
+        };
+        Ok((0..signals.target.len()).map(at).collect())
+    }
+
+    /// Least squares.
+    pub(super) fn refit(&self) -> Result<DVector<f64>, DiagnoseError> {
+        let normal = self.columns.transpose() * &self.columns;
+        let right = self.columns.transpose() * &self.target;
+        normal
+            .cholesky()
+            .map(|factor| factor.solve(&right))
+            .ok_or_else(|| DiagnoseError::Scenario("the motion does not excite the model".into()))
+    }
+
+    /// Of what `parameters` leave.
+    pub(super) fn rms(&self, parameters: &DVector<f64>) -> f64 {
+        let left = &self.target - &self.columns * parameters;
+        (left.norm_squared() / left.len() as f64).sqrt()
+    }
+}
+
+/// Columns and target at every sample.
+struct Signals {
+    columns: Vec<Vec<f64>>,
+    target: Vec<f64>,
+    velocity: Vec<f64>,
+}
+
+impl Signals {
+    fn of(block: &Block, equation: Equation) -> Result<Self, DiagnoseError> {
         let failed = |what: &str| DiagnoseError::Scenario(what.into());
         let filter =
             LowPass::butterworth(4, BAND, RATE).ok_or_else(|| failed("the band does not exist"))?;
@@ -72,30 +126,11 @@ impl Problem {
                 )
             }
         };
-        let rows: Vec<usize> = (0..q.len())
-            .step_by(STRIDE)
-            .filter(|&k| velocity[k].abs() > MOVING)
-            .collect();
         Ok(Self {
-            columns: DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][rows[k]]),
-            target: DVector::from_fn(rows.len(), |k, _| target[rows[k]]),
+            columns,
+            target,
+            velocity,
         })
-    }
-
-    /// Least squares.
-    pub(super) fn refit(&self) -> Result<DVector<f64>, DiagnoseError> {
-        let normal = self.columns.transpose() * &self.columns;
-        let right = self.columns.transpose() * &self.target;
-        normal
-            .cholesky()
-            .map(|factor| factor.solve(&right))
-            .ok_or_else(|| DiagnoseError::Scenario("the motion does not excite the model".into()))
-    }
-
-    /// Of what `parameters` leave.
-    pub(super) fn rms(&self, parameters: &DVector<f64>) -> f64 {
-        let left = &self.target - &self.columns * parameters;
-        (left.norm_squared() / left.len() as f64).sqrt()
     }
 }
 
