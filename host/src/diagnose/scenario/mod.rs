@@ -183,15 +183,9 @@ impl Scenario {
         motion: &[f64],
         run: u64,
     ) -> Result<Block, DiagnoseError> {
-        let joint = robot.joints.first();
-        let (Some(drive), Some(limits)) = (
-            joint.and_then(|j| j.drive.as_ref()),
-            joint.and_then(|j| j.limits.as_ref()),
-        ) else {
-            return Err(DiagnoseError::Scenario(
-                "the description has no drive or no limits".into(),
-            ));
-        };
+        let drive = robot.joints.first().and_then(|j| j.drive.as_ref());
+        let drive =
+            drive.ok_or_else(|| DiagnoseError::Scenario("the description has no drive".into()))?;
         let mut config = healthy.clone();
         if let Some(substeps) = self.substeps {
             config.substeps = substeps;
@@ -204,7 +198,6 @@ impl Scenario {
         let nominal = Nominal {
             inertia: equivalent.inertia,
             gravity: equivalent.gravity_cos.hypot(equivalent.gravity_sin),
-            torque: limits.torque.unwrap_or(f64::INFINITY),
         };
         let intrusion = self.intrusion.filter(|_| run == 0);
         // Seeds of runs far apart from those of the rigs.

@@ -2,7 +2,8 @@
 //!
 //! Proportional and derivative action on the encoder's reading, with the nominal weight and inertia fed forward; the
 //! torque becomes a voltage over the nominal resistance and back-EMF. There is no current loop, so that noise of
-//! the current sensor does not come back as torque.
+//! the current sensor does not come back as torque. The supply alone limits: with a limit on the wanted torque, dead
+//! time would leave nothing of it.
 
 use core::f64::consts::TAU;
 
@@ -29,8 +30,6 @@ pub(super) struct Nominal {
     pub(super) inertia: f64,
     /// Gravity torque at 90° from hanging, N·m.
     pub(super) gravity: f64,
-    /// Highest torque, N·m.
-    pub(super) torque: f64,
 }
 
 /// A torque that comes and goes during one recording, on the link.
@@ -91,7 +90,6 @@ impl Loop {
                 + natural * natural * (reference - q)
                 + 2.0 * DAMPING * natural * (velocity - self.speed))
             + nominal.gravity * reference.sin();
-        let torque = torque.clamp(-nominal.torque, nominal.torque);
         let constant = self.drive.torque_constant * self.drive.gear_ratio;
         let resistance = self.drive.resistance.unwrap_or(0.0);
         let voltage = resistance * torque / constant + constant * self.speed;
