@@ -16,7 +16,7 @@ use crate::diagnose::scenario::Made;
 
 mod dictionary;
 
-use dictionary::{Dictionary, Term};
+use dictionary::Dictionary;
 
 /// Most terms that forward regression tries.
 const MOST: usize = 20;

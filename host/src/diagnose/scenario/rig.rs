@@ -13,7 +13,7 @@ use crate::robot::{JointFriction, ONE_LINK_TEMPLATE, Robot};
 
 /// Ticks of the rig per second: also the resolution of a delay.
 pub(super) const TICK_RATE: f64 = 10_000.0;
-/// Substeps per tick; 2 and 10 differ by less than 1e-3 N·m in what a refit leaves (see the tests).
+/// Substeps per tick. The tests compare with ten.
 pub(super) const SUBSTEPS: u32 = 2;
 /// Travel of the contact on the rig without presliding, rad: below one count of the encoder.
 const STROKE: f64 = 2.0e-5;
