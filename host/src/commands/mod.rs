@@ -1,6 +1,7 @@
 //! The program's verbs, one file each: arguments in, library called, results named.
 
 mod base;
+mod benchmark;
 mod demo;
 mod error;
 mod excite;
@@ -43,6 +44,7 @@ enum Command {
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
+    Benchmark(benchmark::Args),
 }
 
 impl Cli {
@@ -65,6 +67,7 @@ impl Cli {
             Some(Command::Identify(args)) => identify::run(&args, &ui),
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),
+            Some(Command::Benchmark(args)) => benchmark::run(&args, &ui),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! used, and when to stop.
 
 mod anchor;
+pub mod benchmark;
 mod columns;
 mod engine;
 mod fit;
@@ -10,6 +11,7 @@ mod locate;
 pub mod outcome;
 mod rows;
 pub mod runs;
+pub mod scenario;
 mod search;
 mod solve;
 
@@ -44,4 +46,7 @@ pub enum DiagnoseError {
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
+    /// A scenario that cannot be made.
+    #[error("The scenario cannot be made: {0}")]
+    Scenario(String),
 }

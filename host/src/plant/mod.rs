@@ -46,6 +46,7 @@ pub use body::Body;
 pub use config::{Bridge, Channel, Encoder, Equivalent, Mechanism, Motor, PlantConfig, Sensors};
 pub use fault::Faults;
 pub use friction::{Friction, Presliding, VelocityWeakening};
+pub(crate) use sensors::stream;
 pub use truth::{Energy, Truth};
 
 use std::collections::VecDeque;

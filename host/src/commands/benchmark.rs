@@ -1,0 +1,173 @@
+//! `rig benchmark`: how often the diagnosis finds what was hidden.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use clap::ValueEnum;
+
+use super::error::CommandError;
+use super::ui::Ui;
+use crate::diagnose::benchmark::peer::{Frols, Stlsq};
+use crate::diagnose::benchmark::{Diagnose, Method, Plan, Score, markdown, run as ask};
+use crate::diagnose::scenario::{Effect, Noise};
+use crate::files::{folder, write_whole};
+
+/// Which method is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Judged {
+    /// The project's own diagnosis.
+    Diagnose,
+    /// Sequentially thresholded least squares.
+    Stlsq,
+    /// Forward regression with orthogonal least squares and BIC.
+    Frols,
+}
+
+/// Hides effects in recordings of the emulated rig and counts how often they are found.
+///
+/// Prints the figures with 95 % Wilson intervals and writes benchmark.json and benchmark.md. The same seeds give the same
+/// figures.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Effects to hide, by name, separated by commas [default: all]
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) effects: Vec<String>,
+    /// Seeds of each effect
+    #[arg(long, default_value_t = 10)]
+    pub(crate) seeds: u64,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    pub(crate) first_seed: u64,
+    /// Recordings at each noise level with nothing hidden
+    #[arg(long, default_value_t = 20)]
+    pub(crate) nothing: u64,
+    /// Noise levels: low, medium, high
+    #[arg(long, value_delimiter = ',', default_value = "medium")]
+    pub(crate) noise: Vec<String>,
+    /// How many effects are hidden together, for instance 2,3
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) combinations: Vec<usize>,
+    /// Seeds of each size of combination
+    #[arg(long, default_value_t = 20)]
+    pub(crate) combined: u64,
+    /// Hide each effect once more with its name kept out of the library
+    #[arg(long)]
+    pub(crate) leave_out: bool,
+    /// Run the negative controls: wrong description, meaningless residual, faint effect, poor motion, an intrusion, another
+    /// integration step
+    #[arg(long)]
+    pub(crate) controls: bool,
+    /// Methods to judge
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "diagnose")]
+    pub(crate) only: Vec<Judged>,
+    /// Length of the training recording, s
+    #[arg(long, default_value_t = 90.0)]
+    pub(crate) train: f64,
+    /// Length of the hold-out recording, s
+    #[arg(long, default_value_t = 60.0)]
+    pub(crate) holdout: f64,
+    /// Threads [default: as many as the machine has]
+    #[arg(long, default_value_t = 0)]
+    pub(crate) threads: usize,
+    /// Folder for benchmark.json, benchmark.md and, with --keep, the recordings
+    #[arg(long, default_value = "benchmark")]
+    pub(crate) out: PathBuf,
+    /// Write the recordings and descriptions too, one folder a case, and judge nothing
+    #[arg(long)]
+    pub(crate) keep: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Names that do not exist, files that cannot be written.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let levels = args.noise.iter().map(|name| {
+        let known = Noise::LEVELS.into_iter().find(|(level, _)| level == name);
+        known.ok_or_else(|| {
+            CommandError::Sentence(format!(
+                "no noise level is called \"{name}\"; choose from low, medium, high."
+            ))
+        })
+    });
+    for (flag, seconds) in [("--train", args.train), ("--holdout", args.holdout)] {
+        if !(20.0..=3600.0).contains(&seconds) {
+            return Err(CommandError::Sentence(format!(
+                "{flag} is {seconds} s; give 20 to 3600 s, so that every kind of motion fits in."
+            )));
+        }
+    }
+    let effects = if args.effects.is_empty() {
+        Effect::names().map(str::to_owned).collect()
+    } else {
+        args.effects.clone()
+    };
+    let plan = Plan {
+        effects,
+        seeds: args.seeds,
+        first_seed: args.first_seed,
+        nothing: args.nothing,
+        levels: levels.collect::<Result<_, _>>()?,
+        combinations: args.combinations.clone(),
+        combined: args.combined,
+        leave_out: args.leave_out,
+        controls: args.controls,
+        seconds: [args.train, args.holdout],
+    };
+    let cases = plan.cases()?;
+    folder(&args.out)?;
+    if args.keep {
+        let mut progress = ui.progress("recording", cases.len() as u64);
+        for (k, case) in cases.iter().enumerate() {
+            let place = args.out.join(format!("{:04}", k + 1));
+            folder(&place)?;
+            let (made, sizes) = case.make()?;
+            made.write(&place)?;
+            let truth = serde_json::json!({
+                "group": case.group, "level": case.level, "truth": made.truth, "sizes": sizes,
+            });
+            let text = format!("{truth:#}\n");
+            write_whole(&place.join("truth.json"), text.as_bytes())?;
+            progress.advance(1);
+        }
+        drop(progress);
+        ui.say(&format!("{}: {} cases.", args.out.display(), cases.len()));
+        return Ok(());
+    }
+    let methods: Vec<&dyn Method> = args
+        .only
+        .iter()
+        .map(|method| -> &dyn Method {
+            match method {
+                Judged::Diagnose => &Diagnose,
+                Judged::Stlsq => &Stlsq,
+                Judged::Frols => &Frols,
+            }
+        })
+        .collect();
+    let progress = Mutex::new(ui.progress("hiding and seeking", cases.len() as u64));
+    let threads = crate::prepare::threads(args.threads);
+    let outcomes = ask(&cases, &methods, threads, &|done, total| {
+        if let Ok(mut progress) = progress.lock() {
+            progress.at_of(done as u64, total as u64);
+        }
+    })?;
+    drop(progress);
+    let scores: Vec<Score> = methods
+        .iter()
+        .zip(&outcomes)
+        .map(|(method, outcomes)| Score::of(method.name(), outcomes))
+        .collect();
+    let table = markdown(&scores);
+    let json = serde_json::json!({
+        "schema": "rig-benchmark/1", "scores": scores, "outcomes": outcomes,
+    });
+    write_whole(
+        &args.out.join("benchmark.json"),
+        format!("{json:#}\n").as_bytes(),
+    )?;
+    write_whole(&args.out.join("benchmark.md"), table.as_bytes())?;
+    ui.say(table.trim_end());
+    ui.say(&format!("{}: {} cases.", args.out.display(), cases.len()));
+    Ok(())
+}

@@ -1,0 +1,128 @@
+//! What a method says of a recording, reduced to what is scored.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rig_shared::effects::Kind;
+use serde::Serialize;
+
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::outcome::{Diagnosis, Value, Verdict};
+use crate::diagnose::scenario::Made;
+
+/// An effect that a method names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Named {
+    /// Best name.
+    pub effect: String,
+    /// All names that it holds possible, the best among them.
+    pub set: Vec<String>,
+    /// Of the best name.
+    pub parameters: BTreeMap<String, Value>,
+}
+
+/// What a method says.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Answer {
+    /// In the order found.
+    pub named: Vec<Named>,
+    /// Whether it says that something is left that it cannot name.
+    pub remainder: bool,
+    /// Share of the hold-out's gap that it closes; none where it names nothing.
+    pub gap_closed: Option<f64>,
+    /// Effects that it says the recording cannot show.
+    pub not_testable: Vec<String>,
+}
+
+/// A method to be judged.
+pub trait Method: Sync {
+    /// In words.
+    fn name(&self) -> &'static str;
+
+    /// What it says, with these effects left out of its library.
+    ///
+    /// # Errors
+    /// Where it cannot work at all.
+    fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, DiagnoseError>;
+}
+
+/// [`crate::diagnose::diagnose`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Diagnose;
+
+impl Method for Diagnose {
+    fn name(&self) -> &'static str {
+        "rig diagnose"
+    }
+
+    fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, DiagnoseError> {
+        let mut training: Vec<&dyn crate::prepare::Recording> = vec![&made.train];
+        if let Some(repeat) = &made.repeat {
+            training.push(repeat);
+        }
+        let options = crate::diagnose::Options {
+            without: without.to_vec(),
+            threads: 1,
+            seed: made.truth.seed,
+        };
+        let (diagnosis, _) = crate::diagnose::diagnose(
+            &made.robot,
+            &training,
+            &[&made.holdout],
+            &options,
+            &mut |_| {},
+        )?;
+        Ok(Answer::of(&diagnosis))
+    }
+}
+
+impl Answer {
+    /// A change of parameters without a step is that of a payload, the only one that is hidden.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let mut named: Vec<Named> = (diagnosis.steps.iter())
+            .map(|step| Named {
+                effect: step.effect.clone(),
+                set: step.set.clone(),
+                parameters: step.parameters.clone(),
+            })
+            .collect();
+        if diagnosis.verdict == Verdict::ParameterChange && named.is_empty() {
+            named.push(Named {
+                effect: "payload".into(),
+                set: vec!["payload".into()],
+                parameters: BTreeMap::new(),
+            });
+        }
+        Self {
+            named,
+            remainder: diagnosis.verdict == Verdict::Remainder,
+            gap_closed: diagnosis.gap_closed,
+            not_testable: diagnosis
+                .not_testable
+                .iter()
+                .map(|n| n.effect.clone())
+                .collect(),
+        }
+    }
+}
+
+/// A name and those that no recording of torque and motor position can tell from it, itself among them.
+pub fn exact_class(name: &str) -> BTreeSet<&str> {
+    let mut class = BTreeSet::from([name]);
+    for kind in Kind::ALL {
+        let about = kind.about();
+        for confusion in about.confused.iter().filter(|c| c.exact) {
+            if about.name == name {
+                class.insert(confusion.with);
+            }
+            if confusion.with == name {
+                class.insert(about.name);
+            }
+        }
+    }
+    class
+}
+
+/// Whether `named` is `truth` but for exact partners.
+pub fn is_right(named: &str, truth: &str) -> bool {
+    exact_class(truth).contains(named)
+}

@@ -1,0 +1,103 @@
+//! How often a method finds what was hidden in recordings of the emulated rig, and how often it finds what is not there.
+//!
+//! Every figure is over scenarios of [`super::scenario`]; proportions come with Wilson intervals.
+
+mod answer;
+mod cases;
+mod parameters;
+pub mod peer;
+mod score;
+mod table;
+#[cfg(test)]
+mod tests;
+mod wilson;
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::DiagnoseError;
+pub use answer::{Answer, Diagnose, Method, Named, exact_class, is_right};
+pub use cases::{Case, Group, Plan};
+pub use parameters::{Compared, compare};
+pub use score::{EffectScore, Outcome, Score};
+pub use table::markdown;
+pub use wilson::Proportion;
+
+/// Puts every case to every method, `threads` at a time; `progress` hears how many of how many are done. The result has
+/// one list a method, in the order of the cases.
+///
+/// # Errors
+/// A scenario that cannot be made. A method that fails is an outcome, not an error.
+pub fn run(
+    cases: &[Case],
+    methods: &[&dyn Method],
+    threads: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Vec<Outcome>>, DiagnoseError> {
+    let next = AtomicUsize::new(0);
+    let done = AtomicUsize::new(0);
+    let results: Mutex<Vec<Option<Result<Vec<Outcome>, DiagnoseError>>>> =
+        Mutex::new((0..cases.len()).map(|_| None).collect());
+    std::thread::scope(|scope| {
+        for _ in 0..threads.clamp(1, cases.len().max(1)) {
+            scope.spawn(|| {
+                while let Some((k, case)) = {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    cases.get(k).map(|case| (k, case))
+                } {
+                    let outcomes = ask(case, methods);
+                    // A thread that panicked takes the whole run down at the end of the scope.
+                    if let Ok(mut results) = results.lock() {
+                        results[k] = Some(outcomes);
+                    }
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
+                }
+            });
+        }
+    });
+    let mut lists: Vec<Vec<Outcome>> = methods.iter().map(|_| Vec::new()).collect();
+    let results = results.into_inner().unwrap_or_else(|e| e.into_inner());
+    for outcomes in results.into_iter().flatten() {
+        for (list, outcome) in lists.iter_mut().zip(outcomes?) {
+            list.push(outcome);
+        }
+    }
+    Ok(lists)
+}
+
+fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseError> {
+    let (made, sizes) = case.make()?;
+    let drive = made.robot.joints.first().and_then(|j| j.drive.as_ref());
+    let (constant, ratio) = drive.map_or((f64::NAN, f64::NAN), |d| {
+        (d.torque_constant * d.gear_ratio, d.gear_ratio)
+    });
+    Ok(methods
+        .iter()
+        .map(|method| {
+            let (answer, failure) = match method.answer(&made, &case.without) {
+                Ok(answer) => (Some(answer), None),
+                Err(error) => (None, Some(error.to_string())),
+            };
+            let found = answer.iter().flat_map(|a| &a.named);
+            let parameters = found
+                .flat_map(|named| {
+                    let hidden = made.truth.hidden.iter();
+                    hidden
+                        .filter(|h| h.effect.name() == named.effect)
+                        .flat_map(|h| compare(&h.effect, &made.truth, named, constant, ratio))
+                        .collect::<Vec<_>>()
+                })
+                .collect();
+            Outcome {
+                group: case.group,
+                level: case.level,
+                seed: case.scenario.seed,
+                hidden: case.scenario.hidden.clone(),
+                sizes: sizes.clone(),
+                answer,
+                failure,
+                parameters,
+            }
+        })
+        .collect())
+}

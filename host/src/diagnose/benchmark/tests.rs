@@ -1,0 +1,126 @@
+//! That answers are counted as they should.
+
+use std::collections::BTreeMap;
+
+use rig_shared::effects::Kind;
+
+use super::*;
+use crate::diagnose::scenario::{Effect, Hidden, Made, Noise, Scenario};
+
+/// Says what it was told to, whatever the recording.
+struct Parrot(Vec<&'static str>);
+
+impl Method for Parrot {
+    fn name(&self) -> &'static str {
+        "parrot"
+    }
+
+    fn answer(&self, _: &Made, _: &[Kind]) -> Result<Answer, DiagnoseError> {
+        let named = self.0.iter().map(|name| Named {
+            effect: (*name).into(),
+            set: vec![(*name).into()],
+            parameters: BTreeMap::new(),
+        });
+        Ok(Answer {
+            named: named.collect(),
+            ..Answer::default()
+        })
+    }
+}
+
+fn plan() -> Plan {
+    Plan {
+        effects: vec!["gravity_tilt".into(), "gear_eccentricity".into()],
+        seeds: 2,
+        first_seed: 1,
+        nothing: 3,
+        levels: vec![("medium", Noise::MEDIUM)],
+        combinations: vec![2],
+        combined: 2,
+        leave_out: true,
+        controls: true,
+        seconds: [20.0, 20.0],
+    }
+}
+
+#[test]
+fn answers_are_counted_by_what_was_hidden() {
+    let cases = plan().cases().unwrap();
+    let silent = Parrot(Vec::new());
+    let tilt = Parrot(vec!["gravity_tilt"]);
+    let lists = run(&cases, &[&silent, &tilt], 2, &|_, _| {}).unwrap();
+    let [silent, tilt] = [&lists[0], &lists[1]].map(|list| Score::of("", list));
+    assert_eq!((silent.false_alarm.hits, silent.false_alarm.of), (0, 3));
+    assert_eq!((tilt.false_alarm.hits, tilt.false_alarm.of), (3, 3));
+    assert_eq!(silent.right_first_any_size.hits, 0);
+    assert_eq!(silent.false_discovery, Some(0.0));
+    // Right in two of four single cases, and in one of two names of every combination.
+    assert_eq!(
+        (tilt.right_first_any_size.hits, tilt.right_first_any_size.of),
+        (2, 4)
+    );
+    assert_eq!(tilt.false_discovery, Some(2.0 / 6.0));
+    assert_eq!(tilt.exact_combination.hits, 0);
+    // Left out of the library and named all the same, without a word of a remainder.
+    assert!(tilt.invented_silently.of > 0);
+    assert_eq!(tilt.invented_silently.hits, tilt.invented_silently.of);
+    assert_eq!(tilt.remainder_flagged.hits, 0);
+    assert_eq!(tilt.controls[&Group::OneRunOnly].hits, 2);
+}
+
+#[test]
+fn exact_partners_count_as_one_name() {
+    assert!(is_right("current_offset", "torque_offset"));
+    assert!(is_right("asymmetric_coulomb", "current_offset"));
+    assert!(!is_right("gravity_tilt", "torque_offset"));
+    assert!(!is_right("stribeck", "presliding"));
+}
+
+#[test]
+fn combinations_hold_different_effects_and_repeat_with_the_seed() {
+    let plan = Plan {
+        effects: Effect::names().map(str::to_owned).collect(),
+        combinations: vec![2, 3],
+        combined: 60,
+        seeds: 0,
+        nothing: 0,
+        ..plan()
+    };
+    let cases = plan.cases().unwrap();
+    assert_eq!(cases.len(), 120);
+    let mut seen = std::collections::BTreeSet::new();
+    for case in &cases {
+        let names: Vec<&str> = (case.scenario.hidden.iter())
+            .map(|h| h.effect.name())
+            .collect();
+        for (k, a) in names.iter().enumerate() {
+            assert!(names[..k].iter().all(|b| !is_right(a, b)), "{names:?}");
+        }
+        seen.insert(names);
+    }
+    assert!(seen.len() > 80, "{}", seen.len());
+    assert_eq!(cases, plan.cases().unwrap());
+}
+
+#[test]
+fn sparse_regression_names_an_eccentric_gear_first() {
+    let effect = Effect::GearEccentricity {
+        amplitude: 0.3,
+        phase: 1.0,
+    };
+    let scenario = Scenario {
+        seconds: [40.0, 30.0],
+        ..Scenario::new(vec![Hidden { joint: 0, effect }], 3)
+    };
+    let made = scenario.make().unwrap();
+    for method in [&peer::Frols as &dyn Method, &peer::Stlsq] {
+        let answer = method.answer(&made, &[]).unwrap();
+        assert_eq!(
+            answer.named.first().map(|n| n.effect.as_str()),
+            Some("gear_eccentricity"),
+            "{}",
+            method.name()
+        );
+        assert!(answer.gap_closed.unwrap() > 0.5, "{}", method.name());
+    }
+}

@@ -1,0 +1,335 @@
+//! Recordings with a known gap: the emulated rig with effects hidden in it, and the description of a user who does not
+//! know of them.
+//!
+//! The rig ([`crate::plant`]) shares no equation with the library of effects: weakening is rational, not Gaussian,
+//! presliding has four elements, warming is driven by heat, and so on; step, controller and sensors lie between the truth
+//! and what is recorded. Equal scenarios give equal bytes.
+
+mod dice;
+mod hidden;
+mod record;
+mod reference;
+mod rig;
+mod size;
+mod surrogate;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+
+pub use hidden::{Effect, Hidden};
+pub use record::Intrusion;
+pub use reference::Excitation;
+pub use rig::Noise;
+
+use super::DiagnoseError;
+use crate::data::{Block, Column, RecordingWriter};
+use crate::files::write_whole;
+use crate::plant::PlantConfig;
+use crate::prepare::InMemory;
+use crate::robot::Robot;
+use record::{Nominal, record};
+use size::{Equation, Problem, beyond};
+
+/// Which rig is recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rig {
+    /// A geared link in a vertical plane.
+    #[default]
+    OneLink,
+}
+
+/// What is to be recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// On what.
+    pub rig: Rig,
+    /// What is hidden; nothing where empty.
+    pub hidden: Vec<Hidden>,
+    /// Of sensors and surroundings.
+    pub noise: Noise,
+    /// Of rig, motion and noise.
+    pub seed: u64,
+    /// How much the motion shows.
+    pub excitation: Excitation,
+    /// Length of the training and of the hold-out recording, s.
+    pub seconds: [f64; 2],
+    /// Whether the training reference is run twice.
+    pub repeated: bool,
+    /// Relative error of the parameters in the description.
+    pub description_error: f64,
+    /// A torque from outside that comes in the first run only.
+    pub intrusion: Option<Intrusion>,
+    /// Substeps of the rig per 0.1 ms; none for what suffices.
+    pub substeps: Option<u32>,
+}
+
+impl Scenario {
+    /// 90 s of training run twice and 60 s of hold-out at the middle noise level.
+    pub fn new(hidden: Vec<Hidden>, seed: u64) -> Self {
+        Self {
+            rig: Rig::OneLink,
+            hidden,
+            noise: Noise::MEDIUM,
+            seed,
+            excitation: Excitation::Full,
+            seconds: [90.0, 60.0],
+            repeated: true,
+            description_error: 0.0,
+            intrusion: None,
+            substeps: None,
+        }
+    }
+
+    /// The named effects in joint 0, drawn by the seed; none where a name is unknown.
+    pub fn of(names: &[&str], seed: u64) -> Option<Self> {
+        let hidden = names
+            .iter()
+            .map(|name| Effect::draw(name, 1.0, seed).map(|effect| Hidden { joint: 0, effect }));
+        Some(Self::new(hidden.collect::<Option<_>>()?, seed))
+    }
+
+    /// Runs the rig.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Scenario`] where a hidden effect names a joint that the rig has not.
+    pub fn make(&self) -> Result<Made, DiagnoseError> {
+        let Rig::OneLink = self.rig;
+        if let Some(beyond) = self.hidden.iter().find(|h| h.joint > 0) {
+            return Err(DiagnoseError::Scenario(format!(
+                "{} is hidden in joint {}, but the rig has one joint; give 0",
+                beyond.effect.name(),
+                beyond.joint
+            )));
+        }
+        let healthy = rig::healthy(self.seed, &self.noise);
+        let robot = rig::description(&healthy, self.description_error, self.seed)?;
+        let [seconds, later] = self.seconds;
+        let motion = reference::reference(self.excitation, seconds, self.seed, 2);
+        let other = reference::reference(self.excitation, later, self.seed, 3);
+        let recording = |label: &str, motion: &[f64], run: u64| {
+            self.run(&healthy, &robot, motion, run)
+                .map(|block| InMemory {
+                    label: label.into(),
+                    blocks: vec![block],
+                })
+        };
+        Ok(Made {
+            train: recording("train", &motion, 0)?,
+            repeat: if self.repeated {
+                Some(recording("repeat", &motion, 1)?)
+            } else {
+                None
+            },
+            holdout: recording("holdout", &other, 2)?,
+            truth: Truth {
+                hidden: self.hidden.clone(),
+                nominal: nominal_parameters(&healthy),
+                seed: self.seed,
+            },
+            robot,
+        })
+    }
+
+    /// How large each hidden effect is by itself against the noise floor, in the order of `hidden`. Takes two more runs of
+    /// the training reference and one for each effect.
+    ///
+    /// # Errors
+    /// A motion that does not excite the nominal model.
+    pub fn sizes(&self) -> Result<Vec<Size>, DiagnoseError> {
+        let healthy = rig::healthy(self.seed, &self.noise);
+        let robot = rig::description(&healthy, 0.0, self.seed)?;
+        let motion = reference::reference(self.excitation, self.seconds[0], self.seed, 2);
+        let quiet = rig::healthy(self.seed, &Noise::NONE);
+        let recorded = |hidden: &[Hidden], config: &PlantConfig| {
+            let scenario = Self {
+                hidden: hidden.to_vec(),
+                intrusion: None,
+                ..self.clone()
+            };
+            scenario.run(config, &robot, &motion, 0)
+        };
+        let noisy = recorded(&[], &healthy)?;
+        let without = recorded(&[], &quiet)?;
+        let size = |hidden: &Hidden| {
+            let (equation, unit) = match hidden.effect {
+                Effect::DriveDeadzone { .. } => (Equation::Voltage, "V"),
+                _ => (Equation::Torque, "N*m"),
+            };
+            let noisy = Problem::of(&noisy, equation)?;
+            let without = Problem::of(&without, equation)?;
+            let with = Problem::of(&recorded(&[*hidden], &quiet)?, equation)?;
+            let known = without.refit()?;
+            let base = without.rms(&known);
+            Ok(Size {
+                excess_rms: beyond(with.rms(&with.refit()?), base),
+                frozen_rms: beyond(with.rms(&known), base),
+                floor_rms: noisy.rms(&noisy.refit()?),
+                base_rms: base,
+                unit,
+                parameter_change: matches!(hidden.effect, Effect::Payload { .. }),
+            })
+        };
+        self.hidden.iter().map(size).collect()
+    }
+
+    fn run(
+        &self,
+        healthy: &PlantConfig,
+        robot: &Robot,
+        motion: &[f64],
+        run: u64,
+    ) -> Result<Block, DiagnoseError> {
+        let drive = robot.joints.first().and_then(|j| j.drive.as_ref());
+        let drive =
+            drive.ok_or_else(|| DiagnoseError::Scenario("the description has no drive".into()))?;
+        let mut config = healthy.clone();
+        if let Some(substeps) = self.substeps {
+            config.substeps = substeps;
+        }
+        // The controller is tuned to the rig as it was before anything was hidden in it.
+        let equivalent = config.equivalent();
+        for hidden in &self.hidden {
+            hidden.effect.hide(&mut config);
+        }
+        let nominal = Nominal {
+            inertia: equivalent.inertia,
+            gravity: equivalent.gravity_cos.hypot(equivalent.gravity_sin),
+        };
+        let intrusion = self.intrusion.filter(|_| run == 0);
+        // Seeds of runs far apart from those of the rigs.
+        let seed = self.seed.wrapping_mul(8).wrapping_add(run);
+        Ok(record(config, drive, nominal, motion, seed, intrusion))
+    }
+}
+
+/// J, m·g·l, fv and fc of the rig before anything was hidden in it.
+fn nominal_parameters(config: &PlantConfig) -> BTreeMap<&'static str, f64> {
+    let e = config.equivalent();
+    BTreeMap::from([
+        ("inertia", e.inertia),
+        ("gravity", e.gravity_cos.hypot(e.gravity_sin)),
+        ("viscous", e.viscous),
+        ("coulomb", e.coulomb),
+    ])
+}
+
+/// What is true of a scenario's recordings.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Truth {
+    /// What is hidden.
+    pub hidden: Vec<Hidden>,
+    /// The rig's nominal parameters, SI, joint-side.
+    pub nominal: BTreeMap<&'static str, f64>,
+    /// Of the scenario.
+    pub seed: u64,
+}
+
+impl Truth {
+    /// Names of what is hidden.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.hidden.iter().map(|h| h.effect.name()).collect()
+    }
+}
+
+/// How large a hidden effect is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Size {
+    /// RMS that a refit of the nominal model leaves because of it.
+    pub excess_rms: f64,
+    /// The same with the nominal parameters as they were before.
+    pub frozen_rms: f64,
+    /// RMS that a refit leaves of a recording with noise and nothing hidden.
+    pub floor_rms: f64,
+    /// The same without noise: what filtering and reversals leave.
+    pub base_rms: f64,
+    /// ASCII; volts for what shows in the voltage alone.
+    pub unit: &'static str,
+    /// Whether what is hidden is a change of parameters, which a refit takes up.
+    pub parameter_change: bool,
+}
+
+impl Size {
+    /// Whether the effect can be expected to be found: what it leaves is at least half of the noise floor. A change of
+    /// parameters is judged with the parameters as they were.
+    pub fn above_floor(&self) -> bool {
+        let rms = if self.parameter_change {
+            self.frozen_rms
+        } else {
+            self.excess_rms
+        };
+        rms >= 0.5 * self.floor_rms
+    }
+}
+
+/// A scenario's recordings.
+#[derive(Clone, Debug)]
+pub struct Made {
+    /// What the user knows.
+    pub robot: Robot,
+    /// To learn from.
+    pub train: InMemory,
+    /// The same reference again.
+    pub repeat: Option<InMemory>,
+    /// Another reference.
+    pub holdout: InMemory,
+    /// What is true.
+    pub truth: Truth,
+}
+
+impl Made {
+    /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, folder: &Path) -> Result<(), DiagnoseError> {
+        let failed = |error: &dyn std::fmt::Display| DiagnoseError::Scenario(error.to_string());
+        let text = self.robot.to_toml().map_err(|error| failed(&error))?;
+        write_whole(&folder.join("robot.toml"), text.as_bytes()).map_err(|error| failed(&error))?;
+        let recordings = [
+            ("train.csv", Some(&self.train)),
+            ("repeat.csv", self.repeat.as_ref()),
+            ("holdout.csv", Some(&self.holdout)),
+        ];
+        for (name, recording) in recordings {
+            if let Some(recording) = recording {
+                write_csv(&folder.join(name), &recording.blocks).map_err(|error| failed(&error))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write_csv(path: &Path, blocks: &[Block]) -> Result<(), crate::data::DataError> {
+    let joints = blocks.first().map_or(0, |block| block.joints.len());
+    let mut columns = vec![Column::new("t", "s")];
+    for joint in 1..=joints {
+        for (name, unit) in [("q", "rad"), ("tau", "N*m"), ("ref", "rad"), ("u", "V")] {
+            columns.push(Column::new(&format!("{name}{joint}"), unit));
+        }
+    }
+    let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
+    let mut row = Vec::with_capacity(columns.len());
+    for block in blocks {
+        for (k, &t) in block.t.iter().enumerate() {
+            row.clear();
+            row.push(t);
+            for joint in &block.joints {
+                let at = |column: Option<&Vec<f64>>| {
+                    column.and_then(|c| c.get(k)).copied().unwrap_or(f64::NAN)
+                };
+                row.extend([
+                    at(Some(&joint.q)),
+                    at(Some(&joint.tau)),
+                    at(joint.reference.as_ref()),
+                    at(joint.voltage.as_ref()),
+                ]);
+            }
+            writer.push_row(&row)?;
+        }
+    }
+    writer.finish()
+}
