@@ -58,6 +58,9 @@ pub enum CommandError {
     /// Validation.
     #[error(transparent)]
     Validate(#[from] crate::validate::ValidateError),
+    /// Diagnosis.
+    #[error(transparent)]
+    Diagnose(#[from] crate::diagnose::DiagnoseError),
     /// Anything else that has its whole sentence.
     #[error("{0}")]
     Sentence(String),

@@ -2,6 +2,7 @@
 
 mod base;
 mod demo;
+mod diagnose;
 mod error;
 mod excite;
 mod flash;
@@ -20,7 +21,7 @@ use clap::{Parser, Subcommand};
 pub use error::CommandError;
 use ui::Ui;
 
-/// Identifies a robot's dynamics and friction: record, identify, validate, compensate.
+/// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
 /// Without a command: the demonstration, which needs no hardware.
 #[derive(Debug, Parser)]
@@ -43,6 +44,7 @@ enum Command {
     Identify(identify::Args),
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
+    Diagnose(diagnose::Args),
 }
 
 impl Cli {
@@ -65,6 +67,7 @@ impl Cli {
             Some(Command::Identify(args)) => identify::run(&args, &ui),
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),
+            Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
         }
     }
 }

@@ -10,6 +10,8 @@ mod tests;
 mod words;
 
 use super::{Context, parts};
+pub use words::verdict;
+
 use crate::diagnose::outcome::{Diagnosis, Verdict};
 use crate::report::{
     Block, Column, Document, Fact, Section, Table, Tone, format_p_value, format_significant,
@@ -17,7 +19,7 @@ use crate::report::{
 
 /// Composes the page of a diagnosis.
 pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
-    let mut sections = vec![verdict(found)];
+    let mut sections = vec![opening(found)];
     sections.extend(faults(found));
     sections.extend(parts::warnings(&[&context.warnings]));
     sections.extend(gap::waterfall(found));
@@ -120,7 +122,7 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
     facts
 }
 
-fn verdict(found: &Diagnosis) -> Section {
+fn opening(found: &Diagnosis) -> Section {
     let mut section = Section::new("verdict", "The verdict", "").with(Block::Note {
         kind: words::note(found.verdict),
         text: format!(

@@ -5,8 +5,8 @@ use rig_shared::effects::{About, Kind};
 use crate::diagnose::outcome::{Step, Verdict};
 use crate::report::{NoteKind, Tone};
 
-/// The verdict in a word or two.
-pub(super) fn verdict(verdict: Verdict) -> &'static str {
+/// A verdict in a word or two.
+pub fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingMissing => "Nothing missing",
         Verdict::Explained => "Explained",
