@@ -211,7 +211,7 @@ pub(super) fn explained() -> Diagnosis {
         noise_floor_how: "From the two runs of the same motion in train.csv: half the variance of their difference.".into(),
         places: vec![
             place("velocity", [-0.1, 0.1], "rad/s", 0.63, "63 % of the excess lies below 0.1 rad/s, odd in velocity, the same at every position and load."),
-            place("motor angle", [0.0, 6.283], "rad", 0.21, "21 % of the excess repeats seven times per motor turn."),
+            place("motor angle", [0.0, core::f64::consts::TAU], "rad", 0.21, "21 % of the excess repeats seven times per motor turn."),
         ],
         steps: steps(),
         gap_closed: Some(0.971),

@@ -57,10 +57,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }
-    let options = Options {
-        seed: args.seed,
-        ..Options::default()
-    };
+    let options = Options { seed: args.seed };
     let mut progress = ui.progress("diagnosing", 1000);
     let (found, model) = diagnose(
         &robot,

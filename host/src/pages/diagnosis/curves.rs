@@ -41,7 +41,13 @@ const NAMES: [(&str, Role); 3] = [
 fn pair(curves: &Curves, of: &[Vec<f64>; 3], plots: [Plot; 2], scale: f64) -> [Plot; 2] {
     let [mut whole, mut missed] = plots;
     for (values, (name, role)) in of.iter().zip(NAMES).filter(|(v, _)| !v.is_empty()) {
-        whole = whole.with(Series::line(name, role, curves.t.clone(), values.clone()));
+        let line = Series::line(name, role, curves.t.clone(), values.clone());
+        // Broken where it lies on the measured curve, so that both are seen.
+        whole = whole.with(if role == Role::After {
+            line.dashed()
+        } else {
+            line
+        });
         if role != Role::Measured {
             let error = of[0]
                 .iter()
@@ -52,8 +58,8 @@ fn pair(curves: &Curves, of: &[Vec<f64>; 3], plots: [Plot; 2], scale: f64) -> [P
         }
     }
     let note = format!("{}, n = {}.", curves.recording, curves.t.len());
-    whole.height = 260;
-    missed.height = 220;
+    whole.height = 280;
+    missed.height = 280;
     [
         whole.note(note.clone()),
         missed.mark(Marker::horizontal(0.0, "")).note(note),

@@ -7,8 +7,8 @@ use crate::report::{
     format_significant,
 };
 
-/// More models than this are numbered on the axis.
-const NAMED: usize = 4;
+/// Letters for which there is room below the axis on a narrow window; longer names give way to numbers.
+const ROOM: usize = 48;
 /// From this ratio of highest to floor on, bars from zero would hide the last steps.
 const TALL: f64 = 20.0;
 
@@ -49,10 +49,20 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
 
 fn bars(w: &Waterfall) -> Plot {
     let n = w.models.len();
-    let names = if n > NAMED {
+    let short: Vec<String> = w
+        .models
+        .iter()
+        .map(|model| match model.as_str() {
+            "frozen description" => "as given".into(),
+            other => words::name(other),
+        })
+        .collect();
+    let longest = short.iter().map(|m| m.chars().count()).max();
+    let numbered = longest.unwrap_or(0) * n > ROOM;
+    let names = if numbered {
         (1..=n).map(|k| k.to_string()).collect()
     } else {
-        w.models.clone()
+        short
     };
     let unit = parts::unit(&w.unit);
     let places: Vec<f64> = (0..n).map(|k| k as f64).collect();
@@ -89,7 +99,7 @@ fn bars(w: &Waterfall) -> Plot {
         ));
     }
     let mut note = String::new();
-    if n > NAMED {
+    if numbered {
         note.push_str("The table below has the models' names. ");
     }
     if tall {

@@ -35,7 +35,11 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
         "What to do next",
         "The experiment that would tell the most beyond what these data can.",
     )
-    .with(parts::info(format!("{}: {}", next.kind, next.text)));
+    .with(parts::info(format!(
+        "{}. {}",
+        words::capital(&next.kind),
+        next.text
+    )));
     if !items.is_empty() {
         section = section.with(Block::List(items));
     }

@@ -6,10 +6,14 @@ use crate::report::{
     Block, Column, NoteKind, Section, Table, format_p_value, format_significant, format_value,
 };
 
+/// What the figure of a step shows.
+const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something. The line is the effect's law, fitted to the data. The dots after should lie on zero.";
+
 /// The section of step `k`, from 0.
 pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     let step = &found.steps[k];
     let law = step.law.as_deref();
+    let maps: Vec<_> = found.maps.iter().filter(|m| m.step == Some(k)).collect();
     let mut section = Section::new(
         format!("step-{}", k + 1),
         format!(
@@ -18,7 +22,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
             words::title(&step.effect, law),
             step.joint
         ),
-        "",
+        if maps.is_empty() { "" } else { PICTURE },
     );
     if let Some(about) = words::about(&step.effect, law) {
         section = section.with(Block::Text(format!(
@@ -30,15 +34,9 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
             about.law.map_or(String::new(), |law| format!(", law {law}"))
         )));
     }
-    let maps: Vec<_> = found.maps.iter().filter(|m| m.step == Some(k)).collect();
-    if !maps.is_empty() {
-        section = section.with(Block::Text(
-            "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something; the line is the effect's law fitted to them; the dots after should lie on zero.".into(),
-        ));
-        section
-            .blocks
-            .extend(maps.iter().map(|m| Block::Plot(gap::map(m))));
-    }
+    section
+        .blocks
+        .extend(maps.iter().map(|m| Block::Plot(gap::map(m))));
     if !step.parameters.is_empty() {
         section = section.with(parameters(step));
     }
@@ -47,7 +45,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
         .with(Block::Note {
             kind: NoteKind::Good,
             text: format!(
-                "Why to believe it: {} Chance alone would look like this with p = {}, corrected for all that was tried.",
+                "Why to believe it. {} Chance alone would look like this with p = {}, corrected for all that was tried.",
                 step.why,
                 format_p_value(step.p_value)
             ),
@@ -95,24 +93,23 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         .iter()
         .find(|w| w.joint == step.joint)
         .map_or(String::new(), |w| w.unit.clone());
-    let row = |what: &str, [before, after]: [f64; 2], unit: &str| {
-        vec![
-            what.to_owned(),
-            format_significant(before, 3),
-            format_significant(after, 3),
-            parts::unit(unit),
-        ]
+    let row = |what: &str, values: [String; 2]| {
+        let [before, after] = values;
+        vec![what.to_owned(), before, after]
     };
-    let mut rows = vec![row("Torque residual, training", step.train_rms, &torque)];
+    let effort = |rms: [f64; 2]| {
+        rms.map(|v| format!("{} {}", format_significant(v, 3), parts::unit(&torque)))
+    };
+    let mut rows = vec![row("Torque residual, training", effort(step.train_rms))];
     rows.extend(
         step.holdout_rms
-            .map(|rms| row("Torque residual, held back", rms, &torque)),
+            .map(|rms| row("Torque residual, held back", effort(rms))),
     );
     rows.extend(step.motion_rms.map(|rms| {
+        let unit = words::position_unit(&torque);
         row(
             "Error of the simulated motion",
-            rms,
-            words::position_unit(&torque),
+            rms.map(|v| parts::length(v, unit)),
         )
     }));
     Block::Table(Table {
@@ -121,7 +118,6 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
             Column::text("Of what"),
             Column::number("Before", ""),
             Column::number("After", ""),
-            Column::text("Unit"),
         ],
         rows,
         note: format!(

@@ -58,9 +58,17 @@ pub(super) fn about(effect: &str, law: Option<&str>) -> Option<&'static About> {
     Kind::named(effect, law).map(Kind::about)
 }
 
-/// An effect as print has it: its title, or its name without underscores.
+/// An effect as a heading has it: its title, or its name without underscores.
 pub(super) fn title(effect: &str, law: Option<&str>) -> String {
-    about(effect, law).map_or_else(|| effect.replace('_', " "), |about| about.title.into())
+    capital(&about(effect, law).map_or_else(|| name(effect), |about| about.title.into()))
+}
+
+/// A text with its first letter in upper case.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// An effect's name as print has it; its law does not matter.
