@@ -285,6 +285,7 @@ pub(super) fn nothing_missing() -> Diagnosis {
 pub(super) fn parameter_change() -> Diagnosis {
     let mut step = steps().remove(0);
     step.effect = "payload".into();
+    step.gap_closed = 0.99;
     step.set = vec!["payload".into()];
     step.parameters = BTreeMap::from([("mass".into(), value(0.412, 0.006, "kg"))]);
     step.why =
