@@ -1,8 +1,13 @@
-//! A page with every block and every style of plot, to look at while changing the report:
-//! `cargo run -p rig-host --example report_gallery -- gallery.html gallery.svg`.
+//! A page with every block and every style of plot, to look at while changing the report, and a diagnosis of every verdict:
+//! `cargo run -p rig-host --example report_gallery -- gallery.html gallery.svg FOLDER`.
+
+#[path = "made_up/diagnosis.rs"]
+mod diagnosis;
 
 use std::path::Path;
 
+use rig_host::diagnose::outcome;
+use rig_host::pages;
 use rig_host::report::{
     Axis, Block, Column, Document, Fact, Marker, NoteKind, Plot, ReportError, Role, Section,
     Series, Style, Table, Tone, format_p_value, format_value, write, write_svg,
@@ -288,6 +293,19 @@ fn main() -> Result<(), ReportError> {
     write(Path::new(&page), &document())?;
     if let Some(picture) = arguments.next() {
         write_svg(Path::new(&picture), &friction())?;
+    }
+    if let Some(folder) = arguments.next() {
+        let context = pages::Context {
+            command: "rig diagnose --robot one-link.toml --data train.csv --holdout holdout.csv --out found".into(),
+            identified: Some(("model.toml".into(), "name = \"one-link rig\"".into())),
+            ..pages::Context::default()
+        };
+        for (name, found) in diagnosis::all() {
+            write(
+                &Path::new(&folder).join(format!("{name}.html")),
+                &pages::diagnosis(&found, &context),
+            )?;
+        }
     }
     Ok(())
 }

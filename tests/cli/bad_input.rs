@@ -27,9 +27,13 @@ fn recording(folder: &Path, change: impl Fn(usize, &mut Vec<String>)) -> PathBuf
 }
 
 fn identify(robot: &Path, data: &Path, out: &Path) -> std::process::Command {
+    learn("identify", robot, data, out)
+}
+
+fn learn(verb: &str, robot: &Path, data: &Path, out: &Path) -> std::process::Command {
     let mut command = rig();
     command
-        .arg("identify")
+        .arg(verb)
         .arg("--robot")
         .arg(robot)
         .arg("--data")
@@ -252,11 +256,14 @@ fn a_recording_cannot_judge_itself() {
     let folder = tempfile::tempdir().unwrap();
     let data = recording(folder.path(), |_, _| ());
     let out = folder.path().join("out");
-    let mut command = identify(&robot("one-link.toml"), &data, &out);
-    names(
-        &refuse(command.arg("--holdout").arg(&data)),
-        &["recording.csv", "--holdout"],
-    );
+    for verb in ["identify", "diagnose"] {
+        let mut command = learn(verb, &robot("one-link.toml"), &data, &out);
+        names(
+            &refuse(command.arg("--holdout").arg(&data)),
+            &["recording.csv", "--holdout"],
+        );
+        assert!(!out.exists());
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{
@@ -255,21 +255,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     report::write(&args.out.join("report.html"), &page)?;
     print(ui, &identification, &args.out);
     Ok(())
-}
-
-/// A recording that was learnt from says nothing as a judge.
-fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
-    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
-    match holdout
-        .iter()
-        .find(|held| data.iter().any(|path| real(path) == real(held)))
-    {
-        Some(path) => Err(CommandError::Sentence(format!(
-            "{} is given as --data and as --holdout; judge by a recording that was not learnt from.",
-            path.display()
-        ))),
-        None => Ok(()),
-    }
 }
 
 /// Friction that drives the motion at every speed is no friction: the torque has the wrong sign.

@@ -38,14 +38,25 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
+    /// Opens recordings and checks their columns.
+    ///
+    /// # Errors
+    /// What is wrong, by file and line.
+    pub(crate) fn read(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
+        let sources = paths
+            .iter()
+            .map(|path| Source::open(path, robot))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { sources })
+    }
+
     /// Opens recordings and checks their columns and units.
     ///
     /// # Errors
     /// What is wrong, by file and line; all units that look wrong in one sentence.
     pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
-        let mut sources = Vec::with_capacity(paths.len());
-        for path in paths {
-            let source = Source::open(path, robot)?;
+        let inputs = Self::read(robot, paths)?;
+        for source in &inputs.sources {
             if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
                 let found: Vec<String> = plausibility(&block?, robot)
                     .iter()
@@ -54,14 +65,13 @@ impl Inputs {
                 if !found.is_empty() {
                     return Err(CommandError::Implausible(format!(
                         "{}: {}",
-                        path.display(),
+                        source.path().display(),
                         found.join("; ")
                     )));
                 }
             }
-            sources.push(source);
         }
-        Ok(Self { sources })
+        Ok(inputs)
     }
 
     /// What the reader should know of them.
@@ -137,6 +147,24 @@ pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recordin
         .iter()
         .map(|recording| recording as &dyn Recording)
         .collect()
+}
+
+/// A recording that was learnt from says nothing as a judge.
+///
+/// # Errors
+/// A sentence naming a recording that is given as both.
+pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
+    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    match holdout
+        .iter()
+        .find(|held| data.iter().any(|path| real(path) == real(held)))
+    {
+        Some(path) => Err(CommandError::Sentence(format!(
+            "{} is given as --data and as --holdout; judge by a recording that was not learnt from.",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// The command line as typed, for the report's "how to repeat this".

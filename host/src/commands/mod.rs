@@ -3,6 +3,7 @@
 mod base;
 mod benchmark;
 mod demo;
+mod diagnose;
 mod error;
 mod excite;
 mod flash;
@@ -21,7 +22,7 @@ use clap::{Parser, Subcommand};
 pub use error::CommandError;
 use ui::Ui;
 
-/// Identifies a robot's dynamics and friction: record, identify, validate, compensate.
+/// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
 ///
 /// Without a command: the demonstration, which needs no hardware.
 #[derive(Debug, Parser)]
@@ -45,6 +46,7 @@ enum Command {
     FrictionMap(friction_map::Args),
     Validate(validate::Args),
     Benchmark(benchmark::Args),
+    Diagnose(diagnose::Args),
 }
 
 impl Cli {
@@ -68,6 +70,7 @@ impl Cli {
             Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
             Some(Command::Validate(args)) => validate::run(&args, &ui),
             Some(Command::Benchmark(args)) => benchmark::run(&args, &ui),
+            Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! a result does not already hold, no file, no clock.
 
 mod demo;
+mod diagnosis;
 mod estimators;
 mod friction_map;
 mod identification;
@@ -15,6 +16,7 @@ mod validation;
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
 };
+pub use diagnosis::{diagnosis, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
 pub use validation::validation;

@@ -48,6 +48,20 @@ pub(super) fn percent(share: f64) -> String {
     format_significant(value, if value.abs() < 10.0 { 2 } else { 3 })
 }
 
+/// A small length or angle in the unit that reads best.
+pub(super) fn length(value: f64, unit: &str) -> String {
+    let (scale, prefix) = if value < 1e-6 {
+        (1e9, "n")
+    } else if value < 1e-3 {
+        (1e6, "µ")
+    } else if value < 1.0 {
+        (1e3, "m")
+    } else {
+        (1.0, "")
+    };
+    format!("{} {prefix}{unit}", format_significant(scale * value, 3))
+}
+
 pub(super) fn warning(text: impl Into<String>) -> Block {
     Block::Note {
         kind: NoteKind::Warning,

@@ -159,7 +159,7 @@ fn overview(found: &Validation) -> Section {
                     parts::unit(&check.unit)
                 ),
                 parts::percent(check.residual.relative_error),
-                of(&|m| length(m.position_rms_error, &m.position_unit)),
+                of(&|m| parts::length(m.position_rms_error, &m.position_unit)),
                 of(&|m| parts::percent(m.tracking_relative_error)),
                 of(&|m| parts::percent(m.torque_relative_error)),
             ]);
@@ -184,20 +184,6 @@ fn overview(found: &Validation) -> Section {
         rows,
         note: "All RMS: residual of the predicted torque and its share of the torque; error of the simulated position and its share of the tracking error; error of the simulated torque as a share of the torque. A dash: the motion was not simulated; the recording's section says why.".into(),
     }))
-}
-
-/// A small length or angle in the unit that reads best.
-fn length(value: f64, unit: &str) -> String {
-    let (scale, prefix) = if value < 1e-6 {
-        (1e9, "n")
-    } else if value < 1e-3 {
-        (1e6, "µ")
-    } else if value < 1.0 {
-        (1e3, "m")
-    } else {
-        (1.0, "")
-    };
-    format!("{} {prefix}{unit}", format_significant(scale * value, 3))
 }
 
 fn torque(robot: &Robot, checked: &Checked, name: &str, k: usize) -> Section {
@@ -266,9 +252,9 @@ fn steps(joints: &[MotionCheck]) -> Block {
                 let unit = parts::unit(&m.torque_unit);
                 vec![
                     m.joint.clone(),
-                    length(m.position_rms_error, &m.position_unit),
-                    length(m.position_max_error, &m.position_unit),
-                    length(m.position_step_change, &m.position_unit),
+                    parts::length(m.position_rms_error, &m.position_unit),
+                    parts::length(m.position_max_error, &m.position_unit),
+                    parts::length(m.position_step_change, &m.position_unit),
                     format!("{} {unit}", format_significant(m.torque_rms_error, 3)),
                     format!("{} {unit}", format_significant(m.torque_max_error, 3)),
                     format!("{} {unit}", format_significant(m.torque_step_change, 2)),
@@ -299,8 +285,8 @@ fn motion_plots(joint: &Joint, m: &MotionCheck, samples: u64) -> Vec<Block> {
     .with(Series::line("simulated", Role::Model, s.t.clone(), s.simulated.clone()).dashed())
     .note(format!(
         "n = {n}, RMS error {}, largest {}.",
-        length(m.position_rms_error, position),
-        length(m.position_max_error, position)
+        parts::length(m.position_rms_error, position),
+        parts::length(m.position_max_error, position)
     ));
     place.height = 240;
     let scale = if m.tracking_rms < 1e-3 {
@@ -336,7 +322,7 @@ fn motion_plots(joint: &Joint, m: &MotionCheck, samples: u64) -> Vec<Block> {
     ))
     .note(format!(
         "n = {n}, measured RMS {}; the simulation leaves {} % of it.",
-        length(m.tracking_rms, position),
+        parts::length(m.tracking_rms, position),
         parts::percent(m.tracking_relative_error)
     ));
     tracking.height = 260;
@@ -356,7 +342,7 @@ fn motion_plots(joint: &Joint, m: &MotionCheck, samples: u64) -> Vec<Block> {
     ))
     .note(format!(
         "n = {n}, RMS {}.",
-        length(m.position_rms_error, position)
+        parts::length(m.position_rms_error, position)
     ));
     error.height = 220;
     let what = parts::effort(joint.kind);

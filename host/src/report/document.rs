@@ -25,8 +25,12 @@ pub enum Tone {
     Plain,
     /// As it should be.
     Good,
+    /// News that is neither good nor bad, to be seen at once.
+    Notice,
     /// Needs the reader's attention.
     Warning,
+    /// Nothing can be concluded before it is mended.
+    Fault,
 }
 
 /// One key figure of the summary.
@@ -117,6 +121,8 @@ pub enum NoteKind {
     Warning,
     /// Confirmed.
     Good,
+    /// Nothing can be concluded before it is mended.
+    Fault,
 }
 
 /// One piece of a section.

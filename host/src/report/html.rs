@@ -123,6 +123,14 @@ fn card(out: &mut String, fact: &Fact) {
             "good",
             "<span class=\"mark\" role=\"img\" aria-label=\"good\">✓</span> ",
         ),
+        Tone::Notice => (
+            "notice",
+            "<span class=\"mark\" role=\"img\" aria-label=\"notice\">i</span> ",
+        ),
+        Tone::Fault => (
+            "fault",
+            "<span class=\"mark\" role=\"img\" aria-label=\"fault\">✕</span> ",
+        ),
         Tone::Warning => (
             "warning",
             "<span class=\"mark\" role=\"img\" aria-label=\"attention\">!</span> ",
@@ -216,6 +224,7 @@ impl Page {
                     NoteKind::Info => ("info", "Note"),
                     NoteKind::Warning => ("warning", "Attention"),
                     NoteKind::Good => ("good", "Confirmed"),
+                    NoteKind::Fault => ("fault", "Fault"),
                 };
                 let _ = writeln!(
                     self.body,

@@ -1,0 +1,164 @@
+//! `rig diagnose`: what the model lacks.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line, refuse_shared};
+use super::ui::Ui;
+use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
+use crate::diagnose::{Options, diagnose};
+use crate::files::{folder, write_whole};
+use crate::pages::{self, Context};
+use crate::report::{self, format_significant, format_value};
+
+/// Says what the model lacks: where prediction and recording disagree, which physical effect is missing, what it takes
+/// away on data held back, and when there is nothing left to find.
+///
+/// Record every motion twice: what differs between the two runs is noise, and no model needs to explain it. Hold one other
+/// motion back with --holdout: an effect that is really there improves that one, too. Slow motion and reversals show
+/// friction; several speeds, positions and loads show the rest. What the recordings cannot show is listed, with the
+/// experiment that would show it.
+///
+/// The description should be what is believed of the robot: its values are fitted again, and are compared with what they
+/// were.
+///
+/// Writes model.toml (the description with the effects found and the parameters fitted again, for --robot), diagnosis.json
+/// and report.html into the folder given with --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording to learn from, CSV or MCAP; may be given several times
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
+    /// Recording to judge by, of another motion, not used in any fit; may be given several times
+    #[arg(long)]
+    holdout: Vec<PathBuf>,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Seed of whatever is drawn at random; the same seed gives the same files
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming the file, line or value at fault.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let robot = args.robot.load()?;
+    refuse_shared(&args.data, &args.holdout)?;
+    // Units that look wrong are no reason to stop here: they are a verdict.
+    let training = Inputs::read(&robot, &args.data)?;
+    let holdout = Inputs::read(&robot, &args.holdout)?;
+    for warning in training.warnings().chain(holdout.warnings()) {
+        ui.remark(&warning);
+    }
+    let options = Options {
+        seed: args.seed,
+        ..Options::default()
+    };
+    let mut progress = ui.progress("diagnosing", 1000);
+    let (found, model) = diagnose(
+        &robot,
+        &training.recordings(),
+        &holdout.recordings(),
+        &options,
+        &mut |share| progress.at((1000.0 * share) as u64),
+    )?;
+    drop(progress);
+    let text = model.to_toml()?;
+    let context = Context {
+        command: command_line(),
+        identified: Some(("model.toml".into(), text.clone())),
+        remarks: Vec::new(),
+        warnings: training.warnings().chain(holdout.warnings()).collect(),
+    };
+    let page = report::render(&pages::diagnosis(&found, &context))?;
+    let json = serde_json::to_string_pretty(&found).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    folder(&args.out)?;
+    write_whole(&args.out.join("model.toml"), text.as_bytes())?;
+    write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
+    write_whole(&args.out.join("report.html"), page.as_bytes())?;
+    print(ui, &found, &args.out);
+    Ok(())
+}
+
+/// The result at a glance.
+fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
+    for line in summary(found) {
+        ui.say(&line);
+    }
+    for fault in &found.data_faults {
+        ui.remark(&fault.text);
+    }
+    if found.verdict == Verdict::DataFault {
+        ui.remark("nothing was fitted; model.toml is the description as it was given.");
+    }
+    ui.say(&format!("report: {}", out.join("report.html").display()));
+}
+
+fn summary(found: &Diagnosis) -> Vec<String> {
+    let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
+    lines.extend(found.words.iter().cloned());
+    for (k, step) in found.steps.iter().enumerate() {
+        lines.push(effect(k + 1, step));
+        lines.extend(step.parameters.iter().map(|(name, value)| {
+            format!(
+                "    {name} = {} {}",
+                format_value(value.value, value.std),
+                value.unit
+            )
+        }));
+    }
+    if let Some(share) = found.gap_closed {
+        let on = if found.steps.iter().any(|step| step.holdout_rms.is_some()) {
+            "on the hold-out"
+        } else {
+            "on the training data; none were held back"
+        };
+        lines.push(format!(
+            "gap closed: {} %, {on}",
+            format_significant(100.0 * share, 3)
+        ));
+    }
+    if let Some(remainder) = &found.remainder {
+        lines.push(format!("left: {}", remainder.text));
+    }
+    if let Some(next) = &found.next_experiment {
+        lines.push(format!("next: {}", next.text));
+    }
+    lines
+}
+
+fn effect(number: usize, step: &Step) -> String {
+    let law = step
+        .law
+        .as_ref()
+        .map_or(String::new(), |law| format!(" ({law})"));
+    let rivals: Vec<&str> = step
+        .set
+        .iter()
+        .filter(|name| **name != step.effect)
+        .map(String::as_str)
+        .collect();
+    let open = if rivals.is_empty() {
+        String::new()
+    } else {
+        format!("; these data support as well: {}", rivals.join(", "))
+    };
+    format!(
+        "{number}. {}{law} at joint {}, {} % of the gap{open}",
+        step.effect,
+        step.joint,
+        format_significant(100.0 * step.gap_closed, 3)
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,280 @@
+//! How large the gap is and where it sits.
+
+use super::{parts, words};
+use crate::diagnose::outcome::{Diagnosis, Map, Place, Waterfall};
+use crate::report::{
+    Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
+    format_significant,
+};
+
+/// Letters for which there is room below the axis on a narrow window; longer names give way to numbers.
+const ROOM: usize = 48;
+/// From this ratio of highest to floor on, bars from zero would hide the last steps.
+const TALL: f64 = 20.0;
+
+/// From the description down to the noise floor.
+pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
+    if found.waterfall.is_empty() {
+        return None;
+    }
+    let mut section = Section::new(
+        "gap",
+        "From the description down to the noise",
+        "How much torque each model leaves unexplained: first the description as it was given, then the same equations with their parameters fitted again, then each effect added in turn. Where the bars reach the line, nothing but noise is left.",
+    );
+    if !found.noise_floor_how.is_empty() {
+        section = section.with(Block::Text(format!(
+            "The noise floor. {}",
+            found.noise_floor_how
+        )));
+    }
+    let (moved, still): (Vec<&Waterfall>, Vec<&Waterfall>) =
+        found.waterfall.iter().partition(|w| {
+            found.waterfall.len() == 1 || found.steps.iter().any(|step| step.joint == w.joint)
+        });
+    section
+        .blocks
+        .extend(moved.iter().map(|w| Block::Plot(bars(w))));
+    if !still.is_empty() {
+        section.blocks.push(Block::Details {
+            summary: format!(
+                "Joints in which nothing was found: {}",
+                words::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
+            ),
+            blocks: still.iter().map(|w| Block::Plot(bars(w))).collect(),
+        });
+    }
+    Some(section.with(figures(found)))
+}
+
+fn bars(w: &Waterfall) -> Plot {
+    let n = w.models.len();
+    let short: Vec<String> = w
+        .models
+        .iter()
+        .map(|model| match model.as_str() {
+            "frozen description" => "as given".into(),
+            other => words::name(other),
+        })
+        .collect();
+    let longest = short.iter().map(|m| m.chars().count()).max();
+    let numbered = longest.unwrap_or(0) * n > ROOM;
+    let names = if numbered {
+        (1..=n).map(|k| k.to_string()).collect()
+    } else {
+        short
+    };
+    let unit = parts::unit(&w.unit);
+    let places: Vec<f64> = (0..n).map(|k| k as f64).collect();
+    let highest = w
+        .train
+        .iter()
+        .chain(&w.holdout)
+        .fold(0.0f64, |m, v| m.max(*v));
+    let tall = w.floor > 0.0 && highest > TALL * w.floor;
+    let (y, style) = if tall {
+        (Axis::log("residual RMS", &unit), Style::Line)
+    } else {
+        (Axis::new("residual RMS", &unit), Style::Bars)
+    };
+    let mut plot = Plot::new(
+        format!("Joint {}: residual from model to model", w.joint),
+        Axis::categories("", names),
+        y,
+    )
+    .with(Series::new(
+        "training",
+        Role::Before,
+        style.clone(),
+        places.clone(),
+        w.train.clone(),
+    ));
+    if !w.holdout.is_empty() {
+        plot = plot.with(Series::new(
+            "held back",
+            Role::After,
+            style,
+            places,
+            w.holdout.clone(),
+        ));
+    }
+    let mut note = String::new();
+    if numbered {
+        note.push_str("The table below has the models' names. ");
+    }
+    if tall {
+        note.push_str("Logarithmic: the first model leaves far more than the last. ");
+    }
+    note.push_str(&format!(
+        "Noise floor {} {unit}.",
+        format_significant(w.floor, 3)
+    ));
+    plot.mark(Marker::horizontal(w.floor, "noise floor"))
+        .note(note)
+}
+
+fn figures(found: &Diagnosis) -> Block {
+    let held = super::held_out(found);
+    let mut columns = vec![
+        Column::text("Joint"),
+        Column::number("No.", ""),
+        Column::text("Model"),
+        Column::number("Training", ""),
+    ];
+    if held {
+        columns.push(Column::number("Held back", ""));
+    }
+    columns.extend([Column::text("Unit"), Column::number("Over the floor", "")]);
+    let value = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
+    let rows = found
+        .waterfall
+        .iter()
+        .flat_map(|w| {
+            w.models.iter().enumerate().map(move |(k, model)| {
+                let (train, holdout) = (value(&w.train, k), value(&w.holdout, k));
+                let judged = if w.holdout.is_empty() { train } else { holdout };
+                let mut row = vec![
+                    w.joint.clone(),
+                    (k + 1).to_string(),
+                    model.clone(),
+                    format_significant(train, 3),
+                ];
+                if held {
+                    row.push(format_significant(holdout, 3));
+                }
+                row.extend([
+                    parts::unit(&w.unit),
+                    format!("{} ×", format_significant(judged / w.floor, 3)),
+                ]);
+                row
+            })
+        })
+        .collect();
+    Block::Table(Table {
+        caption: "RMS of the torque residual, model by model".into(),
+        columns,
+        rows,
+        note: format!(
+            "Over the floor: {} over the noise floor; 1 is nothing but noise.",
+            if held {
+                "RMS on the data held back"
+            } else {
+                "RMS"
+            }
+        ),
+    })
+}
+
+/// Where the gap sits.
+pub(super) fn places(found: &Diagnosis) -> Option<Section> {
+    if found.places.is_empty() {
+        return None;
+    }
+    let texts: Vec<String> = texts(&found.places);
+    let mut section = Section::new(
+        "where",
+        "Where the gap sits",
+        "Before any effect is added: what the residual of the refitted model depends on. Noise depends on nothing; whatever does is something that the model lacks.",
+    );
+    if !texts.is_empty() {
+        section = section.with(Block::List(texts));
+    }
+    Some(section.with(table(
+        "What the gap depends on, most of it first",
+        &found.places,
+    )))
+}
+
+pub(super) fn texts(places: &[Place]) -> Vec<String> {
+    places
+        .iter()
+        .filter(|place| !place.text.is_empty())
+        .map(|place| place.text.clone())
+        .collect()
+}
+
+pub(super) fn table(caption: &str, places: &[Place]) -> Block {
+    Block::Table(Table {
+        caption: caption.into(),
+        columns: vec![
+            Column::text("Joint"),
+            Column::text("Depends on"),
+            Column::number("Most of it between", ""),
+            Column::text("Unit"),
+            Column::number("Share", "%"),
+            Column::number("p", ""),
+        ],
+        rows: places
+            .iter()
+            .map(|place| {
+                vec![
+                    place.joint.clone(),
+                    place.coordinate.clone(),
+                    format!(
+                        "{} … {}",
+                        format_significant(place.interval[0], 2),
+                        format_significant(place.interval[1], 2)
+                    ),
+                    parts::unit(&place.unit),
+                    parts::percent(place.share),
+                    format_p_value(place.p_value),
+                ]
+            })
+            .collect(),
+        note: "Share: how much of the gap this one quantity accounts for; quantities that move together account for the same part, so shares do not add up. p is corrected for the number of quantities looked at.".into(),
+    })
+}
+
+/// The mean residual over one coordinate, before and after, and the law that was fitted to it.
+pub(super) fn map(map: &Map) -> Plot {
+    let unit = parts::unit(&map.residual_unit);
+    let bars = |name: &str, role, values: &[[f64; 2]]| {
+        Series::new(
+            name,
+            role,
+            Style::ErrorBars {
+                half_width: values.iter().map(|v| v[1]).collect(),
+            },
+            map.at.clone(),
+            values.iter().map(|v| v[0]).collect(),
+        )
+    };
+    let mut plot = Plot::new(
+        format!("Joint {}: mean residual over {}", map.joint, map.coordinate),
+        Axis::new(&map.coordinate, &parts::unit(&map.unit)),
+        Axis::new("mean residual", &unit),
+    );
+    if !map.before.is_empty() {
+        let name = if map.step.is_some() {
+            "before"
+        } else {
+            "first of all"
+        };
+        plot = plot.with(bars(name, Role::Before, &map.before));
+    }
+    if !map.after.is_empty() {
+        let name = if map.step.is_some() {
+            "after"
+        } else {
+            "at the end"
+        };
+        plot = plot.with(bars(name, Role::After, &map.after));
+    }
+    if !map.law.is_empty() {
+        plot = plot.with(Series::line(
+            "the fitted law",
+            Role::Model,
+            map.at.clone(),
+            map.law.clone(),
+        ));
+    }
+    plot.mark(Marker::horizontal(0.0, "")).note(format!(
+        "n = {} bins; bars are 95 % intervals of the mean.{}",
+        map.at.len(),
+        if map.law.is_empty() {
+            ""
+        } else {
+            " The law is drawn without the part that mass, inertia and friction of the standard model can take over."
+        }
+    ))
+}

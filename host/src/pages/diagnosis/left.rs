@@ -1,0 +1,107 @@
+//! What the missing effects had done to the parameters, and what is left without a name.
+
+use super::{gap, parts};
+use crate::diagnose::outcome::{Absorbed, Diagnosis};
+use crate::report::{Block, Column, Section, Table, format_significant, format_value};
+
+/// From so many standard deviations on a parameter counts as having been wrong.
+const LYING: f64 = 3.0;
+
+/// Nominal parameters that had been lying.
+pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
+    if found.absorbed.is_empty() {
+        return None;
+    }
+    let mut list: Vec<&Absorbed> = found.absorbed.iter().collect();
+    list.sort_by(|a, b| b.sigmas.abs().total_cmp(&a.sigmas.abs()));
+    let lying = list.iter().filter(|a| a.sigmas.abs() >= LYING).count();
+    Some(
+        Section::new(
+            "absorbed",
+            "Parameters that had been lying",
+            "What a model lacks does not all stay in the residual: part of it bends the parameters that are there, because the fit uses them to make up for it. These are the parameters of the standard model, fitted without the effects and with them.",
+        )
+        .with(Block::Text(if lying == 0 {
+            format!("None has moved by more than {LYING:.0} standard deviations.")
+        } else {
+            format!(
+                "{lying} of {} {} moved by more than {LYING:.0} standard deviations; their old values should not be used.",
+                list.len(),
+                if lying == 1 { "has" } else { "have" }
+            )
+        }))
+        .with(Block::Table(Table {
+            caption: "Before and after, the largest change first".into(),
+            columns: vec![
+                Column::text("Parameter"),
+                Column::number("Without the effects", ""),
+                Column::number("With them ± std", ""),
+                Column::text("Unit"),
+                Column::number("Moved by", "std"),
+            ],
+            rows: list
+                .iter()
+                .map(|a| {
+                    let std = ((a.after - a.before) / a.sigmas).abs();
+                    vec![
+                        a.parameter.clone(),
+                        format_significant(a.before, 4),
+                        format_value(a.after, std),
+                        parts::unit(&a.unit),
+                        format_significant(a.sigmas, 2),
+                    ]
+                })
+                .collect(),
+            note: String::new(),
+        })),
+    )
+}
+
+/// What no known effect explains; without it, what the residual looks like at the end.
+pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
+    let maps: Vec<Block> = found
+        .maps
+        .iter()
+        .filter(|m| m.step.is_none())
+        .map(|m| Block::Plot(gap::map(m)))
+        .collect();
+    let Some(remainder) = &found.remainder else {
+        return (!maps.is_empty()).then(|| Section {
+            blocks: maps,
+            ..Section::new(
+                "left",
+                "What is left",
+                "The mean residual at the end. Dots that lie on zero within their bars hide nothing; dots that do not would be something that the model still lacks.",
+            )
+        });
+    };
+    let unit = found
+        .waterfall
+        .iter()
+        .find(|w| w.joint == remainder.joint)
+        .map_or(String::new(), |w| parts::unit(&w.unit));
+    let mut section = Section::new(
+        "left",
+        "What is left without a name",
+        "No effect that is known here explains this part of the gap. It is described instead of being given the name that fits least badly.",
+    )
+    .with(parts::warning(remainder.text.clone()))
+    .with(Block::Text(format!(
+        "Joint {}: {} {unit} RMS beyond the noise; the whole residual is {} times the noise floor.",
+        remainder.joint,
+        format_significant(remainder.rms, 3),
+        format_significant(remainder.ratio, 3)
+    )));
+    let texts = gap::texts(&remainder.places);
+    if !texts.is_empty() {
+        section = section.with(Block::List(texts));
+    }
+    if !remainder.places.is_empty() {
+        section = section.with(gap::table(
+            "What the remainder depends on",
+            &remainder.places,
+        ));
+    }
+    section.blocks.extend(maps);
+    Some(section)
+}

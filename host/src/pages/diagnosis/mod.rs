@@ -1,0 +1,202 @@
+//! The page of a diagnosis: the verdict first, then what it rests on.
+
+mod curves;
+mod gap;
+mod left;
+mod limits;
+mod steps;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use super::{Context, parts};
+pub use words::verdict;
+
+use crate::diagnose::outcome::{Diagnosis, Verdict};
+use crate::report::{
+    Block, Column, Document, Fact, Section, Table, Tone, format_p_value, format_significant,
+};
+
+/// Composes the page of a diagnosis.
+pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
+    let mut sections = vec![opening(found)];
+    sections.extend(faults(found));
+    sections.extend(parts::warnings(&[&context.warnings]));
+    sections.extend(gap::waterfall(found));
+    sections.extend(gap::places(found));
+    sections.extend((0..found.steps.len()).map(|k| steps::section(found, k)));
+    sections.extend(curves::section(found));
+    sections.extend(left::absorbed(found));
+    sections.extend(left::remainder(found));
+    sections.extend(limits::next(found));
+    sections.extend(limits::limits(found));
+    sections.extend(limits::tried(found));
+    sections.push(parts::repeat(context));
+    Document {
+        title: format!("{}: what the model lacks", found.robot),
+        subtitle: words::meaning(found.verdict).into(),
+        summary: summary(found),
+        sections,
+        footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
+    }
+}
+
+/// Whether figures on a hold-out stand beside those on the training recordings.
+fn held_out(found: &Diagnosis) -> bool {
+    found.waterfall.iter().any(|w| !w.holdout.is_empty())
+}
+
+/// RMS of the last model over the noise floor, worst joint; on the hold-out where there is one.
+fn left_over(found: &Diagnosis) -> Option<f64> {
+    found
+        .waterfall
+        .iter()
+        .filter_map(|w| {
+            let rms = w.holdout.last().or(w.train.last())?;
+            (w.floor > 0.0).then(|| rms / w.floor)
+        })
+        .reduce(f64::max)
+}
+
+fn summary(found: &Diagnosis) -> Vec<Fact> {
+    let judged = if held_out(found) {
+        "on data held back"
+    } else {
+        "on the training data; no data were held back"
+    };
+    let mut facts =
+        vec![Fact::new("Verdict", words::verdict(found.verdict)).tone(words::tone(found.verdict))];
+    if found.verdict == Verdict::DataFault {
+        facts.push(
+            Fact::new("Faults in the data", found.data_faults.len().to_string())
+                .note("mend them and run the diagnosis again")
+                .tone(Tone::Fault),
+        );
+        return facts;
+    }
+    if !found.steps.is_empty() {
+        let names: Vec<String> = found
+            .steps
+            .iter()
+            .map(|s| {
+                format!(
+                    "{} ({})",
+                    words::title(&s.effect, s.law.as_deref()),
+                    s.joint
+                )
+            })
+            .collect();
+        facts
+            .push(Fact::new("Found", words::several(names.len(), "effect")).note(names.join("; ")));
+    }
+    if let Some(share) = found.gap_closed {
+        facts.push(
+            Fact::new("Gap closed", parts::percent(share))
+                .unit("%")
+                .note(format!("of the residual above the noise floor, {judged}")),
+        );
+    }
+    if let Some(ratio) = left_over(found) {
+        facts.push(
+            Fact::new("Left at the end", format_significant(ratio, 3))
+                .unit("× noise floor")
+                .note(format!("worst joint, {judged}; 1 is nothing but noise")),
+        );
+    }
+    if let ([floor], [joint]) = (found.noise_floor_rms.as_slice(), found.waterfall.as_slice()) {
+        facts.push(
+            Fact::new("Noise floor", format_significant(*floor, 3))
+                .unit(parts::unit(&joint.unit))
+                .note("RMS of what no model can predict"),
+        );
+    }
+    if !found.not_testable.is_empty() {
+        facts.push(
+            Fact::new(
+                "Not testable",
+                words::several(limits::grouped(&found.not_testable).len(), "effect"),
+            )
+            .note("these data cannot show them, if they are there"),
+        );
+    }
+    facts
+}
+
+fn opening(found: &Diagnosis) -> Section {
+    let mut section = Section::new("verdict", "The verdict", "").with(Block::Note {
+        kind: words::note(found.verdict),
+        text: format!(
+            "{}. {}",
+            words::verdict(found.verdict),
+            words::meaning(found.verdict)
+        ),
+    });
+    if !found.words.is_empty() {
+        section = section.with(Block::Text(found.words.join("\n\n")));
+    }
+    if found.steps.is_empty() {
+        return section;
+    }
+    section.with(Block::Table(Table {
+        caption: "What was found, in this order".into(),
+        columns: vec![
+            Column::text("Effect"),
+            Column::text("Joint"),
+            Column::number("Gap closed", "%"),
+            Column::number("p", ""),
+            Column::text("Certain of the name?"),
+        ],
+        rows: found
+            .steps
+            .iter()
+            .map(|step| {
+                vec![
+                    words::title(&step.effect, step.law.as_deref()),
+                    step.joint.clone(),
+                    parts::percent(step.gap_closed),
+                    format_p_value(step.p_value),
+                    match words::rivals(step).len() {
+                        0 => "yes".into(),
+                        n => format!("no: {} as good", words::several(n, "other name")),
+                    },
+                ]
+            })
+            .collect(),
+        note: "Gap: what the residual's RMS lies above the noise floor. p: how often chance alone would look like this, corrected for all that was tried.".into(),
+    }))
+}
+
+fn faults(found: &Diagnosis) -> Option<Section> {
+    if found.data_faults.is_empty() {
+        return None;
+    }
+    Some(
+        Section::new(
+            "faults",
+            "What is wrong with the data",
+            "These cannot come from any robot that the description fits. Fitting such data would only bend parameters, so mend them first.",
+        )
+        .with(Block::Table(Table {
+            caption: "Faults".into(),
+            columns: vec![
+                Column::text("Kind"),
+                Column::text("Recording"),
+                Column::text("Joint"),
+                Column::text("What is wrong, and what would be right"),
+            ],
+            rows: found
+                .data_faults
+                .iter()
+                .map(|fault| {
+                    vec![
+                        fault.kind.clone(),
+                        words::or_dash(&fault.recording),
+                        words::or_dash(&fault.joint),
+                        fault.text.clone(),
+                    ]
+                })
+                .collect(),
+            note: String::new(),
+        })),
+    )
+}

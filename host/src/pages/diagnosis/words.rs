@@ -1,0 +1,111 @@
+//! Names and sentences for a reader.
+
+use rig_shared::effects::{About, Kind};
+
+use crate::diagnose::outcome::{Step, Verdict};
+use crate::report::{NoteKind, Tone};
+
+/// A verdict in a word or two.
+pub fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => "Nothing missing",
+        Verdict::Explained => "Explained",
+        Verdict::ParameterChange => "A parameter has changed",
+        Verdict::Remainder => "Something is left",
+        Verdict::DataFault => "The data are at fault",
+    }
+}
+
+/// What the verdict means.
+pub(super) fn meaning(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingMissing => {
+            "The model as it is explains these data down to the noise. No effect had to be added."
+        }
+        Verdict::Explained => {
+            "The model lacked something, and the effects named here close the gap down to the noise."
+        }
+        Verdict::ParameterChange => {
+            "The equations hold; a value in the description does not, or does no longer."
+        }
+        Verdict::Remainder => {
+            "Some of the gap stays open: no effect that is known here explains it, so it is described and not named."
+        }
+        Verdict::DataFault => "A recording cannot be what it says it is. Nothing was fitted to it.",
+    }
+}
+
+pub(super) fn tone(verdict: Verdict) -> Tone {
+    match verdict {
+        Verdict::NothingMissing | Verdict::Explained => Tone::Good,
+        Verdict::ParameterChange => Tone::Notice,
+        Verdict::Remainder => Tone::Warning,
+        Verdict::DataFault => Tone::Fault,
+    }
+}
+
+pub(super) fn note(verdict: Verdict) -> NoteKind {
+    match verdict {
+        Verdict::NothingMissing | Verdict::Explained => NoteKind::Good,
+        Verdict::ParameterChange => NoteKind::Info,
+        Verdict::Remainder => NoteKind::Warning,
+        Verdict::DataFault => NoteKind::Fault,
+    }
+}
+
+/// What is known of an effect; none where the name is no effect of the catalogue.
+pub(super) fn about(effect: &str, law: Option<&str>) -> Option<&'static About> {
+    Kind::named(effect, law).map(Kind::about)
+}
+
+/// An effect as a heading has it: its title, or its name without underscores.
+pub(super) fn title(effect: &str, law: Option<&str>) -> String {
+    capital(&about(effect, law).map_or_else(|| name(effect), |about| about.title.into()))
+}
+
+/// A text with its first letter in upper case.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// An effect's name as print has it; its law does not matter.
+pub(super) fn name(effect: &str) -> String {
+    effect.replace('_', " ")
+}
+
+/// Names that these data support as well as the step's own.
+pub(super) fn rivals(step: &Step) -> Vec<String> {
+    step.set
+        .iter()
+        .filter(|rival| **rival != step.effect)
+        .map(|rival| name(rival))
+        .collect()
+}
+
+/// `1 effect`, `2 effects`.
+pub(super) fn several(n: usize, what: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {what}{plural}")
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(super) fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// A text for a table cell.
+pub(super) fn or_dash(text: &str) -> String {
+    if text.is_empty() { "–" } else { text }.into()
+}
+
+/// Unit of the position that belongs to a unit of torque or force.
+pub(super) fn position_unit(torque: &str) -> &'static str {
+    if torque == "N" { "m" } else { "rad" }
+}
