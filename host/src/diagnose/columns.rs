@@ -1,10 +1,14 @@
 //! Columns of an effect from the measured motion.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
 use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
+use super::transmission::Driven;
 use crate::prepare::{central_difference, second_difference};
 use crate::robot::Robot;
 
@@ -31,6 +35,8 @@ pub(super) struct Source<'a> {
     pub(super) predicted: Vec<Predicted>,
     /// Identified base parameters.
     pub(super) values: Vec<f64>,
+    /// What twists obey, by run and joint, once it has been asked for.
+    pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
 }
 
 /// An effect on a joint.
@@ -61,8 +67,8 @@ impl Source<'_> {
     ) -> Result<Vec<Column>, DiagnoseError> {
         let n = self.nominal.joints();
         let mut columns: Vec<Column> = vec![vec![None; n]; self.gains(candidate.kind).len()];
-        for (run, predicted) in self.runs.iter().zip(&self.predicted) {
-            let full = self.at_full_rate(candidate, shapes, run, predicted)?;
+        for r in 0..self.runs.len() {
+            let full = self.at_full_rate(candidate, shapes, r)?;
             for (column, signals) in columns.iter_mut().zip(full) {
                 for (j, signal) in signals.iter().enumerate() {
                     if let Some(signal) = signal {
@@ -77,6 +83,17 @@ impl Source<'_> {
 
     /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
     pub(super) fn gains(&self, kind: Kind) -> Vec<Parameter> {
+        if kind.about().channel == Channel::Transmission {
+            // 1 where mass and load are right; the fit may move it a little until they are.
+            return vec![Parameter {
+                name: "share",
+                unit: "1",
+                bounds: [0.5, 2.0],
+                range: [0.5, 2.0],
+                scale: Scale::Linear,
+                meaning: "of the torque that the twist changes",
+            }];
+        }
         if kind != Kind::GravityTilt {
             return kind.about().gains.to_vec();
         }
@@ -103,11 +120,11 @@ impl Source<'_> {
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
-        run: &Run,
-        predicted: &Predicted,
+        r: usize,
     ) -> Result<Vec<Column>, DiagnoseError> {
+        let (run, predicted) = (&self.runs[r], &self.predicted[r]);
         let about = candidate.kind.about();
-        let gains = about.gains.len();
+        let gains = self.gains(candidate.kind).len();
         let own = |signals: Vec<Vec<f64>>| -> Vec<Column> {
             (signals.into_iter().take(gains))
                 .map(|signal| {
@@ -118,6 +135,11 @@ impl Source<'_> {
                 .collect()
         };
         match (candidate.kind, about.channel) {
+            (_, Channel::Transmission) => {
+                let driven = self.driven(candidate.joint, r)?;
+                let excess = driven.excess(candidate.kind, shapes, candidate.joint, run, predicted);
+                Ok(own(vec![excess.unwrap_or_else(|| vec![0.0; run.len()])]))
+            }
             (Kind::MeasurementDelay, _) => {
                 let late = late(&predicted.torque[candidate.joint], DELAY * run.rate);
                 let change = (late.iter().zip(&predicted.torque[candidate.joint]))
@@ -225,6 +247,45 @@ impl Source<'_> {
                 )
             })
             .collect())
+    }
+
+    fn driven(&self, joint: usize, r: usize) -> Result<Arc<Driven>, DiagnoseError> {
+        let mut known = self.driven.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(driven) = known.get(&(r, joint)) {
+            return Ok(driven.clone());
+        }
+        let driven = Arc::new(Driven::of(self, joint, &self.runs[r])?);
+        known.insert((r, joint), driven.clone());
+        Ok(driven)
+    }
+
+    /// Torque of a joint without friction and offset for a motion.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn inertial(
+        &self,
+        joint: usize,
+        motion: [&[Vec<f64>]; 3],
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        let mut torque = vec![0.0; motion[0].first().map_or(0, Vec::len)];
+        self.nominal.columns(motion, &mut |k, j, column| {
+            if j == joint && !self.nominal.is_drive(k) {
+                for (to, y) in torque.iter_mut().zip(column) {
+                    *to += self.values[k] * y;
+                }
+            }
+        })?;
+        Ok(torque)
+    }
+
+    /// Inertia of a joint's drive that stands in a combination with the link's, as the description has it; 0 where it is
+    /// a base parameter by itself.
+    pub(super) fn drive_inertia(&self, joint: usize) -> f64 {
+        if self.nominal.has_own_drive_inertia(joint) {
+            return 0.0;
+        }
+        self.robot.standard_parameters()[joint][rig_shared::multibody::column::DRIVE_INERTIA]
     }
 
     /// Torque of the smooth part of the nominal model for a motion.

@@ -1,6 +1,7 @@
 //! The workflow from recordings to a verdict.
 
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 use rig_shared::effects::{Channel, Effect, GAINS, Kind, SHAPES};
 
@@ -69,6 +70,7 @@ impl<'a> Bench<'a> {
             thinning: &loaded.rows.thinning,
             predicted: self.predicted(values, &loaded.runs)?,
             values: values.to_vec(),
+            driven: Mutex::default(),
         })
     }
 
@@ -113,10 +115,7 @@ fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Candidate> {
     let mut list = Vec::new();
     for &kind in Kind::ALL {
         if without.contains(&kind)
-            || matches!(
-                kind.about().channel,
-                Channel::Transmission | Channel::Voltage
-            )
+            || kind.about().channel == Channel::Voltage
             || kind == Kind::Payload
         {
             continue;

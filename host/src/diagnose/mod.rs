@@ -14,6 +14,7 @@ pub mod runs;
 pub mod scenario;
 mod search;
 mod solve;
+mod transmission;
 
 pub use engine::diagnose;
 pub use outcome::Diagnosis;

@@ -25,8 +25,13 @@ const MOST_EFFECTS: usize = 6;
 const PER_DECADE: f64 = 4.0;
 /// Points of a linear range, most.
 const MOST_POINTS: usize = 96;
+/// Steps of the simplex.
+const SIMPLEX_STEPS: usize = 80;
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
+
+/// Share explained, shapes, columns.
+type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
 
 /// A candidate at its best shapes.
 #[derive(Clone, Debug)]
@@ -186,7 +191,7 @@ impl<'a> Search<'a> {
     ) -> Result<Option<Profile>, DiagnoseError> {
         let kind = self.library[c].kind;
         let points = grid(kind);
-        let mut best: Option<(f64, [f64; SHAPES], Arc<Vec<Column>>)> = None;
+        let mut best: Option<Best> = None;
         if let Some(shapes) = start {
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
             if let Some((share, _)) = self.explained(fit, c, &columns) {
@@ -207,7 +212,16 @@ impl<'a> Search<'a> {
             return Ok(None);
         };
         let about = kind.about();
-        for _ in 0..if about.shapes.len() > 1 { 2 } else { 1 } {
+        if about.channel == Channel::Transmission {
+            self.descend(fit, c, &mut best)?;
+        }
+        for _ in 0..if about.channel == Channel::Transmission {
+            0
+        } else if about.shapes.len() > 1 {
+            2
+        } else {
+            1
+        } {
             for (place, shape) in about.shapes.iter().enumerate() {
                 if shape.scale == Scale::Linear {
                     // Whole orders: nothing between them.
@@ -231,22 +245,87 @@ impl<'a> Search<'a> {
         }))
     }
 
+    /// Nelder and Mead's simplex (1965) over the logarithms of all shapes at once: stiffness, damping and play pull on each
+    /// other.
+    fn descend(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
+        let n = self.library[c].kind.about().shapes.len();
+        let start: Vec<f64> = best.1[..n].iter().map(|s| s.ln()).collect();
+        let mut at = |x: &[f64]| -> Result<f64, DiagnoseError> {
+            let mut shapes = [0.0; SHAPES];
+            for (to, x) in shapes.iter_mut().zip(x) {
+                *to = x.exp();
+            }
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            let Some((share, _)) = self.explained(fit, c, &columns) else {
+                return Ok(0.0);
+            };
+            if share > best.0 {
+                *best = (share, shapes, columns);
+            }
+            Ok(-share)
+        };
+        let mut simplex = vec![(at(&start)?, start.clone())];
+        for k in 0..n {
+            let mut x = start.clone();
+            x[k] += 0.4;
+            simplex.push((at(&x)?, x));
+        }
+        for _ in 0..SIMPLEX_STEPS {
+            simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if simplex[n].0 - simplex[0].0 < 1e-4 * simplex[0].0.abs() {
+                break;
+            }
+            let middle: Vec<f64> = (0..n)
+                .map(|k| simplex[..n].iter().map(|s| s.1[k]).sum::<f64>() / n as f64)
+                .collect();
+            let along = |t: f64, worst: &[f64]| -> Vec<f64> {
+                middle
+                    .iter()
+                    .zip(worst)
+                    .map(|(m, w)| m + t * (w - m))
+                    .collect()
+            };
+            let worst = simplex[n].1.clone();
+            let x = along(-1.0, &worst);
+            let f = at(&x)?;
+            if f < simplex[0].0 {
+                let far = along(-2.0, &worst);
+                let g = at(&far)?;
+                simplex[n] = if g < f { (g, far) } else { (f, x) };
+            } else if f < simplex[n - 1].0 {
+                simplex[n] = (f, x);
+            } else {
+                let near = along(if f < simplex[n].0 { -0.5 } else { 0.5 }, &worst);
+                let g = at(&near)?;
+                if g < simplex[n].0.min(f) {
+                    simplex[n] = (g, near);
+                } else {
+                    let top = simplex[0].1.clone();
+                    for s in &mut simplex[1..] {
+                        let x: Vec<f64> =
+                            s.1.iter().zip(&top).map(|(x, t)| 0.5 * (x + t)).collect();
+                        *s = (at(&x)?, x);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Golden section over one logarithmic shape about the best point.
     fn refine(
         &self,
         fit: &Fit,
         c: usize,
         place: usize,
-        best: &mut (f64, [f64; SHAPES], Arc<Vec<Column>>),
+        best: &mut Best,
     ) -> Result<(), DiagnoseError> {
         let shapes_count = self.library[c].kind.about().shapes.len() as f64;
         let step = shapes_count / PER_DECADE * std::f64::consts::LN_10;
         let middle = best.1[place].ln();
         let (mut low, mut high) = (middle - step, middle + step);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let mut at = |x: f64,
-                      best: &mut (f64, [f64; SHAPES], Arc<Vec<Column>>)|
-         -> Result<f64, DiagnoseError> {
+        let mut at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;
             shapes[place] = x.exp();
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
@@ -298,11 +377,7 @@ impl<'a> Search<'a> {
                 if !is_first_law(candidate.kind) {
                     continue;
                 }
-                let taken = without.iter().any(|w| {
-                    w.joint == candidate.joint
-                        && w.kind.about().name == candidate.kind.about().name
-                        && w.other == candidate.other
-                });
+                let taken = without.iter().any(|w| rivals(w, candidate));
                 if taken {
                     continue;
                 }
@@ -363,7 +438,7 @@ impl<'a> Search<'a> {
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
             let profiles = self.sweep(&fit, &present)?;
             told(chosen.len(), &profiles, &fit);
-            let Some(best) = profiles.into_iter().find(|p| p.refused(trials).is_none()) else {
+            let Some(best) = first_to_take(profiles, trials) else {
                 break;
             };
             let before = chosen.clone();
@@ -383,10 +458,7 @@ impl<'a> Search<'a> {
             let fit = with(base, chosen, Some(i));
             let present = chosen[i].candidate;
             for (c, candidate) in self.library.iter().enumerate() {
-                let law = candidate.kind.about().name == present.kind.about().name
-                    && candidate.kind != present.kind
-                    && candidate.joint == present.joint;
-                if !law {
+                if !rivals(candidate, &present) || candidate.kind == present.kind {
                     continue;
                 }
                 if let Some(rival) = self.profile(&fit, c, None)?
@@ -463,6 +535,23 @@ impl<'a> Search<'a> {
     }
 }
 
+/// The best that passes; of two transmissions the one without play unless play takes away clearly more.
+fn first_to_take(profiles: Vec<Profile>, trials: usize) -> Option<Profile> {
+    let mut passing = profiles.into_iter().filter(|p| p.refused(trials).is_none());
+    let best = passing.next()?;
+    if best.candidate.kind == Kind::Backlash {
+        let simpler = passing.find(|p| {
+            p.candidate.kind == Kind::JointElasticity && p.candidate.joint == best.candidate.joint
+        });
+        if let Some(simpler) = simpler
+            && simpler.evidence.gain + LEAST_GAIN > best.evidence.gain
+        {
+            return Some(simpler);
+        }
+    }
+    Some(best)
+}
+
 fn same(a: &[Profile], b: &[Profile]) -> bool {
     a.len() == b.len()
         && a.iter()
@@ -481,6 +570,14 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
         }
     }
     fit
+}
+
+/// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
+fn rivals(a: &Candidate, b: &Candidate) -> bool {
+    let (x, y) = (a.kind.about(), b.kind.about());
+    let one = x.name == y.name
+        || x.channel == Channel::Transmission && y.channel == Channel::Transmission;
+    one && a.joint == b.joint && a.other == b.other
 }
 
 /// Whether a kind is the law that its name is searched by; others take its place only where they do better.
