@@ -183,3 +183,44 @@ fn what_could_not_be_read_back_is_not_written() {
         "{said}"
     );
 }
+
+/// The table of the documentation, from the library.
+fn table() -> String {
+    let mut out = String::from(
+        "| `kind` (`law`) | what | equation | parameters |\n| --- | --- | --- | --- |\n",
+    );
+    for kind in Kind::ALL {
+        let about = kind.about();
+        let law = about.law.map_or(String::new(), |l| format!(" (`{l}`)"));
+        let list: Vec<String> = parameters(*kind)
+            .map(|p| format!("`{}` {}: {}", p.name, p.unit, p.meaning))
+            .collect();
+        let cells = [about.title, about.equation, &list.join("; ")]
+            .map(|cell| cell.replace('|', "\\|").replace('*', "\\*"));
+        let [title, equation, list] = cells;
+        let _ = writeln!(
+            out,
+            "| `{}`{law} | {title} | {equation} | {list} |",
+            about.name
+        );
+    }
+    out
+}
+
+/// With `RIG_WRITE_DOCS` set the page is brought up to date instead.
+#[test]
+fn the_page_on_formats_has_every_effect_as_the_library_has_it() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/formats.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (before, rest) = page.split_once("<!-- effects: ").unwrap();
+    let (mark, rest) = rest.split_once("-->\n").unwrap();
+    let (found, after) = rest.split_once("<!-- end of effects -->").unwrap();
+    let expected = table();
+    if std::env::var_os("RIG_WRITE_DOCS").is_some() {
+        let page =
+            format!("{before}<!-- effects: {mark}-->\n{expected}<!-- end of effects -->{after}");
+        std::fs::write(&path, page).unwrap();
+    } else {
+        assert_eq!(found, expected, "run this test with RIG_WRITE_DOCS=1");
+    }
+}
