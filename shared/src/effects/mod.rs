@@ -5,7 +5,7 @@
 //! the η (*shapes*) do not; hidden states are driven by the motion itself. A few effects act elsewhere ([`Channel`]): on
 //! what a sensor reads, between motor and link, or between command and voltage.
 //!
-//! Adding an effect is adding its file and one line to [`registry!`].
+//! Adding an effect is adding its file and one line to the `registry!` below.
 
 mod about;
 mod asymmetric_coulomb;
