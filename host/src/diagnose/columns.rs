@@ -137,7 +137,14 @@ impl Source<'_> {
         match (candidate.kind, about.channel) {
             (_, Channel::Transmission) => {
                 let driven = self.driven(candidate.joint, r)?;
-                let excess = driven.excess(candidate.kind, shapes, candidate.joint, run, predicted);
+                let excess = driven.excess(
+                    candidate.kind,
+                    shapes,
+                    candidate.joint,
+                    run,
+                    predicted,
+                    self.friction(candidate.joint),
+                );
                 Ok(own(vec![excess.unwrap_or_else(|| vec![0.0; run.len()])]))
             }
             (Kind::MeasurementDelay, _) => {
@@ -277,6 +284,16 @@ impl Source<'_> {
             }
         })?;
         Ok(torque)
+    }
+
+    /// Viscous and Coulomb friction of a joint, as identified.
+    fn friction(&self, joint: usize) -> [f64; 2] {
+        use rig_shared::multibody::{COLUMNS, column};
+        [column::VISCOUS, column::COULOMB].map(|place| {
+            let c = joint * COLUMNS + place;
+            let k = self.nominal.base.columns.iter().position(|b| *b == c);
+            k.map_or(0.0, |k| self.values[k])
+        })
     }
 
     /// Inertia of a joint's drive that stands in a combination with the link's, as the description has it; 0 where it is

@@ -248,12 +248,17 @@ impl<'a> Search<'a> {
     /// Nelder and Mead's simplex (1965) over the logarithms of all shapes at once: stiffness, damping and play pull on each
     /// other.
     fn descend(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
-        let n = self.library[c].kind.about().shapes.len();
-        let start: Vec<f64> = best.1[..n].iter().map(|s| s.ln()).collect();
+        let scales = self.library[c].kind.about().shapes;
+        let n = scales.len();
+        let logarithmic = |k: usize| scales[k].scale == Scale::Logarithmic;
+        let start: Vec<f64> = (best.1[..n].iter().enumerate())
+            .map(|(k, s)| if logarithmic(k) { s.ln() } else { *s })
+            .collect();
         let mut at = |x: &[f64]| -> Result<f64, DiagnoseError> {
             let mut shapes = [0.0; SHAPES];
-            for (to, x) in shapes.iter_mut().zip(x) {
-                *to = x.exp();
+            for (k, (to, x)) in shapes.iter_mut().zip(x).enumerate() {
+                let [low, high] = scales[k].bounds;
+                *to = if logarithmic(k) { x.exp() } else { *x }.clamp(low, high);
             }
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
             let Some((share, _)) = self.explained(fit, c, &columns) else {
@@ -267,7 +272,12 @@ impl<'a> Search<'a> {
         let mut simplex = vec![(at(&start)?, start.clone())];
         for k in 0..n {
             let mut x = start.clone();
-            x[k] += 0.4;
+            // Away from a bound.
+            x[k] += if !logarithmic(k) && x[k] > 0.5 {
+                -0.4
+            } else {
+                0.4
+            };
             simplex.push((at(&x)?, x));
         }
         for _ in 0..SIMPLEX_STEPS {

@@ -1,11 +1,12 @@
 //! The torque of an elastic gear or of one with play, driven by the motor's measured motion.
 //!
 //! With the twist x = θm/ratio − q of joint j, and the load λ that the rigid gear would transmit for the motor's motion,
-//! the link's equation linearised about the motor's position is M·ẍ = λ − K·x − τc(x, ẋ): M the joint's own inertia
-//! without the drive, K the slope of gravity, τc what spring, damping and play transmit. The drive's torque then differs
-//! from the rigid model's by τc − λ. Play only pushes: [`transmitted`] has the law.
+//! the link's equation linearised about the motor's position is M·ẍ = λ + f − K·x − τc(x, ẋ): M the joint's own inertia
+//! without the drive, K the slope of gravity, f the share of the friction that acts on the link, which sticks (Moreau's
+//! time stepping), τc what spring, damping and play transmit. The drive's torque then differs from the rigid model's by
+//! τc − λ − f(θ̇m/ratio). Play only pushes: [`transmitted`] has the law.
 //!
-//! Leaves out: friction on the link's side of the gear; what the twist of one joint does to the others.
+//! Leaves out: what the twist of one joint does to the others.
 
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 
@@ -67,6 +68,7 @@ impl Driven {
         joint: usize,
         run: &Run,
         predicted: &Predicted,
+        friction: [f64; 2],
     ) -> Option<Vec<f64>> {
         let [gap, stiffness, damping] = kind.transmission(shapes)?;
         let least = self.mass.iter().copied().fold(f64::INFINITY, f64::min);
@@ -80,6 +82,9 @@ impl Driven {
             return None;
         }
         let h = period / steps as f64;
+        let share = kind.link_friction(shapes)?;
+        let [viscous, coulomb] = friction.map(|f| share * f.max(0.0));
+        let speed = &run.joints[joint].qd;
         let load = &predicted.load[joint];
         let first = load.first().copied()?;
         // At rest on the side that the load presses to.
@@ -97,11 +102,17 @@ impl Driven {
                 let middle = x + 0.5 * h * v;
                 let torque = transmitted(gap, stiffness, damping, middle, v);
                 let pull = from + part * (to - from) - slope * middle - torque;
-                v += h * pull / mass;
+                // The link's own velocity after the step, before and after its friction.
+                let motor = speed[k - 1] + part * (speed[k] - speed[k - 1]);
+                let free = motor - v - h * pull / mass;
+                let slid = free / (1.0 + h * viscous / mass);
+                let dry = (mass * slid / h).clamp(-coulomb, coulomb);
+                v = motor - slid + h * dry / mass;
                 x = middle + 0.5 * h * v;
                 sum += torque;
             }
-            out.push(sum / steps as f64 - 0.5 * (from + to));
+            let rigid = viscous * speed[k] + coulomb * speed[k].signum();
+            out.push(sum / steps as f64 - 0.5 * (from + to) - rigid);
         }
         out.iter().all(|t| t.is_finite()).then_some(out)
     }

@@ -3,7 +3,7 @@
 //! Sources: Spong 1987; Nordin and Gutman 2002. The drive's inertia and the joint's friction count on the motor's side,
 //! and so does the position sensor; what acts on the link is the load.
 
-use rig_shared::effects::{Kind, transmitted};
+use rig_shared::effects::{Kind, SHAPES, transmitted};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
 
 use super::{Model, SimulateError};
@@ -32,7 +32,7 @@ impl Elastic {
         let Some(law) = model.effects.placed().iter().find_map(shapes) else {
             return Ok(None);
         };
-        let elastic = |k: Kind| k.transmission(&[0.0; 3]).is_some();
+        let elastic = |k: Kind| k.transmission(&[0.0; SHAPES]).is_some();
         let effect = || model.effects.named(elastic).unwrap_or_default();
         if model.parameters.len() != 1 || model.motors.is_some() {
             return Err(SimulateError::ElasticChain { effect: effect() });

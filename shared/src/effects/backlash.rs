@@ -43,6 +43,14 @@ impl Law for Backlash {
                 scale: Scale::Logarithmic,
                 meaning: "of the teeth in contact",
             },
+            Parameter {
+                name: "link_friction",
+                unit: "1",
+                bounds: [0.0, 1.0],
+                range: [0.0, 1.0],
+                scale: Scale::Linear,
+                meaning: "share of the joint's friction that acts on the link's side of the gear",
+            },
         ],
         signature: "the load vanishes over an angle where its sign changes, followed by impacts",
         confused: &[

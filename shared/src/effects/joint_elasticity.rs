@@ -35,6 +35,14 @@ impl Law for JointElasticity {
                 scale: Scale::Logarithmic,
                 meaning: "torque per rate of twist",
             },
+            Parameter {
+                name: "link_friction",
+                unit: "1",
+                bounds: [0.0, 1.0],
+                range: [0.0, 1.0],
+                scale: Scale::Linear,
+                meaning: "share of the joint's friction that acts on the link's side of the gear",
+            },
         ],
         signature: "resonance between motor and link, growing with the second derivative of the load",
         confused: &[

@@ -47,7 +47,7 @@ use crate::scalar::Real;
 /// Most gains of one effect.
 pub const GAINS: usize = 4;
 /// Most shapes of one effect.
-pub const SHAPES: usize = 3;
+pub const SHAPES: usize = 4;
 /// Most hidden states of one effect.
 pub const MEMORY: usize = 4;
 
@@ -195,8 +195,18 @@ impl Kind {
     /// does not act between motor and link.
     pub fn transmission<T: Real>(self, shapes: &[T; SHAPES]) -> Option<[T; 3]> {
         match self {
-            Self::Backlash => Some(*shapes),
+            Self::Backlash => Some([shapes[0], shapes[1], shapes[2]]),
             Self::JointElasticity => Some([T::ZERO, shapes[0], shapes[1]]),
+            _ => None,
+        }
+    }
+
+    /// Share of the joint's friction that acts behind a transmission with these shapes; none for what does not act
+    /// between motor and link.
+    pub fn link_friction<T: Real>(self, shapes: &[T; SHAPES]) -> Option<T> {
+        match self {
+            Self::Backlash => Some(shapes[3]),
+            Self::JointElasticity => Some(shapes[2]),
             _ => None,
         }
     }
