@@ -3,6 +3,7 @@
 
 pub mod outcome;
 pub mod runs;
+pub mod sanity;
 
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};

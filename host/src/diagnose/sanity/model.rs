@@ -1,0 +1,448 @@
+//! What a refitted simple model says of signs, scales and clocks.
+
+use nalgebra::{DMatrix, DVector};
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::super::outcome::DataFault;
+use super::super::{DiagnoseError, Run};
+use super::columns::fault;
+use super::fit::{Fit, Measured, about_mean};
+use super::names;
+use super::rows::Rows;
+use crate::batch::{ChainBatch, ModelBatch};
+use crate::identify::{chain_of, preference};
+use crate::robot::{JointKind, Robot};
+
+/// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
+const POOR: f64 = 0.1;
+/// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
+const BETTER: f64 = 0.25;
+const GOOD: f64 = 0.2;
+/// Shifts up to this belong to filters and buses, not to clocks, s.
+const SHIFT: f64 = 0.1;
+/// Farthest shift that is tried, s; no more than a quarter of the recording.
+const FARTHEST: f64 = 5.0;
+/// Parameters change by less than this factor; units and ratios by more.
+const CHANGE: f64 = 5.0;
+/// Rows of one trial of several joints.
+const TRIAL: usize = 800;
+/// Standard deviations that a sign must stand from zero.
+const CLEAR: f64 = 4.0;
+
+/// One recording against models of the robot.
+pub(super) struct Judge<'a> {
+    robot: &'a Robot,
+    runs: &'a [&'a Run],
+    chain: ChainBatch,
+    rows: Rows,
+    order: Vec<usize>,
+    matrices: Vec<DMatrix<f64>>,
+    fits: Vec<Option<Fit>>,
+}
+
+fn model_error(error: impl ToString) -> DiagnoseError {
+    DiagnoseError::Model(error.to_string())
+}
+
+impl<'a> Judge<'a> {
+    pub(super) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
+        let chain = ChainBatch::new(&chain_of(robot).map_err(model_error)?);
+        let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let rows = Rows::of(runs, robot.joints.len());
+        let order = preference(&kinds);
+        let matrices = rows.regressors(&chain)?;
+        let fits = matrices
+            .iter()
+            .zip(&rows.tau)
+            .map(|(x, y)| Fit::of(x, y, &order))
+            .collect();
+        Ok(Self {
+            robot,
+            runs,
+            chain,
+            rows,
+            order,
+            matrices,
+            fits,
+        })
+    }
+
+    /// Everything that the torque says; the first that is wrong with the times or scales of positions ends the search,
+    /// because all else follows from it.
+    pub(super) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
+        if !clipped.is_empty() {
+            return Ok(clipped);
+        }
+        let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();
+        if !shifted.is_empty() {
+            return Ok(shifted);
+        }
+        let scaled = self.positions()?;
+        if !scaled.is_empty() {
+            return Ok(scaled);
+        }
+        let mut found = Vec::new();
+        for j in 0..n {
+            found.extend(self.against_description(j)?);
+            if found.iter().all(|f: &DataFault| f.joint != self.name(j))
+                && let Some(fault) = self.sign(j)?
+            {
+                found.push(fault);
+            }
+        }
+        Ok(found)
+    }
+
+    fn name(&self, joint: usize) -> &str {
+        &self.robot.joints[joint].name
+    }
+
+    fn say(&self, kind: &str, joint: usize, text: String) -> DataFault {
+        fault(self.runs, kind, self.name(joint), text)
+    }
+
+    /// A torque that was cut where the motion needs more: a fit to the rest goes on beyond the cut.
+    fn clipped(&self, j: usize) -> Option<DataFault> {
+        let cut = &self.rows.cut[j];
+        let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
+        if at.len() < 10 || 50 * at.len() < cut.len() {
+            return None;
+        }
+        let tau = &self.rows.tau[j];
+        // Rows that hold part of a cut are neither.
+        let free: Vec<usize> = free.into_iter().filter(|k| cut[*k] == 0.0).collect();
+        let rest: Vec<f64> = free.iter().map(|k| tau[*k]).collect();
+        let fit = Fit::of(&self.matrices[j].select_rows(&free), &rest, &self.order)?;
+        let noise = (fit.residual.norm_squared() / rest.len() as f64).sqrt();
+        let beyond = fit.predict(&self.matrices[j].select_rows(&at));
+        let middle = 0.5 * (extreme(tau, f64::max) + extreme(tau, f64::min));
+        let excess = at
+            .iter()
+            .zip(&beyond)
+            .map(|(k, predicted)| (predicted - tau[*k]) * (tau[*k] - middle).signum())
+            .sum::<f64>()
+            / at.len() as f64;
+        let level = at.iter().map(|k| tau[*k].abs()).sum::<f64>() / at.len() as f64;
+        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level)).then(
+            || {
+                self.say(
+                    "saturation",
+                    j,
+                    format!(
+                        "tau{} is cut at {level:.4} for {:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less.",
+                        j + 1,
+                        100.0 * at.len() as f64 / cut.len() as f64
+                    ),
+                )
+            },
+        )
+    }
+
+    /// A torque that belongs to another time than the motion.
+    fn shifted(&self, j: usize) -> Option<DataFault> {
+        let fit = self.fits[j].as_ref()?;
+        if fit.unexplained() < POOR {
+            return None;
+        }
+        let time = self.rows.len() as f64 * self.rows.period;
+        let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
+        let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        if least > BETTER * left[reach] || least > GOOD {
+            return None;
+        }
+        // Of a periodic motion the nearest period.
+        let at = (0..left.len())
+            .filter(|k| left[*k] <= 1.3 * least)
+            .min_by_key(|k| k.abs_diff(reach))?;
+        let shift = (at as f64 - reach as f64) * self.rows.period;
+        (shift.abs() > SHIFT).then(|| {
+            let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
+            self.say(
+                "clock",
+                j,
+                format!(
+                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.0} % of its variance, as recorded {:.0} %; give both by one clock.",
+                    j + 1,
+                    shift.abs(),
+                    j + 1,
+                    100.0 * least,
+                    100.0 * left[reach]
+                ),
+            )
+        })
+    }
+
+    /// Positions of which gravity and coupling say that they are multiples of the joint's.
+    fn positions(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let left: Vec<f64> = self
+            .fits
+            .iter()
+            .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
+            .collect();
+        let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
+        if left.iter().all(|u| *u < POOR) {
+            return Ok(Vec::new());
+        }
+        let rows = self.rows.thinned(if n == 1 { usize::MAX } else { TRIAL });
+        let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
+            let moved = rows.rescaled(joint, factor);
+            let matrices = moved.regressors(&self.chain)?;
+            let fits = matrices.iter().zip(&moved.tau);
+            Ok(fits
+                .map(|(x, y)| Fit::of(x, y, &self.order).map_or(1.0, |f| f.unexplained()))
+                .collect())
+        };
+        if n > 1 && mean(&left) > POOR {
+            let factor = 1.0 / 57.296;
+            let all = mean(&try_out(None, factor)?);
+            if all < BETTER * mean(&left) && all < GOOD {
+                return Ok((0..n).map(|j| self.degrees(j, factor, mean(&left), all)).collect());
+            }
+        }
+        let mut found = Vec::new();
+        for j in (0..n).filter(|j| left[*j] > POOR) {
+            if self.robot.joints[j].kind == JointKind::Prismatic && n == 1 {
+                continue;
+            }
+            let mut best = (1.0, left[j]);
+            for factor in self.factors(j) {
+                let own = try_out(Some(j), factor)?[j];
+                if own < best.1 {
+                    best = (factor, own);
+                }
+            }
+            let (factor, own) = best;
+            // What misfits by a little more than a quarter is an effect's business.
+            let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
+            if own < BETTER * left[j] && own < GOOD && far {
+                found.push(self.degrees(j, factor, left[j], own));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Factors by which a joint's position is tried.
+    fn factors(&self, j: usize) -> Vec<f64> {
+        if self.robot.joints.len() == 1 {
+            // In steps of 3 %: closer than gravity's period over a turn needs.
+            return (-160..=160).map(|k| 1.03f64.powi(k)).collect();
+        }
+        let mut list = vec![-1.0, 1.0 / 57.296, core::f64::consts::TAU, 0.5, 2.0];
+        let drive = self.robot.joints[j].drive.as_ref();
+        if let Some(ratio) = drive.map(|d| d.gear_ratio.abs()).filter(|r| *r > 0.0) {
+            list.extend([ratio, 1.0 / ratio]);
+        }
+        list
+    }
+
+    fn degrees(&self, j: usize, factor: f64, before: f64, after: f64) -> DataFault {
+        let name = names::of_position(&self.robot.joints[j], factor);
+        let (kind, what) = match name {
+            _ if factor < 0.0 => ("sign", "reverse it".to_owned()),
+            Some(name) if name.contains("gear") => ("ratio", name),
+            Some(name) => ("unit", name),
+            None => (
+                "ratio",
+                "check the gear ratio and the counts of the encoder".to_owned(),
+            ),
+        };
+        self.say(
+            kind,
+            j,
+            format!(
+                "q{} fits its torque {factor:.4} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
+                j + 1,
+                100.0 * after,
+                100.0 * before
+            ),
+        )
+    }
+
+    /// Mean of the joint's own inertia over its motion, as weights of the parameters.
+    fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let mut still = self.rows.thinned(200);
+        for column in still.qd.iter_mut().chain(&mut still.qdd) {
+            column.fill(0.0);
+        }
+        let without = still.regressors(&self.chain)?;
+        still.qdd[j].fill(1.0);
+        let with = still.regressors(&self.chain)?;
+        let difference = &with[j] - &without[j];
+        Ok(DVector::from_fn(n * COLUMNS, |c, _| {
+            difference.column(c).mean()
+        }))
+    }
+
+    /// Power lost in the joint's friction, W, that over the variation of torque and speed, and the joint's own inertia.
+    fn senses(&self, j: usize, fit: &Fit) -> Result<(Measured, f64, Measured), DiagnoseError> {
+        let qd = &self.rows.qd[j];
+        let count = qd.len().max(1) as f64;
+        let squares = qd.iter().map(|v| v * v).sum::<f64>() / count;
+        let mut friction = DVector::zeros(self.robot.joints.len() * COLUMNS);
+        friction[j * COLUMNS + column::VISCOUS] = squares;
+        friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
+        let loss = fit.functional(&friction);
+        let varied = (about_mean(self.rows.tau[j].iter().copied()) / count).sqrt();
+        let share = loss.value / (varied * squares.sqrt()).max(f64::MIN_POSITIVE);
+        Ok((loss, share, fit.functional(&self.inertia(j)?)))
+    }
+
+    /// Friction that drives and inertia that pulls: torque and motion are counted in opposite senses.
+    fn sign(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+        let Some(fit) = self.fits[j].as_ref() else {
+            return Ok(None);
+        };
+        let (loss, share, inertia) = self.senses(j, fit)?;
+        let (l, i) = (loss.sigmas(), inertia.sigmas());
+        // Each may be hidden by what the motion does not show; then the other has to be the clearer.
+        let both = l < -1.5 && i < -1.5 && (l + i) / core::f64::consts::SQRT_2 < -CLEAR;
+        let by_friction = l < -CLEAR && share < -0.1 && i < 3.0;
+        let by_inertia = i < -2.0 * CLEAR && share < -0.02 && l < 3.0;
+        if !(both || by_friction || by_inertia) || fit.unexplained() > 0.5 {
+            return Ok(None);
+        }
+        let n = j + 1;
+        let which = match self.scales(j)?.0 {
+            Some(gravity) if gravity.value > 0.0 => {
+                format!("gravity has the right sense, so reverse q{n}")
+            }
+            Some(_) => format!("gravity has the wrong sense too, so reverse tau{n}"),
+            None => "reverse one of them".to_owned(),
+        };
+        Ok(Some(self.say(
+            "sign",
+            j,
+            format!(
+                "tau{n} and q{n} are counted in opposite senses: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
+                -loss.value, inertia.value
+            ),
+        )))
+    }
+
+    /// Measured gravity and measured inertia over the description's, where the description states them and the motion
+    /// shows them.
+    fn scales(&self, j: usize) -> Result<(Option<Measured>, Option<Measured>), DiagnoseError> {
+        let stated = self.robot.joints[j..].iter().all(|joint| {
+            joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0)
+        });
+        if !stated || self.rows.len() == 0 {
+            return Ok((None, None));
+        }
+        let (n, rows) = (self.robot.joints.len(), self.rows.len());
+        let mut parameters = self.robot.standard_parameters();
+        for row in &mut parameters {
+            row[column::VISCOUS..].fill(0.0);
+        }
+        let chain = chain_of(self.robot).map_err(model_error)?;
+        let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
+        let (mut weight, mut all) = (vec![0.0; n * rows], vec![0.0; n * rows]);
+        model.gravity(&self.rows.q, &mut weight).map_err(model_error)?;
+        model
+            .inverse_dynamics(&self.rows.q, &self.rows.qd, &self.rows.qdd, &mut all)
+            .map_err(model_error)?;
+        let own = j * rows..(j + 1) * rows;
+        let (weight, all) = (&weight[own.clone()], &all[own]);
+        let qd = &self.rows.qd[j];
+        let x = DMatrix::from_fn(rows, 5, |k, c| match c {
+            0 => weight[k],
+            1 => all[k] - weight[k],
+            2 => qd[k],
+            3 if qd[k] == 0.0 => 0.0,
+            3 => qd[k].signum(),
+            _ => 1.0,
+        });
+        let tau = &self.rows.tau[j];
+        let Some(fit) = Fit::of(&x, tau, &[4, 3, 2, 0, 1]) else {
+            return Ok((None, None));
+        };
+        let shown = |c: usize| -> Option<Measured> {
+            let order: Vec<usize> = (0..5).filter(|o| *o != c).collect();
+            let without = Fit::of(&x, tau, &order)?.unexplained();
+            fit.parameter(c)
+                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
+        };
+        // A description that explains little of the torque is no scale for it.
+        let whole = fit.unexplained() < 0.2;
+        Ok((
+            shown(0).filter(|_| whole),
+            shown(1).filter(|_| whole),
+        ))
+    }
+
+    /// Factors between the recording and the description that no change of the robot makes.
+    fn against_description(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+        let joint = &self.robot.joints[j];
+        let (gravity, inertia) = self.scales(j)?;
+        // What the description does not state of the drive makes the inertia larger, never smaller.
+        let complete = joint
+            .drive
+            .as_ref()
+            .is_none_or(|d| d.rotor_inertia > 0.0 || d.joint_inertia > 0.0);
+        let inertia = inertia
+            .map(|m| m.value)
+            .filter(|s| complete || s.abs() < 1.0);
+        let large = |s: f64| !(1.0 / CHANGE..CHANGE).contains(&s.abs());
+        let apart = |a: f64, b: f64| (a / b).abs().ln().abs() > f64::ln(2.5);
+        let n = j + 1;
+        let torque = |factor: f64, of: &str| {
+            let name = names::of_torque(joint, factor);
+            // Between a parameter's change and what has a name there is room for an odd robot.
+            (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
+                let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit".to_owned());
+                let nearest = what.split(", or").next().unwrap_or_default();
+                let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
+                self.say(
+                    kind,
+                    j,
+                    format!("tau{n} is {factor:.4} times what the description's {of} needs, {what}."),
+                )
+            })
+        };
+        Ok(match (gravity.map(|m| m.value), inertia) {
+            (Some(g), Some(i)) if large(g) && !apart(g, i) => torque(g, "gravity and inertia"),
+            (Some(g), None) if large(g) => torque(g, "gravity"),
+            (None, Some(i)) if large(i) => torque(i, "inertia"),
+            (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
+                let clock = (i / g).abs().sqrt();
+                Some(self.say(
+                    "clock",
+                    j,
+                    format!(
+                        "Gravity fits the description, but the inertia seen in the motion is {:.4} times what it states: t looks like {}, {clock:.4} of them a second.",
+                        i / g,
+                        names::of_clock(clock)
+                    ),
+                ))
+            }
+            (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j)?.is_none() => {
+                let held = match self.fits[j].as_ref() {
+                    Some(fit) => {
+                        let (loss, _, own) = self.senses(j, fit)?;
+                        loss.sigmas() > 3.0 || own.sigmas() > 3.0
+                    }
+                    None => false,
+                };
+                let which = if held {
+                    format!("friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off")
+                } else {
+                    format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
+                };
+                Some(self.say(
+                    "sign",
+                    j,
+                    format!("Gravity acts on joint {n} {g:.2} times as the description says; {which}."),
+                ))
+            }
+            _ => None,
+        })
+    }
+}
+
+fn extreme(values: &[f64], of: fn(f64, f64) -> f64) -> f64 {
+    values.iter().copied().reduce(of).unwrap_or(0.0)
+}
