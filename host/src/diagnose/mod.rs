@@ -1,9 +1,11 @@
 //! The gap workflow: where simulation and data disagree, which physical effect is missing, what it takes away on data not
 //! used, and when to stop.
 
+pub mod experiment;
 pub mod outcome;
 pub mod runs;
 pub mod sanity;
+pub mod testable;
 
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};

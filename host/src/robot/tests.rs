@@ -175,7 +175,9 @@ fn missing_and_repeated_parts_are_named() {
     let effect = |body: &str| toml_says(&format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{body}\n"));
     assert!(effect("kind = 'magic'").contains("`magic`, but it must be one of stribeck"));
     assert!(effect("joint = 'link'").contains("kind of effect 1 is missing"));
-    assert!(effect("kind = 'torque_offset'\noffset = 1\njoint = 'elbow'").contains("joints are link"));
+    assert!(
+        effect("kind = 'torque_offset'\noffset = 1\njoint = 'elbow'").contains("joints are link")
+    );
 }
 
 #[test]

@@ -15,7 +15,8 @@ const AT_LIMIT: f64 = 0.2;
 
 /// The name of the recording.
 pub(super) fn label(runs: &[&Run]) -> String {
-    runs.first().map_or_else(String::new, |run| run.label.clone())
+    runs.first()
+        .map_or_else(String::new, |run| run.label.clone())
 }
 
 /// A fault of the recording.
@@ -85,7 +86,11 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
             return fault(runs, "clock", "", found.to_string());
         };
         // A recording in milliseconds has fewer than 200 of them between rows, one in microseconds no fewer.
-        let unit = if *step >= 200.0 { "microseconds" } else { "milliseconds" };
+        let unit = if *step >= 200.0 {
+            "microseconds"
+        } else {
+            "milliseconds"
+        };
         fault(
             runs,
             "clock",
@@ -125,10 +130,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
             let joint = joint.saturating_sub(1);
             if found.iter().all(|(j, ..)| *j != joint) {
                 let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
-                found.push((
-                    joint,
-                    fault(runs, "unit", name, format!("{problem}.")),
-                ));
+                found.push((joint, fault(runs, "unit", name, format!("{problem}."))));
             }
         }
     }
@@ -155,16 +157,27 @@ pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
             runs,
             "sign",
             &joint.name,
-            format!("qd{n} has the opposite sign of the change of q{n} over time; reverse one of them."),
+            format!(
+                "qd{n} has the opposite sign of the change of q{n} over time; reverse one of them."
+            ),
         ));
     }
-    let what = names::of_velocity(joint, factor).map_or_else(
-        || format!("give it in {unit}, or correct the clock"),
-        |name| format!("it looks like {name}; give it in {unit}"),
-    );
+    let named = names::of_velocity(joint, factor)
+        .map(|name| format!("qd{n} looks like {name}; give it in {unit}"))
+        .or_else(|| names::of_position(joint, 1.0 / factor).map(|name| format!("of q{n}, {name}")));
+    let what = named.unwrap_or_else(|| {
+        format!(
+            "give it in {unit}, and check the gear ratio, the counts of the encoder and the clock"
+        )
+    });
+    let kind = if what.contains("gear") {
+        "ratio"
+    } else {
+        "unit"
+    };
     Some(fault(
         runs,
-        "unit",
+        kind,
         &joint.name,
         format!(
             "qd{n} is {:.4} times the change of q{n} over time; {what}.",

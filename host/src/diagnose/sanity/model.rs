@@ -16,7 +16,9 @@ use crate::robot::{JointKind, Robot};
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
 const POOR: f64 = 0.1;
 /// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
-const BETTER: f64 = 0.25;
+const BETTER: f64 = 0.35;
+/// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
+const MUCH_BETTER: f64 = 0.2;
 const GOOD: f64 = 0.2;
 /// Shifts up to this belong to filters and buses, not to clocks, s.
 const SHIFT: f64 = 0.1;
@@ -25,9 +27,12 @@ const FARTHEST: f64 = 5.0;
 /// Parameters change by less than this factor; units and ratios by more.
 const CHANGE: f64 = 5.0;
 /// Rows of one trial of several joints.
-const TRIAL: usize = 800;
+const TRIAL: usize = 500;
 /// Standard deviations that a sign must stand from zero.
 const CLEAR: f64 = 4.0;
+
+/// Measured over stated gravity and inertia, where they show.
+type Scales = (Option<Measured>, Option<Measured>);
 
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
@@ -200,7 +205,9 @@ impl<'a> Judge<'a> {
             let factor = 1.0 / 57.296;
             let all = mean(&try_out(None, factor)?);
             if all < BETTER * mean(&left) && all < GOOD {
-                return Ok((0..n).map(|j| self.degrees(j, factor, mean(&left), all)).collect());
+                return Ok((0..n)
+                    .map(|j| self.scaled(j, &[factor], mean(&left), all))
+                    .collect());
             }
         }
         let mut found = Vec::new();
@@ -208,21 +215,53 @@ impl<'a> Judge<'a> {
             if self.robot.joints[j].kind == JointKind::Prismatic && n == 1 {
                 continue;
             }
-            let mut best = (1.0, left[j]);
+            let mut tried: Vec<(f64, f64)> = Vec::new();
             for factor in self.factors(j) {
-                let own = try_out(Some(j), factor)?[j];
-                if own < best.1 {
-                    best = (factor, own);
+                let all = try_out(Some(j), factor)?;
+                let own = all[j];
+                // What misfits by a little more than a quarter is an effect's business.
+                let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
+                let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
+                let least = if unit { BETTER } else { MUCH_BETTER };
+                if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
+                    tried.push((factor, own));
                 }
             }
-            let (factor, own) = best;
-            // What misfits by a little more than a quarter is an effect's business.
-            let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
-            if own < BETTER * left[j] && own < GOOD && far {
-                found.push(self.degrees(j, factor, left[j], own));
+            let least = tried
+                .iter()
+                .map(|(_, own)| *own)
+                .fold(f64::INFINITY, f64::min);
+            // Over a small range gravity is a parabola, which every smaller factor leaves one: where the description
+            // knows the inertia, that decides.
+            tried.retain(|(_, own)| *own <= 1.5 * least + 0.002);
+            let mut misses = Vec::new();
+            for (factor, own) in tried {
+                misses.push((
+                    self.misses(&rows.rescaled(Some(j), factor), j)?,
+                    factor,
+                    own,
+                ));
+            }
+            let nearest = misses
+                .iter()
+                .map(|(m, ..)| *m)
+                .fold(f64::INFINITY, f64::min);
+            misses.retain(|(m, ..)| *m <= nearest + f64::ln(3.0));
+            misses.sort_by(|a, b| a.2.total_cmp(&b.2));
+            if let Some((.., own)) = misses.first() {
+                let factors: Vec<f64> = misses.iter().map(|(_, factor, _)| *factor).collect();
+                found.push(self.scaled(j, &factors, left[j], *own));
             }
         }
         Ok(found)
+    }
+
+    /// How far gravity and inertia of these rows are from the description's, as the sum of their logarithms; 0 where
+    /// it states none.
+    fn misses(&self, rows: &Rows, j: usize) -> Result<f64, DiagnoseError> {
+        let (gravity, inertia) = self.scales_of(rows, j)?;
+        let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
+        Ok(miss(gravity) + miss(inertia))
     }
 
     /// Factors by which a joint's position is tried.
@@ -239,14 +278,19 @@ impl<'a> Judge<'a> {
         list
     }
 
-    fn degrees(&self, j: usize, factor: f64, before: f64, after: f64) -> DataFault {
-        let name = names::of_position(&self.robot.joints[j], factor);
-        let (kind, what) = match name {
-            _ if factor < 0.0 => ("sign", "reverse it".to_owned()),
-            Some(name) if name.contains("gear") => ("ratio", name),
-            Some(name) => ("unit", name),
+    /// A position that is a multiple of the joint's: what the factors that fit, the best first, are called.
+    fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> DataFault {
+        let named = factors
+            .iter()
+            .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
+        let best = factors.first().copied().unwrap_or(1.0);
+        let (kind, factor, what) = match named {
+            _ if best < 0.0 => ("sign", best, "reverse it".to_owned()),
+            Some((factor, name)) if name.contains("gear") => ("ratio", factor, name),
+            Some((factor, name)) => ("unit", factor, name),
             None => (
                 "ratio",
+                best,
                 "check the gear ratio and the counts of the encoder".to_owned(),
             ),
         };
@@ -326,14 +370,18 @@ impl<'a> Judge<'a> {
 
     /// Measured gravity and measured inertia over the description's, where the description states them and the motion
     /// shows them.
-    fn scales(&self, j: usize) -> Result<(Option<Measured>, Option<Measured>), DiagnoseError> {
-        let stated = self.robot.joints[j..].iter().all(|joint| {
-            joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0)
-        });
-        if !stated || self.rows.len() == 0 {
+    fn scales(&self, j: usize) -> Result<Scales, DiagnoseError> {
+        self.scales_of(&self.rows, j)
+    }
+
+    fn scales_of(&self, data: &Rows, j: usize) -> Result<Scales, DiagnoseError> {
+        let stated = self.robot.joints[j..]
+            .iter()
+            .all(|joint| joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
+        if !stated || data.len() == 0 {
             return Ok((None, None));
         }
-        let (n, rows) = (self.robot.joints.len(), self.rows.len());
+        let (n, rows) = (self.robot.joints.len(), data.len());
         let mut parameters = self.robot.standard_parameters();
         for row in &mut parameters {
             row[column::VISCOUS..].fill(0.0);
@@ -341,13 +389,13 @@ impl<'a> Judge<'a> {
         let chain = chain_of(self.robot).map_err(model_error)?;
         let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
         let (mut weight, mut all) = (vec![0.0; n * rows], vec![0.0; n * rows]);
-        model.gravity(&self.rows.q, &mut weight).map_err(model_error)?;
+        model.gravity(&data.q, &mut weight).map_err(model_error)?;
         model
-            .inverse_dynamics(&self.rows.q, &self.rows.qd, &self.rows.qdd, &mut all)
+            .inverse_dynamics(&data.q, &data.qd, &data.qdd, &mut all)
             .map_err(model_error)?;
         let own = j * rows..(j + 1) * rows;
         let (weight, all) = (&weight[own.clone()], &all[own]);
-        let qd = &self.rows.qd[j];
+        let qd = &data.qd[j];
         let x = DMatrix::from_fn(rows, 5, |k, c| match c {
             0 => weight[k],
             1 => all[k] - weight[k],
@@ -356,7 +404,7 @@ impl<'a> Judge<'a> {
             3 => qd[k].signum(),
             _ => 1.0,
         });
-        let tau = &self.rows.tau[j];
+        let tau = &data.tau[j];
         let Some(fit) = Fit::of(&x, tau, &[4, 3, 2, 0, 1]) else {
             return Ok((None, None));
         };
@@ -368,10 +416,7 @@ impl<'a> Judge<'a> {
         };
         // A description that explains little of the torque is no scale for it.
         let whole = fit.unexplained() < 0.2;
-        Ok((
-            shown(0).filter(|_| whole),
-            shown(1).filter(|_| whole),
-        ))
+        Ok((shown(0).filter(|_| whole), shown(1).filter(|_| whole)))
     }
 
     /// Factors between the recording and the description that no change of the robot makes.
@@ -428,14 +473,18 @@ impl<'a> Judge<'a> {
                     None => false,
                 };
                 let which = if held {
-                    format!("friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off")
+                    format!(
+                        "friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off"
+                    )
                 } else {
                     format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
                 };
                 Some(self.say(
                     "sign",
                     j,
-                    format!("Gravity acts on joint {n} {g:.2} times as the description says; {which}."),
+                    format!(
+                        "Gravity acts on joint {n} {g:.2} times as the description says; {which}."
+                    ),
                 ))
             }
             _ => None,

@@ -54,7 +54,10 @@ pub(super) fn of_torque(joint: &Joint, factor: f64) -> Option<String> {
             1.0 / n,
             format!("as the motor's torque is before its gear ({n} to 1)"),
         ));
-        list.push((n, format!("as if the gear ratio ({n}) had been applied twice")));
+        list.push((
+            n,
+            format!("as if the gear ratio ({n}) had been applied twice"),
+        ));
     }
     // A fitted scale is uncertain by what the description's own values are.
     of(factor, 1.6, &list)
@@ -64,8 +67,14 @@ pub(super) fn of_torque(joint: &Joint, factor: f64) -> Option<String> {
 pub(super) fn of_position(joint: &Joint, factor: f64) -> Option<String> {
     let mut list = match joint.kind {
         JointKind::Revolute => vec![
-            (1.0 / 57.296, "it looks like degrees; give it in rad".to_owned()),
-            (57.296, "it has been turned from degrees to rad twice".to_owned()),
+            (
+                1.0 / 57.296,
+                "it looks like degrees; give it in rad".to_owned(),
+            ),
+            (
+                57.296,
+                "it has been turned from degrees to rad twice".to_owned(),
+            ),
             (
                 core::f64::consts::TAU,
                 "it looks like turns; give it in rad".to_owned(),
@@ -76,12 +85,23 @@ pub(super) fn of_position(joint: &Joint, factor: f64) -> Option<String> {
             (1000.0, "it has been turned from mm to m twice".to_owned()),
         ],
     };
+    for (factor, word) in [(0.5, "twice"), (2.0, "half")] {
+        list.push((
+            factor,
+            format!(
+                "it is {word} what it should be; check the gear ratio and the counts of the encoder"
+            ),
+        ));
+    }
     if let Some(n) = ratio(joint) {
         list.push((
             1.0 / n,
             format!("it looks like the angle of the motor; divide it by the gear ratio {n}"),
         ));
-        list.push((n, format!("it has been divided by the gear ratio {n} twice")));
+        list.push((
+            n,
+            format!("it has been divided by the gear ratio {n} twice"),
+        ));
     }
     // Gravity's period or the velocity tell the factor closely.
     of(factor, 1.12, &list)
@@ -121,5 +141,7 @@ pub(super) fn of_clock(factor: f64) -> &'static str {
     seconds
         .iter()
         .find(|(f, _)| (factor / f).ln().abs() <= 0.47)
-        .map_or("something else than seconds; give it in s", |(_, name)| name)
+        .map_or("something else than seconds; give it in s", |(_, name)| {
+            name
+        })
 }

@@ -51,8 +51,9 @@ impl Rows {
                 let Some(joint) = run.joints.get(j) else {
                     continue;
                 };
-                let mean =
-                    |x: &[f64], from: usize| x[from..from + stride].iter().sum::<f64>() / stride as f64;
+                let mean = |x: &[f64], from: usize| {
+                    x[from..from + stride].iter().sum::<f64>() / stride as f64
+                };
                 let columns = [&joint.q, &joint.qd, &joint.qdd, &joint.tau];
                 let whole = columns.iter().map(|x| x.len()).min().unwrap_or(0) / stride;
                 for k in (0..whole.min(MOST.saturating_sub(rows.q[j].len()))).map(|k| k * stride) {
@@ -109,7 +110,10 @@ impl Rows {
     }
 
     /// The standard regressor of each joint's torque, rows × 14 n.
-    pub(super) fn regressors(&self, chain: &ChainBatch) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
+    pub(super) fn regressors(
+        &self,
+        chain: &ChainBatch,
+    ) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
         let (n, rows) = (chain.joint_count(), self.len());
         let width = n * COLUMNS;
         let mut all = vec![0.0; n * width * rows];
