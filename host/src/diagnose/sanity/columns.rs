@@ -128,13 +128,31 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 Implausible::Milliseconds { .. } => continue,
             };
             let joint = joint.saturating_sub(1);
-            if found.iter().all(|(j, ..)| *j != joint) {
-                let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
-                found.push((joint, fault(runs, "unit", name, format!("{problem}."))));
+            if found.iter().any(|(j, _)| *j == joint) {
+                continue;
             }
+            let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
+            let mut text = format!("{problem}.");
+            if let Some(ratio) = motor_angle(robot, run, joint) {
+                text = format!(
+                    "{text} Divided by the gear ratio {ratio} it would fit as well: it may be the motor's angle."
+                );
+            }
+            found.push((joint, fault(runs, "unit", name, text)));
         }
     }
     found
+}
+
+/// The gear ratio, where the position is beyond the joint's limits by about that much.
+fn motor_angle(robot: &Robot, run: &Run, joint: usize) -> Option<f64> {
+    let own = robot.joints.get(joint)?;
+    let [lower, upper] = own.limits.as_ref()?.position;
+    let reach = lower.abs().max(upper.abs());
+    let ratio = own.drive.as_ref()?.gear_ratio.abs();
+    let q = &run.joints.get(joint)?.q_raw;
+    let farthest = q.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+    (farthest > 5.0 * reach && farthest / ratio <= 1.2 * reach).then_some(ratio)
 }
 
 /// A measured velocity that is not the rate of change of the position.

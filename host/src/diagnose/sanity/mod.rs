@@ -14,6 +14,7 @@ mod fit;
 mod model;
 mod names;
 mod rows;
+mod senses;
 
 #[cfg(test)]
 mod tests;
@@ -73,8 +74,11 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         Vec::new()
     };
     if !units.is_empty() {
-        // What a wrong unit of one joint does to the others is its consequence.
-        judged.retain(|f| units.iter().any(|(_, fault)| fault.joint == f.joint));
+        // What a wrong unit of one joint does to the others is its consequence, as is what a wrong position makes of the
+        // torque.
+        let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
+        let of_torque = |f: &DataFault| f.text.starts_with("tau");
+        judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
     }
     // The model says more closely what the limits only notice.
     let mut found: Vec<DataFault> = units
