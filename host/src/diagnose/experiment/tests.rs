@@ -64,7 +64,7 @@ fn what_is_found_for_stribeck_against_presliding_separates_them_as_predicted() {
         effect(Kind::Stribeck, &[0.25], &[0.05]),
         effect(Kind::PreslidingDahl, &[0.4], &[0.01]),
     ];
-    // As much noise as leaves a finite task: nine standard deviations and more are decided by any motion.
+    // So much noise that the distance is moderate and the rival's freedom would show in it.
     let floor = 0.5;
     let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
     let (primitive, predicted) = best(&place, &rivals, floor).unwrap();

@@ -6,7 +6,8 @@
 //! others to judge.
 //!
 //! Leaves out: faults that leave the data consistent in themselves where the description states nothing (both signs
-//! reversed, one factor on everything); a fault that comes and goes within a recording; drives that move several
+//! reversed, one factor on everything); a late torque of a slow arm whose motion has few harmonics, which the
+//! model's many parameters take up; a fault that comes and goes within a recording; drives that move several
 //! joints enter with their joint's own inertia only.
 
 mod columns;

@@ -19,9 +19,6 @@ const BETTER: f64 = 0.35;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
 const MUCH_BETTER: f64 = 0.2;
 const GOOD: f64 = 0.2;
-/// The same where little is left to begin with.
-const WORTH_A_SHIFT: f64 = 0.005;
-const NEXT_TO_NOTHING: f64 = 0.1;
 /// Shifts up to this belong to filters and buses, not to clocks, s.
 const SHIFT: f64 = 0.1;
 /// Farthest shift that is tried, s; no more than a quarter of the recording.
@@ -143,20 +140,14 @@ impl<'a> Judge<'a> {
     /// A torque that belongs to another time than the motion.
     fn shifted(&self, j: usize) -> Option<DataFault> {
         let fit = self.fits[j].as_ref()?;
-        if fit.unexplained() < WORTH_A_SHIFT {
+        if fit.unexplained() < POOR {
             return None;
         }
         let time = self.rows.len() as f64 * self.rows.period;
         let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
         let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        // Of a slow motion a shift spoils little, but moved back it leaves next to nothing.
-        let better = if left[reach] < POOR {
-            NEXT_TO_NOTHING
-        } else {
-            BETTER
-        };
-        if left[reach] < WORTH_A_SHIFT || least > better * left[reach] || least > GOOD {
+        if left[reach] < POOR || least > BETTER * left[reach] || least > GOOD {
             return None;
         }
         // Of a periodic motion the nearest period.

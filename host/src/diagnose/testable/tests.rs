@@ -87,11 +87,7 @@ fn noise_of_the_encoder_is_no_reversal() {
     for (k, q) in joint.q_raw.iter_mut().enumerate() {
         *q += 1e-4 * (1.7 * k as f64).sin();
     }
-    joint.q = joint.q_raw.clone();
     // What the filter leaves of it is a tenth.
-    for (q, raw) in joint.q.iter_mut().zip(&joint.q_raw) {
-        *q -= 0.9 * (raw - *q);
-    }
     let raw = joint.q_raw.clone();
     for (k, q) in joint.q.iter_mut().enumerate() {
         *q = 0.1 * k as f64 / RATE + 0.1 * (raw[k] - 0.1 * k as f64 / RATE);
