@@ -14,6 +14,7 @@ mod writer;
 
 pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
+pub(crate) use plausibility::velocity_scale;
 pub use plausibility::{Implausible, plausibility};
 pub use source::{Blocks, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};

@@ -214,7 +214,7 @@ fn highest_speed(t: &[f64], q: &[f64]) -> Option<f64> {
 
 /// Least-squares factor between changes of q and the integral of qd over windows of twenty samples, if
 /// both go together.
-fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
+pub(crate) fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     const SPAN: usize = 20;
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for start in (SPAN..q.len()).step_by(SPAN) {

@@ -5,15 +5,18 @@ mod anchor;
 pub mod benchmark;
 mod columns;
 mod engine;
+pub mod experiment;
 mod fit;
 mod floor;
 mod locate;
 pub mod outcome;
 mod rows;
 pub mod runs;
+pub mod sanity;
 pub mod scenario;
 mod search;
 mod solve;
+pub mod testable;
 mod transmission;
 
 pub use engine::diagnose;

@@ -17,6 +17,8 @@ pub struct JointRun {
     pub qd: Vec<f64>,
     /// Acceleration, rad/s² or m/s².
     pub qdd: Vec<f64>,
+    /// Velocity as recorded, where it is; nothing is computed from it.
+    pub measured_velocity: Option<Vec<f64>>,
     /// Reference position, where recorded.
     pub reference: Option<Vec<f64>>,
     /// Motor voltage, where recorded, V.
@@ -101,6 +103,7 @@ fn append(run: &mut Run, block: Block) {
     for (to, from) in run.joints.iter_mut().zip(block.joints) {
         to.q_raw.extend(from.q);
         to.tau.extend(from.tau);
+        join(&mut to.measured_velocity, from.qd, before);
         join(&mut to.reference, from.reference, before);
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);

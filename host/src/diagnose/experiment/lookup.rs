@@ -1,0 +1,110 @@
+//! Pairs that no motion splits by its torque, and what does.
+
+use rig_shared::effects::Kind;
+
+use super::primitives::Family;
+
+/// What splits a pair.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Split {
+    /// Name in results.
+    pub(super) kind: &'static str,
+    /// What to do, record and expect, sentences; `{k}` stands for the joint's number.
+    pub(super) text: String,
+    /// The motion to run for it, where there is one.
+    pub(super) motion: Option<Family>,
+}
+
+const DRIVE_OFF: &str = "Record two seconds with the drive off: `rig record` without a trajectory leaves the rig disarmed. The mean of tau{k} (or i{k}) there is the sensor's own offset, because no current flows: about the size in question, it is current_offset; about zero, it is not. With u{k} recorded in motion the same shows as R times the offset between the voltage and what current and speed account for.";
+const TAKE_OFF: &str = "Take off what can pull on the joint (hoses, cables, a counterweight) or fix the link to its shaft half a turn further, and run the same motion again; record t, q{k} and tau{k}. A torque from outside goes or changes with it, friction that differs by direction stays. No motion alone tells the two apart: while the joint moves both are the same constant, and at rest they widen the same band.";
+const TURNED: &str = "Run the motion twice: as the robot stands, and with its base turned by 180 degrees about the vertical or, better, laid on its side so that gravity does nothing. Record t, q{k} and tau{k} each time and give both recordings. What belongs to gravity changes with the base; what belongs to the encoder, the gear or a cable stays.";
+const GRAVITY_CLOSES: &str = "Run the reversals where gravity is strongest, and again about a position where it does nothing; record t, q{k} and tau{k}. Gravity keeps the teeth together, so lost motion from backlash shows at the second place only; what winds up by friction or twist shows at both. A second encoder on the link would show it directly.";
+const FAST_AND_SLOW: &str = "Run the sine, and again at a third of its speed; record t, q{k} and tau{k}. An error of the encoder or of the timing grows with the square of the speed, inertia included; a torque of gear, gravity or cable stays the same at both.";
+const BEYOND_RESONANCE: &str = "Run the chirp, and again at a third of its amplitude; record t, q{k} and tau{k} at 500 Hz or more. A delay goes on turning the phase in proportion to the frequency; a twisting shaft has an antiresonance, which a payload moves to lower frequency; play changes with the amplitude.";
+const CURRENT_TOO: &str = "Record the motor's current i{k} beside its voltage u{k} during the reversals; with the shaft locked by hand or clamp, a few steps of the voltage each way do as well. What the bridge loses stands between voltage and current; friction stands in the current itself.";
+const ONE_AT_A_TIME: &str = "Run the motion of this joint alone, the others held, then that of the other joint alone, then both together; record t, q and tau of all joints. A coupling shows in this joint while only the other one moves; what belongs to this joint alone does not.";
+const LIFT: &str = "Run the sine at full speed; record t, q{k} and tau{k}, and give a description identified before the change as --robot. A payload adds inertia in a fixed proportion to its weight, a tilt adds none.";
+const TWO_LOADS: &str = "Run the constant speeds twice: as the robot is, and with a payload of about half the link's mass; record t, q{k} and tau{k} and give both recordings. What belongs to load or current grows with it, what belongs to the position or the magnets stays.";
+const COLD_AND_WARM: &str = "Run the motion from cold until the gear is warm, and keep the order of speeds random; record t, q{k}, tau{k} and, if there is a sensor, temp{k}. What falls with warmth changes from the first to the last period at the same speed; what depends on speed or current does not.";
+const WIDE: &str = "Run the sine over the whole range; record t, q{k} and tau{k}. Over more than two thirds of a turn a spring goes on growing where gravity turns back and a constant stays; taking the cable off and repeating decides it at any range.";
+const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What depends on the speed shows at constant speed, what remembers the last reversal has died out there.";
+const LOAD_OR_SPEED: &str = "Run the constant speeds; record t, q{k} and tau{k}. At constant speed no acceleration asks for torque, so that what is left belongs to the speed; what belongs to load or current shows where gravity is lifted slowly.";
+
+/// What splits `a` from `b`, names from the registry.
+pub(super) fn split(a: Kind, b: Kind) -> Split {
+    let [a_name, b_name] = [a.about().name, b.about().name];
+    let is = |x: &str, y: &str| (a_name == x && b_name == y) || (a_name == y && b_name == x);
+    let has = |x: &str| a_name == x || b_name == x;
+    let made = |kind, text: &str, motion| Split {
+        kind,
+        text: text.to_owned(),
+        motion,
+    };
+    if has("current_offset") {
+        made("drive-off-log", DRIVE_OFF, None)
+    } else if is("asymmetric_coulomb", "torque_offset") {
+        made("load-taken-off", TAKE_OFF, Some(Family::ConstantSpeeds))
+    } else if has("drive_deadzone") {
+        made(
+            "current-and-voltage",
+            CURRENT_TOO,
+            Some(Family::NestedReversals),
+        )
+    } else if has("inertia_coupling") {
+        made("one-joint-at-a-time", ONE_AT_A_TIME, Some(Family::Sine))
+    } else if is("joint_elasticity", "measurement_delay") {
+        made("chirp", BEYOND_RESONANCE, Some(Family::Chirp))
+    } else if has("backlash") || has("joint_elasticity") {
+        made(
+            Family::ReversalsUnderLoad.name(),
+            GRAVITY_CLOSES,
+            Some(Family::ReversalsUnderLoad),
+        )
+    } else if is("payload", "gravity_tilt") {
+        made("fast-lift", LIFT, Some(Family::Sine))
+    } else if is("spring", "gravity_tilt") || is("spring", "torque_offset") {
+        made("whole-range", WIDE, Some(Family::Sine))
+    } else if has("encoder_eccentricity") && !has("gravity_tilt") {
+        made("fast-and-slow", FAST_AND_SLOW, Some(Family::Sine))
+    } else if has("gravity_tilt") {
+        made("base-turned", TURNED, Some(Family::Sine))
+    } else if has("viscous_warmup") {
+        made("warm-up", COLD_AND_WARM, Some(Family::WarmUp))
+    } else if has("quadratic_drag") {
+        made(
+            Family::ConstantSpeeds.name(),
+            LOAD_OR_SPEED,
+            Some(Family::ConstantSpeeds),
+        )
+    } else if [
+        "torque_ripple",
+        "load_friction",
+        "cogging",
+        "torque_saturation",
+    ]
+    .into_iter()
+    .any(has)
+    {
+        made("payload-swap", TWO_LOADS, Some(Family::ConstantSpeeds))
+    } else if has("stribeck") || has("presliding") {
+        made(
+            Family::ConstantSpeeds.name(),
+            SPEEDS,
+            Some(Family::ConstantSpeeds),
+        )
+    } else {
+        let known = a.about().confused.iter().find(|c| c.with == b_name);
+        let known = known.or_else(|| b.about().confused.iter().find(|c| c.with == a_name));
+        Split {
+            kind: Family::ConstantSpeeds.name(),
+            text: format!(
+                "Run the constant speeds; record t, q{{k}} and tau{{k}}. What tells them apart: {}.",
+                known.map_or(
+                    "the same motion with another payload and at another speed",
+                    |c| c.separated_by
+                )
+            ),
+            motion: Some(Family::ConstantSpeeds),
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! What to record next so that rivals come apart.
+//!
+//! From a library of safe motions, each over amplitudes and speeds within the robot's limits, the one along which the
+//! rivals' predictions lie farthest apart, the loser refitted each time (T-optimality: Atkinson and Fedorov 1975,
+//! Biometrika 62). Pairs that are the same function of torque and motion go by what splits them instead: another
+//! channel, another load, another direction of gravity.
+//!
+//! Leaves out: ranges of cranks and regions of the workspace; the posteriors of the rivals' parameters, of which the
+//! estimates stand for all; the other joints, which stand in the middle of their ranges.
+
+mod criterion;
+mod lookup;
+mod place;
+mod primitives;
+
+#[cfg(test)]
+mod tests;
+
+use rig_shared::effects::{Effect, Kind};
+use rig_shared::trajectory::Trajectory;
+
+pub use criterion::FLOOR_RATE;
+pub use place::Nominal;
+pub use primitives::{Family, Hands};
+
+use super::DiagnoseError;
+use super::outcome::NextExperiment;
+use crate::excite::{JointTrajectory, TrajectoryFile};
+use crate::robot::Robot;
+
+use criterion::{Course, predictable};
+use lookup::split;
+use place::Place;
+use primitives::{Primitive, of_family};
+
+/// The file that the experiment's text speaks of; the caller writes it beside `diagnosis.json`.
+pub const FILE: &str = "next_experiment.toml";
+/// Fewer standard deviations than this decide nothing.
+const DECIDES: f64 = 5.0;
+/// What needs hands must do so much better than what does not.
+const WORTH_HANDS: f64 = 2.0;
+
+/// What to do next, with the motion for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// For the diagnosis.
+    pub experiment: NextExperiment,
+    /// To be written as [`FILE`]; none where no motion helps.
+    pub trajectory: Option<TrajectoryFile>,
+}
+
+/// The experiment that tells `rivals` of one joint (from 0) apart: each an effect with its estimate and the joint's
+/// nominal parameters estimated beside it. `floor` is the noise of its torque, N·m or N, as RMS after the low-pass, so of
+/// about [`FLOOR_RATE`] independent values a second.
+///
+/// None where there are fewer than two rivals.
+///
+/// # Errors
+/// [`DiagnoseError::Model`] where the description's geometry is no chain.
+pub fn next(
+    robot: &Robot,
+    joint: usize,
+    rivals: &[(Effect<f64>, Nominal)],
+    floor: f64,
+) -> Result<Option<Proposal>, DiagnoseError> {
+    let Some((_, nominal)) = rivals.first().filter(|_| rivals.len() > 1) else {
+        return Ok(None);
+    };
+    let place = Place::of(robot, joint, *nominal)?;
+    let pairs = || {
+        let each = rivals.iter().enumerate();
+        each.flat_map(|(i, a)| rivals[..i].iter().map(move |b| (b, a)))
+    };
+    let hopeless = pairs().find(|(a, b)| exact(a.0.kind, b.0.kind));
+    let hidden = pairs().find(|(a, b)| !predictable(a.0.kind) || !predictable(b.0.kind));
+    if let Some((a, b)) = hopeless.or(hidden) {
+        let names = names(rivals);
+        return Ok(Some(by_lookup(
+            robot,
+            joint,
+            place.as_ref(),
+            a.0.kind,
+            b.0.kind,
+            names,
+        )));
+    }
+    let found = place.as_ref().and_then(|place| best(place, rivals, floor));
+    let Some((primitive, apart)) = found.filter(|(_, apart)| *apart >= DECIDES) else {
+        let closest = pairs().next();
+        return Ok(closest.map(|(a, b)| {
+            by_lookup(
+                robot,
+                joint,
+                place.as_ref(),
+                a.0.kind,
+                b.0.kind,
+                names(rivals),
+            )
+        }));
+    };
+    let stand = place.map_or_else(Vec::new, |p| p.stand);
+    let mut text = running(robot, &primitive);
+    if primitive.hands != Hands::None {
+        text.push(' ');
+        text.push_str(primitive.hands.text());
+    }
+    text.push_str(&format!(
+        " Give what it records with --data beside the others: the predictions of the rivals lie {apart:.0} standard deviations of the noise apart along it."
+    ));
+    let kind = match primitive.hands {
+        Hands::None => primitive.family.name().to_owned(),
+        Hands::Payload => format!("payload-swap: {}", primitive.family.name()),
+        Hands::BaseOnItsSide => format!("base-turned: {}", primitive.family.name()),
+    };
+    Ok(Some(Proposal {
+        experiment: NextExperiment {
+            kind,
+            separates: names(rivals),
+            text,
+            file: Some(FILE.to_owned()),
+            separation: Some(apart),
+            duration: Some(primitive.hands.passes().len() as f64 * primitive.trajectory.duration()),
+        },
+        trajectory: Some(file_of(robot, joint, &stand, &primitive)),
+    }))
+}
+
+fn names(rivals: &[(Effect<f64>, Nominal)]) -> Vec<String> {
+    let mut list: Vec<String> = Vec::new();
+    for (effect, _) in rivals {
+        let about = effect.kind.about();
+        let shared = rivals
+            .iter()
+            .filter(|(e, _)| e.kind.about().name == about.name)
+            .count();
+        list.push(match about.law {
+            Some(law) if shared > 1 => format!("{} ({law})", about.name),
+            _ => about.name.to_owned(),
+        });
+    }
+    list
+}
+
+/// Whether the registry has the two as the same function of torque and motion.
+fn exact(a: Kind, b: Kind) -> bool {
+    let says = |x: Kind, y: Kind| {
+        let all = x.about().confused.iter();
+        all.clone().any(|c| c.exact && c.with == y.about().name)
+    };
+    says(a, b) || says(b, a)
+}
+
+/// A motion and how far apart the closest rivals lie along it, standard deviations.
+type Apart = (Primitive, f64);
+
+/// Distance that the same motion would give in one second: what lasts longer decides more by lasting alone.
+fn rate((primitive, apart): &Apart) -> f64 {
+    let passes = primitive.hands.passes().len() as f64;
+    apart / (passes * primitive.trajectory.duration()).max(1.0).sqrt()
+}
+
+/// The motion that takes the closest pair apart fastest, of those that decide; where none does, the one that takes them
+/// farthest.
+fn best(place: &Place, rivals: &[(Effect<f64>, Nominal)], floor: f64) -> Option<Apart> {
+    let mut chosen: Option<Apart> = None;
+    for hands in [Hands::None, Hands::Payload, Hands::BaseOnItsSide] {
+        // What decides without hands is not asked for with them.
+        if chosen.as_ref().is_some_and(|(_, apart)| *apart >= DECIDES) {
+            break;
+        }
+        let mut own: Option<Apart> = None;
+        for family in Family::ALL {
+            for primitive in of_family(place, family, hands) {
+                let course = Course::of(place, &primitive);
+                let apart = closest(&course, rivals, place.revolute, floor);
+                let new = (primitive, apart);
+                let better =
+                    own.as_ref()
+                        .is_none_or(|old| match (apart >= DECIDES, old.1 >= DECIDES) {
+                            (true, true) => rate(&new) > rate(old),
+                            _ => apart > old.1,
+                        });
+                if better {
+                    own = Some(new);
+                }
+            }
+        }
+        let least = chosen
+            .as_ref()
+            .map_or(0.0, |(_, apart)| WORTH_HANDS * apart);
+        if let Some(own) = own.filter(|(_, apart)| *apart > least) {
+            chosen = Some(own);
+        }
+    }
+    chosen
+}
+
+/// Standard deviations between the closest two rivals, whichever of them is true.
+fn closest(course: &Course, rivals: &[(Effect<f64>, Nominal)], revolute: bool, floor: f64) -> f64 {
+    let mut least = f64::INFINITY;
+    for (i, truth) in rivals.iter().enumerate() {
+        for (j, (rival, _)) in rivals.iter().enumerate() {
+            if i != j {
+                least = least.min(course.separation(truth, rival, revolute, floor));
+            }
+        }
+    }
+    least.max(0.0).sqrt()
+}
+
+/// How the motion is run, sentences.
+fn running(robot: &Robot, primitive: &Primitive) -> String {
+    let (start, seconds) = (primitive.start, primitive.trajectory.duration());
+    let how = if robot.joints.len() == 1 {
+        format!(
+            "bring the joint to {start:.4} and run it with `rig record --robot R --trajectory {FILE} --home {start:.4} --out next.csv`"
+        )
+    } else {
+        format!(
+            "bring the joint to {start:.4}, the others to the middle of their ranges, and let your controller follow it; `rig simulate` shows it first"
+        )
+    };
+    format!(
+        "{FILE} holds {} about {start:.4}, {seconds:.0} s: {how}.",
+        primitive.figures
+    )
+}
+
+fn file_of(robot: &Robot, joint: usize, stand: &[f64], primitive: &Primitive) -> TrajectoryFile {
+    let hold = primitive
+        .trajectory
+        .duration_micros()
+        .min(u64::from(u32::MAX)) as u32;
+    let joints = robot.joints.iter().enumerate().map(|(j, own)| {
+        let moves = j == joint;
+        JointTrajectory {
+            name: own.name.clone(),
+            start: if moves {
+                primitive.start
+            } else {
+                stand.get(j).copied().unwrap_or(0.0)
+            },
+            trajectory: if moves {
+                primitive.trajectory.clone()
+            } else {
+                Trajectory::Hold(hold)
+            },
+        }
+    });
+    TrajectoryFile {
+        robot: robot.name.clone(),
+        design: None,
+        joints: joints.collect(),
+    }
+}
+
+/// By what splits the pair, with the widest motion of the family that it asks for.
+fn by_lookup(
+    robot: &Robot,
+    joint: usize,
+    place: Option<&Place>,
+    a: Kind,
+    b: Kind,
+    separates: Vec<String>,
+) -> Proposal {
+    let found = split(a, b);
+    let mut text = found.text.replace("{k}", &(joint + 1).to_string());
+    let motion = found.motion.zip(place).and_then(|(family, place)| {
+        let list = of_family(place, family, Hands::None);
+        list.into_iter().next().map(|p| (p, place.stand.clone()))
+    });
+    if let Some((primitive, _)) = &motion {
+        text = format!("{text} {}", running(robot, primitive));
+    }
+    Proposal {
+        experiment: NextExperiment {
+            kind: found.kind.to_owned(),
+            separates,
+            text,
+            file: motion.as_ref().map(|_| FILE.to_owned()),
+            separation: None,
+            duration: motion.as_ref().map(|(p, _)| p.trajectory.duration()),
+        },
+        trajectory: motion.map(|(primitive, stand)| file_of(robot, joint, &stand, &primitive)),
+    }
+}

@@ -1,0 +1,291 @@
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::path::Path;
+
+use nalgebra::DVector;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rig_shared::safety::Limits;
+
+use super::criterion::access;
+use super::*;
+use crate::robot::{EMPS, ONE_LINK_TEMPLATE, template};
+
+fn robot() -> Robot {
+    Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
+}
+
+/// About what the template states.
+const NOMINAL: Nominal = [0.17, 2.94, 0.0, 0.3, 0.4, 0.0];
+
+fn effect(kind: Kind, gains: &[f64], shapes: &[f64]) -> (Effect<f64>, Nominal) {
+    let mut made = Effect {
+        kind,
+        gains: [0.0; 4],
+        shapes: [0.0; 3],
+    };
+    made.gains[..gains.len()].copy_from_slice(gains);
+    made.shapes[..shapes.len()].copy_from_slice(shapes);
+    (made, NOMINAL)
+}
+
+fn middle_of_range(kind: Kind) -> (Effect<f64>, Nominal) {
+    let of = |list: &[rig_shared::effects::Parameter]| -> Vec<f64> {
+        list.iter()
+            .map(|p| (p.range[0] * p.range[1]).abs().sqrt())
+            .collect()
+    };
+    let about = kind.about();
+    effect(kind, &of(about.gains), &of(about.shapes))
+}
+
+fn within_limits(robot: &Robot, file: &TrajectoryFile) {
+    for (joint, own) in robot.joints.iter().zip(&file.joints) {
+        let limits = joint.limits.as_ref().unwrap();
+        let limits = Limits {
+            position_low: limits.position[0],
+            position_high: limits.position[1],
+            velocity: limits.velocity,
+            acceleration: limits.acceleration.unwrap_or(f64::MAX),
+            ..Limits::default()
+        };
+        own.trajectory
+            .to_f32()
+            .to_f64()
+            .check(&limits, own.start)
+            .unwrap();
+    }
+}
+
+#[test]
+fn what_is_found_for_stribeck_against_presliding_separates_them_as_predicted() {
+    let robot = robot();
+    let rivals = [
+        effect(Kind::Stribeck, &[0.25], &[0.05]),
+        effect(Kind::PreslidingDahl, &[0.4], &[0.01]),
+    ];
+    // So much noise that the distance is moderate and the rival's freedom would show in it.
+    let floor = 0.5;
+    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let (primitive, predicted) = best(&place, &rivals, floor).unwrap();
+    println!(
+        "{:?} {}: {predicted:.2}",
+        primitive.family, primitive.figures
+    );
+    let course = Course::of(&place, &primitive);
+    let mut random = rand_pcg::Pcg64::seed_from_u64(5);
+    let mut least = f64::INFINITY;
+    for (truth, other) in [(0, 1), (1, 0)] {
+        let (truth, other) = (&rivals[truth].0, &rivals[other].0);
+        let (standard, own) = access::rows(&course, truth, &NOMINAL, true);
+        let nominal = DVector::from_fn(standard.ncols(), |c, _| 0.3 + 0.1 * c as f64);
+        let clean = &standard * nominal + own * DVector::from_column_slice(&truth.gains[..1]);
+        // One row stands for `weight` independent values.
+        let weight = primitive.trajectory.duration() * FLOOR_RATE
+            / (primitive.trajectory.duration() * FLOOR_RATE)
+                .ceil()
+                .min(4000.0);
+        let sigma = floor / weight.sqrt();
+        let mut gain = 0.0;
+        const RUNS: usize = 40;
+        for _ in 0..RUNS {
+            let noise = DVector::from_fn(clean.len(), |_, _| {
+                let unit: f64 = StandardNormal.sample(&mut random);
+                sigma * unit
+            });
+            let y = &clean + noise;
+            let wrong = access::best(&course, other, &NOMINAL, true, &y);
+            let right = access::best(&course, truth, &NOMINAL, true, &y);
+            gain += (wrong - right) / (sigma * sigma) / RUNS as f64;
+        }
+        println!(
+            "{:?}: gain {gain:.2}, {:.2} standard deviations",
+            truth.kind,
+            gain.sqrt()
+        );
+        least = least.min(gain.max(0.0).sqrt());
+    }
+    assert!(
+        (least / predicted - 1.0).abs() < 0.2,
+        "{least} against {predicted}"
+    );
+    assert!(predicted > DECIDES);
+}
+
+#[test]
+fn the_choice_beats_the_other_motions_and_fits_the_limits_and_the_rig() {
+    let robot = robot();
+    let rivals = [
+        effect(Kind::Stribeck, &[0.25], &[0.05]),
+        effect(Kind::PreslidingDahl, &[0.4], &[0.01]),
+    ];
+    let began = std::time::Instant::now();
+    let found = next(&robot, 0, &rivals, 0.05).unwrap().unwrap();
+    println!("{:?}: {}", began.elapsed(), found.experiment.text);
+    let file = found.trajectory.unwrap();
+    within_limits(&robot, &file);
+    let text = file.to_toml(&robot);
+    assert_eq!(
+        TrajectoryFile::from_toml(&text, Path::new(FILE)).unwrap(),
+        file
+    );
+    assert_eq!(found.experiment.separates, ["stribeck", "presliding"]);
+    let apart = found.experiment.separation.unwrap();
+    let chosen = apart / found.experiment.duration.unwrap().sqrt();
+    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let mut least = f64::INFINITY;
+    for family in Family::ALL {
+        for primitive in of_family(&place, family, Hands::None) {
+            let other = closest(&Course::of(&place, &primitive), &rivals, true, 0.05);
+            let other = (primitive, other);
+            assert!(rate(&other) <= chosen * (1.0 + 1e-9), "{family:?}");
+            least = least.min(rate(&other));
+        }
+    }
+    println!("{chosen:.3} a root second, the worst motion {least:.3}");
+    assert!(least < 0.3 * chosen);
+}
+
+#[test]
+fn motions_of_every_family_respect_limits_and_torque() {
+    for name in ["one-link", "emps", "edda", "irp6"] {
+        let robot = Robot::from_toml(template(name).unwrap(), Path::new(name)).unwrap();
+        let mut count = 0;
+        for joint in 0..robot.joints.len() {
+            let nominal = if name == "one-link" {
+                NOMINAL
+            } else {
+                [0.0; 6]
+            };
+            let place = Place::of(&robot, joint, nominal).unwrap().unwrap();
+            for family in Family::ALL {
+                for primitive in of_family(&place, family, Hands::None) {
+                    within_limits(&robot, &file_of(&robot, joint, &place.stand, &primitive));
+                    count += 1;
+                }
+            }
+        }
+        println!("{name}: {count} motions");
+        assert!(count > 10 * robot.joints.len());
+    }
+    // A link too heavy for its motor is not asked to move.
+    let mut weak = robot();
+    weak.joints[0].limits.as_mut().unwrap().torque = Some(0.5);
+    let place = Place::of(&weak, 0, NOMINAL).unwrap().unwrap();
+    assert!(
+        Family::ALL
+            .iter()
+            .all(|f| of_family(&place, *f, Hands::None).is_empty())
+    );
+}
+
+#[test]
+fn hands_are_asked_for_only_where_no_motion_decides() {
+    let rivals = [
+        effect(Kind::LoadFriction, &[0.1], &[]),
+        effect(Kind::Cogging, &[0.1, 0.0], &[12.0]),
+    ];
+    let easy = next(&robot(), 0, &rivals, 0.05).unwrap().unwrap();
+    println!("{} {}", easy.experiment.kind, easy.experiment.text);
+    assert!(!easy.experiment.kind.contains("payload"));
+    // In noise that no motion overcomes the answer is what grows with the load.
+    let rivals = [
+        effect(Kind::Cogging, &[0.02, 0.0], &[12.0]),
+        effect(Kind::TorqueRipple, &[0.007, 0.0], &[12.0]),
+    ];
+    let found = next(&robot(), 0, &rivals, 5.0).unwrap().unwrap();
+    println!("{} {}", found.experiment.kind, found.experiment.text);
+    assert!(found.experiment.kind.contains("payload-swap"));
+}
+
+#[test]
+fn every_confused_pair_of_the_registry_has_an_answer() {
+    let robot = robot();
+    let began = std::time::Instant::now();
+    let mut seen: Vec<[&str; 2]> = Vec::new();
+    for kind in Kind::ALL {
+        let about = kind.about();
+        for confusion in about.confused {
+            let other =
+                Kind::named(confusion.with, None).unwrap_or_else(|| panic!("{}", confusion.with));
+            let mut pair = [about.name, confusion.with];
+            pair.sort_unstable();
+            if seen.contains(&pair) {
+                continue;
+            }
+            seen.push(pair);
+            let rivals = [middle_of_range(*kind), middle_of_range(other)];
+            let found = next(&robot, 0, &rivals, 0.05).unwrap().unwrap();
+            let e = &found.experiment;
+            println!(
+                "{} / {}: {} {:?} {:?} s: {}",
+                pair[0], pair[1], e.kind, e.separation, e.duration, e.text
+            );
+            assert!(e.text.len() > 40 && !e.text.contains('{'));
+            assert_eq!(e.file.is_some(), found.trajectory.is_some());
+            if confusion.exact {
+                // No motion is promised to do it.
+                assert_eq!(e.separation, None);
+            }
+            if let Some(file) = &found.trajectory {
+                within_limits(&robot, file);
+            }
+        }
+    }
+    println!("{} pairs in {:?}", seen.len(), began.elapsed());
+    assert!(seen.len() > 15);
+}
+
+#[test]
+fn exact_pairs_ask_for_another_channel_or_another_load() {
+    let robot = robot();
+    let pair = |a: Kind, b: Kind| {
+        next(&robot, 0, &[middle_of_range(a), middle_of_range(b)], 0.05)
+            .unwrap()
+            .unwrap()
+    };
+    let off = pair(Kind::CurrentOffset, Kind::AsymmetricCoulomb);
+    assert_eq!(off.experiment.kind, "drive-off-log");
+    assert!(off.experiment.text.contains("i1") && off.trajectory.is_none());
+    let taken = pair(Kind::TorqueOffset, Kind::AsymmetricCoulomb);
+    assert_eq!(taken.experiment.kind, "load-taken-off");
+    // The torque domain agrees that no motion splits them.
+    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let rivals = [
+        effect(Kind::TorqueOffset, &[0.2], &[]),
+        effect(Kind::AsymmetricCoulomb, &[0.2], &[]),
+    ];
+    assert!(best(&place, &rivals, 0.05).is_none_or(|(_, apart)| apart < 1e-3));
+}
+
+#[test]
+fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
+    assert_eq!(
+        next(&robot(), 0, &[middle_of_range(Kind::Stribeck)], 0.05).unwrap(),
+        None
+    );
+    let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
+    let nominal = [95.0, 0.0, 0.0, 203.0, 20.0, -3.0];
+    let rivals = [
+        (
+            Effect {
+                kind: Kind::Stribeck,
+                gains: [5.0, 0.0, 0.0, 0.0],
+                shapes: [0.005, 0.0, 0.0],
+            },
+            nominal,
+        ),
+        (
+            Effect {
+                kind: Kind::PreslidingDahl,
+                gains: [20.0, 0.0, 0.0, 0.0],
+                shapes: [1e-4, 0.0, 0.0],
+            },
+            nominal,
+        ),
+    ];
+    let found = next(&emps, 0, &rivals, 2.0).unwrap().unwrap();
+    println!("{}", found.experiment.text);
+    within_limits(&emps, &found.trajectory.unwrap());
+    assert!(found.experiment.separation.unwrap() > DECIDES);
+}

@@ -1,0 +1,235 @@
+//! What the columns say about themselves and each other, without a model.
+
+use super::super::Run;
+use super::super::outcome::DataFault;
+use super::names;
+use crate::data::{Block, Implausible, JointColumns, plausibility, velocity_scale};
+use crate::robot::{JointKind, Robot};
+
+/// Less than this cannot hold a reversal and a repetition of it, s.
+const SHORTEST: f64 = 1.0;
+/// Fewer rows than this cannot hold the parameters of one joint.
+const FEWEST: usize = 100;
+/// Share of the moving time at the torque limit that leaves too little to learn from.
+const AT_LIMIT: f64 = 0.2;
+
+/// The name of the recording.
+pub(super) fn label(runs: &[&Run]) -> String {
+    runs.first()
+        .map_or_else(String::new, |run| run.label.clone())
+}
+
+/// A fault of the recording.
+pub(super) fn fault(runs: &[&Run], kind: &str, joint: &str, text: String) -> DataFault {
+    DataFault {
+        kind: kind.to_owned(),
+        recording: label(runs),
+        joint: joint.to_owned(),
+        text,
+    }
+}
+
+/// Furthest distance between filtered positions, over what the filter takes for noise.
+fn motion(run: &Run, joint: usize) -> (f64, f64) {
+    let Some(own) = run.joints.get(joint) else {
+        return (0.0, 0.0);
+    };
+    let (low, high) = own
+        .q
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        });
+    let noise = own.q.iter().zip(&own.q_raw);
+    let noise = noise.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / own.q.len().max(1) as f64;
+    ((high - low).max(0.0), noise.sqrt())
+}
+
+/// Whether a joint moves at all: by more than its noise and than a hundredth of a millirad.
+pub(super) fn moves(run: &Run, joint: usize) -> bool {
+    let (range, noise) = motion(run, joint);
+    range > 1e-5 && range > 8.0 * noise
+}
+
+/// The time covered, or what stands in the way of judging anything.
+pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
+    let rows: usize = runs.iter().map(|run| run.len()).sum();
+    let time: f64 = runs
+        .iter()
+        .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
+        .sum();
+    (rows < FEWEST || time < SHORTEST).then(|| {
+        fault(
+            runs,
+            "too-short",
+            "",
+            format!(
+                "The recording holds {rows} rows, {time:.2} s; at least {FEWEST} rows and {SHORTEST} s are needed, half a minute with reversals would be right."
+            ),
+        )
+    })
+}
+
+/// The unit of time by its steps.
+pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
+    let mut steps: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| run.t.windows(2).map(|w| w[1] - w[0]))
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let block = Block {
+        t: vec![0.0, *steps.get(steps.len() / 2)?],
+        ..Block::default()
+    };
+    plausibility(&block, robot).first().map(|found| {
+        let Implausible::Milliseconds { step } = found else {
+            return fault(runs, "clock", "", found.to_string());
+        };
+        // A recording in milliseconds has fewer than 200 of them between rows, one in microseconds no fewer.
+        let unit = if *step >= 200.0 {
+            "microseconds"
+        } else {
+            "milliseconds"
+        };
+        fault(
+            runs,
+            "clock",
+            "",
+            format!("t looks like {unit}: its steps are {step:.4}, where seconds would be right."),
+        )
+    })
+}
+
+/// What the plausibility of units says, once a joint.
+pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
+    let mut found: Vec<(usize, DataFault)> = Vec::new();
+    for run in runs {
+        let block = Block {
+            t: run.t.clone(),
+            joints: run
+                .joints
+                .iter()
+                .map(|joint| JointColumns {
+                    q: joint.q_raw.clone(),
+                    tau: joint.tau.clone(),
+                    ..JointColumns::default()
+                })
+                .collect(),
+            ..Block::default()
+        };
+        for problem in plausibility(&block, robot) {
+            let joint = match &problem {
+                Implausible::Degrees { joint, .. }
+                | Implausible::Position { joint, .. }
+                | Implausible::Velocity { joint, .. }
+                | Implausible::VelocityScale { joint, .. }
+                | Implausible::EffortTooLarge { joint, .. }
+                | Implausible::EffortTooSmall { joint, .. } => *joint,
+                Implausible::Milliseconds { .. } => continue,
+            };
+            let joint = joint.saturating_sub(1);
+            if found.iter().any(|(j, _)| *j == joint) {
+                continue;
+            }
+            let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
+            let mut text = format!("{problem}.");
+            if let Some(ratio) = motor_angle(robot, run, joint) {
+                text = format!(
+                    "{text} Divided by the gear ratio {ratio} it would fit as well: it may be the motor's angle."
+                );
+            }
+            found.push((joint, fault(runs, "unit", name, text)));
+        }
+    }
+    found
+}
+
+/// The gear ratio, where the position is beyond the joint's limits by about that much.
+fn motor_angle(robot: &Robot, run: &Run, joint: usize) -> Option<f64> {
+    let own = robot.joints.get(joint)?;
+    let [lower, upper] = own.limits.as_ref()?.position;
+    let reach = lower.abs().max(upper.abs());
+    let ratio = own.drive.as_ref()?.gear_ratio.abs();
+    let q = &run.joints.get(joint)?.q_raw;
+    let farthest = q.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+    (farthest > 5.0 * reach && farthest / ratio <= 1.2 * reach).then_some(ratio)
+}
+
+/// A measured velocity that is not the rate of change of the position.
+pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
+    let joint = robot.joints.get(k)?;
+    let run = runs.iter().max_by_key(|run| run.len())?;
+    let own = run.joints.get(k)?;
+    let factor = velocity_scale(&run.t, &own.q_raw, own.measured_velocity.as_ref()?)?;
+    // A filter or another joint's share may take a part of it; units and ratios take more.
+    if (0.5..2.0).contains(&factor) {
+        return None;
+    }
+    let n = k + 1;
+    let unit = match joint.kind {
+        JointKind::Revolute => "rad/s",
+        JointKind::Prismatic => "m/s",
+    };
+    if (-2.0..-0.5).contains(&factor) {
+        return Some(fault(
+            runs,
+            "sign",
+            &joint.name,
+            format!(
+                "qd{n} has the opposite sign of the change of q{n} over time; reverse one of them."
+            ),
+        ));
+    }
+    let named = names::of_velocity(joint, factor)
+        .map(|name| format!("qd{n} looks like {name}; give it in {unit}"))
+        .or_else(|| names::of_position(joint, 1.0 / factor).map(|name| format!("of q{n}, {name}")));
+    let what = named.unwrap_or_else(|| {
+        format!(
+            "give it in {unit}, and check the gear ratio, the counts of the encoder and the clock"
+        )
+    });
+    let kind = if what.contains("gear") {
+        "ratio"
+    } else {
+        "unit"
+    };
+    Some(fault(
+        runs,
+        kind,
+        &joint.name,
+        format!(
+            "qd{n} is {:.4} times the change of q{n} over time; {what}.",
+            1.0 / factor
+        ),
+    ))
+}
+
+/// A torque that stays at its limit while the joint moves.
+pub(super) fn at_limit(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault> {
+    let joint = robot.joints.get(k)?;
+    let limit = joint.limits.as_ref()?.torque?;
+    let own = || runs.iter().filter_map(|run| run.joints.get(k));
+    let fastest = own()
+        .flat_map(|j| &j.qd)
+        .fold(0.0f64, |most, v| most.max(v.abs()));
+    let moving = own()
+        .flat_map(|j| j.qd.iter().zip(&j.tau))
+        .filter(|(qd, _)| qd.abs() > 0.05 * fastest);
+    let (count, at) = moving.fold((0usize, 0usize), |(count, at), (_, tau)| {
+        let share = tau.abs() / limit;
+        (count + 1, at + usize::from((0.98..1.02).contains(&share)))
+    });
+    let share = at as f64 / count.max(1) as f64;
+    (share > AT_LIMIT).then(|| {
+        fault(
+            runs,
+            "saturation",
+            &joint.name,
+            format!(
+                "tau{} stands at its limit of {limit} for {:.0} % of the time in motion; record a motion that needs less.",
+                k + 1,
+                100.0 * share
+            ),
+        )
+    })
+}

@@ -1,0 +1,304 @@
+//! What a refitted simple model says of clocks, cuts and the scales of positions.
+
+use nalgebra::DMatrix;
+
+use super::super::outcome::DataFault;
+use super::super::{DiagnoseError, Run};
+use super::columns::fault;
+use super::fit::{Fit, Measured};
+use super::names;
+use super::rows::Rows;
+use crate::batch::ChainBatch;
+use crate::identify::{chain_of, preference};
+use crate::robot::{JointKind, Robot};
+
+/// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
+const POOR: f64 = 0.1;
+/// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
+const BETTER: f64 = 0.35;
+/// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
+const MUCH_BETTER: f64 = 0.2;
+const GOOD: f64 = 0.2;
+/// Shifts up to this belong to filters and buses, not to clocks, s.
+const SHIFT: f64 = 0.1;
+/// Farthest shift that is tried, s; no more than a quarter of the recording.
+const FARTHEST: f64 = 5.0;
+/// Rows of one trial of several joints.
+const TRIAL: usize = 500;
+
+/// One recording against models of the robot.
+pub(super) struct Judge<'a> {
+    pub(super) robot: &'a Robot,
+    runs: &'a [&'a Run],
+    pub(super) chain: ChainBatch,
+    pub(super) rows: Rows,
+    order: Vec<usize>,
+    matrices: Vec<DMatrix<f64>>,
+    pub(super) fits: Vec<Option<Fit>>,
+}
+
+pub(super) fn model_error(error: impl ToString) -> DiagnoseError {
+    DiagnoseError::Model(error.to_string())
+}
+
+impl<'a> Judge<'a> {
+    pub(super) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
+        let chain = ChainBatch::new(&chain_of(robot).map_err(model_error)?);
+        let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
+        let rows = Rows::of(runs, robot.joints.len());
+        let order = preference(&kinds);
+        let matrices = rows.regressors(&chain)?;
+        let fits = matrices
+            .iter()
+            .zip(&rows.tau)
+            .map(|(x, y)| Fit::of(x, y, &order))
+            .collect();
+        Ok(Self {
+            robot,
+            runs,
+            chain,
+            rows,
+            order,
+            matrices,
+            fits,
+        })
+    }
+
+    /// Everything that the torque says; the first that is wrong with the times or scales of positions ends the search,
+    /// because all else follows from it.
+    pub(super) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
+        if !clipped.is_empty() {
+            return Ok(clipped);
+        }
+        let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();
+        if !shifted.is_empty() {
+            return Ok(shifted);
+        }
+        let scaled = self.positions()?;
+        if !scaled.is_empty() {
+            return Ok(scaled);
+        }
+        let mut found = Vec::new();
+        for j in 0..n {
+            found.extend(self.against_description(j)?);
+            if found.iter().all(|f: &DataFault| f.joint != self.name(j))
+                && let Some(fault) = self.sign(j)?
+            {
+                found.push(fault);
+            }
+        }
+        Ok(found)
+    }
+
+    fn name(&self, joint: usize) -> &str {
+        &self.robot.joints[joint].name
+    }
+
+    pub(super) fn say(&self, kind: &str, joint: usize, text: String) -> DataFault {
+        fault(self.runs, kind, self.name(joint), text)
+    }
+
+    /// A torque that was cut where the motion needs more: a fit to the rest goes on beyond the cut.
+    fn clipped(&self, j: usize) -> Option<DataFault> {
+        let cut = &self.rows.cut[j];
+        let (at, free): (Vec<usize>, Vec<usize>) = (0..cut.len()).partition(|k| cut[*k] > 0.5);
+        if at.len() < 10 || 50 * at.len() < cut.len() {
+            return None;
+        }
+        let tau = &self.rows.tau[j];
+        // Rows that hold part of a cut are neither.
+        let free: Vec<usize> = free.into_iter().filter(|k| cut[*k] == 0.0).collect();
+        let rest: Vec<f64> = free.iter().map(|k| tau[*k]).collect();
+        let fit = Fit::of(&self.matrices[j].select_rows(&free), &rest, &self.order)?;
+        let noise = (fit.residual.norm_squared() / rest.len() as f64).sqrt();
+        let beyond = fit.predict(&self.matrices[j].select_rows(&at));
+        let middle = 0.5 * (extreme(tau, f64::max) + extreme(tau, f64::min));
+        let excess = at
+            .iter()
+            .zip(&beyond)
+            .map(|(k, predicted)| (predicted - tau[*k]) * (tau[*k] - middle).signum())
+            .sum::<f64>()
+            / at.len() as f64;
+        let level = at.iter().map(|k| tau[*k].abs()).sum::<f64>() / at.len() as f64;
+        (excess > 3.0 * noise / (at.len() as f64).sqrt() && excess > noise.max(0.05 * level)).then(
+            || {
+                self.say(
+                    "saturation",
+                    j,
+                    format!(
+                        "tau{} is cut at {level:.4} for {:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less.",
+                        j + 1,
+                        100.0 * at.len() as f64 / cut.len() as f64
+                    ),
+                )
+            },
+        )
+    }
+
+    /// A torque that belongs to another time than the motion.
+    fn shifted(&self, j: usize) -> Option<DataFault> {
+        let fit = self.fits[j].as_ref()?;
+        if fit.unexplained() < POOR {
+            return None;
+        }
+        let time = self.rows.len() as f64 * self.rows.period;
+        let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
+        let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        if left[reach] < POOR || least > BETTER * left[reach] || least > GOOD {
+            return None;
+        }
+        // Of a periodic motion the nearest period.
+        let at = (0..left.len())
+            .filter(|k| left[*k] <= 1.3 * least)
+            .min_by_key(|k| k.abs_diff(reach))?;
+        let shift = (at as f64 - reach as f64) * self.rows.period;
+        (shift.abs() > SHIFT).then(|| {
+            let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
+            self.say(
+                "clock",
+                j,
+                format!(
+                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.0} % of its variance, as recorded {:.0} %; give both by one clock.",
+                    j + 1,
+                    shift.abs(),
+                    j + 1,
+                    100.0 * least,
+                    100.0 * left[reach]
+                ),
+            )
+        })
+    }
+
+    /// Positions of which gravity and coupling say that they are multiples of the joint's.
+    fn positions(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let left: Vec<f64> = self
+            .fits
+            .iter()
+            .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
+            .collect();
+        let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
+        if left.iter().all(|u| *u < POOR) {
+            return Ok(Vec::new());
+        }
+        let rows = self.rows.thinned(if n == 1 { usize::MAX } else { TRIAL });
+        let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
+            let moved = rows.rescaled(joint, factor);
+            let matrices = moved.regressors(&self.chain)?;
+            let fits = matrices.iter().zip(&moved.tau);
+            Ok(fits
+                .map(|(x, y)| Fit::of(x, y, &self.order).map_or(1.0, |f| f.unexplained()))
+                .collect())
+        };
+        if n > 1 && mean(&left) > POOR {
+            let factor = 1.0 / 57.296;
+            let all = mean(&try_out(None, factor)?);
+            if all < BETTER * mean(&left) && all < GOOD {
+                return Ok((0..n)
+                    .map(|j| self.scaled(j, &[factor], mean(&left), all))
+                    .collect());
+            }
+        }
+        let mut found = Vec::new();
+        for j in (0..n).filter(|j| left[*j] > POOR) {
+            if self.robot.joints[j].kind == JointKind::Prismatic && n == 1 {
+                continue;
+            }
+            let mut tried: Vec<(f64, f64)> = Vec::new();
+            for factor in self.factors(j) {
+                let all = try_out(Some(j), factor)?;
+                let own = all[j];
+                // What misfits by a little more than a quarter is an effect's business.
+                let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
+                let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
+                let least = if unit { BETTER } else { MUCH_BETTER };
+                if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
+                    tried.push((factor, own));
+                }
+            }
+            let least = tried
+                .iter()
+                .map(|(_, own)| *own)
+                .fold(f64::INFINITY, f64::min);
+            // Over a small range gravity is a parabola, which every smaller factor leaves one: where the description
+            // knows the inertia, that decides.
+            tried.retain(|(_, own)| *own <= 1.5 * least + 0.002);
+            let mut misses = Vec::new();
+            for (factor, own) in tried {
+                misses.push((
+                    self.misses(&rows.rescaled(Some(j), factor), j)?,
+                    factor,
+                    own,
+                ));
+            }
+            let nearest = misses
+                .iter()
+                .map(|(m, ..)| *m)
+                .fold(f64::INFINITY, f64::min);
+            misses.retain(|(m, ..)| *m <= nearest + f64::ln(3.0));
+            misses.sort_by(|a, b| a.2.total_cmp(&b.2));
+            if let Some((.., own)) = misses.first() {
+                let factors: Vec<f64> = misses.iter().map(|(_, factor, _)| *factor).collect();
+                found.push(self.scaled(j, &factors, left[j], *own));
+            }
+        }
+        Ok(found)
+    }
+
+    /// How far gravity and inertia of these rows are from the description's, as the sum of their logarithms; 0 where
+    /// it states none.
+    fn misses(&self, rows: &Rows, j: usize) -> Result<f64, DiagnoseError> {
+        let (gravity, inertia) = self.scales_of(rows, j)?;
+        let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
+        Ok(miss(gravity) + miss(inertia))
+    }
+
+    /// Factors by which a joint's position is tried.
+    fn factors(&self, j: usize) -> Vec<f64> {
+        if self.robot.joints.len() == 1 {
+            // In steps of 3 %: closer than gravity's period over a turn needs.
+            return (-160..=160).map(|k| 1.03f64.powi(k)).collect();
+        }
+        let mut list = vec![-1.0, 1.0 / 57.296, core::f64::consts::TAU, 0.5, 2.0];
+        let drive = self.robot.joints[j].drive.as_ref();
+        if let Some(ratio) = drive.map(|d| d.gear_ratio.abs()).filter(|r| *r > 0.0) {
+            list.extend([ratio, 1.0 / ratio]);
+        }
+        list
+    }
+
+    /// A position that is a multiple of the joint's: what the factors that fit, the best first, are called.
+    fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> DataFault {
+        let named = factors
+            .iter()
+            .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
+        let best = factors.first().copied().unwrap_or(1.0);
+        let (kind, factor, what) = match named {
+            _ if best < 0.0 => ("sign", best, "reverse it".to_owned()),
+            Some((factor, name)) if name.contains("gear") => ("ratio", factor, name),
+            Some((factor, name)) => ("unit", factor, name),
+            None => (
+                "ratio",
+                best,
+                "check the gear ratio and the counts of the encoder".to_owned(),
+            ),
+        };
+        self.say(
+            kind,
+            j,
+            format!(
+                "q{} fits its torque {factor:.4} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
+                j + 1,
+                100.0 * after,
+                100.0 * before
+            ),
+        )
+    }
+}
+
+fn extreme(values: &[f64], of: fn(f64, f64) -> f64) -> f64 {
+    values.iter().copied().reduce(of).unwrap_or(0.0)
+}

@@ -1,0 +1,128 @@
+//! A recording as a few thousand rows: means over short stretches, which treat regressor and torque alike.
+
+use nalgebra::DMatrix;
+use rig_shared::multibody::COLUMNS;
+
+use super::super::{DiagnoseError, Run};
+use crate::batch::ChainBatch;
+
+/// Rows a second that are kept: slow against the noise, fast against what drives are asked to do.
+const RATE: f64 = 50.0;
+/// Rows that are looked at; what is wrong with a column is wrong all along it.
+const MOST: usize = 6000;
+
+/// Means over stretches of equal length.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    /// s between rows
+    pub(super) period: f64,
+    /// Position, velocity, acceleration and torque, joint by joint.
+    pub(super) q: Vec<Vec<f64>>,
+    pub(super) qd: Vec<Vec<f64>>,
+    pub(super) qdd: Vec<Vec<f64>>,
+    pub(super) tau: Vec<Vec<f64>>,
+    /// Share of the samples of each row at the highest or lowest torque of the recording.
+    pub(super) cut: Vec<Vec<f64>>,
+}
+
+impl Rows {
+    /// The rows of one recording with torque.
+    pub(super) fn of(runs: &[&Run], joints: usize) -> Self {
+        let rate = runs.first().map_or(RATE, |run| run.rate);
+        let stride = (rate / RATE).round().max(1.0) as usize;
+        let mut rows = Self {
+            period: stride as f64 / rate,
+            q: vec![Vec::new(); joints],
+            qd: vec![Vec::new(); joints],
+            qdd: vec![Vec::new(); joints],
+            tau: vec![Vec::new(); joints],
+            cut: vec![Vec::new(); joints],
+        };
+        for j in 0..joints {
+            let (low, high) = runs
+                .iter()
+                .filter_map(|run| run.joints.get(j))
+                .flat_map(|joint| &joint.tau)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                    (l.min(*v), h.max(*v))
+                });
+            let near = 1e-6 * low.abs().max(high.abs());
+            for run in runs {
+                let Some(joint) = run.joints.get(j) else {
+                    continue;
+                };
+                let mean = |x: &[f64], from: usize| {
+                    x[from..from + stride].iter().sum::<f64>() / stride as f64
+                };
+                let columns = [&joint.q, &joint.qd, &joint.qdd, &joint.tau];
+                let whole = columns.iter().map(|x| x.len()).min().unwrap_or(0) / stride;
+                for k in (0..whole.min(MOST.saturating_sub(rows.q[j].len()))).map(|k| k * stride) {
+                    rows.q[j].push(mean(&joint.q, k));
+                    rows.qd[j].push(mean(&joint.qd, k));
+                    rows.qdd[j].push(mean(&joint.qdd, k));
+                    rows.tau[j].push(mean(&joint.tau, k));
+                    let at = joint.tau[k..k + stride]
+                        .iter()
+                        .filter(|v| high - **v <= near || **v - low <= near)
+                        .count();
+                    rows.cut[j].push(at as f64 / stride as f64);
+                }
+            }
+        }
+        rows
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.q.first().map_or(0, Vec::len)
+    }
+
+    /// The rows as if the joint (all of them where none is named) had moved `factor` times as far.
+    pub(super) fn rescaled(&self, joint: Option<usize>, factor: f64) -> Self {
+        let mut rows = self.clone();
+        for columns in [&mut rows.q, &mut rows.qd, &mut rows.qdd] {
+            for (j, column) in columns.iter_mut().enumerate() {
+                if joint.is_none_or(|k| k == j) {
+                    column.iter_mut().for_each(|v| *v *= factor);
+                }
+            }
+        }
+        rows
+    }
+
+    /// Every `step`-th row, so that many trials are cheap.
+    pub(super) fn thinned(&self, most: usize) -> Self {
+        let step = self.len().div_ceil(most.max(1)).max(1);
+        let thin = |columns: &[Vec<f64>]| {
+            columns
+                .iter()
+                .map(|c| c.iter().copied().step_by(step).collect())
+                .collect()
+        };
+        Self {
+            period: self.period * step as f64,
+            q: thin(&self.q),
+            qd: thin(&self.qd),
+            qdd: thin(&self.qdd),
+            tau: thin(&self.tau),
+            cut: thin(&self.cut),
+        }
+    }
+
+    /// The standard regressor of each joint's torque, rows × 14 n.
+    pub(super) fn regressors(
+        &self,
+        chain: &ChainBatch,
+    ) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
+        let (n, rows) = (chain.joint_count(), self.len());
+        let width = n * COLUMNS;
+        let mut all = vec![0.0; n * width * rows];
+        chain
+            .differential_regressor(&self.q, &self.qd, &self.qdd, &mut all)
+            .map_err(|e| DiagnoseError::Model(e.to_string()))?;
+        Ok(all
+            .chunks_exact((width * rows).max(1))
+            .map(|own| DMatrix::from_column_slice(rows, width, own))
+            .collect())
+    }
+}

@@ -1,0 +1,208 @@
+//! What friction, inertia and gravity say of signs, and the description's own values of scales.
+
+use nalgebra::{DMatrix, DVector};
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::super::DiagnoseError;
+use super::super::outcome::DataFault;
+use super::fit::{Fit, Measured, about_mean};
+use super::model::{Judge, model_error};
+use super::names;
+use super::rows::Rows;
+use crate::batch::ModelBatch;
+use crate::identify::chain_of;
+
+/// Parameters change by less than this factor; units and ratios by more.
+const CHANGE: f64 = 5.0;
+/// Standard deviations that a sign must stand from zero.
+const CLEAR: f64 = 4.0;
+
+/// Measured over stated gravity and inertia, where they show.
+pub(super) type Scales = (Option<Measured>, Option<Measured>);
+
+impl Judge<'_> {
+    /// Mean of the joint's own inertia over its motion, as weights of the parameters.
+    fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
+        let n = self.robot.joints.len();
+        let mut still = self.rows.thinned(200);
+        for column in still.qd.iter_mut().chain(&mut still.qdd) {
+            column.fill(0.0);
+        }
+        let without = still.regressors(&self.chain)?;
+        still.qdd[j].fill(1.0);
+        let with = still.regressors(&self.chain)?;
+        let difference = &with[j] - &without[j];
+        Ok(DVector::from_fn(n * COLUMNS, |c, _| {
+            difference.column(c).mean()
+        }))
+    }
+
+    /// Power lost in the joint's friction, W, that over the variation of torque and speed, and the joint's own inertia.
+    fn senses(&self, j: usize, fit: &Fit) -> Result<(Measured, f64, Measured), DiagnoseError> {
+        let qd = &self.rows.qd[j];
+        let count = qd.len().max(1) as f64;
+        let squares = qd.iter().map(|v| v * v).sum::<f64>() / count;
+        let mut friction = DVector::zeros(self.robot.joints.len() * COLUMNS);
+        friction[j * COLUMNS + column::VISCOUS] = squares;
+        friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
+        let loss = fit.functional(&friction);
+        let varied = (about_mean(self.rows.tau[j].iter().copied()) / count).sqrt();
+        let share = loss.value / (varied * squares.sqrt()).max(f64::MIN_POSITIVE);
+        Ok((loss, share, fit.functional(&self.inertia(j)?)))
+    }
+
+    /// Friction that drives and inertia that pulls: torque and motion are counted in opposite senses.
+    pub(super) fn sign(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+        let Some(fit) = self.fits[j].as_ref() else {
+            return Ok(None);
+        };
+        let (loss, share, inertia) = self.senses(j, fit)?;
+        let (l, i) = (loss.sigmas(), inertia.sigmas());
+        // Each may be hidden by what the motion does not show; then the other has to be the clearer.
+        let both = l < -1.5 && i < -1.5 && (l + i) / core::f64::consts::SQRT_2 < -CLEAR;
+        let by_friction = l < -CLEAR && share < -0.1 && i < 3.0;
+        let by_inertia = i < -2.0 * CLEAR && share < -0.02 && l < 3.0;
+        if !(both || by_friction || by_inertia) || fit.unexplained() > 0.5 {
+            return Ok(None);
+        }
+        let n = j + 1;
+        let which = match self.scales(j)?.0 {
+            Some(gravity) if gravity.value > 0.0 => {
+                format!("gravity has the right sense, so reverse q{n}")
+            }
+            Some(_) => format!("gravity has the wrong sense too, so reverse tau{n}"),
+            None => "reverse one of them".to_owned(),
+        };
+        Ok(Some(self.say(
+            "sign",
+            j,
+            format!(
+                "tau{n} and q{n} are counted in opposite senses: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
+                -loss.value, inertia.value
+            ),
+        )))
+    }
+
+    /// Measured gravity and measured inertia over the description's, where the description states them and the motion
+    /// shows them.
+    fn scales(&self, j: usize) -> Result<Scales, DiagnoseError> {
+        self.scales_of(&self.rows, j)
+    }
+
+    pub(super) fn scales_of(&self, data: &Rows, j: usize) -> Result<Scales, DiagnoseError> {
+        let stated = self.robot.joints[j..]
+            .iter()
+            .all(|joint| joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
+        if !stated || data.len() == 0 {
+            return Ok((None, None));
+        }
+        let (n, rows) = (self.robot.joints.len(), data.len());
+        let mut parameters = self.robot.standard_parameters();
+        for row in &mut parameters {
+            row[column::VISCOUS..].fill(0.0);
+        }
+        let chain = chain_of(self.robot).map_err(model_error)?;
+        let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
+        let (mut weight, mut all) = (vec![0.0; n * rows], vec![0.0; n * rows]);
+        model.gravity(&data.q, &mut weight).map_err(model_error)?;
+        model
+            .inverse_dynamics(&data.q, &data.qd, &data.qdd, &mut all)
+            .map_err(model_error)?;
+        let own = j * rows..(j + 1) * rows;
+        let (weight, all) = (&weight[own.clone()], &all[own]);
+        let qd = &data.qd[j];
+        let x = DMatrix::from_fn(rows, 5, |k, c| match c {
+            0 => weight[k],
+            1 => all[k] - weight[k],
+            2 => qd[k],
+            3 if qd[k] == 0.0 => 0.0,
+            3 => qd[k].signum(),
+            _ => 1.0,
+        });
+        let tau = &data.tau[j];
+        let Some(fit) = Fit::of(&x, tau, &[4, 3, 2, 0, 1]) else {
+            return Ok((None, None));
+        };
+        let shown = |c: usize| -> Option<Measured> {
+            let order: Vec<usize> = (0..5).filter(|o| *o != c).collect();
+            let without = Fit::of(&x, tau, &order)?.unexplained();
+            fit.parameter(c)
+                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
+        };
+        // A description that explains little of the torque is no scale for it.
+        let whole = fit.unexplained() < 0.2;
+        Ok((shown(0).filter(|_| whole), shown(1).filter(|_| whole)))
+    }
+
+    /// Factors between the recording and the description that no change of the robot makes.
+    pub(super) fn against_description(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+        let joint = &self.robot.joints[j];
+        let (gravity, inertia) = self.scales(j)?;
+        // What the description does not state of the drive makes the inertia larger, never smaller.
+        let complete = joint
+            .drive
+            .as_ref()
+            .is_none_or(|d| d.rotor_inertia > 0.0 || d.joint_inertia > 0.0);
+        let inertia = inertia
+            .map(|m| m.value)
+            .filter(|s| complete || s.abs() < 1.0);
+        let large = |s: f64| !(1.0 / CHANGE..CHANGE).contains(&s.abs());
+        let apart = |a: f64, b: f64| (a / b).abs().ln().abs() > f64::ln(2.5);
+        let n = j + 1;
+        let torque = |factor: f64, of: &str| {
+            let name = names::of_torque(joint, factor);
+            // Between a parameter's change and what has a name there is room for an odd robot.
+            (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
+                let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit".to_owned());
+                let nearest = what.split(", or").next().unwrap_or_default();
+                let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
+                self.say(
+                    kind,
+                    j,
+                    format!("tau{n} is {factor:.4} times what the description's {of} needs, {what}."),
+                )
+            })
+        };
+        Ok(match (gravity.map(|m| m.value), inertia) {
+            (Some(g), Some(i)) if large(g) && !apart(g, i) => torque(g, "gravity and inertia"),
+            (Some(g), None) if large(g) => torque(g, "gravity"),
+            (None, Some(i)) if large(i) => torque(i, "inertia"),
+            (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
+                let clock = (i / g).abs().sqrt();
+                Some(self.say(
+                    "clock",
+                    j,
+                    format!(
+                        "Gravity fits the description, but the inertia seen in the motion is {:.4} times what it states: t looks like {}, {clock:.4} of them a second.",
+                        i / g,
+                        names::of_clock(clock)
+                    ),
+                ))
+            }
+            (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j)?.is_none() => {
+                let held = match self.fits[j].as_ref() {
+                    Some(fit) => {
+                        let (loss, _, own) = self.senses(j, fit)?;
+                        loss.sigmas() > 3.0 || own.sigmas() > 3.0
+                    }
+                    None => false,
+                };
+                let which = if held {
+                    format!(
+                        "friction and inertia have the right sense: q{n} and tau{n} are both counted the other way round, or the zero of q{n} is half a turn off"
+                    )
+                } else {
+                    format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
+                };
+                Some(self.say(
+                    "sign",
+                    j,
+                    format!(
+                        "Gravity acts on joint {n} {g:.2} times as the description says; {which}."
+                    ),
+                ))
+            }
+            _ => None,
+        })
+    }
+}

@@ -1,0 +1,295 @@
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::path::{Path, PathBuf};
+
+use super::*;
+use crate::data::{EffortNeed, Source, data_dir};
+use crate::diagnose::runs::runs_of;
+use crate::prepare::LowPass;
+use crate::robot::{EMPS, TX40, template};
+
+/// A robot with its recordings.
+struct Set {
+    name: &'static str,
+    robot: Robot,
+    files: Vec<PathBuf>,
+}
+
+fn text(name: &str, toml: &str) -> Robot {
+    Robot::from_toml(toml, Path::new(name)).unwrap()
+}
+
+fn double_pendulum() -> Robot {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/double-pendulum.toml");
+    Robot::load(&path).unwrap()
+}
+
+fn measured() -> Vec<Set> {
+    let Some(data) = data_dir() else {
+        println!("no real recordings here (set RIG_DATA): only emulated ones are judged");
+        return Vec::new();
+    };
+    let files = |list: &[&str]| list.iter().map(|f| data.join(f)).collect::<Vec<_>>();
+    vec![
+        Set {
+            name: "emps",
+            robot: text("emps.toml", EMPS),
+            files: files(&["emps/train.csv", "emps/test_pulses.csv"]),
+        },
+        Set {
+            name: "dfki",
+            robot: double_pendulum(),
+            files: files(&[
+                "dfki_double_pendulum/train.csv",
+                "dfki_double_pendulum/test.csv",
+            ]),
+        },
+        Set {
+            name: "kuka",
+            robot: Robot::load(&data.join("kuka_lwr4/kuka_lwr4.urdf")).unwrap(),
+            files: files(&[
+                "kuka_lwr4/run1.csv",
+                "kuka_lwr4/run2.csv",
+                "kuka_lwr4/run3.csv",
+            ]),
+        },
+        Set {
+            name: "tx40",
+            robot: text("tx40.toml", TX40),
+            files: files(&["staubli_tx40/motor_1kHz.csv"]),
+        },
+    ]
+}
+
+fn read(robot: &Robot, path: &Path, number: usize) -> Vec<Run> {
+    let source = Source::open_with(path, robot, EffortNeed::Optional).unwrap();
+    let rate = 1.0 / source.sampling().period;
+    let low_pass = LowPass::butterworth(4, 20.0, rate).unwrap();
+    runs_of(&source, number, rate, &low_pass).unwrap()
+}
+
+fn all(set: &Set) -> Vec<Run> {
+    let files = set.files.iter().enumerate();
+    files.flat_map(|(k, f)| read(&set.robot, f, k)).collect()
+}
+
+/// The same runs with something done to a joint's columns, filtered and differentiated again.
+fn injured(runs: &[Run], change: impl Fn(&mut Run)) -> Vec<Run> {
+    let mut runs = runs.to_vec();
+    for run in &mut runs {
+        change(run);
+        let low_pass = LowPass::butterworth(4, f64::min(20.0, 0.2 * run.rate), run.rate).unwrap();
+        for joint in &mut run.joints {
+            joint.q = low_pass.zero_phase(&joint.q_raw);
+            joint.qd = crate::prepare::central_difference(&joint.q, 1.0 / run.rate);
+            joint.qdd = crate::prepare::second_difference(&joint.q, 1.0 / run.rate);
+        }
+    }
+    runs
+}
+
+fn times(column: &mut [f64], factor: f64) {
+    column.iter_mut().for_each(|v| *v *= factor);
+}
+
+fn emulated() -> (Robot, Vec<Run>) {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = crate::demo::run(folder.path(), 7, |_| ()).unwrap();
+    let runs = ["train.csv", "holdout.csv", "sweep.csv"]
+        .iter()
+        .enumerate()
+        .flat_map(|(k, f)| read(&demo.robot, &folder.path().join(f), k))
+        .collect();
+    (demo.robot, runs)
+}
+
+/// The one fault that is found of a joint.
+fn only(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str) {
+    let found = faults(robot, runs).unwrap();
+    for fault in &found {
+        println!(
+            "  {} {}: {} {}",
+            fault.kind, fault.joint, fault.recording, fault.text
+        );
+    }
+    assert!(!found.is_empty(), "nothing found: {kind} {words}");
+    for fault in &found {
+        assert_eq!(fault.kind, kind, "{}", fault.text);
+        assert_eq!(fault.joint, robot.joints[joint].name);
+        assert!(fault.text.contains(words), "{words}: {}", fault.text);
+    }
+}
+
+#[test]
+fn healthy_recordings_raise_nothing() {
+    for set in measured() {
+        let began = std::time::Instant::now();
+        assert_eq!(faults(&set.robot, &all(&set)).unwrap(), [], "{}", set.name);
+        println!("{}: {:?}", set.name, began.elapsed());
+    }
+    if let Some(data) = data_dir() {
+        let robot = text("one-link.toml", template("one-link").unwrap());
+        for entry in std::fs::read_dir(data.join("rhoban_xl330")).unwrap() {
+            let runs = read(&robot, &entry.unwrap().path(), 0);
+            assert_eq!(faults(&robot, &runs).unwrap(), [], "{}", runs[0].label);
+        }
+    }
+    let (robot, runs) = emulated();
+    assert_eq!(faults(&robot, &runs).unwrap(), []);
+}
+
+/// The set of that name with its recordings; none where there are no real recordings.
+fn one(name: &str) -> Option<(Robot, Vec<Run>)> {
+    let set = measured().into_iter().find(|set| set.name == name)?;
+    let runs = all(&set);
+    Some((set.robot, runs))
+}
+
+fn tau(runs: &[Run], j: usize, factor: f64) -> Vec<Run> {
+    injured(runs, |r| times(&mut r.joints[j].tau, factor))
+}
+
+fn q(runs: &[Run], j: usize, factor: f64) -> Vec<Run> {
+    injured(runs, |r| times(&mut r.joints[j].q_raw, factor))
+}
+
+/// A torque that comes late.
+fn late(robot: &Robot, runs: &[Run], joint: usize) {
+    let late = injured(runs, |r| {
+        let by = (0.7 * r.rate) as usize;
+        let tau = &mut r.joints[joint].tau;
+        // A remnant behind a gap is shorter than the shift.
+        if by < tau.len() {
+            tau.rotate_right(by);
+        }
+    });
+    only(robot, &late, "clock", joint, "0.7");
+}
+
+/// A torque that was cut at half its peak.
+fn cut(robot: &Robot, runs: &[Run], joint: usize) {
+    let cut = injured(runs, |r| {
+        let tau = &mut r.joints[joint].tau;
+        let top = 0.5 * tau.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        tau.iter_mut().for_each(|v| *v = v.clamp(-top, top));
+    });
+    only(robot, &cut, "saturation", joint, "cut at");
+}
+
+#[test]
+fn faults_of_a_real_slide_are_named() {
+    let Some((robot, runs)) = one("emps") else {
+        return;
+    };
+    only(&robot, &tau(&runs, 0, -1.0), "sign", 0, "reverse one");
+    only(&robot, &q(&runs, 0, -1.0), "sign", 0, "reverse one");
+    only(&robot, &tau(&runs, 0, 1000.0), "unit", 0, "too large");
+    only(&robot, &q(&runs, 0, 1000.0), "unit", 0, "outside");
+    late(&robot, &runs, 0);
+    cut(&robot, &runs, 0);
+}
+
+#[test]
+fn faults_of_two_real_links_are_named() {
+    let Some((robot, runs)) = one("dfki") else {
+        return;
+    };
+    only(&robot, &tau(&runs, 0, -1.0), "sign", 0, "opposite");
+    only(&robot, &tau(&runs, 1, -1.0), "sign", 1, "opposite");
+    only(&robot, &q(&runs, 0, 57.296), "unit", 0, "degrees");
+    let rpm = injured(&runs, |r| {
+        let velocity = r.joints[0].measured_velocity.as_mut().unwrap();
+        times(velocity, 9.5493);
+    });
+    only(&robot, &rpm, "unit", 0, "revolutions per minute");
+    late(&robot, &runs, 1);
+    cut(&robot, &runs, 1);
+}
+
+#[test]
+fn faults_of_a_real_arm_with_torque_sensors_are_named() {
+    let Some((robot, runs)) = one("kuka") else {
+        return;
+    };
+    only(&robot, &tau(&runs, 1, -1.0), "sign", 1, "");
+    only(&robot, &tau(&runs, 3, 1000.0), "unit", 3, "");
+    only(&robot, &q(&runs, 1, 57.296), "unit", 1, "degrees");
+    // A late torque is taken up here: a few slow harmonics, shifted, are other sums of the same columns.
+    cut(&robot, &runs, 1);
+}
+
+#[test]
+fn faults_of_a_real_arm_with_geared_motors_are_named() {
+    let Some((robot, runs)) = one("tx40") else {
+        return;
+    };
+    for j in 0..4 {
+        only(&robot, &tau(&runs, j, -1.0), "sign", j, "");
+    }
+    only(&robot, &q(&runs, 1, 32.0), "unit", 1, "gear ratio");
+    late(&robot, &runs, 0);
+    cut(&robot, &runs, 0);
+}
+
+#[test]
+fn injured_recordings_of_the_emulated_rig_are_named() {
+    let (robot, runs) = emulated();
+    let tau = |factor: f64| tau(&runs, 0, factor);
+    let q = |factor: f64| q(&runs, 0, factor);
+    only(&robot, &tau(-1.0), "sign", 0, "reverse tau1");
+    only(&robot, &q(-1.0), "sign", 0, "reverse q1");
+    let both = injured(&runs, |r| {
+        times(&mut r.joints[0].q_raw, -1.0);
+        times(&mut r.joints[0].tau, -1.0);
+    });
+    only(&robot, &both, "sign", 0, "both counted");
+    only(&robot, &tau(1000.0), "unit", 0, "");
+    only(&robot, &tau(1e-3), "unit", 0, "");
+    only(&robot, &tau(9.549), "unit", 0, "rpm");
+    only(&robot, &tau(1.0 / 50.0), "ratio", 0, "before its gear");
+    // The sweep's few degrees leave the factor open, so that only its existence is certain there.
+    let wide = |factor: f64| -> Vec<Run> {
+        let all = q(factor).into_iter();
+        all.filter(|r| r.recording < 2).collect()
+    };
+    only(&robot, &wide(57.296), "unit", 0, "degrees");
+    only(&robot, &wide(50.0), "ratio", 0, "motor");
+    only(&robot, &wide(2.0), "ratio", 0, "gear ratio");
+    only(&robot, &wide(0.5), "ratio", 0, "gear ratio");
+    let sweep: Vec<Run> = q(57.296).into_iter().filter(|r| r.recording == 2).collect();
+    assert!(!faults(&robot, &sweep).unwrap().is_empty());
+    // Changes of the robot, for others to judge.
+    for factor in [0.7, 1.3, 2.0] {
+        assert_eq!(faults(&robot, &tau(factor)).unwrap(), [], "{factor}");
+    }
+    let clock = |factor: f64| {
+        let mut runs = runs.clone();
+        for run in &mut runs {
+            times(&mut run.t, factor);
+            run.rate /= factor;
+        }
+        runs = injured(&runs, |_| ());
+        faults(&robot, &runs).unwrap()
+    };
+    for factor in [1.0 / 60.0, 60.0] {
+        let found = clock(factor);
+        println!("{factor}: {found:?}");
+        assert!(
+            found
+                .iter()
+                .any(|f| f.kind == "clock" || f.text.contains("units of q1 and t"))
+        );
+    }
+    let mut run = runs[0].clone();
+    times(&mut run.t, 1000.0);
+    run.rate /= 1000.0;
+    let found = faults(&robot, std::slice::from_ref(&run)).unwrap();
+    assert_eq!(found.len(), 1);
+    assert!(found[0].kind == "clock" && found[0].text.contains("milliseconds"));
+    let still = injured(&runs[..1], |r| r.joints[0].q_raw.fill(0.3));
+    assert_eq!(faults(&robot, &still).unwrap()[0].kind, "not-moving");
+    let mut two = runs.clone();
+    two[1].joints[0] = still[0].joints[0].clone();
+    two[1].t = still[0].t.clone();
+    assert_eq!(faults(&robot, &two).unwrap(), []);
+}
