@@ -326,7 +326,9 @@ fn two_masses_keep_their_energy_without_friction_and_never_gain_any() {
         robot.joints[0].friction = None;
         let model = Model::from_robot(&robot).unwrap();
         let [gap, stiffness, _] = kind
-            .transmission(&std::array::from_fn(|k| shapes.get(k).copied().unwrap_or(0.0)))
+            .transmission(&std::array::from_fn(|k| {
+                shapes.get(k).copied().unwrap_or(0.0)
+            }))
             .unwrap();
         let mut link = model.parameters.clone();
         link[0][column::DRIVE_INERTIA] = 0.0;

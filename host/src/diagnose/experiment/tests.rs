@@ -22,7 +22,7 @@ fn effect(kind: Kind, gains: &[f64], shapes: &[f64]) -> (Effect<f64>, Nominal) {
     let mut made = Effect {
         kind,
         gains: [0.0; 4],
-        shapes: [0.0; 3],
+        shapes: [0.0; 4],
     };
     made.gains[..gains.len()].copy_from_slice(gains);
     made.shapes[..shapes.len()].copy_from_slice(shapes);
@@ -271,7 +271,7 @@ fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
             Effect {
                 kind: Kind::Stribeck,
                 gains: [5.0, 0.0, 0.0, 0.0],
-                shapes: [0.005, 0.0, 0.0],
+                shapes: [0.005, 0.0, 0.0, 0.0],
             },
             nominal,
         ),
@@ -279,7 +279,7 @@ fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
             Effect {
                 kind: Kind::PreslidingDahl,
                 gains: [20.0, 0.0, 0.0, 0.0],
-                shapes: [1e-4, 0.0, 0.0],
+                shapes: [1e-4, 0.0, 0.0, 0.0],
             },
             nominal,
         ),
