@@ -88,8 +88,8 @@ impl Source<'_> {
             return vec![Parameter {
                 name: "share",
                 unit: "1",
-                bounds: [0.5, 2.0],
-                range: [0.5, 2.0],
+                bounds: [0.3, 3.0],
+                range: [0.3, 3.0],
                 scale: Scale::Linear,
                 meaning: "of the torque that the twist changes",
             }];

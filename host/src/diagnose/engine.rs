@@ -6,16 +6,19 @@ use std::sync::Mutex;
 use rig_shared::effects::{Channel, Effect, GAINS, Kind, SHAPES};
 
 use super::anchor::Anchor;
+use super::change::change;
 use super::columns::{Candidate, Predicted, Source, predict};
 use super::fit::Fit;
 use super::floor;
 use super::locate::{coordinates, locate};
-use super::outcome::{Absorbed, Diagnosis, Step, Tried, Value, Verdict, Waterfall};
+use super::outcome::{
+    Absorbed, DataFault, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall,
+};
 use super::rows::{Column, Nominal, Rows};
 use super::runs::{Run, runs_of};
-use super::search::{Profile, Search, with};
+use super::search::{Profile, SIGNIFICANT, Search, with};
 use super::solve::{Solution, solve};
-use super::{DiagnoseError, Options};
+use super::{DiagnoseError, Options, sanity, testable};
 use crate::prepare::{Choice, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 
@@ -172,6 +175,10 @@ pub fn diagnose(
     };
     let mut loaded = bench.load(training)?;
     progress(0.1);
+    let data_faults = sanity::faults(robot, &loaded.runs)?;
+    if !data_faults.is_empty() {
+        return Ok((at_fault(robot, data_faults), robot.clone()));
+    }
     bench.anchored(&mut loaded.rows);
     let rows = &loaded.rows;
     let free = bench.anchor.columns(rows);
@@ -190,7 +197,7 @@ pub fn diagnose(
         )
     })?;
     let values = bench.anchor.values(&before.values);
-    let search = Search::new(
+    let mut search = Search::new(
         bench.source(&loaded, &values)?,
         library(robot, &loaded.runs, &options.without),
         crate::prepare::threads(options.threads),
@@ -198,7 +205,15 @@ pub fn diagnose(
     let mut tried = Vec::new();
     let trials = search.trials();
     let mut sweeps = 0;
-    let chosen = search.run(&base, &mut |step, profiles, _| {
+    let renew = |chosen: &[Profile]| {
+        let columns: Vec<&Column> = free
+            .iter()
+            .chain(chosen.iter().flat_map(|p| p.columns.iter()))
+            .collect();
+        let coefficients = solve(&plain, &columns, &[]).map_or(before.values.clone(), |s| s.values);
+        bench.source(&loaded, &bench.anchor.values(&coefficients[..free.len()]))
+    };
+    let chosen = search.run(&base, &renew, &mut |step, profiles, _| {
         sweeps += 1;
         progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(sweeps)));
         for (k, p) in profiles.iter().enumerate() {
@@ -286,7 +301,7 @@ pub fn diagnose(
             effect: about.name.to_owned(),
             law: about.law.map(str::to_owned),
             joint: robot.joints[j].name.clone(),
-            set: vec![about.name.to_owned()],
+            set: Vec::new(),
             parameters: parameters(&search, profile, &after, &chosen, free.len(), k),
             p_value: profile.corrected(trials),
             runner_up: None,
@@ -298,36 +313,124 @@ pub fn diagnose(
             why: String::new(),
         });
     }
-    let gap_closed = (!chosen.is_empty()).then(|| {
-        let of = |lists: &[Vec<f64>]| {
-            let ends = |j: usize| [lists[j][0], lists[j][lists[j].len() - 1]];
+    for (k, step) in steps.iter_mut().enumerate() {
+        let rivals = search.alternatives(&base, &chosen, k)?;
+        rank(step, &chosen[k], &rivals, &loaded.runs);
+    }
+    let known: Vec<Column> = {
+        let mut at = free.len();
+        let mut list = Vec::new();
+        for profile in &chosen {
+            for column in profile.columns.iter() {
+                list.push(scaled(column, after.values[at]));
+                at += 1;
+            }
+        }
+        list
+    };
+    let change = change(
+        robot,
+        &bench.nominal,
+        &bench.anchor,
+        rows,
+        &plain,
+        &free,
+        &known,
+        &after,
+    );
+    // What the description as it stands leaves, with the effects.
+    let prior = bench.anchor.prior_coefficients();
+    let mut frozen = plain.clone();
+    for (column, factor) in free.iter().zip(&prior) {
+        frozen.subtract(column, *factor);
+    }
+    let frozen_train: Vec<f64> = (0..n).map(|j| frozen.rms(j)).collect();
+    let frozen_holdout = match &sealed {
+        Some(sealed) => Some(unseen(&bench, sealed, &prior, free.len(), &[])?),
+        None => None,
+    };
+    let last = |lists: &[Vec<f64>], j: usize| lists[j].last().copied();
+    if let Some(change) = change.as_ref().filter(|c| c.effect.is_some()) {
+        let j = n - 1;
+        let about = Kind::Payload.about();
+        let now = [train_rms[j][0], last(&train_rms, j).unwrap_or(0.0)];
+        let train = [frozen_train[j].max(now[0]), now[1]];
+        let unseen = match (&frozen_holdout, last(&holdout_rms, j)) {
+            (Some(frozen), Some(now)) => Some([frozen[j], now]),
+            _ => None,
+        };
+        steps.push(Step {
+            effect: about.name.to_owned(),
+            law: None,
+            joint: robot.joints[j].name.clone(),
+            set: vec![about.name.to_owned()],
+            parameters: change.parameters.clone(),
+            p_value: change.evidence.p_value,
+            runner_up: None,
+            runner_up_gap_closed: None,
+            train_rms: train,
+            holdout_rms: unseen,
+            motion_rms: None,
+            gap_closed: closed(unseen.unwrap_or(train), floors[j]),
+            why: change.words.clone(),
+        });
+    }
+    let remainder = remainder(
+        &search,
+        &bench,
+        &loaded,
+        &fit,
+        &floors,
+        !pairs.is_empty(),
+        options.seed,
+    );
+    if remainder.is_some() {
+        // Beside something unknown, a name that closes less than half of what was there is a guess at it.
+        steps.retain(|s| s.gap_closed >= HALF);
+    }
+    let gap_closed = (!steps.is_empty()).then(|| {
+        let of = |lists: &[Vec<f64>], frozen: &[f64]| {
             let sums = (0..n).fold([0.0, 0.0], |s, j| {
-                let e = ends(j);
+                let first = if change.is_some() {
+                    frozen[j].max(lists[j][0])
+                } else {
+                    lists[j][0]
+                };
+                let end = lists[j][lists[j].len() - 1];
                 let f = floors[j];
-                [s[0] + (e[0] - f) / f, s[1] + (e[0] - e[1]) / f]
+                [s[0] + (first - f) / f, s[1] + (first - end) / f]
             });
             sums[1] / sums[0]
         };
-        if holdout_rms.iter().all(|l| !l.is_empty()) {
-            of(&holdout_rms)
-        } else {
-            of(&train_rms)
+        match &frozen_holdout {
+            Some(frozen) if holdout_rms.iter().all(|l| !l.is_empty()) => of(&holdout_rms, frozen),
+            _ => of(&train_rms, &frozen_train),
         }
     });
-    let verdict = if chosen.is_empty() {
-        Verdict::NothingMissing
-    } else {
+    let verdict = if remainder.is_some() {
+        Verdict::Remainder
+    } else if steps.iter().any(|s| s.effect != Kind::Payload.about().name) {
         Verdict::Explained
+    } else if change.is_some() {
+        Verdict::ParameterChange
+    } else {
+        Verdict::NothingMissing
     };
     let waterfall = (0..n)
         .map(|j| Waterfall {
             joint: robot.joints[j].name.clone(),
             unit: "N*m".into(),
-            models: std::iter::once("refitted".to_owned())
+            models: ["frozen description", "refitted"]
+                .into_iter()
+                .map(str::to_owned)
                 .chain(chosen.iter().map(|p| label(p.candidate.kind)))
                 .collect(),
-            train: train_rms[j].clone(),
-            holdout: holdout_rms[j].clone(),
+            train: std::iter::once(frozen_train[j])
+                .chain(train_rms[j].iter().copied())
+                .collect(),
+            holdout: (frozen_holdout.iter().map(|f| f[j]))
+                .chain(holdout_rms[j].iter().copied())
+                .collect(),
             floor: floors[j],
         })
         .collect();
@@ -336,7 +439,7 @@ pub fn diagnose(
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict,
-        words: Vec::new(),
+        words: change.iter().map(|c| c.words.clone()).collect(),
         noise_floor_rms: floors,
         noise_floor_how: if pairs.is_empty() {
             "what the last model leaves".into()
@@ -350,7 +453,7 @@ pub fn diagnose(
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
-        remainder: None,
+        remainder,
         data_faults: Vec::new(),
         waterfall,
         tried,
@@ -359,6 +462,133 @@ pub fn diagnose(
     };
     progress(1.0);
     Ok((diagnosis, robot.clone()))
+}
+
+/// Share of its gap that a step must close to stand beside a remainder.
+const HALF: f64 = 0.5;
+/// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings: the filters'
+/// treatment of a true structure leaves up to a tenth more.
+const BEYOND_FLOOR: f64 = 1.25;
+/// … and, without a repeat, where a coordinate explains this share of its squares.
+const SHARE_LEFT: f64 = 0.1;
+/// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
+const AS_GOOD: f64 = 0.9;
+/// Standard deviations of a paired difference between blocks.
+const NO_DIFFERENCE: f64 = 2.5;
+
+/// Fills the set and the runner-up of a step.
+fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
+    let mut names = vec![step.effect.clone()];
+    let mut exact = |kind: Kind| {
+        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+            if !names.iter().any(|n| n == confusion.with) {
+                names.push(confusion.with.to_owned());
+            }
+        }
+    };
+    exact(own.candidate.kind);
+    for rival in rivals {
+        let name = rival.candidate.kind.about().name;
+        if names.iter().any(|n| n == name) {
+            continue;
+        }
+        let equal = rival.candidate.joint == own.candidate.joint
+            && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+            && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE;
+        if equal {
+            names.push(name.to_owned());
+        } else if step.runner_up.is_none() {
+            step.runner_up = Some(name.to_owned());
+            step.runner_up_gap_closed =
+                Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
+        }
+    }
+    step.set = names;
+}
+
+/// What is left beyond the floor and goes with the motion.
+fn remainder(
+    search: &Search,
+    bench: &Bench,
+    loaded: &Loaded,
+    fit: &Fit,
+    floors: &[f64],
+    repeated: bool,
+    seed: u64,
+) -> Option<Remainder> {
+    (0..floors.len())
+        .filter_map(|j| {
+            let rows = &loaded.rows;
+            let rms = fit.rms(j);
+            let list = coordinates(rows, &loaded.runs, &search.source.predicted, bench.robot, j);
+            let name = &bench.robot.joints[j].name;
+            let floor = if repeated { floors[j] } else { 0.0 };
+            let residual = fit.residual(j);
+            let places = locate(rows, &list, &residual, fit.block_of_rows(), j, name, floor, seed);
+            let shown = places
+                .iter()
+                .find(|p| p.p_value < SIGNIFICANT)
+                .filter(|p| repeated || p.share > SHARE_LEFT);
+            // Without a repeat the floor is what no coordinate of the motion explains.
+            let ratio = if repeated {
+                rms / floors[j]
+            } else {
+                shown.map_or(1.0, |p| 1.0 / (1.0 - p.share).max(0.01).sqrt())
+            };
+            let shown_text = shown.map_or_else(
+                || "It goes with no single coordinate of the motion.".to_owned(),
+                |p| p.text.clone(),
+            );
+            let left = if repeated { ratio > BEYOND_FLOOR } else { shown.is_some() };
+            left.then(|| Remainder {
+                joint: name.clone(),
+                rms: (rms * rms - (rms / ratio).powi(2)).max(0.0).sqrt(),
+                ratio,
+                text: format!(
+                    "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {}",
+                    100.0 * (ratio - 1.0),
+                    shown_text
+                ),
+                places,
+            })
+        })
+        .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// The result where the data themselves are at fault.
+fn at_fault(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
+    Diagnosis {
+        schema: "rig-diagnosis/1".into(),
+        robot: robot.name.clone(),
+        verdict: Verdict::DataFault,
+        words: data_faults.iter().map(|f| f.text.clone()).collect(),
+        noise_floor_rms: Vec::new(),
+        noise_floor_how: "Nothing was fitted.".into(),
+        places: Vec::new(),
+        steps: Vec::new(),
+        gap_closed: None,
+        absorbed: Vec::new(),
+        not_testable: Vec::new(),
+        detectable: Vec::new(),
+        next_experiment: None,
+        remainder: None,
+        data_faults,
+        waterfall: Vec::new(),
+        tried: Vec::new(),
+        maps: Vec::new(),
+        curves: Vec::new(),
+    }
+}
+
+/// A column times a factor.
+fn scaled(column: &Column, factor: f64) -> Column {
+    (column.iter())
+        .map(|values| {
+            values
+                .as_ref()
+                .map(|v| v.iter().map(|x| factor * x).collect())
+        })
+        .collect()
 }
 
 /// Name with its law.

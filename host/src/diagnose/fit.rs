@@ -116,6 +116,12 @@ impl<'a> Fit<'a> {
         true
     }
 
+    /// Takes a known torque off what is to be explained.
+    pub(super) fn subtract(&mut self, column: &Column, factor: f64) {
+        let known = self.weighted(column);
+        axpy(-factor, &known, &mut self.residual);
+    }
+
     /// RMS of a joint's residual in its own unit, over the rows used.
     pub(super) fn rms(&self, joint: usize) -> f64 {
         let n = self.rows.count;
@@ -318,6 +324,19 @@ impl<'a> Fit<'a> {
             }
         }
         list
+    }
+}
+
+impl Evidence {
+    /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
+    pub(super) fn ahead_of(&self, other: &Self) -> f64 {
+        let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
+            .map(|(a, b)| b[1] - a[1])
+            .collect();
+        let n = differences.len().max(2) as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod anchor;
 pub mod benchmark;
+mod change;
 mod columns;
 mod engine;
 pub mod experiment;
