@@ -1,5 +1,6 @@
 //! What can go wrong on the line.
 
+use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
@@ -132,8 +133,8 @@ pub enum LinkError {
 }
 
 /// A refusal as a clause that says what to do.
-pub fn describe(refusal: Refusal) -> &'static str {
-    match refusal {
+pub fn describe(refusal: Refusal) -> Cow<'static, str> {
+    Cow::Borrowed(match refusal {
         Refusal::WrongMode => {
             "it is not allowed in the present mode (arm before starting, stop before uploading)"
         }
@@ -149,5 +150,12 @@ pub fn describe(refusal: Refusal) -> &'static str {
         Refusal::StorageFailed => {
             "the memory did not take the settings; those stored before still stand"
         }
-    }
+        Refusal::NotCompensable(kind) => {
+            return Cow::Owned(format!(
+                "{} has no torque and no corrected reading that would undo it; leave the effect `{}` out",
+                kind.about().title,
+                kind.about().name
+            ));
+        }
+    })
 }
