@@ -184,7 +184,7 @@ fn a_description_with_a_fault_is_named_by_line() {
         &said(good.replace("gear_ratio = 50.0", "gear_ration = 50.0")),
         &["robot.toml:", "gear_ration"],
     );
-    let effect = "\n[[effect]]\nkind = \"stribeck\"\njoint = \"lnik\"\n";
+    let effect = "\n[[effect]]\nkind = \"torque_offset\"\noffset = 0.1\njoint = \"lnik\"\n";
     names(
         &said(format!("{good}{effect}")),
         &["robot.toml:", "lnik", "link"],

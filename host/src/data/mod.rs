@@ -45,6 +45,8 @@ pub struct JointColumns {
     pub voltage: Option<Vec<f64>>,
     /// Temperature, if recorded, °C.
     pub temperature: Option<Vec<f64>>,
+    /// What of the torque is the description's effects', N·m or N; in no file, from [`crate::effects::Compensated`].
+    pub effects: Option<Vec<f64>>,
 }
 
 /// A stretch of consecutive, evenly sampled rows.

@@ -84,6 +84,7 @@ pub fn replay(
             )
         })
         .collect();
+    notes.extend(model.effects.unsimulated());
     let settling = (SETTLING / reference.period).ceil() as usize;
     let with_rest: Vec<Vec<f64>> = reference
         .position

@@ -11,6 +11,7 @@ use super::prior::Prior;
 use super::problem::Problem;
 use super::twin::Companion;
 use crate::data::Block;
+use crate::effects::Effects;
 use crate::prepare::{LowPass, PrepareError};
 use crate::robot::{Controller, Robot};
 use crate::simulate::{Model, Motors, Stepper};
@@ -120,11 +121,13 @@ pub(super) fn model_of(
             parameters: motors.as_chunks::<MOTOR_COLUMNS>().0.to_vec(),
         })
     };
-    Ok(Model {
-        chain: chain.clone(),
-        parameters: joints.as_chunks::<COLUMNS>().0.to_vec(),
+    Model::assembled(
+        robot,
+        chain.clone(),
+        joints.as_chunks::<COLUMNS>().0.to_vec(),
         motors,
-    })
+    )
+    .map_err(|e| IdentifyError::Model(e.to_string()))
 }
 
 /// Simulates block after block; the state carries over where a block continues the one before.
@@ -132,6 +135,7 @@ pub(super) struct LoopMotion<'a> {
     robot: &'a Robot,
     controllers: &'a [Controller],
     stepper: Stepper<'a>,
+    effects: &'a Effects,
     period: f64,
     state: Option<(Vec<f64>, Vec<f64>)>,
 }
@@ -148,6 +152,7 @@ impl<'a> LoopMotion<'a> {
             robot,
             controllers,
             stepper: Stepper::new(model).map_err(|e| IdentifyError::Simulation(e.to_string()))?,
+            effects: &model.effects,
             period,
             state: None,
         })
@@ -187,13 +192,19 @@ impl Companion for LoopMotion<'_> {
         };
         let mut positions = vec![Vec::with_capacity(rows); n];
         let mut torque = vec![0.0; n];
+        let mut errors = vec![[0.0; 2]; n];
         let dt = self.period / f64::from(SUBSTEPS);
         for k in 0..rows {
+            self.effects
+                .position_errors(&q, &v, &mut errors)
+                .map_err(stopped)?;
             for i in 0..n {
                 let c = &self.controllers[i];
                 let wish = c.torque_gain
                     * c.velocity_gain
-                    * (c.position_gain * (reference[i][k] - q[i]) - v[i])
+                    * (c.position_gain * (reference[i][k] - q[i] - errors[i][0])
+                        - v[i]
+                        - errors[i][1])
                     + added[i][k];
                 let limit = self.robot.joints[i]
                     .limits

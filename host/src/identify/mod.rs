@@ -26,6 +26,7 @@ mod essential;
 mod evaluate;
 mod excitation;
 mod factor;
+mod freed;
 mod friction_map;
 mod further;
 mod grouping;

@@ -7,6 +7,7 @@ use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
+use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
 use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
@@ -18,6 +19,7 @@ use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
+use crate::effects::Effects;
 use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
 use crate::robot::Robot;
 
@@ -73,6 +75,25 @@ pub fn identify(
     for s in &holdout_surveys {
         decided.admits(s)?;
     }
+    let effects = Effects::of(robot).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let known = if effects.is_empty() {
+        [const { Vec::new() }; 3]
+    } else {
+        let free = |list| freed(list, &effects, &chain, &decided);
+        [free(training)?, free(holdout)?, free(sources)?]
+    };
+    let [known_training, known_holdout, known_sources] = known.each_ref().map(|l| plain(l));
+    let spooled = [Spooled::all(&known_training), Spooled::all(&known_holdout)];
+    let [spooled_training, spooled_holdout] = spooled.each_ref().map(|l| plain(l));
+    let (training, holdout, sources) = if effects.is_empty() {
+        (training, holdout, sources)
+    } else {
+        (
+            spooled_training.as_slice(),
+            spooled_holdout.as_slice(),
+            known_sources.as_slice(),
+        )
+    };
     let loudness: Vec<f64> = (0..joints)
         .map(|j| {
             surveys
@@ -348,11 +369,9 @@ pub fn identify(
             ));
         }
     }
-    if !robot.effects.is_empty() {
-        warnings.push(
-            "The description's effects beyond the standard model are not part of this fit.".into(),
-        );
-    }
+    let [taken, left] = effects.uncompensated();
+    warnings.extend(left);
+    let procedure = taken.into_iter().chain(beyond.procedure).collect();
     Ok(Identification {
         schema: "rig-identification/1".into(),
         robot: robot.name.clone(),
@@ -378,7 +397,7 @@ pub fn identify(
         essential: beyond.essential,
         standard_parameters: beyond.standard,
         comparison: beyond.comparison,
-        procedure: beyond.procedure,
+        procedure,
         details: Details {
             masked: tally.masked(),
             training: surveys.clone(),

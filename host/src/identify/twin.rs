@@ -50,6 +50,7 @@ impl Recording for Doubled<'_> {
                 .map(|(q, joint)| JointColumns {
                     q,
                     tau: joint.tau.clone(),
+                    effects: joint.effects.clone(),
                     ..Default::default()
                 })
                 .collect();

@@ -35,6 +35,7 @@ pub fn validation(robot: &Robot, found: &Validation, context: &Context) -> Docum
                     format_significant(r.sample_rate, 4)
                 )
             })
+            .chain(found.taken_off.clone())
             .collect(),
     ));
     data.blocks

@@ -23,7 +23,9 @@ mod workers;
 
 pub use decimate::{Decimator, Stream};
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
+pub(crate) use motion::later;
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
+pub(crate) use pieces::stretch;
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
 pub use spool::{Spooled, surveyed};

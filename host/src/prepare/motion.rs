@@ -15,7 +15,7 @@ pub struct JointMotion {
     pub qd: Vec<f64>,
     /// Acceleration, rad/s² or m/s².
     pub qdd: Vec<f64>,
-    /// Torque as recorded, N·m or N.
+    /// Torque as recorded less that of the description's effects, N·m or N.
     pub tau: Vec<f64>,
     /// Whether the speed is below the joint's threshold.
     pub slow: Vec<bool>,
@@ -130,7 +130,7 @@ fn motion_of(
                     .iter()
                     .map(|tau| low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h))
                     .collect(),
-                tau: column.tau,
+                tau: without(column.tau, column.effects.as_deref()),
                 q,
                 qd,
                 qdd,
@@ -155,8 +155,15 @@ fn motion_of(
     })
 }
 
+fn without(mut torque: Vec<f64>, effects: Option<&[f64]>) -> Vec<f64> {
+    for (torque, effect) in torque.iter_mut().zip(effects.unwrap_or_default()) {
+        *torque -= effect;
+    }
+    torque
+}
+
 /// The motion `lead` seconds later, by Taylor's series: the filtered position is smooth over a few samples.
-fn later(
+pub(crate) fn later(
     q: Vec<f64>,
     qd: Vec<f64>,
     qdd: Vec<f64>,

@@ -81,7 +81,7 @@ pub struct Piece {
 }
 
 /// Rows `start .. end` of a block.
-pub(super) fn stretch(block: &Block, start: usize, end: usize) -> Block {
+pub(crate) fn stretch(block: &Block, start: usize, end: usize) -> Block {
     let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
     Block {
         t: of(&block.t),
@@ -96,6 +96,7 @@ pub(super) fn stretch(block: &Block, start: usize, end: usize) -> Block {
                 reference: j.reference.as_ref().map(of),
                 voltage: j.voltage.as_ref().map(of),
                 temperature: j.temperature.as_ref().map(of),
+                effects: j.effects.as_ref().map(of),
             })
             .collect(),
         extra: block
@@ -128,6 +129,7 @@ fn append(block: &mut Block, mut more: Block) {
         join(&mut a.reference, b.reference);
         join(&mut a.voltage, b.voltage);
         join(&mut a.temperature, b.temperature);
+        join(&mut a.effects, b.effects);
     }
     for ((_, a), (_, b)) in block.extra.iter_mut().zip(more.extra) {
         a.extend(b);
@@ -146,6 +148,7 @@ fn drop_front(block: &mut Block, rows: usize) {
             &mut joint.reference,
             &mut joint.voltage,
             &mut joint.temperature,
+            &mut joint.effects,
         ]
         .into_iter()
         .flatten()

@@ -12,8 +12,8 @@ pub(super) const LONGEST_STEP: f64 = 2.5;
 ///
 /// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
 /// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
-/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Time, position, torque
-/// and measured derivatives are kept, other columns left out.
+/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Time, position, torque,
+/// measured derivatives and temperature are kept, other columns left out.
 pub(super) struct Resampled<'a> {
     source: &'a dyn Recording,
     period: f64,
@@ -25,13 +25,14 @@ impl<'a> Resampled<'a> {
     }
 }
 
-/// Signals of a block in a fixed order: position, torque, then velocity and acceleration where recorded.
+/// Signals of a block in a fixed order: position, torque, then velocity, acceleration and temperature where recorded.
 fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
     [
         Some(&joint.q),
         Some(&joint.tau),
         joint.qd.as_ref(),
         joint.qdd.as_ref(),
+        joint.temperature.as_ref(),
     ]
     .into_iter()
     .flatten()
@@ -119,6 +120,7 @@ impl Grid {
                     Some(&mut joint.tau),
                     joint.qd.as_mut(),
                     joint.qdd.as_mut(),
+                    joint.temperature.as_mut(),
                 ];
                 for (list, value) in lists.into_iter().flatten().zip(values) {
                     list.push(value);
@@ -162,6 +164,7 @@ impl Grid {
                 .map(|j| JointColumns {
                     qd: j.qd.as_ref().map(|_| Vec::new()),
                     qdd: j.qdd.as_ref().map(|_| Vec::new()),
+                    temperature: j.temperature.as_ref().map(|_| Vec::new()),
                     ..Default::default()
                 })
                 .collect(),
@@ -210,6 +213,7 @@ impl Recording for Resampled<'_> {
                         .map(|j| JointColumns {
                             qd: j.qd.as_ref().map(|_| Vec::new()),
                             qdd: j.qdd.as_ref().map(|_| Vec::new()),
+                            temperature: j.temperature.as_ref().map(|_| Vec::new()),
                             ..Default::default()
                         })
                         .collect(),

@@ -11,7 +11,7 @@ use super::resample::{LONGEST_STEP, Resampled};
 use super::survey::Survey;
 use crate::data::{Block, JointColumns};
 
-/// A recording whose time, position, torque and measured derivatives are written to a temporary file while they
+/// A recording whose time, position, torque, measured derivatives and temperature are written to a temporary file while they
 /// are read for the first time, and taken from there afterwards: text is parsed once, memory stays constant. Other
 /// columns are left out.
 pub struct Spooled<'a> {
@@ -136,7 +136,6 @@ fn bare(block: Block) -> Block {
             .map(|j| JointColumns {
                 reference: None,
                 voltage: None,
-                temperature: None,
                 ..j
             })
             .collect(),
@@ -154,7 +153,7 @@ fn write(to: &mut File, record: &mut Vec<u8>, block: &Block) -> std::io::Result<
     for joint in &block.joints {
         put_numbers(record, joint.q.iter());
         put_numbers(record, joint.tau.iter());
-        for measured in [&joint.qd, &joint.qdd] {
+        for measured in [&joint.qd, &joint.qdd, &joint.temperature, &joint.effects] {
             put_count(record, usize::from(measured.is_some()));
             if let Some(list) = measured {
                 put_numbers(record, list.iter());
@@ -180,11 +179,14 @@ fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<Option<Block>>
                 _ => Ok(None),
             };
             let (qd, qdd) = (measured()?, measured()?);
+            let (temperature, effects) = (measured()?, measured()?);
             Ok(JointColumns {
                 q,
                 tau,
                 qd,
                 qdd,
+                temperature,
+                effects,
                 ..Default::default()
             })
         })

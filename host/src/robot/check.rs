@@ -6,6 +6,7 @@
 use std::collections::HashSet;
 
 use super::check_drives::check_transmission;
+use super::effects::check_effects;
 use super::workspace::check_workspace;
 use super::{Drive, Joint, JointKind, Robot};
 
@@ -406,39 +407,4 @@ fn check_position_limits(joint: &Joint, [lower, upper]: [f64; 2], unit: &str) ->
             "it must be [lowest, highest], two finite numbers in {unit} (or [-inf, inf] for a revolute joint that turns endlessly)"
         ),
     })
-}
-
-fn check_effects(robot: &Robot) -> Result<(), Fault> {
-    use Step::{At, Key};
-    for (i, effect) in robot.effects.iter().enumerate() {
-        let describe = |key| match effect.get(key) {
-            None => "missing".to_owned(),
-            Some(toml::Value::String(s)) => format!("`{s}`"),
-            Some(other) => other.to_string(),
-        };
-        let known = |key, names: &[&str]| {
-            effect
-                .get(key)
-                .and_then(toml::Value::as_str)
-                .is_some_and(|s| names.contains(&s))
-        };
-        if !known("kind", &EFFECT_NAMES) {
-            return Err(Fault {
-                way: vec![Key("effect"), At(i), Key("kind")],
-                what: format!("the kind of effect {}", i + 1),
-                found: describe("kind"),
-                right: format!("it must be one of {}", EFFECT_NAMES.join(", ")),
-            });
-        }
-        let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
-        if effect.contains_key("joint") && !known("joint", &joints) {
-            return Err(Fault {
-                way: vec![Key("effect"), At(i), Key("joint")],
-                what: format!("the joint of effect {}", i + 1),
-                found: describe("joint"),
-                right: format!("this robot's joints are {}", joints.join(", ")),
-            });
-        }
-    }
-    Ok(())
 }

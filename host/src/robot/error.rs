@@ -117,16 +117,12 @@ pub enum RobotError {
         /// The joint that moves it.
         joint: String,
     },
-    /// The description cannot be put into text.
-    #[error(
-        "effect number {number} of robot `{robot}` cannot be written as TOML: {message}; an effect holds numbers, texts, lists and tables only"
-    )]
+    /// The description holds an effect that could not be read back.
+    #[error("robot `{robot}` cannot be written: {message}")]
     Write {
         /// The robot.
         robot: String,
-        /// The effect, counted from 1.
-        number: usize,
-        /// What the serialiser said.
+        /// What is wrong with which effect, and what would be right.
         message: String,
     },
     /// The description cannot be put into URDF.

@@ -10,6 +10,7 @@ mod check;
 mod check_drives;
 mod dh;
 mod drives;
+mod effects;
 mod error;
 mod numbers;
 mod text;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
+pub use effects::{Placed, RobotEffect, unit_of};
 pub use error::{Place, RobotError};
 pub use urdf_out::Urdf;
 pub use workspace::Region;
@@ -62,9 +64,9 @@ pub struct Robot {
     /// Where points of the links must stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub workspace: Vec<Region>,
-    /// Effects beyond the standard model, as `diagnose` adds them; kept as read.
+    /// Effects beyond the standard model, as `diagnose` adds them.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
-    pub effects: Vec<toml::Table>,
+    pub effects: Vec<RobotEffect>,
 }
 
 /// Revolute or prismatic.

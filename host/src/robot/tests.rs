@@ -72,12 +72,11 @@ fn everything_optional_survives_writing() {
         velocity_gain: 1e-9,
         torque_gain: -2.5,
     });
-    let effect: toml::Table = toml::from_str(
-        "kind = 'stribeck'\njoint = 'link'\nbreakaway = 0.31\n[nested]\nlist = [1, 2.5, 'x']\n",
-    )
-    .unwrap();
+    let effect: RobotEffect =
+        toml::from_str("kind = 'stribeck'\njoint = 'link'\nbreakaway = 0.31\nvelocity = 1e-3\n")
+            .unwrap();
     let mut second = effect.clone();
-    second.insert("kind".into(), "cogging".into());
+    (second.joint, second.effect.gains[0]) = (None, 0.1 + 0.2);
     robot.effects = vec![effect, second];
     let text = robot.to_toml().unwrap();
     assert_eq!(
@@ -176,7 +175,9 @@ fn missing_and_repeated_parts_are_named() {
     let effect = |body: &str| toml_says(&format!("{ONE_LINK_TEMPLATE}\n[[effect]]\n{body}\n"));
     assert!(effect("kind = 'magic'").contains("`magic`, but it must be one of stribeck"));
     assert!(effect("joint = 'link'").contains("kind of effect 1 is missing"));
-    assert!(effect("kind = 'stribeck'\njoint = 'elbow'").contains("joints are link"));
+    assert!(
+        effect("kind = 'torque_offset'\noffset = 1\njoint = 'elbow'").contains("joints are link")
+    );
 }
 
 #[test]

@@ -4,28 +4,35 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::check::{Step, check};
+use super::check::{Fault, Step, check};
+use super::effects::{check_effects, check_tables, write_effect};
 use super::error::{Place, RobotError};
 use super::{Drive, Joint, JointKind, Region, Robot, Screw};
 
 pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
+    let refused = |f: Fault| RobotError::Value {
+        path: path.into(),
+        place: Place::of(text, offset(text, &f.way)),
+        what: f.what,
+        found: f.found,
+        right: f.right,
+    };
+    // Before the whole: what the reader of the whole says of an effect has no line of its own.
+    if let Ok(tables) = toml::from_str::<toml::Table>(text)
+        && let Some(toml::Value::Array(effects)) = tables.get("effect")
+    {
+        check_tables(effects).map_err(refused)?;
+    }
     let robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
         path: path.into(),
         place: Place::of(text, e.span().map_or(0, |s| s.start)),
         message: sentence(&e),
     })?;
     missing_ratio(&robot, text, path)?;
-    check(&robot).map_err(|f| RobotError::Value {
-        path: path.into(),
-        place: Place::of(text, offset(text, &f.way)),
-        what: f.what,
-        found: f.found,
-        right: f.right,
-    })?;
+    check(&robot).map_err(refused)?;
     for (i, joint) in robot.joints.iter().enumerate() {
         let drive = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
         let way = [&drive[..], &[Step::Key("torque_constant")]].concat();
@@ -123,7 +130,7 @@ fn walk(text: &str, way: &[Step]) -> (usize, bool) {
 }
 
 /// Shortest form that reads back to the same number, always with a point or an exponent.
-fn float(value: f64) -> String {
+pub(super) fn float(value: f64) -> String {
     format!("{value:?}")
 }
 
@@ -132,11 +139,11 @@ fn list(values: &[f64]) -> String {
     format!("[{}]", items.join(", "))
 }
 
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-fn line(out: &mut String, key: &str, value: &str, comment: &str) {
+pub(super) fn line(out: &mut String, key: &str, value: &str, comment: &str) {
     let assignment = format!("{key} = {value}");
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{assignment:<40} # {comment}");
@@ -165,19 +172,12 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     for region in &robot.workspace {
         write_region(&mut out, region);
     }
-    #[derive(Serialize)]
-    struct Effects<'a> {
-        effect: [&'a toml::Table; 1],
-    }
-    for (i, effect) in robot.effects.iter().enumerate() {
-        let text =
-            toml::to_string(&Effects { effect: [effect] }).map_err(|e| RobotError::Write {
-                robot: robot.name.clone(),
-                number: i + 1,
-                message: e.to_string(),
-            })?;
-        out.push('\n');
-        out.push_str(&text);
+    check_effects(robot).map_err(|fault| RobotError::Write {
+        robot: robot.name.clone(),
+        message: format!("{} is {}, but {}", fault.what, fault.found, fault.right),
+    })?;
+    for effect in &robot.effects {
+        write_effect(&mut out, robot, effect);
     }
     Ok(out)
 }

@@ -1,5 +1,8 @@
 //! The closed loop of a model and its controller.
 
+mod acting;
+mod elastic;
+mod solve;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -10,6 +13,7 @@ use rig_shared::multibody::{
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError};
 use thiserror::Error;
 
+use crate::effects::Effects;
 use crate::robot::{Controller, Robot};
 
 pub use step::Stepper;
@@ -67,6 +71,36 @@ pub enum SimulateError {
         /// Least eigenvalue of the damping matrix.
         least: f64,
     },
+    /// Friction whose effects leave it driving.
+    #[error(
+        "the friction of joint {joint} with the description's effects would drive it at {velocity} (rad/s or m/s): it lies between {low} and {high} N·m (N), which must hold 0; give the joint more Coulomb friction, or the effects less."
+    )]
+    DrivingEffects {
+        /// From 1 at the base.
+        joint: usize,
+        /// rad/s or m/s
+        velocity: f64,
+        /// Friction against motion backwards.
+        low: f64,
+        /// Friction against motion forwards.
+        high: f64,
+    },
+    /// Play or elasticity where it is not simulated.
+    #[error(
+        "{effect} is simulated for a robot of one joint with a drive of its own only; leave it out, or describe the joint alone."
+    )]
+    ElasticChain {
+        /// The effect and its joint.
+        effect: String,
+    },
+    /// Play or elasticity without a second mass.
+    #[error(
+        "{effect} needs a motor with inertia on the other side of the gear, and the description has none; give rotor_inertia in [joint.drive]."
+    )]
+    NoRotor {
+        /// The effect and its joint.
+        effect: String,
+    },
     /// The drives cannot be used.
     #[error(transparent)]
     Drives(#[from] TransmissionError),
@@ -83,6 +117,8 @@ pub struct Model {
     pub parameters: Vec<[f64; COLUMNS]>,
     /// Drives that move more than their own joint or do it at a changing ratio; none where there is no such drive.
     pub motors: Option<Motors>,
+    /// Effects beyond all that; payloads are in the parameters.
+    pub effects: Effects,
 }
 
 /// Coupled drives and what they add to the joints' own parameters.
@@ -100,10 +136,27 @@ impl Model {
     /// [`SimulateError::Chain`] on geometry that is no chain.
     pub fn from_robot(robot: &Robot) -> Result<Self, SimulateError> {
         let chain = Chain::new(&robot.geometry(), robot.gravity)?;
+        let motors = Motors::from_robot(robot)?;
+        Self::assembled(robot, chain, robot.standard_parameters(), motors)
+    }
+
+    /// A model of these parameters with the effects of `robot`, whose payloads are added.
+    ///
+    /// # Errors
+    /// [`SimulateError::Drives`] on drives that are none.
+    pub fn assembled(
+        robot: &Robot,
+        chain: Chain<f64>,
+        mut parameters: Vec<[f64; COLUMNS]>,
+        motors: Option<Motors>,
+    ) -> Result<Self, SimulateError> {
+        let effects = Effects::of(robot)?;
+        effects.add_loads(&mut parameters);
         Ok(Self {
             chain,
-            parameters: robot.standard_parameters(),
-            motors: Motors::from_robot(robot)?,
+            parameters,
+            motors,
+            effects,
         })
     }
 
@@ -220,11 +273,11 @@ pub struct Inputs<'a> {
 /// A simulated motion: per joint one value a sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Positions.
+    /// Positions as the sensors read them; at the motor, where it is a mass of its own.
     pub q: Vec<Vec<f64>>,
-    /// Velocities.
+    /// Velocities, likewise.
     pub qd: Vec<Vec<f64>>,
-    /// Torques of the controllers (without `Inputs::added`).
+    /// Torques of the controllers (without `Inputs::added`), as the sensors read them.
     pub tau: Vec<Vec<f64>>,
     /// Samples at which a joint's torque limit cut the controller's wish.
     pub saturated: Vec<usize>,
@@ -252,13 +305,16 @@ pub fn closed_loop(
     };
     let (mut q, mut v) = (inputs.q.to_vec(), inputs.v.to_vec());
     let mut torque = vec![0.0; n];
+    let mut errors = vec![[0.0; 2]; n];
     let dt = inputs.period / f64::from(inputs.substeps.max(1));
     for k in 0..samples {
+        model.effects.position_errors(&q, &v, &mut errors)?;
         for i in 0..n {
             let c = &controllers[i];
+            let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
             let wish = c.torque_gain
                 * c.velocity_gain
-                * (c.position_gain * (inputs.reference[i][k] - q[i]) - v[i]);
+                * (c.position_gain * (inputs.reference[i][k] - read[0]) - read[1]);
             let limit = robot.joints[i]
                 .limits
                 .as_ref()
@@ -266,8 +322,8 @@ pub fn closed_loop(
                 .unwrap_or(f64::INFINITY);
             let applied = wish.max(-limit).min(limit);
             motion.saturated[i] += usize::from(applied != wish);
-            motion.q[i].push(q[i]);
-            motion.qd[i].push(v[i]);
+            motion.q[i].push(read[0]);
+            motion.qd[i].push(read[1]);
             motion.tau[i].push(applied);
             torque[i] = applied
                 + inputs
@@ -287,6 +343,9 @@ pub fn closed_loop(
             stepper.step(&mut q, &mut v, &torque, dt)?;
         }
         progress(k + 1);
+    }
+    for (i, torque) in motion.tau.iter_mut().enumerate() {
+        model.effects.read_effort(i, torque, inputs.period);
     }
     Ok(motion)
 }

@@ -8,15 +8,25 @@
 //! Motors of coupled drives count with their inertia A + Jᵀ·I_m·J, its change with the position, their viscous friction
 //! and a Coulomb friction along the motor's own motion, all of the middle of the step.
 //!
-//! Leaves out: every friction beyond Coulomb and viscous, elasticity, end stops.
+//! Effects beyond the standard model act as their laws say: what turns with the direction widens or shifts the bounds of
+//! the set-valued friction ([−fc + h(−1), fc + h(1)] at the speed of the step; friction that remembers a distance so
+//! takes its part of Coulomb friction over), the rest is a torque of the middle of the step, a coupled inertia part of the
+//! matrix. Play and elasticity make the motor a mass of its own, with steps short enough for the gear.
+//!
+//! Leaves out: end stops, temperatures, the electrical side.
 
 use rig_shared::multibody::{COLUMNS, bias_torque, column, inertia_matrix};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
+use super::acting::Acting;
+use super::elastic::Elastic;
+use super::solve::{invert, invert_any};
 use super::{Model, SimulateError};
 
 /// Passes over velocity-dependent terms; the second makes the step second order.
 const PASSES: usize = 2;
+/// Passes where effects depend on accelerations and hidden states: they contract, but not at once.
+const PASSES_WITH_EFFECTS: usize = 5;
 /// Bound on the sweeps over the joints for the friction torques; they converge geometrically.
 const SWEEPS: usize = 200;
 /// Joints that a stuck motor holds are at rest below this speed, rad/s or m/s: rounding of the friction torques.
@@ -39,8 +49,15 @@ pub struct Stepper<'a> {
     damping: Vec<f64>,
     /// Directions along which Coulomb friction acts, one row each: the joints, then the motors of coupled drives.
     along: Vec<f64>,
-    /// Its bounds.
-    limits: Vec<f64>,
+    /// Coulomb friction along them.
+    coulomb: Vec<f64>,
+    /// Bounds of the friction torques.
+    limits: Vec<[f64; 2]>,
+    acting: Acting<'a>,
+    elastic: Option<Elastic>,
+    acceleration: Vec<f64>,
+    /// What the links ask of the gears.
+    loads: Vec<f64>,
     friction: Vec<f64>,
     /// What a unit of each friction does to the velocities (n columns a row), and to the speeds along all directions.
     response: Vec<f64>,
@@ -55,7 +72,10 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// [`SimulateError::NegativeFriction`] where a joint's friction would feed energy in.
     pub fn new(model: &'a Model) -> Result<Self, SimulateError> {
-        let n = model.parameters.len();
+        let joints = model.parameters.len();
+        let elastic = Elastic::of(model)?;
+        // The motor, then the link.
+        let n = joints + usize::from(elastic.is_some());
         let mut smooth = model.parameters.clone();
         for (joint, row) in smooth.iter_mut().enumerate() {
             for (place, name) in [(column::VISCOUS, "fv"), (column::COULOMB, "fc")] {
@@ -70,8 +90,11 @@ impl<'a> Stepper<'a> {
             row[column::VISCOUS] = 0.0;
             row[column::COULOMB] = 0.0;
             row[column::OFFSET] = 0.0;
+            if elastic.is_some() {
+                row[column::DRIVE_INERTIA] = 0.0;
+            }
         }
-        let mut limits: Vec<f64> = model
+        let mut coulomb: Vec<f64> = model
             .parameters
             .iter()
             .map(|p| p[column::COULOMB])
@@ -92,13 +115,13 @@ impl<'a> Stepper<'a> {
                         });
                     }
                 }
-                limits.push(row[motor_column::COULOMB]);
+                coulomb.push(row[motor_column::COULOMB]);
             }
             columns = vec![0.0; n * n * MOTOR_COLUMNS];
         }
-        let contacts = limits.len();
+        let contacts = coulomb.len();
         let mut along = vec![0.0; contacts * n];
-        for i in 0..n {
+        for i in 0..joints {
             along[i * n + i] = 1.0;
         }
         let stepper = Self {
@@ -114,7 +137,12 @@ impl<'a> Stepper<'a> {
             next: vec![0.0; n],
             damping: vec![0.0; n * n],
             along,
-            limits,
+            limits: coulomb.iter().map(|fc| [-fc, *fc]).collect(),
+            coulomb,
+            acting: Acting::new(&model.effects, joints, elastic.map(|_| joints)),
+            elastic,
+            acceleration: vec![0.0; n],
+            loads: vec![0.0; joints],
             friction: vec![0.0; contacts],
             response: vec![0.0; contacts * n],
             coupling: vec![0.0; contacts * contacts],
@@ -157,15 +185,24 @@ impl<'a> Stepper<'a> {
     /// What depends on the position alone: inertia, damping and the directions of friction in the middle of the step.
     fn place(&mut self) -> Result<(), SimulateError> {
         let n = self.middle.len();
+        self.damping.fill(0.0);
+        for (i, own) in self.model.parameters.iter().enumerate() {
+            self.damping[i * n + i] = own[column::VISCOUS];
+        }
+        if let Some(elastic) = &self.elastic {
+            let (rotor, link) = self.mass.split_at_mut(3);
+            rotor.copy_from_slice(&[elastic.rotor, 0.0, 0.0]);
+            inertia_matrix(&self.model.chain, &self.smooth, &self.middle[1..], link)?;
+            return Ok(());
+        }
         inertia_matrix(
             &self.model.chain,
             &self.smooth,
             &self.middle,
             &mut self.mass,
         )?;
-        self.damping.fill(0.0);
-        for i in 0..n {
-            self.damping[i * n + i] = self.model.parameters[i][column::VISCOUS];
+        for (joint, other, inertia) in self.acting.couplings() {
+            self.mass[joint * n + other] += inertia;
         }
         if let Some(motors) = &self.model.motors {
             let t = &motors.transmission;
@@ -178,6 +215,19 @@ impl<'a> Stepper<'a> {
 
     /// Torques at rest acceleration without friction, with the change of the motors' ratios.
     fn bias(&mut self) -> Result<(), SimulateError> {
+        if let Some(elastic) = &self.elastic {
+            let torque = elastic.torque(&self.middle, &self.mean_velocity);
+            bias_torque(
+                &self.model.chain,
+                &self.smooth,
+                &self.middle[1..],
+                &self.mean_velocity[1..],
+                &mut self.bias[1..],
+            )?;
+            self.bias[0] = torque;
+            self.bias[1] -= torque;
+            return Ok(());
+        }
         bias_torque(
             &self.model.chain,
             &self.smooth,
@@ -207,11 +257,74 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`.
+    /// Torques of the effects in the middle of a step, and the bounds that they leave friction.
+    fn effects(&mut self, torque: &[f64], dt: f64) -> Result<(), SimulateError> {
+        if self.acting.is_empty() {
+            return Ok(());
+        }
+        let n = self.middle.len();
+        for (j, load) in self.loads.iter_mut().enumerate() {
+            let row = self.mass[j * n..(j + 1) * n].iter();
+            let inertia: f64 = row.zip(&self.acceleration).map(|(m, a)| m * a).sum();
+            let rotor = self.smooth[j][column::DRIVE_INERTIA] * self.acceleration[j];
+            *load = match self.elastic {
+                Some(_) => self.bias[0],
+                None => self.bias[j] + inertia - rotor,
+            };
+        }
+        let motion = [
+            self.middle.as_slice(),
+            &self.mean_velocity,
+            &self.acceleration,
+            torque,
+        ];
+        self.acting.evaluate(motion, &self.loads, dt)?;
+        for j in 0..self.loads.len() {
+            self.limits[j] = self
+                .acting
+                .bounds(j, self.coulomb[j], self.mean_velocity[j])?;
+        }
+        Ok(())
+    }
+
+    /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`. Where the gear has
+    /// play or elasticity, they are the motor's; the link follows from rest behind it.
     ///
     /// # Errors
-    /// [`SimulateError::Multibody`] where the inertia matrix is not positive definite.
+    /// [`SimulateError::Multibody`] where the inertia matrix is not positive definite,
+    /// [`SimulateError::DrivingEffects`].
     pub fn step(
+        &mut self,
+        q: &mut [f64],
+        v: &mut [f64],
+        torque: &[f64],
+        dt: f64,
+    ) -> Result<(), SimulateError> {
+        let Some(elastic) = self.elastic else {
+            return self.advance(q, v, torque, dt);
+        };
+        let [at, speed] = match elastic.link {
+            Some(link) => link,
+            None => [elastic.at_rest(self.model, q[0])?, v[0]],
+        };
+        let (mut both, mut speeds) = ([q[0], at], [v[0], speed]);
+        let steps = elastic.steps(dt);
+        for _ in 0..steps {
+            self.advance(&mut both, &mut speeds, torque, dt / steps as f64)?;
+        }
+        (q[0], v[0]) = (both[0], speeds[0]);
+        if let Some(elastic) = &mut self.elastic {
+            elastic.link = Some([both[1], speeds[1]]);
+        }
+        Ok(())
+    }
+
+    /// Position and velocity of the link where it is a mass of its own and has begun to move.
+    pub fn link(&self) -> Option<[f64; 2]> {
+        self.elastic.and_then(|e| e.link)
+    }
+
+    fn advance(
         &mut self,
         q: &mut [f64],
         v: &mut [f64],
@@ -231,20 +344,32 @@ impl<'a> Stepper<'a> {
         {
             *entry = mass + 0.5 * dt * damping;
         }
-        invert(&mut self.factor, &mut self.inverse, n)?;
+        if self.acting.couplings().next().is_some() {
+            invert_any(&mut self.factor, &mut self.inverse, n)?;
+        } else {
+            invert(&mut self.factor, &mut self.inverse, n)?;
+        }
         self.respond();
         self.mean_velocity.copy_from_slice(v);
-        for _ in 0..PASSES {
+        let passes = if self.acting.is_empty() {
+            PASSES
+        } else {
+            PASSES_WITH_EFFECTS
+        };
+        for _ in 0..passes {
             self.bias()?;
+            self.effects(torque, dt)?;
             for i in 0..n {
-                let own = &self.model.parameters[i];
+                let own = self.model.parameters.get(i);
+                let offset = own.map_or(0.0, |own| own[column::OFFSET]) + self.acting.torque[i];
+                let drive = torque.get(i).copied().unwrap_or(0.0);
                 let row = i * n..(i + 1) * n;
                 let drag: f64 = self.damping[row.clone()]
                     .iter()
                     .zip(&*v)
                     .map(|(d, v)| d * v)
                     .sum();
-                let driving = torque[i] - self.bias[i] - own[column::OFFSET] - 0.5 * drag;
+                let driving = drive - self.bias[i] - offset - 0.5 * drag;
                 let momentum: f64 = self.mass[row].iter().zip(&*v).map(|(m, v)| m * v).sum();
                 self.next[i] = momentum + dt * driving;
             }
@@ -254,7 +379,17 @@ impl<'a> Stepper<'a> {
             self.solve_friction(dt);
             for i in 0..n {
                 self.mean_velocity[i] = 0.5 * (v[i] + self.next[i]);
+                self.acceleration[i] = (self.next[i] - v[i]) / dt;
             }
+        }
+        if !self.acting.is_empty() {
+            let motion = [
+                self.middle.as_slice(),
+                &self.mean_velocity,
+                &self.acceleration,
+                torque,
+            ];
+            self.acting.advance(motion, dt);
         }
         for i in 0..n {
             q[i] = self.middle[i] + 0.5 * dt * self.next[i];
@@ -290,10 +425,12 @@ impl<'a> Stepper<'a> {
         for _ in 0..SWEEPS {
             let mut change = 0.0_f64;
             for c in 0..contacts {
-                let limit = self.limits[c];
+                let [low, high] = self.limits[c];
+                let limit = high.max(-low);
                 let own = self.coupling[c * contacts + c];
                 // A motor that moves its own joint only has no direction here: its friction is the joint's.
                 if limit == 0.0 || own <= 0.0 {
+                    self.friction[c] = 0.0;
                     continue;
                 }
                 let coupled: f64 = (0..contacts)
@@ -302,7 +439,7 @@ impl<'a> Stepper<'a> {
                 let free: f64 = (0..n).map(|k| self.along[c * n + k] * self.free[k]).sum();
                 let before = self.friction[c];
                 let wanted = before + (free - dt * coupled) / (dt * own);
-                self.friction[c] = wanted.clamp(-limit, limit);
+                self.friction[c] = wanted.clamp(low, high);
                 change = change.max((self.friction[c] - before).abs() / limit);
             }
             // A single joint is exact after one sweep; the comparison ends it after the second.
@@ -318,12 +455,13 @@ impl<'a> Stepper<'a> {
         }
         // What is stuck is at rest exactly, not to rounding: drift over minutes would otherwise add up.
         for c in 0..contacts {
-            if self.friction[c].abs() >= self.limits[c] {
+            let [low, high] = self.limits[c];
+            if self.friction[c] <= low || self.friction[c] >= high {
                 continue;
             }
             let along = &self.along[c * n..(c + 1) * n];
             let touched = |i: usize| along[i] != 0.0;
-            if c < n {
+            if c < self.loads.len() {
                 self.next[c] = 0.0;
             } else if (0..n).all(|i| !touched(i) || self.next[i].abs() < AT_REST) {
                 for i in 0..n {
@@ -334,31 +472,4 @@ impl<'a> Stepper<'a> {
             }
         }
     }
-}
-
-/// Inverse of a symmetric positive definite matrix by Cholesky; the factor replaces the input.
-fn invert(a: &mut [f64], inverse: &mut [f64], n: usize) -> Result<(), SimulateError> {
-    for j in 0..n {
-        let pivot = a[j * n + j] - (0..j).map(|k| a[j * n + k] * a[j * n + k]).sum::<f64>();
-        if pivot.is_nan() || pivot <= 0.0 {
-            return Err(SimulateError::NotPositiveDefinite { joint: j + 1 });
-        }
-        let root = pivot.sqrt();
-        a[j * n + j] = root;
-        for i in j + 1..n {
-            let rest: f64 = (0..j).map(|k| a[i * n + k] * a[j * n + k]).sum();
-            a[i * n + j] = (a[i * n + j] - rest) / root;
-        }
-    }
-    for c in 0..n {
-        for i in 0..n {
-            let rest: f64 = (0..i).map(|k| a[i * n + k] * inverse[k * n + c]).sum();
-            inverse[i * n + c] = (f64::from(u8::from(i == c)) - rest) / a[i * n + i];
-        }
-        for i in (0..n).rev() {
-            let rest: f64 = (i + 1..n).map(|k| a[k * n + i] * inverse[k * n + c]).sum();
-            inverse[i * n + c] = (inverse[i * n + c] - rest) / a[i * n + i];
-        }
-    }
-    Ok(())
 }

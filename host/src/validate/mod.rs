@@ -12,8 +12,11 @@
 //! limit acts on the whole. (For the pulses of EMPS this was measured: `u1` less what the controller's law gives for
 //! `ref1` and `q1` is the column `pulses`, and the torque balance has no room for a further force.)
 //!
-//! Leaves out: the description's effects beyond the standard model (a warning says so); uncertainty of the
-//! description's parameters; measured inputs other than reference and added torque.
+//! Effects beyond the standard model: their torque along the measured motion is taken off the measured torque, their
+//! errors of a sensor off its readings; the simulated motion has them all. Payloads are masses of the model.
+//!
+//! Leaves out: in the torque check, what acts between motor and link or on the voltage (a warning says so); uncertainty
+//! of the description's parameters; measured inputs other than reference and added torque.
 
 mod motion;
 #[cfg(test)]
@@ -23,6 +26,7 @@ pub(crate) use motion::added_torque;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
+use crate::effects::Compensated;
 use crate::identify::{IdentifyError, Plan, ResidualReport, chain_of, torque_residuals};
 use crate::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::{JointKind, Robot};
@@ -193,6 +197,9 @@ pub struct Validation {
     pub recordings: Vec<Checked>,
     /// Sentences.
     pub warnings: Vec<String>,
+    /// What of the description was taken off the recordings, a sentence; none without such effects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub taken_off: Option<String>,
     /// What was done to the recordings for the torque check.
     #[serde(skip)]
     pub treatment: Treatment,
@@ -268,11 +275,19 @@ pub fn validate(
         cache: crate::identify::RowCache::default(),
     };
     let mut warnings = prior_warnings(robot, &columns);
+    let [taken, left] = model.effects.uncompensated();
+    warnings.extend(left);
     let mut checked = Vec::with_capacity(recordings.len());
     let share = 1.0 / recordings.len() as f64;
     for (k, (recording, survey)) in recordings.iter().zip(&surveys).enumerate() {
+        let free = Compensated::new(*recording, &model.effects, &chain, &treatment, false)?;
+        let compared: &dyn Recording = if model.effects.is_empty() {
+            *recording
+        } else {
+            &free
+        };
         let torque: Vec<TorqueCheck> =
-            torque_residuals(&[*recording], std::slice::from_ref(survey), &plan, &values)?
+            torque_residuals(&[compared], std::slice::from_ref(survey), &plan, &values)?
                 .into_iter()
                 .zip(&robot.joints)
                 .map(|(residual, joint)| TorqueCheck {
@@ -320,6 +335,7 @@ pub fn validate(
         robot: robot.name.clone(),
         recordings: checked,
         warnings,
+        taken_off: taken,
         treatment,
     })
 }
@@ -339,12 +355,6 @@ fn prior_warnings(robot: &Robot, columns: &[usize]) -> Vec<String> {
                 joint.name
             ));
         }
-    }
-    if !robot.effects.is_empty() {
-        warnings.push(
-            "The description's effects beyond the standard model are not part of this check."
-                .into(),
-        );
     }
     warnings
 }

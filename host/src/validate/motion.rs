@@ -163,6 +163,7 @@ pub(super) fn check(
         },
     ];
     remarks.extend(gathered.added.iter().cloned());
+    remarks.extend(model.effects.unsimulated());
     if gathered.short > 0 {
         remarks.push(format!(
             "{} stretches between gaps in time are shorter than {FEWEST_ROWS} rows and were not simulated.",

@@ -5,15 +5,40 @@
 //! the η (*shapes*) do not; hidden states are driven by the motion itself. A few effects act elsewhere ([`Channel`]): on
 //! what a sensor reads, between motor and link, or between command and voltage.
 //!
-//! Adding an effect is adding its file and one line to [`registry!`].
+//! Adding an effect is adding its file and one line to the `registry!` below.
 
 mod about;
 mod asymmetric_coulomb;
+mod backlash;
 mod cogging;
+mod current_offset;
+mod drive_deadzone;
+mod encoder_eccentricity_joint;
+mod encoder_eccentricity_motor;
+mod gear_eccentricity;
+mod gravity_tilt;
+mod inertia_coupling;
+mod joint_elasticity;
+mod load_friction;
+mod measurement_delay;
+mod payload;
+mod position_friction;
 mod presliding_dahl;
+mod presliding_lugre;
+mod presliding_maxwell;
+mod quadratic_drag;
+mod spring;
 mod stribeck;
+#[cfg(test)]
+mod tests;
+mod torque_offset;
+mod torque_ripple;
+mod torque_saturation;
+mod viscous_warmup_temperature;
+mod viscous_warmup_time;
 
 pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+pub use backlash::transmitted;
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +51,7 @@ pub const GAINS: usize = 4;
 /// Most shapes of one effect.
 pub const SHAPES: usize = 3;
 /// Most hidden states of one effect.
-pub const MEMORY: usize = 6;
+pub const MEMORY: usize = 4;
 
 /// What an effect sees at one instant. Joint-side, SI.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,8 +68,12 @@ pub struct Instant<T> {
     pub motor_angle: T,
     /// Torque of the motor as its current and nominal constant say, times the ratio, N·m.
     pub drive_torque: T,
-    /// Torque that the gear transmits, N·m.
+    /// Change of the drive torque, N·m/s.
+    pub drive_rate: T,
+    /// Torque that the gear transmits to the link, friction and the drive's own inertia taken off, N·m.
     pub load: T,
+    /// Torque of gravity per kg·m of first moment along x of the link's frame, m/s².
+    pub gravity: T,
     /// Running time, s.
     pub time: T,
     /// Temperature above that at the start, K; 0 where it is not measured.
@@ -130,16 +159,70 @@ registry! {
     Stribeck in stribeck,
     /// Friction that differs with the direction.
     AsymmetricCoulomb in asymmetric_coulomb,
+    /// Drag of air and churning grease.
+    QuadraticDrag in quadratic_drag,
+    /// Friction of teeth and bearings that carry more.
+    LoadFriction in load_friction,
+    /// Tight spots.
+    PositionFriction in position_friction,
     /// Friction with memory of distance, after Dahl.
     PreslidingDahl in presliding_dahl,
+    /// Friction with memory of distance and of speed, after Canudas de Wit.
+    PreslidingLugre in presliding_lugre,
+    /// Friction with memory of distance: elements that slip one after the other.
+    PreslidingMaxwell in presliding_maxwell,
+    /// Viscous friction that falls with running time.
+    ViscousWarmupTime in viscous_warmup_time,
+    /// Viscous friction that falls with a measured temperature.
+    ViscousWarmupTemperature in viscous_warmup_temperature,
     /// Detent torque of the motor's magnets.
     Cogging in cogging,
+    /// A torque constant that varies with the motor's angle.
+    TorqueRipple in torque_ripple,
+    /// Torque of teeth whose lever arm varies over a turn.
+    GearEccentricity in gear_eccentricity,
+    /// Play between the teeth of a gear.
+    Backlash in backlash,
+    /// A shaft or gear that twists under load.
+    JointElasticity in joint_elasticity,
+    /// A code disc or magnet off the motor's axis.
+    EncoderEccentricityMotor in encoder_eccentricity_motor,
+    /// A code disc or magnet off the joint's axis.
+    EncoderEccentricityJoint in encoder_eccentricity_joint,
+    /// What the current sensor reads when no current flows.
+    CurrentOffset in current_offset,
+    /// A torque constant that falls at high current.
+    TorqueSaturation in torque_saturation,
+    /// A torque or current that is read later than the position.
+    MeasurementDelay in measurement_delay,
+    /// Gravity that does not stand where the description says.
+    GravityTilt in gravity_tilt,
+    /// A mass on the link.
+    Payload in payload,
+    /// A cable or hose that pulls the joint back.
+    Spring in spring,
+    /// Voltage that half-bridges lose.
+    DriveDeadzone in drive_deadzone,
+    /// Terms of another joint's motion.
+    InertiaCoupling in inertia_coupling,
+    /// A constant torque.
+    TorqueOffset in torque_offset,
 }
 
 impl Kind {
     /// How many of the parameters are gains; they come first.
     pub fn gains(self) -> usize {
         self.about().gains.len()
+    }
+
+    /// Gap, stiffness and damping of a transmission with these shapes, as [`transmitted`] takes them; none for what
+    /// does not act between motor and link.
+    pub fn transmission<T: Real>(self, shapes: &[T; SHAPES]) -> Option<[T; 3]> {
+        match self {
+            Self::Backlash => Some(*shapes),
+            Self::JointElasticity => Some([T::ZERO, shapes[0], shapes[1]]),
+            _ => None,
+        }
     }
 
     /// The kind with this name and law, as a description writes them.

@@ -28,7 +28,7 @@ impl Law for PreslidingDahl {
         shapes: &[Parameter {
             name: "stroke",
             unit: "rad",
-            bounds: [0.0, f64::INFINITY],
+            bounds: [f64::MIN_POSITIVE, f64::INFINITY],
             range: [2.0e-4, 0.1],
             scale: Scale::Logarithmic,
             meaning: "displacement over which friction builds up to 63 %",

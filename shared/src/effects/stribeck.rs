@@ -28,17 +28,24 @@ impl Law for Stribeck {
         shapes: &[Parameter {
             name: "velocity",
             unit: "rad/s",
-            bounds: [0.0, f64::INFINITY],
+            bounds: [f64::MIN_POSITIVE, f64::INFINITY],
             range: [0.005, 2.0],
             scale: Scale::Logarithmic,
             meaning: "Stribeck velocity",
         }],
         signature: "odd in velocity, below about three Stribeck velocities, the same at every position and load",
-        confused: &[Confusion {
-            with: "presliding",
-            exact: false,
-            separated_by: "constant speeds from 0.005 to 1 rad/s, both ways",
-        }],
+        confused: &[
+            Confusion {
+                with: "presliding",
+                exact: false,
+                separated_by: "constant speeds from 0.005 to 1 rad/s, both ways",
+            },
+            Confusion {
+                with: "drive_deadzone",
+                exact: false,
+                separated_by: "a measured current: with the voltage alone, friction at rest and a dead zone look the same",
+            },
+        ],
         needs: &[Need::SlowMotion(0.05), Need::Reversals(4)],
         compensable: true,
         leaves_out: "rising breakaway with dwell time, frictional lag",

@@ -1,0 +1,304 @@
+//! A recording freed of the effects that a description states.
+
+use rig_shared::effects::{Kind, Memory};
+use rig_shared::multibody::{Chain, column, inverse_dynamics};
+use rig_shared::scalar::Real as _;
+
+use super::{Effects, State, at_the_link, is_torque, shifted};
+use crate::data::{Block, JointColumns};
+use crate::prepare::{
+    LowPass, Piece, PrepareError, Recording, Treatment, central_difference, each_piece, later,
+    second_difference, stretch,
+};
+
+/// Rows that are worked on together.
+const CORE: usize = 1 << 16;
+
+/// A recording whose positions are what the sensors should have read, and whose torques have beside them
+/// ([`JointColumns::effects`]) what of each is the effects'. Other columns stay.
+///
+/// The effects see the motion behind the position filter of the treatment and the torque behind the same filter; hidden
+/// states run on from row to row of a stretch and start at 0. The load that a gear transmits is the torque less the
+/// drive's inertia, the friction of the description and all other effects on the motor's side.
+pub struct Compensated<'a> {
+    inner: &'a dyn Recording,
+    effects: &'a Effects,
+    chain: &'a Chain<f64>,
+    filter: LowPass,
+    period: f64,
+    lead: f64,
+    measured_derivatives: bool,
+    loads: bool,
+}
+
+impl<'a> Compensated<'a> {
+    /// Frees `inner`; of payloads only where `loads` says so.
+    ///
+    /// # Errors
+    /// [`PrepareError::Cutoff`] where the treatment has no position filter.
+    pub fn new(
+        inner: &'a dyn Recording,
+        effects: &'a Effects,
+        chain: &'a Chain<f64>,
+        treatment: &Treatment,
+        loads: bool,
+    ) -> Result<Self, PrepareError> {
+        let filter = treatment
+            .position_filter()
+            .ok_or_else(|| PrepareError::Cutoff {
+                cutoff: treatment.cutoff,
+                rate: treatment.sample_rate,
+                nyquist: treatment.sample_rate / 2.0,
+            })?;
+        Ok(Self {
+            inner,
+            effects,
+            chain,
+            filter,
+            period: treatment.dt(),
+            lead: treatment.torque_lead,
+            measured_derivatives: treatment.measured_derivatives,
+            loads,
+        })
+    }
+}
+
+fn stopped(e: impl std::fmt::Display) -> PrepareError {
+    PrepareError::Stopped(e.to_string())
+}
+
+/// What runs on from piece to piece.
+struct Running {
+    memory: Vec<Memory<f64>>,
+    segment: usize,
+    first_time: f64,
+    first_temperature: Vec<Option<f64>>,
+}
+
+/// One joint over a piece, as the effects see it.
+struct Seen {
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    qdd: Vec<f64>,
+    /// Torque with the sensor's errors taken off, as recorded and filtered.
+    raw: Vec<f64>,
+    torque: Vec<f64>,
+}
+
+impl Recording for Compensated<'_> {
+    fn label(&self) -> String {
+        self.inner.label()
+    }
+
+    fn passed(&self, share: f64) {
+        self.inner.passed(share);
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        let longest = (0..self.effects.loads.len())
+            .map(|j| self.effects.effort(j).0 / self.period)
+            .fold(0.0, f64::max);
+        let margin = self.filter.settle_samples() + longest.ceil() as usize + 4;
+        let mut running: Option<Running> = None;
+        each_piece(self.inner, CORE.max(margin), margin, &mut |mut piece| {
+            if running.is_none() {
+                running = Some(Running {
+                    memory: Vec::new(),
+                    segment: usize::MAX,
+                    first_time: piece.rows.t.first().copied().unwrap_or(0.0),
+                    first_temperature: temperatures(&piece, piece.core_start),
+                });
+            }
+            if let Some(running) = &mut running {
+                if running.segment != piece.segment {
+                    running.segment = piece.segment;
+                    running.memory = vec![Memory::default(); self.effects.placed.len()];
+                }
+                self.work(&mut piece, running)?;
+            }
+            for start in (piece.core_start..piece.core_end).step_by(rows.max(1)) {
+                let end = start.saturating_add(rows.max(1)).min(piece.core_end);
+                let mut block = stretch(&piece.rows, start, end);
+                block.continues = piece.offset + start as u64 > 0;
+                take(block)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Temperature of each joint at a row.
+fn temperatures(piece: &Piece, row: usize) -> Vec<Option<f64>> {
+    let joints = piece.rows.joints.iter();
+    joints
+        .map(|j| j.temperature.as_ref().and_then(|t| t.get(row).copied()))
+        .collect()
+}
+
+impl Compensated<'_> {
+    /// Corrects the positions of a piece and says what of its torques is the effects'.
+    fn work(&self, piece: &mut Piece, running: &mut Running) -> Result<(), PrepareError> {
+        self.correct_positions(piece)?;
+        let seen = piece
+            .rows
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(j, column)| self.seen(j, column))
+            .collect::<Vec<Seen>>();
+        let joints = seen.len();
+        let mut known: Vec<Vec<f64>> = seen
+            .iter()
+            .zip(&piece.rows.joints)
+            .map(|(s, column)| {
+                let pairs = column.tau.iter().zip(&s.raw);
+                pairs.map(|(read, acting)| read - acting).collect()
+            })
+            .collect();
+        let mut row = [vec![0.0; joints], vec![0.0; joints], vec![0.0; joints]];
+        let (mut motor, mut drive) = (vec![0.0; joints], vec![0.0; joints]);
+        let (mut warming, mut sum) = (vec![0.0; joints], vec![0.0; joints]);
+        for r in piece.core_start..piece.core_end {
+            for (j, s) in seen.iter().enumerate() {
+                (row[0][j], row[1][j], row[2][j]) = (s.q[r], s.qd[r], s.qdd[r]);
+                drive[j] = s.torque.get(r).copied().unwrap_or(0.0);
+            }
+            for ((to, now), first) in warming
+                .iter_mut()
+                .zip(temperatures(piece, r))
+                .zip(&running.first_temperature)
+            {
+                *to = now.zip(*first).map_or(0.0, |(now, first)| now - first);
+            }
+            self.effects
+                .motor_angles(&row[0], &mut motor)
+                .map_err(stopped)?;
+            let state = State {
+                q: &row[0],
+                qd: &row[1],
+                qdd: &row[2],
+                motor: &motor,
+                drive: &drive,
+                time: piece.rows.t[r] - running.first_time,
+                warming: &warming,
+                period: self.period,
+            };
+            self.torques(&state, &mut running.memory, &mut sum);
+            if self.loads && self.effects.loads.iter().flatten().any(|x| *x != 0.0) {
+                let mut load = vec![0.0; joints];
+                let loads = &self.effects.loads;
+                inverse_dynamics(self.chain, loads, &row[0], &row[1], &row[2], &mut load)
+                    .map_err(stopped)?;
+                for (to, from) in sum.iter_mut().zip(load) {
+                    *to += from;
+                }
+            }
+            for (to, torque) in known.iter_mut().zip(&sum) {
+                to[r] += torque;
+            }
+        }
+        for (column, known) in piece.rows.joints.iter_mut().zip(known) {
+            column.effects = Some(known);
+        }
+        Ok(())
+    }
+
+    /// Torques of all joints along a motion; the hidden states go on.
+    fn torques(&self, at: &State<'_>, memory: &mut [Memory<f64>], sum: &mut [f64]) {
+        sum.fill(0.0);
+        let placed = &self.effects.placed;
+        let mut behind: Vec<f64> = self
+            .effects
+            .standard
+            .iter()
+            .enumerate()
+            .map(|(j, p)| {
+                at.drive[j]
+                    - p[column::DRIVE_INERTIA] * at.qdd[j]
+                    - p[column::VISCOUS] * at.qd[j]
+                    - p[column::COULOMB] * at.qd[j].sgn()
+                    - p[column::OFFSET]
+            })
+            .collect();
+        for (k, p) in placed.iter().enumerate() {
+            let kind = p.effect.kind;
+            if !is_torque(kind) || kind == Kind::LoadFriction {
+                continue;
+            }
+            let mut instant = self.effects.instant(k, at);
+            instant.direction = at.qd[p.joint].sgn();
+            let torque = p.effect.torque(&mut memory[k], &instant);
+            sum[p.joint] += torque;
+            if !at_the_link(kind) {
+                behind[p.joint] -= torque;
+            }
+        }
+        for (j, behind) in behind.iter().enumerate() {
+            // What is left is load + c·|load|·direction.
+            let of = placed.iter();
+            let coefficient: f64 = of
+                .filter(|p| p.joint == j && p.effect.kind == Kind::LoadFriction)
+                .map(|p| p.effect.gains[0])
+                .sum();
+            let load = behind / (1.0 + coefficient * at.qd[j].sgn() * behind.sgn());
+            sum[j] += coefficient * load.abs() * at.qd[j].sgn();
+        }
+    }
+
+    fn correct_positions(&self, piece: &mut Piece) -> Result<(), PrepareError> {
+        let joints = piece.rows.joints.len();
+        let still = vec![0.0; joints];
+        let mut errors = vec![[0.0; 2]; joints];
+        let mut guess = vec![0.0; joints];
+        for r in 0..piece.rows.len() {
+            // The error is a function of the true position: twice is enough for errors far below its period.
+            let read: Vec<f64> = piece.rows.joints.iter().map(|j| j.q[r]).collect();
+            guess.copy_from_slice(&read);
+            for _ in 0..2 {
+                self.effects
+                    .position_errors(&guess, &still, &mut errors)
+                    .map_err(stopped)?;
+                for ((to, read), error) in guess.iter_mut().zip(&read).zip(&errors) {
+                    *to = read - error[0];
+                }
+            }
+            for (column, q) in piece.rows.joints.iter_mut().zip(&guess) {
+                column.q[r] = *q;
+            }
+        }
+        Ok(())
+    }
+
+    fn seen(&self, j: usize, column: &JointColumns) -> Seen {
+        let (dt, filter) = (self.period, &self.filter);
+        let q = filter.zero_phase(&column.q);
+        let (qd, qdd) = match &column.qd {
+            Some(qd) if self.measured_derivatives => {
+                let qd = filter.zero_phase(qd);
+                let qdd = match &column.qdd {
+                    Some(qdd) => filter.zero_phase(qdd),
+                    None => central_difference(&qd, dt),
+                };
+                (qd, qdd)
+            }
+            _ => (central_difference(&q, dt), second_difference(&q, dt)),
+        };
+        let (q, qd, qdd) = later(q, qd, qdd, self.lead, dt);
+        let (delay, offset) = self.effects.effort(j);
+        let raw: Vec<f64> = shifted(&column.tau, delay / dt)
+            .into_iter()
+            .map(|tau| tau - offset)
+            .collect();
+        Seen {
+            torque: filter.zero_phase(&raw),
+            q,
+            qd,
+            qdd,
+            raw,
+        }
+    }
+}

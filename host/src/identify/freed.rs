@@ -1,0 +1,24 @@
+//! Recordings freed of the description's effects before anything is fitted to them.
+
+use rig_shared::multibody::Chain;
+
+use super::IdentifyError;
+use crate::effects::{Compensated, Effects};
+use crate::prepare::{Recording, Treatment};
+
+/// Each of several recordings, payloads taken off too: what is identified is the robot without them.
+pub(super) fn freed<'a>(
+    list: &[&'a dyn Recording],
+    effects: &'a Effects,
+    chain: &'a Chain<f64>,
+    treatment: &Treatment,
+) -> Result<Vec<Compensated<'a>>, IdentifyError> {
+    list.iter()
+        .map(|r| Ok(Compensated::new(*r, effects, chain, treatment, true)?))
+        .collect()
+}
+
+/// As recordings.
+pub(super) fn plain<R: Recording>(list: &[R]) -> Vec<&dyn Recording> {
+    list.iter().map(|r| r as &dyn Recording).collect()
+}

@@ -1,0 +1,170 @@
+//! The effects of a model within a step.
+
+use rig_shared::effects::{Direction, GAINS, Kind, Memory};
+
+use super::SimulateError;
+use crate::effects::{Effects, State, at_the_link, is_torque};
+
+/// Friction may be beyond zero by this share of itself: rounding.
+const SLACK: f64 = 1e-9;
+
+/// What the effects of a model remember, and what they do in the step at hand.
+pub(super) struct Acting<'a> {
+    effects: &'a Effects,
+    memory: Vec<Memory<f64>>,
+    motor: Vec<f64>,
+    time: f64,
+    /// Where the link is a mass of its own: the place of its coordinate.
+    link: Option<usize>,
+    /// Torques that do not turn with the direction, one a coordinate.
+    pub torque: Vec<f64>,
+    /// What dry friction adds against motion backwards and forwards, one a joint.
+    dry: Vec<[f64; 2]>,
+    /// The part of that whose hidden state stands for the direction.
+    remembered: Vec<[f64; 2]>,
+}
+
+impl<'a> Acting<'a> {
+    pub(super) fn new(effects: &'a Effects, joints: usize, link: Option<usize>) -> Self {
+        Self {
+            effects,
+            memory: vec![Memory::default(); effects.placed().len()],
+            motor: vec![0.0; joints],
+            time: 0.0,
+            link,
+            torque: vec![0.0; joints + usize::from(link.is_some())],
+            dry: vec![[0.0; 2]; joints],
+            remembered: vec![[0.0; 2]; joints],
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.effects.is_empty()
+    }
+
+    /// Inertia that another joint's acceleration makes felt: joint, other, kg·m².
+    pub(super) fn couplings(&self) -> impl Iterator<Item = (usize, usize, f64)> + use<'a> {
+        let of = |p: &&crate::robot::Placed| p.effect.kind == Kind::InertiaCoupling;
+        self.effects
+            .placed()
+            .iter()
+            .filter(of)
+            .filter_map(|p| Some((p.joint, p.other?, p.effect.gains[0])))
+    }
+
+    /// What effect `k` sees at a state; the coupled acceleration counts with the inertia.
+    fn instant(
+        &self,
+        k: usize,
+        [q, v, a, drive]: [&[f64]; 4],
+        period: f64,
+    ) -> rig_shared::effects::Instant<f64> {
+        let place = self.effects.placed()[k];
+        let mut instant = self.effects.instant(
+            k,
+            &State {
+                q,
+                qd: v,
+                qdd: a,
+                motor: &self.motor,
+                drive,
+                time: self.time + period,
+                warming: &[],
+                period,
+            },
+        );
+        instant.other[2] = 0.0;
+        if let Some(link) = self.link
+            && at_the_link(place.effect.kind)
+        {
+            (instant.position, instant.velocity) = (q[link], v[link]);
+        }
+        instant
+    }
+
+    /// Evaluates all torques in the middle of a step of `dt`: positions, mean velocities and accelerations of all
+    /// coordinates, torques of the drives, and what the links ask of the gears.
+    pub(super) fn evaluate(
+        &mut self,
+        motion: [&[f64]; 4],
+        links: &[f64],
+        dt: f64,
+    ) -> Result<(), SimulateError> {
+        self.torque.fill(0.0);
+        self.dry.fill([0.0; 2]);
+        self.remembered.fill([0.0; 2]);
+        let joints = self.motor.len();
+        self.effects
+            .motor_angles(&motion[0][..joints], &mut self.motor)?;
+        let mut load = links.to_vec();
+        // Friction under load last: what acts on the link is part of the load.
+        for last in [false, true] {
+            for (k, p) in self.effects.placed().iter().enumerate() {
+                let kind = p.effect.kind;
+                if !is_torque(kind) || (kind == Kind::LoadFriction) != last {
+                    continue;
+                }
+                let mut instant = self.instant(k, motion, 0.5 * dt);
+                instant.load = load[p.joint];
+                if kind.about().direction == Direction::Dry {
+                    for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
+                        instant.direction = direction;
+                        let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
+                        self.dry[p.joint][side] += torque;
+                        if kind.about().name == "presliding" {
+                            self.remembered[p.joint][side] += torque;
+                        }
+                    }
+                    continue;
+                }
+                let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
+                match self.link.filter(|_| at_the_link(kind)) {
+                    Some(link) => self.torque[link] += torque,
+                    None => self.torque[p.joint] += torque,
+                }
+                if at_the_link(kind) && self.link.is_none() {
+                    load[p.joint] += torque;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bounds of the friction of a joint whose Coulomb friction is `coulomb`, at a velocity.
+    pub(super) fn bounds(
+        &self,
+        joint: usize,
+        coulomb: f64,
+        velocity: f64,
+    ) -> Result<[f64; 2], SimulateError> {
+        let [low, high] = self.dry[joint];
+        let bounds = [low - coulomb, high + coulomb];
+        let [back, forth] = self.remembered[joint];
+        let slack = SLACK * (coulomb + low.abs() + high.abs());
+        // Slid far enough, what is remembered is the direction: the rest must be friction on its own.
+        let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack;
+        if passive && bounds[0] <= bounds[1] {
+            return Ok(bounds);
+        }
+        if passive && bounds[0] <= bounds[1] + slack {
+            let middle = 0.5 * (bounds[0] + bounds[1]);
+            return Ok([middle; 2]);
+        }
+        Err(SimulateError::DrivingEffects {
+            joint: joint + 1,
+            velocity,
+            low: bounds[0],
+            high: bounds[1],
+        })
+    }
+
+    /// Hidden states and time at the end of the step.
+    pub(super) fn advance(&mut self, motion: [&[f64]; 4], dt: f64) {
+        for k in 0..self.memory.len() {
+            let instant = self.instant(k, motion, dt);
+            let p = &self.effects.placed()[k].effect;
+            let _: [f64; GAINS] = p.kind.terms(&p.shapes, &mut self.memory[k].0, &instant);
+        }
+        self.time += dt;
+    }
+}

@@ -1,0 +1,82 @@
+//! Play between the teeth of a gear.
+
+use super::{
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
+    Scale,
+};
+use crate::scalar::Real;
+
+pub(super) struct Backlash;
+
+impl Law for Backlash {
+    const ABOUT: About = About {
+        name: "backlash",
+        law: None,
+        title: "backlash of the gear",
+        equation: "torque = stiffness · bend + damping · d(twist)/dt while the teeth touch, 0 within the gap; bend = twist − clamp(twist, ±gap/2), twist = θm/ratio − q",
+        source: "Nordin and Gutman 2002, sec. 2; damping that never pulls, Hunt and Crossley 1975",
+        channel: Channel::Transmission,
+        direction: Direction::Indifferent,
+        gains: &[],
+        shapes: &[
+            Parameter {
+                name: "gap",
+                unit: "rad",
+                bounds: [0.0, f64::INFINITY],
+                range: [1.0e-3, 0.04],
+                scale: Scale::Logarithmic,
+                meaning: "whole play at the joint",
+            },
+            Parameter {
+                name: "stiffness",
+                unit: "N*m/rad",
+                bounds: [f64::MIN_POSITIVE, f64::INFINITY],
+                range: [500.0, 2.0e4],
+                scale: Scale::Logarithmic,
+                meaning: "of the teeth in contact",
+            },
+            Parameter {
+                name: "damping",
+                unit: "N*m*s/rad",
+                bounds: [0.0, f64::INFINITY],
+                range: [0.1, 50.0],
+                scale: Scale::Logarithmic,
+                meaning: "of the teeth in contact",
+            },
+        ],
+        signature: "the load vanishes over an angle where its sign changes, followed by impacts",
+        confused: &[
+            Confusion {
+                with: "presliding",
+                exact: false,
+                separated_by: "reversals at q = 90 degrees, where gravity closes a gap",
+            },
+            Confusion {
+                with: "joint_elasticity",
+                exact: false,
+                separated_by: "small motion at q = 90 degrees, where gravity closes a gap",
+            },
+        ],
+        needs: &[Need::Reversals(8)],
+        compensable: false,
+        leaves_out: "friction within the gap, a gap that varies from tooth to tooth",
+    };
+
+    #[inline(always)]
+    fn terms<T: Real>(_: &[T; SHAPES], _: &mut [T; MEMORY], _: &Instant<T>) -> [T; GAINS] {
+        [T::ZERO; GAINS]
+    }
+}
+
+/// Torque that a gear passes from motor to link, N·m: play, a spring behind it and damping in contact.
+///
+/// `twist` is the motor's angle over the ratio less the joint's, rad, `rate` its derivative; `gap` the whole play, rad;
+/// `stiffness` N·m/rad, `damping` N·m·s/rad. Teeth with play only push; a shaft without play pulls as well.
+#[inline(always)]
+pub fn transmitted<T: Real>(gap: T, stiffness: T, damping: T, twist: T, rate: T) -> T {
+    let half = T::from_f64(0.5) * gap;
+    let bend = twist - twist.clamp_to(-half, half);
+    let torque = stiffness * bend + damping * rate;
+    let apart = T::ZERO.lt(gap) & (torque * bend).le(T::ZERO);
+    T::select(apart, T::ZERO, torque)
+}

@@ -1,0 +1,56 @@
+//! Friction of teeth and bearings that carry more.
+
+use super::{
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
+    Scale,
+};
+use crate::scalar::Real;
+
+pub(super) struct LoadFriction;
+
+impl Law for LoadFriction {
+    const ABOUT: About = About {
+        name: "load_friction",
+        law: None,
+        title: "friction that grows with the load",
+        equation: "coefficient · |load| · sgn q̇",
+        source: "Hamon, Gautier, Garrec 2010; Bittencourt and Gunnarsson 2012",
+        channel: Channel::Torque,
+        direction: Direction::Dry,
+        gains: &[Parameter {
+            name: "coefficient",
+            unit: "1",
+            bounds: [0.0, 1.0],
+            range: [0.02, 0.3],
+            scale: Scale::Logarithmic,
+            meaning: "friction per transmitted torque",
+        }],
+        shapes: &[],
+        signature: "odd in velocity and proportional to the transmitted torque, whatever its sign",
+        confused: &[
+            Confusion {
+                with: "position_friction",
+                exact: false,
+                separated_by: "the same speed with two payloads, or with the base turned so that gravity does nothing",
+            },
+            Confusion {
+                with: "torque_ripple",
+                exact: false,
+                separated_by: "speeds in both directions at one load",
+            },
+            Confusion {
+                with: "torque_saturation",
+                exact: false,
+                separated_by: "slow motion under high load in both directions",
+            },
+        ],
+        needs: &[Need::LoadRange(1.0), Need::Reversals(4)],
+        compensable: true,
+        leaves_out: "different efficiencies for driving and being driven, a term with the square of the load",
+    };
+
+    #[inline(always)]
+    fn terms<T: Real>(_: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
+        [at.load.abs() * at.direction, T::ZERO, T::ZERO, T::ZERO]
+    }
+}

@@ -1,0 +1,394 @@
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::HashSet;
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// A kind with its searched range's middle, gains all positive.
+fn example(kind: Kind) -> Effect<f64> {
+    let about = kind.about();
+    let middle = |p: &Parameter| match p.scale {
+        Scale::Linear => 0.5 * (p.range[0] + p.range[1]),
+        Scale::Logarithmic => (p.range[0] * p.range[1]).sqrt(),
+    };
+    let mut effect = Effect {
+        kind,
+        gains: [0.0; GAINS],
+        shapes: [0.0; SHAPES],
+    };
+    for (to, p) in effect.gains.iter_mut().zip(about.gains) {
+        *to = middle(p);
+    }
+    for (to, p) in effect.shapes.iter_mut().zip(about.shapes) {
+        *to = middle(p);
+    }
+    effect
+}
+
+/// Instants along positions at a constant period, velocities between them taken as constant.
+fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
+    q.windows(2)
+        .enumerate()
+        .map(|(k, pair)| {
+            let velocity = (pair[1] - pair[0]) / period;
+            Instant {
+                position: 0.5 * (pair[0] + pair[1]),
+                velocity,
+                direction: velocity.sgn(),
+                motor_angle: 25.0 * (pair[0] + pair[1]),
+                drive_torque: 2.0,
+                load: -3.0,
+                time: k as f64 * period,
+                warming: 5.0,
+                period,
+                ..Instant::default()
+            }
+        })
+        .collect()
+}
+
+/// Work against `effect` along `q`, J; `coulomb` is friction of the joint beside it.
+fn work(effect: &Effect<f64>, coulomb: f64, q: &[f64], period: f64) -> f64 {
+    let mut memory = Memory::default();
+    along(q, period)
+        .iter()
+        .map(|at| {
+            let torque = effect.torque(&mut memory, at) + coulomb * at.direction;
+            torque * at.velocity * period
+        })
+        .sum()
+}
+
+/// A closed path: there and back along three sines.
+fn loop_of(a: [f64; 3], turns: usize) -> Vec<f64> {
+    let n = 4000;
+    (0..=turns * n)
+        .map(|k| {
+            let phase = core::f64::consts::TAU * (k % n) as f64 / n as f64;
+            a[0] * phase.sin() + a[1] * (2.0 * phase).sin() + a[2] * (3.0 * phase).sin()
+        })
+        .collect()
+}
+
+#[test]
+fn every_kind_says_all_there_is_to_say() {
+    let mut seen = HashSet::new();
+    for &kind in Kind::ALL {
+        let about = kind.about();
+        assert!(seen.insert((about.name, about.law)), "{kind:?} twice");
+        let laws = Kind::ALL
+            .iter()
+            .filter(|k| k.about().name == about.name)
+            .count();
+        assert_eq!(laws > 1, about.law.is_some(), "{kind:?}");
+        assert_eq!(Kind::named(about.name, about.law), Some(kind));
+        for text in [
+            about.title,
+            about.equation,
+            about.source,
+            about.signature,
+            about.leaves_out,
+        ] {
+            assert!(text.len() > 3 && !text.ends_with('.'), "{kind:?}: {text}");
+        }
+        assert!(about.gains.len() <= GAINS && about.shapes.len() <= SHAPES);
+        assert!(
+            !about.confused.is_empty() && !about.needs.is_empty(),
+            "{kind:?}"
+        );
+        let mut names = HashSet::from(["kind", "joint", "law", "other"]);
+        for p in about.gains.iter().chain(about.shapes) {
+            assert!(names.insert(p.name), "{kind:?}: {}", p.name);
+            assert!(p.unit.is_ascii() && !p.meaning.is_empty());
+            assert!(
+                p.bounds[0] <= p.range[0] && p.range[0] < p.range[1] && p.range[1] <= p.bounds[1]
+            );
+            assert!(
+                p.scale == Scale::Linear || p.range[0] > 0.0,
+                "{kind:?}: {}",
+                p.name
+            );
+        }
+        // Only what acts between motor and link has no torque of its own.
+        assert_eq!(
+            about.gains.is_empty(),
+            about.channel == Channel::Transmission
+        );
+        assert_eq!(
+            kind.transmission(&[1.0; SHAPES]).is_some(),
+            about.channel == Channel::Transmission
+        );
+        for c in about.confused {
+            assert!(
+                Kind::named(c.with, None).is_some() && c.with != about.name,
+                "{kind:?}"
+            );
+            assert!(!c.separated_by.is_empty());
+            let back = Kind::ALL.iter().any(|k| {
+                let other = k.about();
+                other.name == c.with
+                    && other
+                        .confused
+                        .iter()
+                        .any(|d| d.with == about.name && d.exact)
+            });
+            assert_eq!(c.exact, back, "{} and {}", about.name, c.with);
+        }
+    }
+}
+
+#[test]
+fn terms_beyond_the_gains_are_zero_and_no_gain_is_without_a_term() {
+    let at = Instant {
+        position: 0.7,
+        velocity: -0.4,
+        acceleration: 2.0,
+        direction: -1.0,
+        motor_angle: 35.2,
+        drive_torque: 3.0,
+        drive_rate: 7.0,
+        load: 2.5,
+        gravity: 6.0,
+        time: 40.0,
+        warming: 8.0,
+        other: [0.3, 0.6, -1.5],
+        period: 1e-3,
+    };
+    for &kind in Kind::ALL {
+        let effect = example(kind);
+        let terms = kind.terms(&effect.shapes, &mut [0.0; MEMORY], &at);
+        for (k, term) in terms.iter().enumerate() {
+            assert!(term.is_finite(), "{kind:?}");
+            assert_eq!(*term != 0.0, k < kind.gains(), "{kind:?} {k}: {term}");
+        }
+    }
+}
+
+#[test]
+fn dry_friction_turns_with_the_direction_and_the_rest_does_not_know_it() {
+    let moving = along(&[0.30, 0.31], 1e-2)[0];
+    for &kind in Kind::ALL {
+        let effect = example(kind);
+        let torque = |direction| {
+            let at = Instant {
+                direction,
+                ..moving
+            };
+            effect.torque(&mut Memory::default(), &at)
+        };
+        let dry = kind.about().direction == Direction::Dry;
+        if dry && kind != Kind::AsymmetricCoulomb {
+            // The hidden state does not depend on the direction; what is left is odd in it.
+            let even = torque(1.0) + torque(-1.0) - 2.0 * torque(0.0);
+            assert!(even.abs() < 1e-12, "{kind:?}");
+        }
+        assert_eq!(
+            torque(1.0) != torque(-1.0),
+            dry && kind != Kind::AsymmetricCoulomb,
+            "{kind:?}"
+        );
+    }
+    let asymmetric = example(Kind::AsymmetricCoulomb);
+    let at = Instant {
+        direction: 0.0,
+        ..moving
+    };
+    assert_eq!(asymmetric.torque(&mut Memory::default(), &at), 0.0);
+}
+
+proptest! {
+    /// Over any closed path nothing that is friction gives energy back.
+    #[test]
+    fn friction_only_takes(
+        a in proptest::array::uniform3(-1.0..1.0_f64),
+        scale in 1e-3..1.0_f64,
+        period in 1e-4..1e-2_f64,
+    ) {
+        let q = loop_of(a.map(|x| x * scale), 2);
+        for kind in [
+            Kind::Stribeck, Kind::QuadraticDrag, Kind::LoadFriction, Kind::PreslidingDahl,
+            Kind::PreslidingMaxwell, Kind::PositionFriction, Kind::AsymmetricCoulomb,
+        ] {
+            let effect = example(kind);
+            // What the joint's own friction must have at least, for its difference to be friction.
+            let coulomb: f64 = match kind {
+                Kind::PreslidingMaxwell | Kind::PreslidingDahl => effect.gains.iter().sum(),
+                Kind::PositionFriction => effect.gains[0].hypot(effect.gains[1]),
+                Kind::AsymmetricCoulomb => effect.gains[0],
+                _ => 0.0,
+            };
+            let lost = work(&effect, coulomb, &q, period);
+            let size: f64 = q.windows(2).map(|p| (p[1] - p[0]).abs()).sum();
+            prop_assert!(lost >= -1e-9 * size, "{kind:?} gives {}", -lost);
+        }
+    }
+
+    /// What has a potential takes nothing over a closed path.
+    #[test]
+    fn conservative_torques_return_what_they_take(a in proptest::array::uniform3(-1.0..1.0_f64)) {
+        let q = loop_of(a, 1);
+        let way: f64 = q.windows(2).map(|p| (p[1] - p[0]).abs()).sum();
+        for kind in [
+            Kind::Spring, Kind::GravityTilt, Kind::Cogging, Kind::GearEccentricity, Kind::TorqueOffset,
+        ] {
+            let effect = example(kind);
+            let lost = work(&effect, 0.0, &q, 1e-3);
+            // The midpoint rule is not exact for the periodic ones: 2000 motor radians in 4000 steps.
+            let slack = match kind { Kind::Cogging | Kind::GearEccentricity => 1e-1, _ => 1e-6 };
+            prop_assert!(lost.abs() < slack * way, "{kind:?}: {lost}");
+        }
+    }
+
+    /// Presliding knows distances, not times, and closes its loops.
+    #[test]
+    fn presliding_does_not_know_how_fast(a in proptest::array::uniform3(-0.05..0.05_f64)) {
+        let q = loop_of(a, 1);
+        for kind in [Kind::PreslidingDahl, Kind::PreslidingMaxwell] {
+            let effect = example(kind);
+            let state = |period| {
+                let mut memory = Memory::default();
+                for at in along(&q, period) {
+                    effect.torque(&mut memory, &at);
+                }
+                memory
+            };
+            let (slow, fast) = (state(1e-2), state(1e-4));
+            for (s, f) in slow.0.iter().zip(fast.0) {
+                prop_assert!((s - f).abs() < 1e-9, "{kind:?}");
+                prop_assert!(s.abs() <= 1.0);
+            }
+        }
+    }
+
+    /// The controller's numbers are those of the desktop.
+    #[test]
+    fn single_precision_is_enough(
+        position in -3.0..3.0_f64, velocity in -4.0..4.0_f64, torque in -20.0..20.0_f64,
+    ) {
+        let at = Instant {
+            position, velocity, acceleration: 3.0 * velocity, direction: velocity.sgn(), motor_angle: 50.0 * position,
+            drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, gravity: 9.0, time: 60.0,
+            warming: 4.0, other: [0.1, velocity, -velocity], period: 1e-3,
+        };
+        let near = Instant {
+            position: at.position as f32, velocity: at.velocity as f32, acceleration: at.acceleration as f32,
+            direction: at.direction as f32, motor_angle: at.motor_angle as f32,
+            drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32,
+            gravity: at.gravity as f32, time: at.time as f32, warming: at.warming as f32,
+            other: at.other.map(|x| x as f32), period: at.period as f32,
+        };
+        for &kind in Kind::ALL {
+            let shapes = example(kind).shapes;
+            let wide = kind.terms(&shapes, &mut [0.0; MEMORY], &at);
+            let narrow = kind.terms(&shapes.map(|x| x as f32), &mut [0.0; MEMORY], &near);
+            for (w, n) in wide.iter().zip(narrow) {
+                // 150 motor radians times order 44, in units of 2⁻²⁴ of themselves.
+                let slack = 1e-6 * w.abs() + 150.0 * 44.0 * 1.2e-7 * torque.abs().max(1.0);
+                prop_assert!((w - f64::from(n)).abs() < slack, "{kind:?}: {w} {n}");
+            }
+        }
+    }
+
+    /// Without a jump anywhere, save that teeth may part.
+    #[test]
+    fn what_a_gear_transmits_is_continuous_and_never_pulls(
+        gap in 0.0..0.02_f64, twist in -0.03..0.03_f64, rate in -2.0..2.0_f64,
+    ) {
+        let (stiffness, damping) = (3000.0, 4.0);
+        let torque = transmitted(gap, stiffness, damping, twist, rate);
+        let bend = twist - twist.clamp(-0.5 * gap, 0.5 * gap);
+        if gap > 0.0 {
+            prop_assert!(torque * bend >= 0.0);
+            prop_assert!(bend != 0.0 || torque == 0.0);
+        }
+        let quasi = transmitted(gap, stiffness, 0.0, twist, rate);
+        let moved = transmitted(gap, stiffness, 0.0, twist + 1e-9, rate);
+        prop_assert!((quasi - moved).abs() <= stiffness * 1.1e-9);
+        // Damping takes: what is left of the elastic part is of the rate's sign, or the teeth are apart.
+        prop_assert!(torque == 0.0 || (torque - quasi) * rate >= 0.0);
+    }
+}
+
+#[test]
+fn inner_loops_of_the_slipping_elements_close_where_dahl_forgets() {
+    // Out, an inner loop of a tenth of the stroke, and back to where it began.
+    let stroke = (5.0e-4_f64 * 0.2).sqrt();
+    let ramp =
+        |from: f64, to: f64| (1..=1000).map(move |k| from + (to - from) * f64::from(k) * 1e-3);
+    let out: Vec<f64> = core::iter::once(0.0)
+        .chain(ramp(0.0, 0.6 * stroke))
+        .collect();
+    let (top, low) = (0.6 * stroke, 0.5 * stroke);
+    let inner: Vec<f64> = out
+        .iter()
+        .copied()
+        .chain(ramp(top, low))
+        .chain(ramp(low, top))
+        .collect();
+    let end = |kind: Kind, q: &[f64]| {
+        let effect = example(kind);
+        let mut memory = Memory::default();
+        let states: Vec<f64> = along(q, 1e-3)
+            .iter()
+            .map(|at| effect.torque(&mut memory, at))
+            .collect();
+        *states.last().unwrap()
+    };
+    let closed = end(Kind::PreslidingMaxwell, &out) - end(Kind::PreslidingMaxwell, &inner);
+    assert!(closed.abs() < 1e-9, "{closed}");
+    let mut dahl = example(Kind::PreslidingDahl);
+    dahl.shapes[0] = stroke;
+    let run = |q: &[f64]| {
+        let mut memory = Memory::default();
+        along(q, 1e-3)
+            .iter()
+            .map(|at| dahl.torque(&mut memory, at))
+            .last()
+            .unwrap()
+    };
+    assert!((run(&out) - run(&inner)).abs() > 1e-3 * dahl.gains[0]);
+}
+
+#[test]
+fn sliding_on_leaves_only_coulomb_and_breakaway() {
+    // Far beyond the stroke the state is the direction, so that presliding adds nothing to Coulomb friction.
+    let q: Vec<f64> = (0..=5000).map(|k| 1e-3 * f64::from(k)).collect();
+    for kind in [
+        Kind::PreslidingDahl,
+        Kind::PreslidingMaxwell,
+        Kind::PreslidingLugre,
+    ] {
+        let effect = example(kind);
+        let mut memory = Memory::default();
+        let last = along(&q, 1e-3)
+            .iter()
+            .map(|at| effect.torque(&mut memory, at))
+            .last()
+            .unwrap();
+        let expected = match kind {
+            Kind::PreslidingLugre => {
+                effect.gains[0] * effect.shapes[1] * (-(1.0 / effect.shapes[2]).powi(2)).exp()
+            }
+            _ => 0.0,
+        };
+        assert!((last - expected).abs() < 1e-9, "{kind:?}: {last}");
+    }
+}
+
+#[test]
+fn a_saturated_motor_is_the_textbook_torque_constant() {
+    // Kt(1 − b·i²)·i·ratio is what the joint gets; the effect is what it lacks.
+    let (constant, ratio, current, b) = (0.05, 50.0, 6.0, 2.0e-3);
+    let mut effect = example(Kind::TorqueSaturation);
+    effect.gains[0] = b / (constant * ratio * constant * ratio);
+    let at = Instant {
+        drive_torque: constant * ratio * current,
+        ..Instant::default()
+    };
+    let lacking = effect.torque(&mut Memory::default(), &at);
+    let got = constant * (1.0 - b * current * current) * current * ratio;
+    assert!((at.drive_torque - lacking - got).abs() < 1e-12);
+}
