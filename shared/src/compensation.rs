@@ -65,7 +65,12 @@ impl Role {
     pub(crate) const fn by(about: &About) -> Option<Self> {
         match (about.channel, about.direction) {
             (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
-            (Channel::Torque, Direction::Indifferent) if about.compensable => Some(Self::Standing),
+            // A mass on the link belongs into the model, which knows where gravity points.
+            (Channel::Torque | Channel::Load, Direction::Indifferent)
+                if about.compensable && !same(about.name, "payload") =>
+            {
+                Some(Self::Standing)
+            }
             // Of what a sensor reads wrongly, only a known function of the position, or a constant, can be taken off.
             (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
                 Some(Self::Position)
@@ -242,6 +247,9 @@ impl<T: Real> Now<T> {
             direction: T::ZERO,
             motor_angle: self.angle(whole),
             drive_torque: self.drive_torque,
+            // Laws of what a sensor reads late, and of masses, are not compensated.
+            drive_rate: T::ZERO,
+            gravity: T::ZERO,
             load: self.load,
             time: self.time,
             warming: self.warming,

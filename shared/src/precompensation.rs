@@ -90,7 +90,9 @@ pub(crate) fn finite<T: Real>(x: T) -> T {
 
 /// Direction of motion, −1 to 1, smooth: the reference's near rest, the measurement's beyond the threshold; 0 where
 /// the reference stands.
-#[inline(always)]
+///
+/// Not inlined: every law asks for it, and the chip's fast memory has no room for copies.
+#[inline(never)]
 pub fn direction<T: Real>(reference: T, measured: T, velocity_threshold: T) -> T {
     let threshold = velocity_threshold.max(T::from_f64(1.0e-6));
     let weight = smooth_step(measured.abs(), threshold, threshold + threshold);

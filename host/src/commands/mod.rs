@@ -1,6 +1,7 @@
 //! The program's verbs, one file each: arguments in, library called, results named.
 
 mod base;
+mod board;
 mod demo;
 mod error;
 mod excite;
@@ -35,6 +36,7 @@ enum Command {
     Demo(demo::Args),
     Init(init::Args),
     Record(record::Args),
+    Board(board::Args),
     Flash(flash::Args),
     Excite(excite::Args),
     Simulate(simulate::Args),
@@ -57,6 +59,7 @@ impl Cli {
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Board(args)) => board::run(&args, &ui),
             Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Excite(args)) => excite::run(&args, &ui),
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
+use rig_shared::effects::Channel;
 use rig_shared::wire::message::Refusal;
 use rig_shared::wire::{EncodeError, EndMismatch};
 
@@ -151,10 +152,15 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
             "the memory did not take the settings; those stored before still stand"
         }
         Refusal::NotCompensable(kind) => {
+            let about = kind.about();
+            let mend = if about.channel == Channel::Load {
+                "put it into the link's inertial parameters"
+            } else {
+                "leave it out"
+            };
             return Cow::Owned(format!(
-                "{} has no torque and no corrected reading that would undo it; leave the effect `{}` out",
-                kind.about().title,
-                kind.about().name
+                "the firmware does not compensate {} (the effect `{}`); {mend}",
+                about.title, about.name
             ));
         }
     })
