@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use rig_shared::effects::{Channel, Effect, GAINS, Kind, SHAPES};
+use rig_shared::effects::{Channel, Kind};
 
 use super::anchor::Anchor;
 use super::change::change;
@@ -779,17 +779,4 @@ fn absorbed(bench: &Bench, before: &Solution, after: &Solution) -> Vec<Absorbed>
         .collect();
     list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
     list
-}
-
-/// An effect as a description and the firmware take it.
-pub(super) fn effect_of(kind: Kind, gains: &[f64], shapes: &[f64; SHAPES]) -> Effect<f64> {
-    let mut all = [0.0; GAINS];
-    for (to, from) in all.iter_mut().zip(gains) {
-        *to = *from;
-    }
-    Effect {
-        kind,
-        gains: all,
-        shapes: *shapes,
-    }
 }

@@ -54,8 +54,6 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// What they do.
     pub(super) evidence: Evidence,
-    /// Shapes tried.
-    pub(super) tried: usize,
 }
 
 impl Profile {
@@ -300,7 +298,6 @@ impl<'a> Search<'a> {
             shapes: best.1,
             columns: best.2,
             evidence,
-            tried: points.len(),
         }))
     }
 
@@ -394,7 +391,7 @@ impl<'a> Search<'a> {
         let middle = best.1[place].ln();
         let (mut low, mut high) = (middle - step, middle + step);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let mut at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
+        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;
             shapes[place] = x.exp();
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
