@@ -7,12 +7,15 @@ use rig_shared::effects::{Channel, Effect, GAINS, Kind, SHAPES};
 
 use super::anchor::Anchor;
 use super::columns::{Candidate, Predicted, Source, predict};
+use super::fault::faulty;
+use super::finish::{Drawn, Found, finish};
 use super::fit::Fit;
 use super::floor;
 use super::locate::{coordinates, locate};
 use super::outcome::{Absorbed, Diagnosis, Step, Tried, Value, Verdict, Waterfall};
 use super::rows::{Column, Nominal, Rows};
 use super::runs::{Run, runs_of};
+use super::sanity::faults;
 use super::search::{Profile, Search, with};
 use super::solve::{Solution, solve};
 use super::{DiagnoseError, Options};
@@ -89,7 +92,10 @@ impl<'a> Bench<'a> {
 const LEAST_BAND: f64 = 30.0;
 
 /// Decides how recordings are treated: as for an identification, but with a band that shows more than the motion's own.
-fn treatment_of(recordings: &[&dyn Recording], robot: &Robot) -> Result<Treatment, DiagnoseError> {
+pub(super) fn treatment_of(
+    recordings: &[&dyn Recording],
+    robot: &Robot,
+) -> Result<Treatment, DiagnoseError> {
     let n = robot.joints.len();
     let surveys = (recordings.iter())
         .map(|r| Survey::take(*r, n))
@@ -171,6 +177,10 @@ pub fn diagnose(
         treatment: treatment_of(training, robot)?,
     };
     let mut loaded = bench.load(training)?;
+    let wrong = faults(robot, &loaded.runs)?;
+    if !wrong.is_empty() {
+        return Ok((faulty(robot, wrong), robot.clone()));
+    }
     progress(0.1);
     bench.anchored(&mut loaded.rows);
     let rows = &loaded.rows;
@@ -248,6 +258,10 @@ pub fn diagnose(
         None
     } else {
         let mut sealed = bench.load(holdout)?;
+        let wrong = faults(robot, &sealed.runs)?;
+        if !wrong.is_empty() {
+            return Ok((faulty(robot, wrong), robot.clone()));
+        }
         bench.anchored(&mut sealed.rows);
         Some(sealed)
     };
@@ -332,7 +346,7 @@ pub fn diagnose(
         })
         .collect();
     let absorbed = absorbed(&bench, &before, &after);
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict,
@@ -357,8 +371,31 @@ pub fn diagnose(
         maps: Vec::new(),
         curves: Vec::new(),
     };
+    let model = {
+        let drawn = sealed.as_ref().unwrap_or(&loaded);
+        let left = |values: &[f64], part| remaining(&bench, drawn, values, free.len(), part);
+        let drawn = Drawn {
+            runs: &drawn.runs,
+            rows: &drawn.rows,
+            left: [left(&before.values, &[])?, left(&after.values, &chosen)?],
+        };
+        let found = Found {
+            robot,
+            nominal: &bench.nominal,
+            anchor: &bench.anchor,
+            search: &search,
+            rows,
+            base: &base,
+            after: &after,
+            chosen: &chosen,
+            floors: &diagnosis.noise_floor_rms.clone(),
+            seed: options.seed,
+            drawn,
+        };
+        finish(&found, &mut diagnosis)?
+    };
     progress(1.0);
-    Ok((diagnosis, robot.clone()))
+    Ok((diagnosis, model))
 }
 
 /// Name with its law.
@@ -487,14 +524,14 @@ fn parameters(
     map
 }
 
-/// RMS per joint on recordings that nothing was fitted to.
-fn unseen(
+/// What a model leaves of recordings' torque, joint by joint.
+fn remaining(
     bench: &Bench,
     sealed: &Loaded,
     coefficients: &[f64],
     free: usize,
     chosen: &[Profile],
-) -> Result<Vec<f64>, DiagnoseError> {
+) -> Result<Vec<Vec<f64>>, DiagnoseError> {
     let values = bench.anchor.values(&coefficients[..free]);
     let source = bench.source(sealed, &values)?;
     let rows = &sealed.rows;
@@ -516,7 +553,19 @@ fn unseen(
             at += 1;
         }
     }
-    Ok((residual.iter().zip(&rows.keep))
+    Ok(residual)
+}
+
+/// RMS per joint on recordings that nothing was fitted to.
+fn unseen(
+    bench: &Bench,
+    sealed: &Loaded,
+    coefficients: &[f64],
+    free: usize,
+    chosen: &[Profile],
+) -> Result<Vec<f64>, DiagnoseError> {
+    let residual = remaining(bench, sealed, coefficients, free, chosen)?;
+    Ok((residual.iter().zip(&sealed.rows.keep))
         .map(|(r, keep)| {
             let squares: f64 = r
                 .iter()
