@@ -186,9 +186,12 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let rows = drawn.rows;
     let [without, with] = [0, 1].map(|k| &drawn.left[k][joint]);
     let length = ((STRETCH / rows.period).ceil() as usize).max(2);
+    let keep = &rows.keep[joint];
     // Without effects both are the same: where the model misses most.
     let weight = |k: usize| {
-        if found.chosen.is_empty() {
+        if !keep[k] {
+            0.0
+        } else if found.chosen.is_empty() {
             without[k].powi(2)
         } else {
             (without[k] - with[k]).powi(2)
@@ -222,9 +225,12 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let picked: Vec<usize> = (from..to).step_by(step).collect();
     let start = rows.starts[r];
     let measured: Vec<f64> = picked.iter().map(|k| torque[k - start]).collect();
+    // Rows that are not used, where the joint stands or is at its limit, stay open.
     let predicted = |left: &[f64]| -> Vec<f64> {
         let pairs = picked.iter().zip(&measured);
-        pairs.map(|(k, tau)| tau - left[*k]).collect()
+        pairs
+            .map(|(k, tau)| if keep[*k] { tau - left[*k] } else { f64::NAN })
+            .collect()
     };
     Some(Curves {
         joint: found.robot.joints[joint].name.clone(),
