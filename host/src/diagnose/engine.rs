@@ -3,22 +3,23 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use rig_shared::effects::{Channel, Kind};
+use rig_shared::effects::{Channel, Effect, GAINS, Kind, SHAPES};
 
 use super::anchor::Anchor;
 use super::change::change;
 use super::columns::{Candidate, Predicted, Source, predict};
+use super::fault::faulty;
+use super::finish::{Drawn, Found, finish};
 use super::fit::Fit;
 use super::floor;
 use super::locate::{coordinates, locate};
-use super::outcome::{
-    Absorbed, DataFault, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall,
-};
+use super::outcome::{Absorbed, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall};
 use super::rows::{Column, Nominal, Rows};
 use super::runs::{Run, runs_of};
+use super::sanity::faults;
 use super::search::{Profile, SIGNIFICANT, Search, with};
 use super::solve::{Solution, solve};
-use super::{DiagnoseError, Options, sanity, testable};
+use super::{DiagnoseError, Options, testable};
 use crate::prepare::{Choice, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 
@@ -92,7 +93,10 @@ impl<'a> Bench<'a> {
 const LEAST_BAND: f64 = 30.0;
 
 /// Decides how recordings are treated: as for an identification, but with a band that shows more than the motion's own.
-fn treatment_of(recordings: &[&dyn Recording], robot: &Robot) -> Result<Treatment, DiagnoseError> {
+pub(super) fn treatment_of(
+    recordings: &[&dyn Recording],
+    robot: &Robot,
+) -> Result<Treatment, DiagnoseError> {
     let n = robot.joints.len();
     let surveys = (recordings.iter())
         .map(|r| Survey::take(*r, n))
@@ -174,11 +178,11 @@ pub fn diagnose(
         treatment: treatment_of(training, robot)?,
     };
     let mut loaded = bench.load(training)?;
-    progress(0.1);
-    let data_faults = sanity::faults(robot, &loaded.runs)?;
-    if !data_faults.is_empty() {
-        return Ok((at_fault(robot, data_faults), robot.clone()));
+    let wrong = faults(robot, &loaded.runs)?;
+    if !wrong.is_empty() {
+        return Ok((faulty(robot, wrong), robot.clone()));
     }
+    progress(0.1);
     bench.anchored(&mut loaded.rows);
     let rows = &loaded.rows;
     let free = bench.anchor.columns(rows);
@@ -213,7 +217,7 @@ pub fn diagnose(
         let coefficients = solve(&plain, &columns, &[]).map_or(before.values.clone(), |s| s.values);
         bench.source(&loaded, &bench.anchor.values(&coefficients[..free.len()]))
     };
-    let chosen = search.run(&base, &renew, &mut |step, profiles, _| {
+    let mut chosen = search.run(&base, &renew, &mut |step, profiles, _| {
         sweeps += 1;
         progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(sweeps)));
         for (k, p) in profiles.iter().enumerate() {
@@ -233,15 +237,40 @@ pub fn diagnose(
             });
         }
     })?;
-    let fit = with(&base, &chosen, None);
     progress(0.85);
-
     let pairs = floor::repeats(&loaded.runs);
-    let floors: Vec<f64> = (0..n)
-        .map(|j| {
-            floor::from_repeats(rows, &pairs, &fit.residual(j), j).unwrap_or_else(|| fit.rms(j))
-        })
-        .collect();
+    let judged = |chosen: &[Profile]| {
+        let fit = with(&base, chosen, None);
+        let floors: Vec<f64> = (0..n)
+            .map(|j| {
+                floor::from_repeats(rows, &pairs, &fit.residual(j), j).unwrap_or_else(|| fit.rms(j))
+            })
+            .collect();
+        let left = remainder(
+            &search,
+            &bench,
+            &loaded,
+            &fit,
+            &floors,
+            !pairs.is_empty(),
+            options.seed,
+        );
+        (floors, left)
+    };
+    let (mut floors, mut left) = judged(&chosen);
+    if left.is_some() {
+        // Beside something unknown, a name that closes less than half of what was there is a guess at it.
+        let closes: Vec<bool> = (0..chosen.len())
+            .map(|k| {
+                let j = chosen[k].candidate.joint;
+                let at = |count: usize| with(&base, &chosen[..count], None).rms(j);
+                closed([at(k), at(k + 1)], floors[j]) >= HALF
+            })
+            .collect();
+        let mut closes = closes.into_iter();
+        chosen.retain(|_| closes.next().unwrap_or(true));
+        (floors, left) = judged(&chosen);
+    }
     let places = (0..n)
         .flat_map(|j| {
             let list = coordinates(rows, &loaded.runs, &search.source.predicted, robot, j);
@@ -263,6 +292,10 @@ pub fn diagnose(
         None
     } else {
         let mut sealed = bench.load(holdout)?;
+        let wrong = faults(robot, &sealed.runs)?;
+        if !wrong.is_empty() {
+            return Ok((faulty(robot, wrong), robot.clone()));
+        }
         bench.anchored(&mut sealed.rows);
         Some(sealed)
     };
@@ -375,19 +408,6 @@ pub fn diagnose(
             why: change.words.clone(),
         });
     }
-    let remainder = remainder(
-        &search,
-        &bench,
-        &loaded,
-        &fit,
-        &floors,
-        !pairs.is_empty(),
-        options.seed,
-    );
-    if remainder.is_some() {
-        // Beside something unknown, a name that closes less than half of what was there is a guess at it.
-        steps.retain(|s| s.gap_closed >= HALF);
-    }
     let gap_closed = (!steps.is_empty()).then(|| {
         let of = |lists: &[Vec<f64>], frozen: &[f64]| {
             let sums = (0..n).fold([0.0, 0.0], |s, j| {
@@ -407,7 +427,7 @@ pub fn diagnose(
             _ => of(&train_rms, &frozen_train),
         }
     });
-    let verdict = if remainder.is_some() {
+    let verdict = if left.is_some() {
         Verdict::Remainder
     } else if steps.iter().any(|s| s.effect != Kind::Payload.about().name) {
         Verdict::Explained
@@ -435,11 +455,11 @@ pub fn diagnose(
         })
         .collect();
     let absorbed = absorbed(&bench, &before, &after);
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict,
-        words: change.iter().map(|c| c.words.clone()).collect(),
+        words: Vec::new(),
         noise_floor_rms: floors,
         noise_floor_how: if pairs.is_empty() {
             "what the last model leaves".into()
@@ -453,15 +473,40 @@ pub fn diagnose(
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
-        remainder,
+        remainder: left,
         data_faults: Vec::new(),
         waterfall,
         tried,
         maps: Vec::new(),
         curves: Vec::new(),
     };
+    let model = {
+        let drawn = sealed.as_ref().unwrap_or(&loaded);
+        let left = |values: &[f64], part| remaining(&bench, drawn, values, free.len(), part);
+        let drawn = Drawn {
+            runs: &drawn.runs,
+            rows: &drawn.rows,
+            left: [left(&before.values, &[])?, left(&after.values, &chosen)?],
+        };
+        let found = Found {
+            robot,
+            nominal: &bench.nominal,
+            anchor: &bench.anchor,
+            search: &search,
+            rows,
+            base: &base,
+            after: &after,
+            chosen: &chosen,
+            floors: &diagnosis.noise_floor_rms.clone(),
+            seed: options.seed,
+            drawn,
+        };
+        let model = finish(&found, &mut diagnosis)?;
+        diagnosis.words.extend(change.map(|c| c.words));
+        model
+    };
     progress(1.0);
-    Ok((diagnosis, robot.clone()))
+    Ok((diagnosis, model))
 }
 
 /// Share of its gap that a step must close to stand beside a remainder.
@@ -553,31 +598,6 @@ fn remainder(
             })
         })
         .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
-}
-
-/// The result where the data themselves are at fault.
-fn at_fault(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
-    Diagnosis {
-        schema: "rig-diagnosis/1".into(),
-        robot: robot.name.clone(),
-        verdict: Verdict::DataFault,
-        words: data_faults.iter().map(|f| f.text.clone()).collect(),
-        noise_floor_rms: Vec::new(),
-        noise_floor_how: "Nothing was fitted.".into(),
-        places: Vec::new(),
-        steps: Vec::new(),
-        gap_closed: None,
-        absorbed: Vec::new(),
-        not_testable: Vec::new(),
-        detectable: Vec::new(),
-        next_experiment: None,
-        remainder: None,
-        data_faults,
-        waterfall: Vec::new(),
-        tried: Vec::new(),
-        maps: Vec::new(),
-        curves: Vec::new(),
-    }
 }
 
 /// A column times a factor.
@@ -717,14 +737,14 @@ fn parameters(
     map
 }
 
-/// RMS per joint on recordings that nothing was fitted to.
-fn unseen(
+/// What a model leaves of recordings' torque, joint by joint.
+fn remaining(
     bench: &Bench,
     sealed: &Loaded,
     coefficients: &[f64],
     free: usize,
     chosen: &[Profile],
-) -> Result<Vec<f64>, DiagnoseError> {
+) -> Result<Vec<Vec<f64>>, DiagnoseError> {
     let values = bench.anchor.values(&coefficients[..free]);
     let source = bench.source(sealed, &values)?;
     let rows = &sealed.rows;
@@ -746,7 +766,19 @@ fn unseen(
             at += 1;
         }
     }
-    Ok((residual.iter().zip(&rows.keep))
+    Ok(residual)
+}
+
+/// RMS per joint on recordings that nothing was fitted to.
+fn unseen(
+    bench: &Bench,
+    sealed: &Loaded,
+    coefficients: &[f64],
+    free: usize,
+    chosen: &[Profile],
+) -> Result<Vec<f64>, DiagnoseError> {
+    let residual = remaining(bench, sealed, coefficients, free, chosen)?;
+    Ok((residual.iter().zip(&sealed.rows.keep))
         .map(|(r, keep)| {
             let squares: f64 = r
                 .iter()
@@ -779,4 +811,17 @@ fn absorbed(bench: &Bench, before: &Solution, after: &Solution) -> Vec<Absorbed>
         .collect();
     list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
     list
+}
+
+/// An effect as a description and the firmware take it.
+pub(super) fn effect_of(kind: Kind, gains: &[f64], shapes: &[f64; SHAPES]) -> Effect<f64> {
+    let mut all = [0.0; GAINS];
+    for (to, from) in all.iter_mut().zip(gains) {
+        *to = *from;
+    }
+    Effect {
+        kind,
+        gains: all,
+        shapes: *shapes,
+    }
 }

@@ -187,7 +187,11 @@ impl<'a> Search<'a> {
         cache.retain(|(c, _), _| !depends_on_model(self.library[*c].kind));
     }
 
-    fn cached(
+    /// Columns of a point of a candidate's grid.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn cached(
         &self,
         c: usize,
         point: usize,
@@ -675,7 +679,7 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
 }
 
 /// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
-fn rivals(a: &Candidate, b: &Candidate) -> bool {
+pub(super) fn rivals(a: &Candidate, b: &Candidate) -> bool {
     let (x, y) = (a.kind.about(), b.kind.about());
     let one = x.name == y.name
         || x.channel == Channel::Transmission && y.channel == Channel::Transmission;
@@ -683,7 +687,7 @@ fn rivals(a: &Candidate, b: &Candidate) -> bool {
 }
 
 /// Whether a kind is the law that its name is searched by; others take its place only where they do better.
-fn is_first_law(kind: Kind) -> bool {
+pub(super) fn is_first_law(kind: Kind) -> bool {
     Kind::named(kind.about().name, None) == Some(kind)
         // Rings of motor and joint are at different places, not different laws.
         || kind == Kind::EncoderEccentricityJoint
