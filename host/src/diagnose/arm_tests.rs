@@ -163,6 +163,31 @@ fn faults_of_one_joint() {
     }
 }
 
+#[test]
+fn two_joints_with_nothing_wrong_are_left_alone() {
+    let diagnosis = made(&ArmScenario::new(Arm::Planar, None, 1));
+    told("planar", &diagnosis);
+    assert!(diagnosis.steps.is_empty());
+    for w in &diagnosis.waterfall {
+        // What repeats of the residual is little: the floor is the noise that was put in.
+        assert!(w.holdout[0] < 1.1 * w.floor, "{w:?}");
+    }
+}
+
+#[test]
+fn a_missing_term_of_the_other_joint_is_named_with_its_inertia() {
+    let fault = Some((1, Fault::InertiaCoupling(0.3)));
+    let diagnosis = made(&ArmScenario::new(Arm::Planar, fault, 1));
+    told("coupling", &diagnosis);
+    assert_eq!(named(&diagnosis), [("inertia_coupling", "elbow")]);
+    let inertia = &diagnosis.steps[0].parameters["inertia"];
+    assert!(
+        (inertia.value - 0.3).abs() < 4.0 * inertia.std,
+        "{inertia:?}"
+    );
+    assert!(diagnosis.steps[0].gap_closed > 0.8);
+}
+
 /// A real arm: description, training, hold-out.
 struct Real {
     robot: Robot,

@@ -1,6 +1,6 @@
 //! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
@@ -104,22 +104,14 @@ impl Nominal {
         })
     }
 
-    /// The same base parameters with the base turned by `angle` about a unit vector of the base frame.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn tilted(&self, axis: [f64; 3], angle: f64) -> Result<Self, DiagnoseError> {
-        let turn = Rotation3::from_scaled_axis(angle * Vector3::from(axis));
-        let mut robot = self.robot.clone();
-        // The base turns one way, gravity as seen from it the other.
-        robot.gravity = (turn.inverse() * Vector3::from(robot.gravity)).into();
-        let chain = chain_of(&robot).map_err(|e| DiagnoseError::Model(e.to_string()))?;
-        Ok(Self {
-            base: self.base.clone(),
-            batch: ChainBatch::new(&chain),
-            transmission: self.transmission.clone(),
-            robot,
-        })
+    /// Base parameters as a description has them.
+    pub(super) fn stated(&self, robot: &Robot) -> Vec<f64> {
+        let mut standard = robot.standard_parameters().concat();
+        standard.extend(robot.motor_parameters().as_flattened());
+        standard.resize(self.base.combination.ncols(), 0.0);
+        (self.base.combination.row_iter())
+            .map(|row| row.iter().zip(&standard).map(|(k, p)| k * p).sum())
+            .collect()
     }
 
     /// Axes of the base frame about which a tilt changes gravity as the joints feel it: where all of them turn about one
