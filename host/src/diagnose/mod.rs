@@ -2,6 +2,8 @@
 //! used, and when to stop.
 
 mod anchor;
+#[cfg(test)]
+mod arm_tests;
 pub mod benchmark;
 mod change;
 mod columns;

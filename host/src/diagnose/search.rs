@@ -63,10 +63,10 @@ impl Profile {
         let p = self.corrected(tried);
         if p > SIGNIFICANT {
             Some(format!("p = {p:.2}, corrected for {tried} trials"))
-        } else if e.gain < self.least_gain() {
+        } else if e.joint_gain < self.least_gain() {
             Some(format!(
                 "takes away {:.1} % of the residual, less than {:.0} %",
-                100.0 * e.gain,
+                100.0 * e.joint_gain,
                 100.0 * self.least_gain()
             ))
         } else if e.gain_sigmas < LEAST_SIGMAS {
@@ -216,12 +216,11 @@ impl<'a> Search<'a> {
         Ok(columns)
     }
 
-    /// Share of the residual that a candidate explains at given shapes, with its columns projected.
-    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<(f64, Vec<Vec<f64>>)> {
-        let projected = fit.distinct(columns)?;
+    /// Share of the residual that a candidate's columns explain.
+    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
         let bounds = self.bounds(self.library[c].kind);
-        let (share, _) = fit.explained(&projected, &bounds)?;
-        Some((share, projected))
+        let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
+        Some(share)
     }
 
     /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
@@ -241,13 +240,13 @@ impl<'a> Search<'a> {
         let mut followed: Vec<Best> = Vec::new();
         if let Some(shapes) = start {
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            if let Some((share, _)) = self.explained(fit, c, &columns) {
+            if let Some(share) = self.explained(fit, c, &columns) {
                 best = Some((share, shapes, columns));
             }
         } else {
             for (place, shapes) in points.iter().enumerate() {
                 let columns = self.cached(c, place, shapes)?;
-                let Some((share, _)) = self.explained(fit, c, &columns) else {
+                let Some(share) = self.explained(fit, c, &columns) else {
                     continue;
                 };
                 if gear {
@@ -264,7 +263,9 @@ impl<'a> Search<'a> {
             return Ok(None);
         };
         let about = kind.about();
-        if best.0 < if gear { HOPELESS_GEAR } else { HOPELESS } {
+        // One joint's share of the squares of all.
+        let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
+        if best.0 * (self.source.nominal.joints() as f64) < hopeless {
             return Ok(None);
         }
         if gear {
@@ -321,7 +322,7 @@ impl<'a> Search<'a> {
                 *to = if logarithmic(k) { x.exp() } else { *x }.clamp(low, high);
             }
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some((share, _)) = self.explained(fit, c, &columns) else {
+            let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(0.0);
             };
             if share > best.0 {
@@ -399,7 +400,7 @@ impl<'a> Search<'a> {
             let mut shapes = best.1;
             shapes[place] = x.exp();
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some((share, _)) = self.explained(fit, c, &columns) else {
+            let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(f64::NEG_INFINITY);
             };
             if share > best.0 {
@@ -568,7 +569,7 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 if let Some(rival) = self.profile(&fit, c, None)?
-                    && rival.evidence.gain > chosen[i].evidence.gain + LEAST_GAIN
+                    && rival.evidence.joint_gain > chosen[i].evidence.joint_gain + LEAST_GAIN
                 {
                     chosen[i] = rival;
                 }
@@ -591,7 +592,7 @@ impl<'a> Search<'a> {
         let mut i = 0;
         while chosen.len() > 1 && i < chosen.len() {
             let e = &chosen[i].evidence;
-            if e.p_value > STAYS || e.gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
+            if e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
                 chosen.remove(i);
                 self.refine_all(base, chosen)?;
                 i = 0;
@@ -634,6 +635,7 @@ impl<'a> Search<'a> {
             } else {
                 // No column of its own any more.
                 chosen[i].evidence.gain = 0.0;
+                chosen[i].evidence.joint_gain = 0.0;
                 chosen[i].evidence.p_value = 1.0;
             }
         }
@@ -650,7 +652,7 @@ fn first_to_take(profiles: Vec<Profile>, trials: usize) -> Option<Profile> {
             p.candidate.kind == Kind::JointElasticity && p.candidate.joint == best.candidate.joint
         });
         if let Some(simpler) = simpler
-            && simpler.evidence.gain + LEAST_GAIN > best.evidence.gain
+            && simpler.evidence.joint_gain + LEAST_GAIN > best.evidence.joint_gain
         {
             return Some(simpler);
         }
