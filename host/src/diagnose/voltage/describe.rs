@@ -80,6 +80,9 @@ impl Told<'_> {
         {
             words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
         }
+        if !last.is_finite() {
+            words.push("With the effects the recordings held back cannot be simulated: they ask more of the drive than the effects were fitted to. Give a recording of such voltages to learn from.".into());
+        }
         let remainder = left.then(|| Remainder {
             joint: self.joint(),
             rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),

@@ -210,7 +210,12 @@ impl Search<'_> {
                 more.bounds.push([0.1 * low, 10.0 * high]);
             }
             more.free.extend(model.theta.len()..more.theta.len());
-            let fitted = self.fitted(&more, self.blocks());
+            // Whole recordings alone end in the nearest of many valleys; windows alone weigh what windows show.
+            let near = self.fitted(&more, segments(self.logs, |_| true, WINDOW));
+            let fitted = self.better(
+                self.fitted(&more, self.blocks()),
+                self.fitted(&near, self.blocks()),
+            );
             if self.rms(&fitted).is_finite() {
                 found = Some(match found {
                     Some(other) => self.better(other, fitted),
