@@ -1,5 +1,6 @@
 //! What is fixed while the rig runs: rates, nameplate, thresholds; and what the host may replace.
 
+use rig_shared::compensation::Effects;
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
 use rig_shared::estimation::EstimatorSettings;
@@ -94,6 +95,8 @@ pub struct Settings {
     pub friction: Friction<f32>,
     /// How the friction law is used near zero speed.
     pub precompensation: PrecompensationSettings<f32>,
+    /// Effects that are compensated beside the friction law.
+    pub effects: Effects<f32>,
     /// Limits.
     pub limits: Limits<f32>,
     /// On-line estimator.

@@ -20,6 +20,8 @@ pub struct Derived {
     pub estimator_period: f32,
     /// Joint angle of one encoder count, rad.
     pub radians_per_count: f32,
+    /// Motor angle of one encoder count, rad.
+    pub motor_radians_per_count: f32,
     /// Joint torque per motor current, N·m/A.
     pub torque_per_ampere: f32,
     /// Velocity observer.
@@ -32,6 +34,7 @@ pub struct Derived {
 
 impl Derived {
     /// Works them out.
+    #[inline(never)]
     pub fn new(config: &Config, settings: &Settings) -> Self {
         let rate = config.rates.control_hz as f32;
         let period = 1.0 / rate;
@@ -42,6 +45,8 @@ impl Derived {
             period,
             estimator_period: f32::from(config.rates.estimator_decimation) * period,
             radians_per_count: core::f32::consts::TAU / counts_per_joint_turn,
+            motor_radians_per_count: core::f32::consts::TAU
+                / config.encoder.counts_per_motor_turn as f32,
             torque_per_ampere: config.drive.joint_torque(1.0),
             observer: encoder::Config::new(config.encoder.observer_bandwidth, rate),
             law: law::Config {

@@ -3,6 +3,7 @@
 //! The numbers are those of `host/robots/one-link.toml`, which `rig init one-link` writes; a test of the host
 //! holds them together. What the host may replace (limits, gains, laws, models) it sends or stores over the wire.
 
+use rig_shared::compensation::Effects;
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
 use rig_shared::estimation::EstimatorSettings;
@@ -90,6 +91,7 @@ pub fn one_link() -> (Config, Settings) {
             gain_at_rest: 0.8,
             velocity_threshold: 0.01,
         },
+        effects: Effects::default(),
         limits,
         estimator: EstimatorSettings {
             slip_velocity: 0.2,

@@ -16,8 +16,11 @@ use crate::step::brake;
 /// Requests about the conversation itself (`Hello`, streams, snapshot, capture) are the
 /// [`Clerk`](crate::clerk::Clerk)'s and are accepted here without effect.
 ///
+/// Not inlined: it is rare, and the chip's fast memory is for what runs in every tick.
+///
 /// # Errors
 /// The [`Refusal`] that goes back to the host.
+#[inline(never)]
 pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Result<(), Refusal> {
     let body = &examined.request.body;
     match body {
@@ -38,7 +41,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         _ if state.storing => Err(Refusal::Busy),
         RequestBody::Store => store(state),
         RequestBody::Arm => arm(state),
-        RequestBody::Start => start(state),
+        RequestBody::Start => start(config, state),
         RequestBody::Stop => match state.mode {
             Mode::Running => {
                 brake(state);
@@ -48,13 +51,24 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
             _ => Err(Refusal::WrongMode),
         },
         RequestBody::ClearFault => clear_fault(config, state),
-        RequestBody::SetPosition(position) => set_position(config, state, *position),
+        RequestBody::SetPosition(position) => set_position(state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
             let extremes = examined.extremes.ok_or(Refusal::BadValue)?;
             fits(&extremes, &state.settings.limits, None)?;
             state.trajectory = Some((trajectory.clone(), extremes));
             Ok(())
+        }
+        RequestBody::SetEffects(_) => {
+            refuse_in_motion(state)?;
+            match &examined.effects {
+                Some(Ok(compensation)) => {
+                    state.replace_effects(compensation);
+                    Ok(())
+                }
+                Some(Err(refusal)) => Err(*refusal),
+                None => Err(Refusal::BadValue),
+            }
         }
         _ => {
             refuse_in_motion(state)?;
@@ -65,7 +79,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
                 .map_err(|_| Refusal::BadValue)?;
             if matches!(body, RequestBody::SetEstimator(_)) {
                 state
-                    .restart_estimator(config)
+                    .replace_estimator(config)
                     .map_err(|_| Refusal::BadValue)?;
             }
             Ok(())
@@ -116,6 +130,7 @@ fn arm(state: &mut State) -> Result<(), Refusal> {
                 ..Run::default()
             };
             state.current_loop = current::State::default();
+            state.effects.interrupt();
             state.law.adaptive = adaptive::State::new(state.settings.model);
             state.mode = Mode::Holding;
             Ok(())
@@ -125,21 +140,23 @@ fn arm(state: &mut State) -> Result<(), Refusal> {
     }
 }
 
-fn start(state: &mut State) -> Result<(), Refusal> {
+fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Holding => {}
         Mode::Fault => return Err(Refusal::FaultLatched),
         _ => return Err(Refusal::WrongMode),
     }
-    let (_, extremes) = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
+    let (trajectory, extremes) = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
     fits(extremes, &state.settings.limits, Some(state.run.base))?;
+    let rate = u64::from(config.rates.control_hz);
+    state.run.length = (trajectory.duration_micros().saturating_mul(rate)).div_ceil(1_000_000);
     state.run.start = state.tick;
     state.mode = Mode::Running;
     Ok(())
 }
 
 /// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
-fn set_position(config: &Config, state: &mut State, position: f32) -> Result<(), Refusal> {
+fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
         return Err(Refusal::WrongMode);
     }
@@ -153,15 +170,14 @@ fn set_position(config: &Config, state: &mut State, position: f32) -> Result<(),
     state.counts += shift;
     state.position = state.counts as f32 * state.derived.radians_per_count;
     state.reference.position = state.position;
+    state.placed = true;
     // Windows that are open hold counts from the old origin.
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);
     state.previous = None;
     if shift != 0 {
         // gc and gs belong to the angle that they were learnt for.
-        state
-            .restart_estimator(config)
-            .map_err(|_| Refusal::BadValue)?;
+        state.restart_estimator();
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! What changes while the rig runs.
 
+use rig_shared::compensation::{self, Compensation};
 use rig_shared::control::{current, law};
 use rig_shared::encoder;
 use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
@@ -36,6 +37,8 @@ pub struct State {
     pub position: f32,
     /// Joint velocity as last estimated, rad/s.
     pub velocity: f32,
+    /// Somebody has said where the link stands since power on.
+    pub placed: bool,
     /// Reference of the last tick.
     pub reference: Reference<f32>,
     /// Limits that acted in the last tick.
@@ -46,6 +49,21 @@ pub struct State {
     pub estimator: OneLinkEstimator<f32>,
     pub(crate) settings: Settings,
     pub(crate) derived: Derived,
+    /// The settings have changed since `derived` was worked out.
+    pub(crate) stale: bool,
+    /// The effects of the settings, checked.
+    pub(crate) compensation: Compensation<f32>,
+    pub(crate) effects: compensation::State<f32>,
+    /// Constant error of the current that the effects know of, A.
+    pub(crate) current_error: f32,
+    /// What the effects have taken off the position in this tick, rad.
+    pub(crate) position_error: f32,
+    /// Torque ordered in the last tick, N·m.
+    pub(crate) drive_torque: f32,
+    /// Temperature at the end of the calibration, °C.
+    pub(crate) start_temperature: f32,
+    /// Temperature above that one, K.
+    pub(crate) warming: f32,
     pub(crate) calibration: Calibration,
     pub(crate) encoder: encoder::State<f32>,
     /// Unwrapped counts at power on.
@@ -59,6 +77,8 @@ pub struct State {
     pub(crate) estimation: Window,
     /// The estimator's previous window: its regressor lies midway between two.
     pub(crate) previous: Option<Window>,
+    /// The estimator is to start anew.
+    pub(crate) forget: bool,
     pub(crate) updates_since_report: u16,
     /// Duty cycle that acts during this tick.
     pub(crate) duty: f32,
@@ -70,6 +90,8 @@ pub struct State {
 pub(crate) struct Run {
     /// Tick at which the trajectory started.
     pub(crate) start: u64,
+    /// Ticks that it takes.
+    pub(crate) length: u64,
     /// Position that trajectory or hold is about, rad.
     pub(crate) base: f32,
     /// The stop under way.
@@ -117,6 +139,8 @@ impl State {
     /// made where it is to lie: it is too large to be passed about on a chip's stack.
     pub fn with(config: &Config, settings: Settings, estimator: OneLinkEstimator<f32>) -> Self {
         let derived = Derived::new(config, &settings);
+        // The firmware's own settings have none, stored ones were checked when they were read.
+        let compensation = Compensation::new(&settings.effects).unwrap_or_default();
         Self {
             tick: 0,
             mode: Mode::Calibrating,
@@ -127,12 +151,21 @@ impl State {
             heard: 0,
             position: 0.0,
             velocity: 0.0,
+            placed: false,
             reference: Reference::default(),
             limits: LimitSet::default(),
             cause_acting: false,
             estimator,
             settings,
+            compensation,
+            effects: compensation::State::default(),
+            current_error: compensation.current_error(derived.torque_per_ampere),
+            position_error: 0.0,
+            drive_torque: 0.0,
+            start_temperature: 0.0,
+            warming: 0.0,
             derived,
+            stale: false,
             calibration: Calibration {
                 zero_code: config.scaling.current_zero,
                 ..Calibration::default()
@@ -146,6 +179,7 @@ impl State {
             telemetry: Window::default(),
             estimation: Window::default(),
             previous: None,
+            forget: false,
             updates_since_report: 0,
             duty: 0.0,
             run: Run::default(),
@@ -162,23 +196,50 @@ impl State {
         self.tick - u64::from(self.telemetry.ticks)
     }
 
-    /// Replaces settings and everything that follows from them; nothing where they cannot be used.
+    /// Replaces settings; nothing where they cannot be used. What follows from them is worked out at the beginning of
+    /// the next tick: the one that serves a request has enough to do.
     pub(crate) fn apply(
         &mut self,
         config: &Config,
         settings: Settings,
     ) -> Result<(), SettingsFault> {
         settings.estimator.check(config.rates.estimator_hz())?;
-        self.derived = Derived::new(config, &settings);
         self.settings = settings;
+        self.stale = true;
         Ok(())
     }
 
+    /// Works out what follows from settings that have changed.
+    #[inline(always)]
+    pub(crate) fn follow(&mut self, config: &Config) {
+        if self.stale {
+            self.stale = false;
+            self.derived = Derived::new(config, &self.settings);
+        }
+    }
+
+    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain.
+    pub(crate) fn replace_effects(&mut self, compensation: &Compensation<f32>) {
+        self.settings.effects = compensation.effects();
+        self.compensation = *compensation;
+        self.effects = compensation::State::default();
+        self.current_error = compensation.current_error(self.derived.torque_per_ampere);
+        self.restart_estimator();
+    }
+
     /// Has the estimator forget everything.
-    pub(crate) fn restart_estimator(&mut self, config: &Config) -> Result<(), SettingsFault> {
+    ///
+    /// It does so in its own time: the tick that serves a request has enough to do.
+    pub(crate) fn restart_estimator(&mut self) {
+        self.forget = true;
+    }
+
+    /// An estimator of the settings as they are now.
+    pub(crate) fn replace_estimator(&mut self, config: &Config) -> Result<(), SettingsFault> {
         self.estimator =
             OneLinkEstimator::new(&self.settings.estimator, config.rates.estimator_hz())?;
         self.previous = None;
+        self.forget = false;
         Ok(())
     }
 }

@@ -1,11 +1,13 @@
 //! The control tick: the one function that board, emulated rig and tests all call.
 
+mod compensate;
+mod learning;
+
 use rig_shared::control::{Measured, current, law};
 use rig_shared::encoder;
-use rig_shared::link::PARAMETER_COUNT;
 use rig_shared::safety::monitor::{self, Readings};
 use rig_shared::safety::{Fault, FaultRecord, Limit, LimitSet, Mode, SnapshotSample};
-use rig_shared::trajectory::{Reference, Trajectory};
+use rig_shared::trajectory::Reference;
 use rig_shared::units::Duty;
 use rig_shared::wire::message::{Estimate, StateSample};
 
@@ -13,10 +15,7 @@ use crate::config::Config;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
-use crate::window::{Tick, Window};
-
-/// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
-const OFFSET: usize = PARAMETER_COUNT - 1;
+use crate::window::Tick;
 
 /// What a control tick gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +34,7 @@ pub struct Output {
 
 /// One control tick. Takes the samples of one instant, gives the command that acts from the next one on.
 pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
+    state.follow(config);
     let readings = read(config, state, sample);
     let mut output = Output::default();
     let found = monitor::step(
@@ -46,7 +46,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     .or_else(|| board_fault(&sample));
     state.cause_acting = found.is_some();
     let found = found
-        .or_else(|| calibrate(config, state, sample))
+        .or_else(|| calibrate(config, state, sample, &readings))
         .or_else(|| listen(config, state));
     if let Some((fault, value)) = found {
         output.fault = fall(state, fault, value);
@@ -54,11 +54,16 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
 
     let mut limits = LimitSet::default();
     state.reference = reference(config, state, &mut limits);
-    let (duty, torque) = if state.mode.drives() {
+    let Driven {
+        duty,
+        torque,
+        explained,
+    } = if state.mode.drives() {
         drive(config, state, &readings, &mut limits)
     } else {
-        (0.0, 0.0)
+        Driven::default()
     };
+    state.drive_torque = torque;
     state.limits = limits;
 
     let tick = Tick {
@@ -68,6 +73,8 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         voltage: state.duty * readings.supply,
         reference: state.reference.position,
         torque,
+        explained,
+        position_error: state.position_error,
         limits,
     };
     output.tick = SnapshotSample {
@@ -80,7 +87,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     };
     state.snapshot.push(output.tick);
     output.state = telemetry(config, state, &tick);
-    output.estimate = estimate(config, state, &tick);
+    output.estimate = learning::estimate(config, state, &tick);
     output.command = Command {
         duty: Duty(duty),
         bridge: state.mode.drives(),
@@ -102,19 +109,25 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
     state.position = counts as f32 * state.derived.radians_per_count;
     state.velocity = motion.velocity * state.derived.radians_per_count;
+    let (position, velocity) = (state.position, state.velocity);
+    compensate::correct(config, state);
+    let temperature = scaling.temperature_at_zero
+        + f32::from(sample.temperature.0) * scaling.temperature_per_code;
+    state.warming = temperature - state.start_temperature;
+    // The checks see what the sensors say, the laws what is true of it.
     Readings {
         driver_fault: sample.driver_fault,
         overrun: sample.overrun,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
         current: (f32::from(sample.current.0) - state.calibration.zero_code)
-            * scaling.current_per_code,
+            * scaling.current_per_code
+            - state.current_error,
         supply: f32::from(sample.supply.0) * scaling.supply_per_code,
-        temperature: scaling.temperature_at_zero
-            + f32::from(sample.temperature.0) * scaling.temperature_per_code,
+        temperature,
         encoder_step: step as i32,
-        position: state.position,
-        velocity: state.velocity,
+        position,
+        velocity,
         duty: state.duty,
         driving: state.mode.drives(),
     }
@@ -129,7 +142,12 @@ fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
 }
 
 /// Measures the current offset while the bridge is off; a fault where it is implausible.
-fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Fault, f32)> {
+fn calibrate(
+    config: &Config,
+    state: &mut State,
+    sample: Sample,
+    now: &Readings,
+) -> Option<(Fault, f32)> {
     if state.mode != Mode::Calibrating {
         return None;
     }
@@ -147,6 +165,7 @@ fn calibrate(config: &Config, state: &mut State, sample: Sample) -> Option<(Faul
     }
     state.calibration.zero_code = zero_code;
     state.calibration.std = state.calibration.std_of_mean() * config.scaling.current_per_code.abs();
+    state.start_temperature = now.temperature;
     state.mode = Mode::Disarmed;
     None
 }
@@ -188,7 +207,12 @@ pub(crate) fn brake(state: &mut State) {
 
 /// The reference of this tick, by mode; modes that end by themselves end here.
 fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Reference<f32> {
-    let Run { start, base, .. } = state.run;
+    let Run {
+        start,
+        length,
+        base,
+        ..
+    } = state.run;
     let standing = |position| Reference {
         position,
         ..Reference::default()
@@ -199,7 +223,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         Mode::Running => {
             let elapsed = state.tick - start;
             match &state.trajectory {
-                Some((trajectory, _)) if !is_over(trajectory, elapsed, config.rates.control_hz) => {
+                Some((trajectory, _)) if elapsed < length => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
                     Reference {
                         position: base + offset.position,
@@ -230,13 +254,6 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
     within_range(&state.settings.limits, wish, limits)
 }
 
-fn is_over(trajectory: &Trajectory<f32>, elapsed: u64, rate_hz: u32) -> bool {
-    elapsed.saturating_mul(1_000_000)
-        >= trajectory
-            .duration_micros()
-            .saturating_mul(u64::from(rate_hz))
-}
-
 /// Holds a reference at the edge of the position range.
 fn within_range(
     range: &rig_shared::safety::Limits<f32>,
@@ -259,17 +276,29 @@ fn within_range(
     }
 }
 
-/// Position law, then current loop: duty cycle and commanded joint torque.
-fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> (f32, f32) {
+/// What driving comes to in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Driven {
+    duty: f32,
+    /// Commanded joint torque, N·m.
+    torque: f32,
+    /// Torque that effects beyond the standard model explain, N·m.
+    explained: f32,
+}
+
+/// Effects and position law, then current loop.
+fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> Driven {
     let measured = Measured {
         position: state.position,
         velocity: state.velocity,
     };
+    let effects = compensate::torque(config, state);
     let torque = law::step(
         &state.derived.law,
         &mut state.law,
         measured,
         state.reference,
+        effects.feed,
     );
     limits.set(Limit::Torque, torque.limited);
     let wish = config.drive.current(torque.value);
@@ -287,7 +316,11 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
         },
     );
     limits.set(Limit::Voltage, output.limited);
-    (output.duty, torque.value)
+    Driven {
+        duty: output.duty,
+        torque: torque.value,
+        explained: effects.explained,
+    }
 }
 
 /// Closes a telemetry window when it is full.
@@ -307,66 +340,4 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
         mode: state.mode,
     };
     Some((first_tick, sample))
-}
-
-/// Feeds the on-line estimator when a window is full, and reports at its own, slower pace.
-///
-/// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
-/// same two windows: all belong to the instant between them, and no column lags another.
-fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
-    let window = state
-        .estimation
-        .push(tick, config.rates.estimator_decimation)?;
-    // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
-    // doubt: neither says anything about the rig's parameters.
-    if !state.mode.drives() {
-        state.previous = None;
-        state.estimator.interrupt();
-    } else if let Some(before) = state.previous.replace(window) {
-        learn(config, state, &before, &window);
-    }
-    if state.mode == Mode::Calibrating {
-        return None;
-    }
-    state.updates_since_report += 1;
-    if state.updates_since_report < config.rates.estimate_report_decimation {
-        return None;
-    }
-    state.updates_since_report = 0;
-    Some(estimate_report(state))
-}
-
-/// One update from two consecutive windows.
-fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
-    let ticks = f32::from(config.rates.estimator_decimation);
-    let per_count = state.derived.radians_per_count / ticks;
-    // The difference is taken in integers: exact at any position.
-    let qd =
-        (window.position - before.position) as f32 * per_count / state.derived.estimator_period;
-    let q = 0.5 * (window.position + before.position) as f32 * per_count;
-    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
-    state
-        .estimator
-        .step(q, qd, current * state.derived.torque_per_ampere);
-}
-
-/// The estimate as it goes over the wire.
-fn estimate_report(state: &State) -> Estimate {
-    let report = state.estimator.report();
-    let mut estimate = Estimate {
-        tick: state.tick,
-        value: [0.0; PARAMETER_COUNT],
-        std: [0.0; PARAMETER_COUNT],
-        trusted: [false; PARAMETER_COUNT],
-        residual_rms: report.residual_rms,
-    };
-    estimate.value = report.value;
-    estimate.std = report.std;
-    // The current offset was measured from finitely many samples; its error is a constant torque that no motion
-    // shows, and goes into `off` alone.
-    let measured = state.calibration.std * state.derived.torque_per_ampere;
-    estimate.std[OFFSET] =
-        libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);
-    estimate.trusted = report.trusted;
-    estimate
 }

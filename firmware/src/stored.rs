@@ -10,6 +10,7 @@
 
 use crc::{CRC_32_ISCSI, Crc, Table};
 use heapless::Vec;
+use rig_shared::compensation::Compensation;
 use rig_shared::wire::message::SettingsOrigin;
 use rig_shared::wire::schema;
 
@@ -17,7 +18,7 @@ use crate::config::{Config, Settings};
 use crate::request::usable;
 
 /// Bytes that a copy takes at most; a whole number of 64-bit words, which flash is written in.
-pub const IMAGE: usize = 512;
+pub const IMAGE: usize = 704;
 
 /// "RIG1".
 const MAGIC: u32 = u32::from_le_bytes(*b"RIG1");
@@ -127,6 +128,7 @@ pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     let (settings, origin) = match &copies[newer] {
         Copy::Whole { settings, .. } => {
             let good = usable(settings).is_ok()
+                && Compensation::new(&settings.effects).is_ok()
                 && settings
                     .estimator
                     .check(config.rates.estimator_hz())

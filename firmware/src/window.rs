@@ -20,6 +20,10 @@ pub struct Window {
     pub reference: f32,
     /// Commanded joint torque, N·m.
     pub torque: f32,
+    /// Torque that effects beyond the standard model explain, N·m.
+    pub explained: f32,
+    /// What effects have taken off the position, rad.
+    pub position_error: f32,
     /// Limits that acted at some tick.
     pub limits: LimitSet,
 }
@@ -39,6 +43,10 @@ pub struct Tick {
     pub reference: f32,
     /// Commanded joint torque, N·m.
     pub torque: f32,
+    /// Torque that effects beyond the standard model explain, N·m.
+    pub explained: f32,
+    /// What effects have taken off the position, rad.
+    pub position_error: f32,
     /// Limits acting.
     pub limits: LimitSet,
 }
@@ -53,6 +61,8 @@ impl Window {
         self.voltage += tick.voltage;
         self.reference += tick.reference;
         self.torque += tick.torque;
+        self.explained += tick.explained;
+        self.position_error += tick.position_error;
         self.limits = self.limits.union(tick.limits);
         (self.ticks >= length).then(|| core::mem::take(self))
     }

@@ -4,6 +4,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod compensation;
 pub mod control;
 pub mod drive;
 pub mod dual;

@@ -84,18 +84,30 @@ fn smooth_step<T: Real>(x: T, low: T, high: T) -> T {
 
 /// The value where it is a number of sane size, else zero.
 #[inline(always)]
-fn finite<T: Real>(x: T) -> T {
+pub(crate) fn finite<T: Real>(x: T) -> T {
     T::select(x.abs().le(T::from_f64(1.0e30)), x, T::ZERO)
 }
 
 /// Direction of motion, −1 to 1, smooth: the reference's near rest, the measurement's beyond the threshold; 0 where
 /// the reference stands.
-#[inline(always)]
+///
+/// Not inlined: every law asks for it, and the chip's fast memory has no room for copies.
+#[inline(never)]
 pub fn direction<T: Real>(reference: T, measured: T, velocity_threshold: T) -> T {
     let threshold = velocity_threshold.max(T::from_f64(1.0e-6));
     let weight = smooth_step(measured.abs(), threshold, threshold + threshold);
     let wanted = (reference / (T::from_f64(REFERENCE_SHARE) * threshold)).tanh();
     weight * measured.sgn() * wanted.abs() + (T::ONE - weight) * wanted
+}
+
+/// Share of dry friction that is given: `gain_at_rest` at rest, `gain` from the threshold on, by the faster of reference
+/// and link.
+#[inline(always)]
+pub fn share<T: Real>(settings: &PrecompensationSettings<T>, reference: T, measured: T) -> T {
+    let threshold = settings.velocity_threshold.max(T::from_f64(1.0e-6));
+    let faster = reference.abs().max(measured.abs());
+    settings.gain_at_rest
+        + (settings.gain - settings.gain_at_rest) * smooth_step(faster, T::ZERO, threshold)
 }
 
 /// Feed-forward torque against friction, N·m.
@@ -114,11 +126,9 @@ pub fn torque<T: Real>(
         return T::ZERO;
     }
     let (reference, measured, load) = (finite(reference), finite(measured), finite(load));
-    let threshold = settings.velocity_threshold.max(T::from_f64(1.0e-6));
-    let sign = direction(reference, measured, threshold);
+    let sign = direction(reference, measured, settings.velocity_threshold);
     let faster = reference.abs().max(measured.abs());
-    let share = settings.gain_at_rest
-        + (settings.gain - settings.gain_at_rest) * smooth_step(faster, T::ZERO, threshold);
+    let share = share(settings, reference, measured);
     let dry = friction.coulomb
         + friction.stribeck_excess(faster)
         + friction.load_coefficient * load.abs();

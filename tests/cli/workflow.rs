@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::run::{real_data, rig, robot, succeed};
+use crate::run::{real_data, refuse, rig, robot, succeed};
 
 fn json(path: &std::path::Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
@@ -238,4 +238,35 @@ fn arms_with_coupled_drives_go_from_template_to_parameters() {
             assert!((screw / 0.08 - 1.0).abs() < 0.05, "{screw}");
         }
     }
+}
+
+/// What needs no board: a burst of ticks, a description told to the rig; and a sentence for what does need one.
+#[test]
+fn board_commands_on_the_emulated_rig() {
+    let folder = tempfile::tempdir().unwrap();
+    let burst = folder.path().join("burst.csv");
+    let board = || {
+        let mut command = rig();
+        command.args(["board", "--emulated"]);
+        command
+    };
+    let told = succeed(
+        board()
+            .args(["capture", "--after", "50", "--out"])
+            .arg(&burst),
+    );
+    assert!(told.contains("control ticks"), "{told}");
+    let text = std::fs::read_to_string(&burst).unwrap();
+    assert!(text.starts_with("t,q1,i1,duty1,supply,ref1\n"), "{text}");
+    assert!(refuse(board().args(["capture", "--out"]).arg(&burst)).contains("--force"));
+    let model = robot("one-link.toml");
+    succeed(
+        board()
+            .args(["upload", "--unstored", "--model"])
+            .arg(&model),
+    );
+    let no_memory = refuse(board().args(["upload", "--model"]).arg(&model));
+    assert!(no_memory.contains("no memory"), "{no_memory}");
+    assert!(refuse(board().arg("store")).contains("no memory"));
+    assert!(refuse(board().arg("health")).contains("emulated rig has none"));
 }

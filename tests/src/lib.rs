@@ -15,6 +15,9 @@ use rig_host::link::{
 };
 use rig_host::plant::PlantConfig;
 use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_shared::effects::{Effect, Kind};
+use rig_shared::friction::Friction;
+use rig_shared::link::LinkParameters;
 use rig_shared::safety::FaultRecord;
 use rig_shared::trajectory::{Fourier, Trajectory};
 use rig_shared::wire::message::{Estimate, Refusal, Report, RequestBody};
@@ -49,6 +52,42 @@ pub fn bench(seed: u64) -> (Line, PlantConfig) {
     line.request(RequestBody::SetPosition(plant.initial_position as f32))
         .unwrap();
     (line, plant)
+}
+
+/// The plant's own model and steady friction, as the host would send them.
+pub fn truth_of(plant: &PlantConfig) -> Vec<RequestBody> {
+    let truth = plant.equivalent().to_array().map(|value| value as f32);
+    let model = LinkParameters::from_array(truth);
+    vec![
+        RequestBody::SetModel(model),
+        RequestBody::SetFriction(Friction {
+            coulomb: model.coulomb,
+            viscous: model.viscous,
+            ..Friction::default()
+        }),
+    ]
+}
+
+/// What the drive has to give against a torque amplitude·sin(order·θ + phase) on the joint, θ the motor's angle.
+pub fn periodic(amplitude: f64, order: f64, phase: f64) -> Effect<f32> {
+    let (sine, cosine) = phase.sin_cos();
+    Effect {
+        kind: Kind::Cogging,
+        gains: [
+            (-amplitude * sine) as f32,
+            (-amplitude * cosine) as f32,
+            0.0,
+            0.0,
+        ],
+        shapes: [order as f32, 0.0, 0.0, 0.0],
+    }
+}
+
+/// The plant's cogging as an effect.
+pub fn cogging_of(plant: &PlantConfig) -> Effect<f32> {
+    let cogging = plant.motor.cogging.unwrap();
+    let amplitude = plant.mechanism.ratio * cogging.amplitude;
+    periodic(amplitude, cogging.order, cogging.phase)
 }
 
 /// Waits until the rig has measured its current offset.

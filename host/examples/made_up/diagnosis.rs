@@ -235,6 +235,7 @@ pub(super) fn explained() -> Diagnosis {
             file: Some("next.toml".into()),
             separation: Some(7.4),
             duration: Some(24.0),
+            trajectory: None,
         }),
         waterfall: vec![waterfall(
             &["frozen description", "refitted", "stribeck", "cogging"],
@@ -320,6 +321,7 @@ pub(super) fn remainder() -> Diagnosis {
         file: None,
         separation: None,
         duration: None,
+            trajectory: None,
     });
     Diagnosis {
         verdict: Verdict::Remainder,

@@ -25,7 +25,7 @@ use crate::report::{self, format_significant, format_value};
 /// were.
 ///
 /// Writes model.toml (the description with the effects found and the parameters fitted again, for --robot), diagnosis.json
-/// and report.html into the folder given with --out.
+/// and report.html into the folder given with --out, and next_experiment.toml where a motion would tell more.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -82,6 +82,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
     })?;
     folder(&args.out)?;
+    let next = found.next_experiment.as_ref();
+    if let Some((name, motion)) = next.and_then(|n| n.file.as_ref().zip(n.trajectory.as_ref())) {
+        write_whole(&args.out.join(name), motion.as_bytes())?;
+    }
     write_whole(&args.out.join("model.toml"), text.as_bytes())?;
     write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
     write_whole(&args.out.join("report.html"), page.as_bytes())?;

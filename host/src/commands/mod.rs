@@ -2,6 +2,7 @@
 
 mod base;
 mod benchmark;
+mod board;
 mod demo;
 mod diagnose;
 mod error;
@@ -37,6 +38,7 @@ enum Command {
     Demo(demo::Args),
     Init(init::Args),
     Record(record::Args),
+    Board(board::Args),
     Flash(flash::Args),
     Excite(excite::Args),
     Simulate(simulate::Args),
@@ -61,6 +63,7 @@ impl Cli {
             Some(Command::Demo(args)) => demo::run(&args, &ui),
             Some(Command::Init(args)) => init::run(&args, &ui),
             Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Board(args)) => board::run(&args, &ui),
             Some(Command::Flash(args)) => flash::run(&args, &ui),
             Some(Command::Excite(args)) => excite::run(&args, &ui),
             Some(Command::Simulate(args)) => simulate::run(&args, &ui),

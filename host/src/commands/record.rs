@@ -5,6 +5,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args as ClapArgs};
+use rig_shared::compensation::EFFECTS;
+use rig_shared::effects::Effect;
 use rig_shared::safety::{Limit, Mode};
 use rig_shared::trajectory::Trajectory;
 use rig_shared::wire::message::RequestBody;
@@ -115,35 +117,36 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     } else if args.probe {
         record(open_probe()?, &experiment, &args.out, ui)?
     } else {
-        let described = match robot {
-            Some(robot) => robot,
-            None => Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?,
-        };
-        let rig = EmulatedRig::new(
-            &Nameplate::from_robot(&described)?,
-            PlantConfig::laboratory(args.seed),
-            args.seed,
-        )
-        .map_err(|fault| {
-            CommandError::Sentence(format!(
-                "The estimator's settings cannot be used: {fault:?}."
-            ))
-        })?;
+        let rig = emulated(robot, args.seed)?;
         record(EmulatedPort::new(rig), &experiment, &args.out, ui)?
     };
     ui.say(&format!("{}: {losses}", args.out.display()));
     Ok(())
 }
 
+/// The emulated rig: a laboratory's, with the nameplate of this description or of the template.
+pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, CommandError> {
+    let described = match robot {
+        Some(robot) => robot,
+        None => Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?,
+    };
+    let nameplate = Nameplate::from_robot(&described)?;
+    EmulatedRig::new(&nameplate, PlantConfig::laboratory(seed), seed).map_err(|fault| {
+        CommandError::Sentence(format!(
+            "The estimator's settings cannot be used: {fault:?}."
+        ))
+    })
+}
+
 /// The rig behind the debug probe.
 #[cfg(feature = "probe")]
-fn open_probe() -> Result<crate::link::ProbeLine, CommandError> {
+pub(crate) fn open_probe() -> Result<crate::link::ProbeLine, CommandError> {
     Ok(crate::link::ProbeLine::open()?)
 }
 
 /// A program without this ability says so.
 #[cfg(not(feature = "probe"))]
-fn open_probe() -> Result<Box<dyn Port>, CommandError> {
+pub(crate) fn open_probe() -> Result<Box<dyn Port>, CommandError> {
     Err(CommandError::Sentence(
         "This program was built without the debug probe; build it with `cargo build --release --features probe`, or use the board's serial port with --port.".to_owned(),
     ))
@@ -190,6 +193,25 @@ pub(crate) fn upload(nameplate: &Nameplate, precompensation: bool) -> Vec<Reques
         RequestBody::SetGains(settings.gains),
         RequestBody::SetEstimator(settings.estimator),
     ]
+}
+
+/// The effects of a one-link description as a request.
+pub(crate) fn effects_of(robot: &Robot) -> Result<RequestBody, CommandError> {
+    let placed = robot.placed_effects();
+    if placed.len() > EFFECTS {
+        return Err(CommandError::Sentence(format!(
+            "{} has {} effects, but the rig compensates at most {EFFECTS}; leave the smallest out.",
+            robot.name,
+            placed.len()
+        )));
+    }
+    let single = |effect: Effect<f64>| Effect {
+        kind: effect.kind,
+        gains: effect.gains.map(|value| value as f32),
+        shapes: effect.shapes.map(|value| value as f32),
+    };
+    let effects = placed.iter().map(|one| single(one.effect)).collect();
+    Ok(RequestBody::SetEffects(effects))
 }
 
 fn record<P: Port>(

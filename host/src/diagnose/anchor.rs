@@ -31,12 +31,7 @@ impl Anchor {
     /// For a robot.
     pub(super) fn of(robot: &Robot, nominal: &Nominal) -> Self {
         let n = robot.joints.len();
-        let mut standard = robot.standard_parameters().concat();
-        standard.extend(robot.motor_parameters().as_flattened());
-        standard.resize(nominal.base.combination.ncols(), 0.0);
-        let prior: Vec<f64> = (nominal.base.combination.row_iter())
-            .map(|row| row.iter().zip(&standard).map(|(k, p)| k * p).sum())
-            .collect();
+        let prior = nominal.stated(robot);
         let inertial = robot
             .joints
             .iter()

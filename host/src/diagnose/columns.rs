@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use nalgebra::Vector3;
 use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAPES, Scale};
+use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 
 use super::DiagnoseError;
 use super::rows::{Column, Nominal, Thinning, motion_of};
@@ -88,8 +90,8 @@ impl Source<'_> {
             return vec![Parameter {
                 name: "share",
                 unit: "1",
-                bounds: [0.5, 2.0],
-                range: [0.5, 2.0],
+                bounds: [0.3, 3.0],
+                range: [0.3, 3.0],
                 scale: Scale::Linear,
                 meaning: "of the torque that the twist changes",
             }];
@@ -288,7 +290,6 @@ impl Source<'_> {
 
     /// Viscous and Coulomb friction of a joint, as identified.
     fn friction(&self, joint: usize) -> [f64; 2] {
-        use rig_shared::multibody::{COLUMNS, column};
         [column::VISCOUS, column::COULOMB].map(|place| {
             let c = joint * COLUMNS + place;
             let k = self.nominal.base.columns.iter().position(|b| *b == c);
@@ -302,7 +303,7 @@ impl Source<'_> {
         if self.nominal.has_own_drive_inertia(joint) {
             return 0.0;
         }
-        self.robot.standard_parameters()[joint][rig_shared::multibody::column::DRIVE_INERTIA]
+        self.robot.standard_parameters()[joint][column::DRIVE_INERTIA]
     }
 
     /// Torque of the smooth part of the nominal model for a motion.
@@ -322,22 +323,43 @@ impl Source<'_> {
     }
 
     /// What a tilt of the base by a unit angle does to the torque: one column a horizontal axis that matters.
+    ///
+    /// Gravity from another side also acts on what it did not act on before, first moments along an upright axis for one:
+    /// they are no base parameters, and taken from the description.
     fn tilted(&self, run: &Run) -> Result<Vec<Column>, DiagnoseError> {
-        let motion = motion_of(run);
-        let motion = [&motion[0][..], &motion[1][..], &motion[2][..]];
+        let failed = |e: &dyn std::fmt::Display| DiagnoseError::Model(e.to_string());
+        let n = self.nominal.joints();
+        let mut parameters = self.robot.standard_parameters();
+        let base = &self.nominal.base;
+        let prior = self.nominal.stated(self.robot);
+        for ((&c, value), prior) in base.columns.iter().zip(&self.values).zip(&prior) {
+            if c < n * COLUMNS {
+                parameters[c / COLUMNS][c % COLUMNS] += value - prior;
+            }
+        }
+        for row in &mut parameters {
+            row[column::DRIVE_INERTIA..].fill(0.0);
+        }
+        let gravity = Vector3::from(self.robot.gravity);
+        let rest = vec![0.0; n];
+        let (mut q, mut torque) = (vec![0.0; n], vec![0.0; n]);
         let mut columns = Vec::new();
         for axis in self.nominal.tilt_axes() {
-            let mut difference: Vec<Vec<f64>> = vec![vec![0.0; run.len()]; self.nominal.joints()];
-            for side in [1.0, -1.0] {
-                self.nominal
-                    .tilted(axis, side * NUDGE)?
-                    .columns(motion, &mut |k, j, column| {
-                        for (to, y) in difference[j].iter_mut().zip(column) {
-                            *to += side * self.values[k] * y / (2.0 * NUDGE);
-                        }
-                    })?;
+            // The base turns one way, gravity as seen from it the other; its torque is linear in it.
+            let change = gravity.cross(&Vector3::from(axis));
+            let chain =
+                Chain::new(&self.robot.geometry(), change.into()).map_err(|e| failed(&e))?;
+            let mut signals = vec![Vec::with_capacity(run.len()); n];
+            for k in 0..run.len() {
+                for (q, joint) in q.iter_mut().zip(&run.joints) {
+                    *q = joint.q[k];
+                }
+                bias_torque(&chain, &parameters, &q, &rest, &mut torque).map_err(|e| failed(&e))?;
+                for (signal, torque) in signals.iter_mut().zip(&torque) {
+                    signal.push(*torque);
+                }
             }
-            columns.push(difference.into_iter().map(Some).collect());
+            columns.push(signals.into_iter().map(Some).collect());
         }
         Ok(columns)
     }
@@ -385,7 +407,7 @@ pub(super) fn predict(
     let drives = robot.standard_parameters();
     for j in 0..n {
         // The drive's inertia is part of a combination with the link's: the description says how much is its own.
-        let own = drives[j][rig_shared::multibody::column::DRIVE_INERTIA];
+        let own = drives[j][column::DRIVE_INERTIA];
         let grouped = !nominal.has_own_drive_inertia(j);
         if own != 0.0 && grouped {
             for (to, a) in predicted.load[j].iter_mut().zip(&run.joints[j].qdd) {

@@ -1,5 +1,8 @@
 //! Weighted least squares on the rows with columns taken in one by one, and what one more column would explain.
 
+use std::ops::Range;
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -23,6 +26,34 @@ pub(super) struct Fit<'a> {
     blocks: usize,
     basis: Vec<Vec<f64>>,
     residual: Vec<f64>,
+    /// What every cross-validation shares, once one was asked for.
+    folded: OnceLock<Option<Folded>>,
+}
+
+/// The columns taken in, fold by fold.
+#[derive(Clone)]
+struct Folded {
+    /// Ranges of the weighted rows that lie in one fold, with it.
+    stretches: Vec<(Range<usize>, usize)>,
+    /// Inner products of the basis within each fold.
+    own: Vec<DMatrix<f64>>,
+    /// … with the residual.
+    right: Vec<DVector<f64>>,
+    /// Squared error of each block, and of each joint, with the basis refitted without the block's fold.
+    errors: Errors,
+}
+
+/// Squared errors on folds not fitted to.
+#[derive(Clone, Debug, PartialEq)]
+struct Errors {
+    of_block: Vec<f64>,
+    of_joint: Vec<f64>,
+}
+
+/// Inner products of candidates' columns with themselves and with the residual, what was taken in taken off.
+pub(super) struct Beside {
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
 }
 
 /// What candidates' columns would do.
@@ -36,7 +67,9 @@ pub(super) struct Evidence {
     pub(super) explained: f64,
     /// Share of the RMS that they take away on folds they were not fitted to.
     pub(super) gain: f64,
-    /// That gain over its standard deviation between blocks.
+    /// The same for the joint that gains most: what one joint lacks is a small share of all joints together.
+    pub(super) joint_gain: f64,
+    /// The gain over its standard deviation between blocks.
     pub(super) gain_sigmas: f64,
     /// Of all coefficients together being zero; not corrected for anything.
     pub(super) p_value: f64,
@@ -65,6 +98,7 @@ impl<'a> Fit<'a> {
             blocks: next,
             basis: Vec::new(),
             residual: Vec::new(),
+            folded: OnceLock::new(),
         };
         let torque: Column = rows.torque.iter().cloned().map(Some).collect();
         fit.residual = fit.weighted(&torque);
@@ -77,14 +111,15 @@ impl<'a> Fit<'a> {
         let mut out = vec![0.0; n * self.rows.joints()];
         for (j, values) in column.iter().enumerate() {
             let Some(values) = values else { continue };
-            let keep = &self.rows.keep[j];
-            for (k, to) in out[j * n..(j + 1) * n].iter_mut().enumerate() {
-                if keep[k] {
-                    *to = self.scale[j] * values[k];
-                }
-            }
+            out[j * n..(j + 1) * n].copy_from_slice(&self.weighted_joint(j, values));
         }
         out
+    }
+
+    fn weighted_joint(&self, j: usize, values: &[f64]) -> Vec<f64> {
+        (values.iter().zip(&self.rows.keep[j]))
+            .map(|(value, keep)| if *keep { self.scale[j] * value } else { 0.0 })
+            .collect()
     }
 
     /// What is left of a weighted column beside those taken in.
@@ -113,7 +148,14 @@ impl<'a> Fit<'a> {
         let along = dot(&rest, &self.residual);
         axpy(-along, &rest, &mut self.residual);
         self.basis.push(rest);
+        self.folded = OnceLock::new();
         true
+    }
+
+    /// Takes a known torque off what is to be explained.
+    pub(super) fn subtract(&mut self, column: &Column, factor: f64) {
+        let known = self.weighted(column);
+        axpy(-factor, &known, &mut self.residual);
     }
 
     /// RMS of a joint's residual in its own unit, over the rows used.
@@ -147,17 +189,59 @@ impl<'a> Fit<'a> {
         &self.block
     }
 
-    /// Share of the residual's squares that projected columns explain, with their coefficients; none where they are
-    /// not distinct from what was taken in. `bounds` are those of the coefficients: outside them nothing is explained.
+    /// Columns of a candidate beside those taken in; none where one of them is no column of its own. Joints on which a column
+    /// is zero take no part.
+    pub(super) fn beside(&self, columns: &[Column]) -> Option<Beside> {
+        let n = self.rows.count;
+        let k = columns.len();
+        let weighted: Vec<Vec<(usize, Vec<f64>)>> = (columns.iter())
+            .map(|column| {
+                (column.iter().enumerate())
+                    .filter_map(|(j, values)| Some((j, self.weighted_joint(j, values.as_ref()?))))
+                    .collect()
+            })
+            .collect();
+        let with = |rows: &[f64], column: &[(usize, Vec<f64>)]| -> f64 {
+            (column.iter())
+                .map(|(j, own)| dot(&rows[j * n..(j + 1) * n], own))
+                .sum()
+        };
+        let along: Vec<DVector<f64>> = (weighted.iter())
+            .map(|column| {
+                DVector::from_iterator(self.basis.len(), self.basis.iter().map(|b| with(b, column)))
+            })
+            .collect();
+        let mut gram = DMatrix::zeros(k, k);
+        for a in 0..k {
+            for b in 0..=a {
+                let whole: f64 = (weighted[a].iter())
+                    .flat_map(|(i, x)| weighted[b].iter().map(move |(j, y)| (i == j, x, y)))
+                    .filter(|(same, ..)| *same)
+                    .map(|(_, x, y)| dot(x, y))
+                    .sum();
+                let left = whole - along[a].dot(&along[b]);
+                // As `distinct` has it, by squares.
+                if a == b && (left.is_nan() || left <= DISTINCT * DISTINCT * whole || whole == 0.0)
+                {
+                    return None;
+                }
+                gram[(a, b)] = left;
+                gram[(b, a)] = left;
+            }
+        }
+        let right = DVector::from_iterator(k, weighted.iter().map(|c| with(&self.residual, c)));
+        Some(Beside { gram, right })
+    }
+
+    /// Share of the residual's squares that such columns explain, with their coefficients. `bounds` are those of the
+    /// coefficients: outside them nothing is explained.
     pub(super) fn explained(
         &self,
-        columns: &[Vec<f64>],
+        columns: &Beside,
         bounds: &[[f64; 2]],
     ) -> Option<(f64, Vec<f64>)> {
-        let k = columns.len();
-        let gram = DMatrix::from_fn(k, k, |a, b| dot(&columns[a], &columns[b]));
-        let right = DVector::from_fn(k, |a, _| dot(&columns[a], &self.residual));
-        let beta = gram.cholesky()?.solve(&right);
+        let right = &columns.right;
+        let beta = columns.gram.clone().cholesky()?.solve(right);
         let within = beta
             .iter()
             .zip(bounds)
@@ -165,7 +249,7 @@ impl<'a> Fit<'a> {
         if !within {
             return None;
         }
-        let share = beta.dot(&right) / dot_self(&self.residual);
+        let share = beta.dot(right) / dot_self(&self.residual);
         share
             .is_finite()
             .then(|| (share, beta.iter().copied().collect()))
@@ -189,7 +273,16 @@ impl<'a> Fit<'a> {
 
     /// Everything about projected columns.
     pub(super) fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
-        let (explained, gains) = self.explained(columns, bounds)?;
+        let beside = Beside {
+            gram: DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+                dot(&columns[a], &columns[b])
+            }),
+            right: DVector::from_iterator(
+                columns.len(),
+                columns.iter().map(|c| dot(c, &self.residual)),
+            ),
+        };
+        let (explained, gains) = self.explained(&beside, bounds)?;
         let (k, blocks) = (columns.len(), self.blocks);
         let n = self.rows.count;
         // Scores of the blocks under the alternative: what is left after the columns.
@@ -212,8 +305,7 @@ impl<'a> Fit<'a> {
         }
         let g = blocks as f64;
         meat *= g / (g - 1.0).max(1.0);
-        let gram = DMatrix::from_fn(k, k, |a, b| dot(&columns[a], &columns[b]));
-        let bread = gram.cholesky()?.inverse();
+        let bread = beside.gram.cholesky()?.inverse();
         let covariance = &bread * meat * &bread;
         let stds = (0..k).map(|c| covariance[(c, c)].max(0.0).sqrt()).collect();
         let beta = DVector::from_column_slice(&gains);
@@ -224,7 +316,14 @@ impl<'a> Fit<'a> {
             .map(|f| f.sf(statistic.max(0.0)))
             .unwrap_or(1.0)
             .max(f64::MIN_POSITIVE);
-        let block_errors = self.cross_validated(columns)?;
+        let (plain, more) = self.cross_validated(columns)?;
+        let block_errors: Vec<[f64; 2]> = (plain.of_block.iter().zip(&more.of_block))
+            .map(|(a, b)| [*a, *b])
+            .collect();
+        let joint_gain = (plain.of_joint.iter().zip(&more.of_joint))
+            .filter(|(before, _)| **before > 0.0)
+            .map(|(before, after)| 1.0 - (after / before).sqrt())
+            .fold(f64::NEG_INFINITY, f64::max);
         let (before, after) = block_errors
             .iter()
             .fold((0.0, 0.0), |(a, b), e| (a + e[0], b + e[1]));
@@ -241,25 +340,26 @@ impl<'a> Fit<'a> {
             stds,
             explained,
             gain,
+            joint_gain,
             gain_sigmas,
             p_value,
             block_errors,
         })
     }
 
-    /// Squared errors of every block without and with the columns, everything refitted without the block's fold.
-    fn cross_validated(&self, columns: &[Vec<f64>]) -> Option<Vec<[f64; 2]>> {
-        let (n, p, k) = (self.rows.count, self.basis.len(), columns.len());
-        let folds = FOLDS.min(self.blocks.max(2));
-        let fold_of = |b: usize| b * folds / self.blocks.max(1);
+    /// Squared errors without and with the columns, everything refitted without each fold.
+    fn cross_validated(&self, columns: &[Vec<f64>]) -> Option<(&Errors, Errors)> {
+        let folded = self.folded.get_or_init(|| self.folded()).as_ref()?;
+        let (p, size) = (self.basis.len(), self.basis.len() + columns.len());
+        let mut own: Vec<DMatrix<f64>> = (folded.own.iter())
+            .map(|m| m.clone().resize(size, size, 0.0))
+            .collect();
+        let mut right: Vec<DVector<f64>> = (folded.right.iter())
+            .map(|r| r.clone().resize_vertically(size, 0.0))
+            .collect();
         let all: Vec<&Vec<f64>> = self.basis.iter().chain(columns).collect();
-        let size = p + k;
-        let mut own = vec![DMatrix::<f64>::zeros(size, size); folds];
-        let mut right = vec![DVector::<f64>::zeros(size); folds];
-        // Runs of rows of one fold, so that the sums go over slices.
-        let stretches = self.stretches(&fold_of);
-        for (range, fold) in &stretches {
-            for a in 0..size {
+        for (range, fold) in &folded.stretches {
+            for a in p..size {
                 let left = &all[a][range.clone()];
                 right[*fold][a] += dot(left, &self.residual[range.clone()]);
                 for b in 0..=a {
@@ -267,57 +367,116 @@ impl<'a> Fit<'a> {
                 }
             }
         }
+        for matrix in &mut own {
+            matrix.fill_upper_triangle_with_lower_triangle();
+        }
+        let more = self.errors(&all, &folded.stretches, &own, &right)?;
+        Some((&folded.errors, more))
+    }
+
+    /// What does not depend on the candidate.
+    fn folded(&self) -> Option<Folded> {
+        let p = self.basis.len();
+        let folds = FOLDS.min(self.blocks.max(2));
+        let fold_of = |b: usize| b * folds / self.blocks.max(1);
+        // Runs of rows of one fold, so that the sums go over slices.
+        let stretches = self.stretches(&fold_of);
+        let mut own = vec![DMatrix::<f64>::zeros(p, p); folds];
+        let mut right = vec![DVector::<f64>::zeros(p); folds];
+        for (range, fold) in &stretches {
+            for a in 0..p {
+                let left = &self.basis[a][range.clone()];
+                right[*fold][a] += dot(left, &self.residual[range.clone()]);
+                for b in 0..=a {
+                    own[*fold][(a, b)] += dot(left, &self.basis[b][range.clone()]);
+                }
+            }
+        }
+        for matrix in &mut own {
+            matrix.fill_upper_triangle_with_lower_triangle();
+        }
+        let basis: Vec<&Vec<f64>> = self.basis.iter().collect();
+        let errors = self.errors(&basis, &stretches, &own, &right)?;
+        Some(Folded {
+            stretches,
+            own,
+            right,
+            errors,
+        })
+    }
+
+    /// Squared errors of `columns`, whose inner products by folds are given, on each fold by a fit to the others.
+    fn errors(
+        &self,
+        columns: &[&Vec<f64>],
+        stretches: &[(Range<usize>, usize)],
+        own: &[DMatrix<f64>],
+        right: &[DVector<f64>],
+    ) -> Option<Errors> {
+        let (n, size) = (self.rows.count, columns.len());
         let mut total = DMatrix::zeros(size, size);
         let mut total_right = DVector::zeros(size);
-        for (matrix, right) in own.iter_mut().zip(&right) {
-            matrix.fill_upper_triangle_with_lower_triangle();
-            total += &*matrix;
+        for (matrix, right) in own.iter().zip(right) {
+            total += matrix;
             total_right += right;
         }
-        let mut errors = vec![[0.0; 2]; self.blocks];
-        for fold in 0..folds {
-            let gram = &total - &own[fold];
-            let rest = &total_right - &right[fold];
-            let with = gram.clone().cholesky()?.solve(&rest);
-            let without = if p == 0 {
+        let mut coefficients = Vec::with_capacity(own.len());
+        for (matrix, right) in own.iter().zip(right) {
+            coefficients.push(if size == 0 {
                 DVector::zeros(0)
             } else {
-                gram.view((0, 0), (p, p))
-                    .into_owned()
-                    .cholesky()?
-                    .solve(&rest.rows(0, p).into_owned())
-            };
-            for (range, f) in &stretches {
-                if *f != fold {
-                    continue;
-                }
-                for at in range.clone() {
-                    let plain: f64 = (0..p).map(|c| without[c] * self.basis[c][at]).sum();
-                    let more: f64 = (0..size).map(|c| with[c] * all[c][at]).sum();
-                    let y = self.residual[at];
-                    let entry = &mut errors[self.block[at % n]];
-                    entry[0] += (y - plain).powi(2);
-                    entry[1] += (y - more).powi(2);
-                }
+                (&total - matrix).cholesky()?.solve(&(&total_right - right))
+            });
+        }
+        let mut errors = Errors {
+            of_block: vec![0.0; self.blocks],
+            of_joint: vec![0.0; self.rows.joints()],
+        };
+        let mut left = Vec::new();
+        for (range, fold) in stretches {
+            left.clear();
+            left.extend_from_slice(&self.residual[range.clone()]);
+            for (column, c) in columns.iter().zip(coefficients[*fold].iter()) {
+                axpy(-c, &column[range.clone()], &mut left);
+            }
+            for (at, x) in range.clone().zip(&left) {
+                errors.of_block[self.block[at % n]] += x * x;
+                errors.of_joint[at / n] += x * x;
             }
         }
         Some(errors)
     }
 
     /// Ranges of the weighted rows that lie in one fold, with it.
-    fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(std::ops::Range<usize>, usize)> {
+    fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(Range<usize>, usize)> {
         let n = self.rows.count;
-        let mut list: Vec<(std::ops::Range<usize>, usize)> = Vec::new();
+        let mut list: Vec<(Range<usize>, usize)> = Vec::new();
         for j in 0..self.rows.joints() {
             for (row, &b) in self.block.iter().enumerate() {
                 let (at, fold) = (j * n + row, fold_of(b));
                 match list.last_mut() {
-                    Some((range, f)) if *f == fold && range.end == at => range.end = at + 1,
+                    // A stretch stays within a joint.
+                    Some((range, f)) if *f == fold && range.end == at && row > 0 => {
+                        range.end = at + 1;
+                    }
                     _ => list.push((at..at + 1, fold)),
                 }
             }
         }
         list
+    }
+}
+
+impl Evidence {
+    /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
+    pub(super) fn ahead_of(&self, other: &Self) -> f64 {
+        let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
+            .map(|(a, b)| b[1] - a[1])
+            .collect();
+        let n = differences.len().max(2) as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
     }
 }
 

@@ -2,19 +2,28 @@
 //! used, and when to stop.
 
 mod anchor;
+#[cfg(test)]
+mod arm_tests;
 pub mod benchmark;
+mod change;
 mod columns;
 mod engine;
 pub mod experiment;
+mod fault;
+mod finish;
 mod fit;
 mod floor;
+mod limits;
 mod locate;
+mod model;
 pub mod outcome;
+mod pictures;
 mod rows;
 pub mod runs;
 pub mod sanity;
 pub mod scenario;
 mod search;
+mod sentences;
 mod solve;
 pub mod testable;
 mod transmission;

@@ -140,6 +140,9 @@ pub struct NextExperiment {
     pub separation: Option<f64>,
     /// s
     pub duration: Option<f64>,
+    /// What [`Self::file`] has to hold, as TOML.
+    #[serde(skip)]
+    pub trajectory: Option<String>,
 }
 
 /// What no known effect explains.

@@ -1,6 +1,6 @@
 //! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
@@ -9,11 +9,14 @@ use super::runs::Run;
 use crate::batch::{ChainBatch, RegressorBlock};
 use crate::identify::{Base, ModelKind, chain_of, transmission_of};
 use crate::prepare::{LowPass, Treatment};
-use crate::robot::Robot;
+use crate::robot::{JointKind, Robot};
 
 /// Share of a row's neighbourhood that may be slow or saturated before the row is left out: what the low-pass makes of an
 /// indicator that is 1 on such samples.
 const SPOILT: f64 = 0.1;
+
+/// Directions whose angle has a sine below this are one.
+const PARALLEL: f64 = 1e-6;
 
 /// A signal on the kept rows, joint by joint; absent where it is zero throughout.
 pub(super) type Column = Vec<Option<Vec<f64>>>;
@@ -101,33 +104,33 @@ impl Nominal {
         })
     }
 
-    /// The same base parameters with the base turned by `angle` about a unit vector of the base frame.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn tilted(&self, axis: [f64; 3], angle: f64) -> Result<Self, DiagnoseError> {
-        let turn = Rotation3::from_scaled_axis(angle * Vector3::from(axis));
-        let mut robot = self.robot.clone();
-        // The base turns one way, gravity as seen from it the other.
-        robot.gravity = (turn.inverse() * Vector3::from(robot.gravity)).into();
-        let chain = chain_of(&robot).map_err(|e| DiagnoseError::Model(e.to_string()))?;
-        Ok(Self {
-            base: self.base.clone(),
-            batch: ChainBatch::new(&chain),
-            transmission: self.transmission.clone(),
-            robot,
-        })
+    /// Base parameters as a description has them.
+    pub(super) fn stated(&self, robot: &Robot) -> Vec<f64> {
+        let mut standard = robot.standard_parameters().concat();
+        standard.extend(robot.motor_parameters().as_flattened());
+        standard.resize(self.base.combination.ncols(), 0.0);
+        (self.base.combination.row_iter())
+            .map(|row| row.iter().zip(&standard).map(|(k, p)| k * p).sum())
+            .collect()
     }
 
-    /// Axes of the base frame about which a tilt changes gravity: for one joint its own axis alone.
+    /// Axes of the base frame about which a tilt changes gravity as the joints feel it: where all of them turn about one
+    /// direction that is not upright, that direction alone (about another the change is of second order).
     pub(super) fn tilt_axes(&self) -> Vec<[f64; 3]> {
         let g = Vector3::from(self.robot.gravity);
         if g.norm() == 0.0 {
             return Vec::new();
         }
-        if let [joint] = self.robot.joints.as_slice() {
-            // z of frame 1 in the base frame: RotX(alpha) alone turns it.
-            let (s, c) = joint.alpha.sin_cos();
+        let (first, others) = match self.robot.joints.split_first() {
+            Some(joints) => joints,
+            None => return Vec::new(),
+        };
+        // z of frame 1 in the base frame: RotX(alpha) alone turns it.
+        let (s, c) = first.alpha.sin_cos();
+        let upright = Vector3::new(0.0, -s, c).cross(&g).norm() < PARALLEL * g.norm();
+        let planar = (self.robot.joints.iter()).all(|j| j.kind == JointKind::Revolute)
+            && others.iter().all(|j| j.alpha.sin().abs() < PARALLEL);
+        if others.is_empty() || planar && !upright {
             return vec![[0.0, -s, c]];
         }
         let one = if g.normalize().x.abs() < 0.9 {

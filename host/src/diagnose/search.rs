@@ -17,6 +17,12 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
 pub(super) const LEAST_SIGMAS: f64 = 2.0;
+/// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
+const LEAST_GAIN_OF_GEARS: f64 = 0.1;
+/// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
+const HOPELESS: f64 = 0.5 * LEAST_GAIN;
+/// … and a gear, from whose starting points the ridge is further away.
+const HOPELESS_GEAR: f64 = 0.02;
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
 /// Most effects.
@@ -25,6 +31,10 @@ const MOST_EFFECTS: usize = 6;
 const PER_DECADE: f64 = 4.0;
 /// Points of a linear range, most.
 const MOST_POINTS: usize = 96;
+/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
+const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
+/// Starting points that are followed up.
+const FOLLOWED: usize = 3;
 /// Steps of the simplex.
 const SIMPLEX_STEPS: usize = 80;
 /// Golden-section steps of the refinement.
@@ -44,8 +54,6 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// What they do.
     pub(super) evidence: Evidence,
-    /// Shapes tried.
-    pub(super) tried: usize,
 }
 
 impl Profile {
@@ -55,11 +63,11 @@ impl Profile {
         let p = self.corrected(tried);
         if p > SIGNIFICANT {
             Some(format!("p = {p:.2}, corrected for {tried} trials"))
-        } else if e.gain < LEAST_GAIN {
+        } else if e.joint_gain < self.least_gain() {
             Some(format!(
                 "takes away {:.1} % of the residual, less than {:.0} %",
-                100.0 * e.gain,
-                100.0 * LEAST_GAIN
+                100.0 * e.joint_gain,
+                100.0 * self.least_gain()
             ))
         } else if e.gain_sigmas < LEAST_SIGMAS {
             Some(format!(
@@ -68,6 +76,14 @@ impl Profile {
             ))
         } else {
             None
+        }
+    }
+
+    fn least_gain(&self) -> f64 {
+        if self.candidate.kind.about().channel == Channel::Transmission {
+            LEAST_GAIN_OF_GEARS
+        } else {
+            LEAST_GAIN
         }
     }
 
@@ -88,8 +104,32 @@ pub(super) struct Search<'a> {
     cache: Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>,
 }
 
+/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
+/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
+fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
+    let mut list = Vec::new();
+    let shapes = kind.about().shapes;
+    let [low, high] = shapes[0].range;
+    const STEPS: usize = 11;
+    for k in 0..=STEPS {
+        let first = low * (high / low).powf(k as f64 / STEPS as f64);
+        for share in [0.05, 0.25, 0.5, 0.9] {
+            list.push(if kind == Kind::Backlash {
+                [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
+            } else {
+                // A few per cent of critical damping for a tenth of a kg·m².
+                [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
+            });
+        }
+    }
+    list
+}
+
 /// Grid of shapes of an effect.
 pub(super) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
+    if kind.about().channel == Channel::Transmission {
+        return starts(kind);
+    }
     let shapes = kind.about().shapes;
     let mut points = vec![[0.0; SHAPES]];
     for (place, shape) in shapes.iter().enumerate() {
@@ -140,13 +180,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Forgets columns that depend on what the model predicts.
-    pub(super) fn model_changed(&self) {
+    /// Takes a source with another model's predictions; columns that depend on them are forgotten.
+    fn renewed(&mut self, source: Source<'a>) {
+        self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         cache.retain(|(c, _), _| !depends_on_model(self.library[*c].kind));
     }
 
-    fn cached(
+    /// Columns of a point of a candidate's grid.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn cached(
         &self,
         c: usize,
         point: usize,
@@ -171,12 +216,11 @@ impl<'a> Search<'a> {
         Ok(columns)
     }
 
-    /// Share of the residual that a candidate explains at given shapes, with its columns projected.
-    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<(f64, Vec<Vec<f64>>)> {
-        let projected = fit.distinct(columns)?;
+    /// Share of the residual that a candidate's columns explain.
+    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
         let bounds = self.bounds(self.library[c].kind);
-        let (share, _) = fit.explained(&projected, &bounds)?;
-        Some((share, projected))
+        let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
+        Some(share)
     }
 
     /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
@@ -192,17 +236,24 @@ impl<'a> Search<'a> {
         let kind = self.library[c].kind;
         let points = grid(kind);
         let mut best: Option<Best> = None;
+        let gear = kind.about().channel == Channel::Transmission;
+        let mut followed: Vec<Best> = Vec::new();
         if let Some(shapes) = start {
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            if let Some((share, _)) = self.explained(fit, c, &columns) {
+            if let Some(share) = self.explained(fit, c, &columns) {
                 best = Some((share, shapes, columns));
             }
         } else {
             for (place, shapes) in points.iter().enumerate() {
                 let columns = self.cached(c, place, shapes)?;
-                let Some((share, _)) = self.explained(fit, c, &columns) else {
+                let Some(share) = self.explained(fit, c, &columns) else {
                     continue;
                 };
+                if gear {
+                    followed.push((share, *shapes, columns.clone()));
+                    followed.sort_by(|a, b| b.0.total_cmp(&a.0));
+                    followed.truncate(FOLLOWED);
+                }
                 if best.as_ref().is_none_or(|b| share > b.0) {
                     best = Some((share, *shapes, columns));
                 }
@@ -212,8 +263,19 @@ impl<'a> Search<'a> {
             return Ok(None);
         };
         let about = kind.about();
-        if about.channel == Channel::Transmission {
+        // One joint's share of the squares of all.
+        let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
+        if best.0 * (self.source.nominal.joints() as f64) < hopeless {
+            return Ok(None);
+        }
+        if gear {
             self.descend(fit, c, &mut best)?;
+            for mut other in followed.into_iter().skip(1) {
+                self.descend(fit, c, &mut other)?;
+                if other.0 > best.0 {
+                    best = other;
+                }
+            }
         }
         for _ in 0..if about.channel == Channel::Transmission {
             0
@@ -241,7 +303,6 @@ impl<'a> Search<'a> {
             shapes: best.1,
             columns: best.2,
             evidence,
-            tried: points.len(),
         }))
     }
 
@@ -261,7 +322,7 @@ impl<'a> Search<'a> {
                 *to = if logarithmic(k) { x.exp() } else { *x }.clamp(low, high);
             }
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some((share, _)) = self.explained(fit, c, &columns) else {
+            let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(0.0);
             };
             if share > best.0 {
@@ -335,11 +396,11 @@ impl<'a> Search<'a> {
         let middle = best.1[place].ln();
         let (mut low, mut high) = (middle - step, middle + step);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let mut at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
+        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;
             shapes[place] = x.exp();
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some((share, _)) = self.explained(fit, c, &columns) else {
+            let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(f64::NEG_INFINITY);
             };
             if share > best.0 {
@@ -432,13 +493,14 @@ impl<'a> Search<'a> {
     }
 
     /// Finds effects one by one. `base` holds the nominal columns; `told` hears of every sweep and of the effects in the
-    /// model at that time.
+    /// model at that time; `renew` gives what columns are formed from once they are in.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn run<'f>(
-        &self,
+        &mut self,
         base: &Fit<'f>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
         told: &mut dyn FnMut(usize, &[Profile], &Fit<'f>),
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let trials = self.trials();
@@ -454,12 +516,47 @@ impl<'a> Search<'a> {
             let before = chosen.clone();
             chosen.push(best);
             self.settle(base, &mut chosen, trials)?;
+            for _ in 0..2 {
+                // Load and inertia as they are with the effects in; the columns that rest on them follow.
+                self.renewed(renew(&chosen)?);
+                self.refine_all(base, &mut chosen)?;
+            }
             if same(&before, &chosen) {
                 break;
             }
         }
         self.other_laws(base, &mut chosen)?;
         Ok(chosen)
+    }
+
+    /// What would stand in the place of the `i`-th effect beside all others, best first; gears only where a gear or what is
+    /// taken for one stands there.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn alternatives(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        i: usize,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let fit = with(base, chosen, Some(i));
+        let mut others: Vec<Candidate> = (chosen.iter().enumerate())
+            .filter(|(k, _)| *k != i)
+            .map(|(_, p)| p.candidate)
+            .collect();
+        let own = chosen[i].candidate.kind.about();
+        others.push(chosen[i].candidate);
+        if own.channel != Channel::Transmission {
+            let like = |name: &str| own.confused.iter().any(|c| c.with == name);
+            for candidate in &self.library {
+                let about = candidate.kind.about();
+                if about.channel == Channel::Transmission && !like(about.name) {
+                    others.push(*candidate);
+                }
+            }
+        }
+        self.sweep(&fit, &others)
     }
 
     /// Another law under the same name where it does clearly better: it has more parameters to bend.
@@ -472,7 +569,7 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 if let Some(rival) = self.profile(&fit, c, None)?
-                    && rival.evidence.gain > chosen[i].evidence.gain + LEAST_GAIN
+                    && rival.evidence.joint_gain > chosen[i].evidence.joint_gain + LEAST_GAIN
                 {
                     chosen[i] = rival;
                 }
@@ -495,7 +592,7 @@ impl<'a> Search<'a> {
         let mut i = 0;
         while chosen.len() > 1 && i < chosen.len() {
             let e = &chosen[i].evidence;
-            if e.p_value > STAYS || e.gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
+            if e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
                 chosen.remove(i);
                 self.refine_all(base, chosen)?;
                 i = 0;
@@ -538,6 +635,7 @@ impl<'a> Search<'a> {
             } else {
                 // No column of its own any more.
                 chosen[i].evidence.gain = 0.0;
+                chosen[i].evidence.joint_gain = 0.0;
                 chosen[i].evidence.p_value = 1.0;
             }
         }
@@ -554,7 +652,7 @@ fn first_to_take(profiles: Vec<Profile>, trials: usize) -> Option<Profile> {
             p.candidate.kind == Kind::JointElasticity && p.candidate.joint == best.candidate.joint
         });
         if let Some(simpler) = simpler
-            && simpler.evidence.gain + LEAST_GAIN > best.evidence.gain
+            && simpler.evidence.joint_gain + LEAST_GAIN > best.evidence.joint_gain
         {
             return Some(simpler);
         }
@@ -583,7 +681,7 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
 }
 
 /// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
-fn rivals(a: &Candidate, b: &Candidate) -> bool {
+pub(super) fn rivals(a: &Candidate, b: &Candidate) -> bool {
     let (x, y) = (a.kind.about(), b.kind.about());
     let one = x.name == y.name
         || x.channel == Channel::Transmission && y.channel == Channel::Transmission;
@@ -591,7 +689,7 @@ fn rivals(a: &Candidate, b: &Candidate) -> bool {
 }
 
 /// Whether a kind is the law that its name is searched by; others take its place only where they do better.
-fn is_first_law(kind: Kind) -> bool {
+pub(super) fn is_first_law(kind: Kind) -> bool {
     Kind::named(kind.about().name, None) == Some(kind)
         // Rings of motor and joint are at different places, not different laws.
         || kind == Kind::EncoderEccentricityJoint
@@ -601,9 +699,11 @@ fn is_first_law(kind: Kind) -> bool {
 /// Whether an effect's columns depend on what the model predicts.
 fn depends_on_model(kind: Kind) -> bool {
     let about = kind.about();
-    matches!(about.channel, Channel::Position | Channel::Effort)
-        || matches!(
-            about.name,
-            "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
-        )
+    matches!(
+        about.channel,
+        Channel::Position | Channel::Effort | Channel::Transmission
+    ) || matches!(
+        about.name,
+        "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
+    )
 }

@@ -21,6 +21,9 @@ const FEWEST_STEPS: usize = 4;
 const MOST_STEPS: usize = 64;
 /// Step times natural frequency, at most.
 const STEP: f64 = 0.2;
+/// Most twist that the load may wind up, rad: beyond it the equation, linearised about the motor's position, says nothing,
+/// and a gear so soft is none.
+const MOST_TWIST: f64 = 0.2;
 /// Error of the position at which the slope of gravity is taken, rad.
 const NUDGE: f64 = 1e-4;
 
@@ -59,8 +62,8 @@ impl Driven {
         })
     }
 
-    /// What the drive's torque differs by from a rigid gear's; none where the link has no inertia of its own or the
-    /// contact is too stiff for the steps.
+    /// What the drive's torque differs by from a rigid gear's; none where the link has no inertia of its own, the contact is
+    /// too stiff for the steps or the gear softer than [`MOST_TWIST`] allows.
     pub(super) fn excess(
         &self,
         kind: Kind,
@@ -87,6 +90,10 @@ impl Driven {
         let speed = &run.joints[joint].qd;
         let load = &predicted.load[joint];
         let first = load.first().copied()?;
+        let most = load.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
+        if most > MOST_TWIST * stiffness {
+            return None;
+        }
         // At rest on the side that the load presses to.
         let mut x = 0.5 * gap * first.signum() + first / stiffness;
         let mut v = 0.0;

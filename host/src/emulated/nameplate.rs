@@ -4,6 +4,7 @@ use core::f64::consts::FRAC_PI_2;
 
 use rig_firmware::config::{Config, Encoder, Rates, Settings};
 use rig_firmware::sample::Scaling;
+use rig_shared::compensation::Effects;
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
 use rig_shared::estimation::EstimatorSettings;
@@ -164,6 +165,7 @@ impl Nameplate {
                 gain_at_rest: 0.8,
                 velocity_threshold: DIRECTION_THRESHOLD,
             },
+            effects: Effects::default(),
             limits,
             estimator: estimator(&model, &limits),
         };

@@ -5,6 +5,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::Identification;
+use super::prior::described;
 use crate::robot::{JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
@@ -15,28 +16,70 @@ use crate::robot::{JointKind, Robot};
 /// moved by the smallest step that gives the identified combinations (K⁺·(β − K·π₀)). The second result lists what
 /// had to be said.
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
-    let k = &identification.details.combination;
-    let values = DVector::from_column_slice(&identification.details.estimate.values);
-    let links = robot.joints.len() * COLUMNS;
-    let mut described = robot.standard_parameters().concat();
-    described.extend(robot.motor_parameters().as_flattened());
-    // Without coupled drives there are no columns of motors, and their parameters are all zero.
-    described.truncate(k.ncols().max(links));
-    let mut pi = DVector::from_vec(described);
-    let mut remarks = Vec::new();
+    let details = &identification.details;
     if let Some(set) = &identification.standard_parameters {
+        let mut pi = described(robot, details.combination.ncols());
         for (entry, value) in pi.iter_mut().zip(set.values()) {
             *entry = value;
         }
-        remarks.extend(set.prior.iter().cloned());
-    } else if robot.joints.len() == 1 {
-        one_link(robot, identification, &mut pi, &mut remarks);
-    } else if let Ok(inverse) = pseudo_inverse(k) {
-        let step = inverse * (&values - k * &pi);
-        pi += step;
-        remarks.push("No physically consistent set of standard parameters was found for these values: the split of the combinations over the links is the smallest change of the description, and single masses and inertias need not be those of a body. Use the combinations, not single parameters.".into());
+        return written(robot, &pi, set.prior.to_vec());
+    }
+    let base = Combinations {
+        combination: &details.combination,
+        columns: &details.columns,
+        values: &details.estimate.values,
+    };
+    let (result, mut remarks) = redistributed(robot, &base, None);
+    if robot.joints.len() > 1 {
+        remarks.insert(0, "No physically consistent set of standard parameters was found for these values: the split of the combinations over the links is the smallest change of the description, and single masses and inertias need not be those of a body. Use the combinations, not single parameters.".into());
+    }
+    (result, remarks)
+}
+
+/// Base parameters with what they combine.
+pub(crate) struct Combinations<'a> {
+    /// Base over standard parameters.
+    pub(crate) combination: &'a DMatrix<f64>,
+    /// Column of the standard regressor that each is named after.
+    pub(crate) columns: &'a [usize],
+    /// SI
+    pub(crate) values: &'a [f64],
+}
+
+/// `robot` with these base parameters: one link as a body that can exist, several links by the smallest change of the
+/// description, each parameter's change counted in its `weights` (one a standard parameter, above 0; none for all alike).
+/// The second result lists what had to be said.
+pub(crate) fn redistributed(
+    robot: &Robot,
+    base: &Combinations,
+    weights: Option<&DVector<f64>>,
+) -> (Robot, Vec<String>) {
+    let k = base.combination;
+    let mut pi = described(robot, k.ncols());
+    let mut remarks = Vec::new();
+    if robot.joints.len() == 1 {
+        one_link(robot, base, &mut pi, &mut remarks);
+        return written(robot, &pi, remarks);
+    }
+    let missing = DVector::from_column_slice(base.values) - k * &pi;
+    let scaled = match weights {
+        Some(weights) => DMatrix::from_fn(k.nrows(), k.ncols(), |i, c| k[(i, c)] * weights[c]),
+        None => k.clone(),
+    };
+    if let Ok(inverse) = pseudo_inverse(&scaled) {
+        let step = inverse * missing;
+        pi += match weights {
+            Some(weights) => step.component_mul(weights),
+            None => step,
+        };
         without_negative_masses(robot, k, &mut pi, &mut remarks);
     }
+    written(robot, &pi, remarks)
+}
+
+/// The description with these standard parameters.
+fn written(robot: &Robot, pi: &DVector<f64>, mut remarks: Vec<String>) -> (Robot, Vec<String>) {
+    let links = robot.joints.len() * COLUMNS;
     let (joints, motors) = pi.as_slice().split_at(links);
     let mut motors = motors.to_vec();
     motors.resize(robot.joints.len() * MOTOR_COLUMNS, 0.0);
@@ -105,19 +148,12 @@ fn pseudo_inverse(k: &DMatrix<f64>) -> Result<DMatrix<f64>, &'static str> {
 }
 
 /// Distributes the base parameters of one link.
-fn one_link(
-    robot: &Robot,
-    identification: &Identification,
-    pi: &mut DVector<f64>,
-    remarks: &mut Vec<String>,
-) {
-    let details = &identification.details;
+fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: &mut Vec<String>) {
     let identified = |c: usize| {
-        details
-            .columns
+        base.columns
             .iter()
             .position(|&x| x == c)
-            .map(|k| details.estimate.values[k])
+            .map(|k| base.values[k])
     };
     let prior_drive = pi[column::DRIVE_INERTIA];
     for c in [1, 2, column::VISCOUS, column::COULOMB, column::OFFSET] {

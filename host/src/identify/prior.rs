@@ -235,7 +235,7 @@ impl Prior {
 }
 
 /// The description's standard parameters, those of motors behind them where there are columns for them.
-fn described(robot: &Robot, columns: usize) -> DVector<f64> {
+pub(crate) fn described(robot: &Robot, columns: usize) -> DVector<f64> {
     let mut all = robot.standard_parameters().concat();
     all.extend(robot.motor_parameters().concat());
     all.truncate(columns);

@@ -1,8 +1,10 @@
 //! What can go wrong on the line.
 
+use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
+use rig_shared::effects::Channel;
 use rig_shared::wire::message::Refusal;
 use rig_shared::wire::{EncodeError, EndMismatch};
 
@@ -132,8 +134,8 @@ pub enum LinkError {
 }
 
 /// A refusal as a clause that says what to do.
-pub fn describe(refusal: Refusal) -> &'static str {
-    match refusal {
+pub fn describe(refusal: Refusal) -> Cow<'static, str> {
+    Cow::Borrowed(match refusal {
         Refusal::WrongMode => {
             "it is not allowed in the present mode (arm before starting, stop before uploading)"
         }
@@ -149,5 +151,17 @@ pub fn describe(refusal: Refusal) -> &'static str {
         Refusal::StorageFailed => {
             "the memory did not take the settings; those stored before still stand"
         }
-    }
+        Refusal::NotCompensable(kind) => {
+            let about = kind.about();
+            let mend = if about.channel == Channel::Load {
+                "put it into the link's inertial parameters"
+            } else {
+                "leave it out"
+            };
+            return Cow::Owned(format!(
+                "the firmware does not compensate {} (the effect `{}`); {mend}",
+                about.title, about.name
+            ));
+        }
+    })
 }

@@ -73,7 +73,13 @@ pub fn run<P: Port>(
 }
 
 /// A request that the rig refuses only because it is still calibrating.
-fn when_calibrated<P: Port>(session: &mut Session<P>, body: RequestBody) -> Result<(), LinkError> {
+///
+/// # Errors
+/// What the link says.
+pub(crate) fn when_calibrated<P: Port>(
+    session: &mut Session<P>,
+    body: RequestBody,
+) -> Result<(), LinkError> {
     let begin = session.port().now();
     loop {
         match session.request(body.clone()) {

@@ -67,12 +67,17 @@ impl Converter {
 impl Encoder {
     /// Counts since the zero at true motor angle `angle` (0 where the joint's angle is 0), not wrapped.
     pub(crate) fn count(&self, angle: f64, ratio: f64) -> i64 {
+        self.reading(angle, ratio).floor() as i64
+    }
+
+    /// What an encoder without steps would read at motor angle `angle`, rad: counts with their fraction.
+    pub fn reading(&self, angle: f64, ratio: f64) -> f64 {
         let shaft = angle - self.zero * ratio;
         let read = shaft
             + self
                 .eccentricity
                 .map_or(0.0, |e| e.error(shaft) - e.error(0.0));
-        (read / TAU * self.counts_per_turn).floor() as i64
+        read / TAU * self.counts_per_turn
     }
 }
 

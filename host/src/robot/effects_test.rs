@@ -144,8 +144,8 @@ fn faults_name_line_value_and_mend() {
             &["other", "another joint"],
         ),
         (
-            "kind = 'joint_elasticity'\nstiffness = 1000\ndamping = 1\n[[effect]]\nkind = 'backlash'\ngap = 0.01\nstiffness = 900\ndamping = 1",
-            4,
+            "kind = 'joint_elasticity'\nstiffness = 1000\ndamping = 1\nlink_friction = 0\n[[effect]]\nkind = 'backlash'\ngap = 0.01\nstiffness = 900\ndamping = 1\nlink_friction = 0",
+            5,
             &[
                 "backlash",
                 "effect 2",

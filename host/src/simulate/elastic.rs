@@ -1,7 +1,8 @@
 //! A gear with play or elasticity: the motor as one mass, the link as the other.
 //!
-//! Sources: Spong 1987; Nordin and Gutman 2002. The drive's inertia and the joint's friction count on the motor's side,
-//! and so does the position sensor; what acts on the link is the load.
+//! Sources: Spong 1987; Nordin and Gutman 2002. The drive's inertia and the position sensor are on the motor's side. So is the
+//! joint's friction, but for the share of its viscous and Coulomb parts that the effect puts on the link's; what effects add
+//! to friction stays on the motor.
 
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
@@ -17,6 +18,8 @@ const REST_PASSES: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Elastic {
     law: [f64; 3],
+    /// Share of the joint's friction that acts on the link.
+    pub link_friction: f64,
     /// Inertia of the motor's side.
     pub rotor: f64,
     /// rad/s that a step has to resolve.
@@ -28,8 +31,11 @@ pub(super) struct Elastic {
 impl Elastic {
     /// The one that the model has, if any.
     pub(super) fn of(model: &Model) -> Result<Option<Self>, SimulateError> {
-        let shapes = |p: &crate::robot::Placed| p.effect.kind.transmission(&p.effect.shapes);
-        let Some(law) = model.effects.placed().iter().find_map(shapes) else {
+        let of = |p: &crate::robot::Placed| {
+            let (kind, shapes) = (p.effect.kind, &p.effect.shapes);
+            kind.transmission(shapes).zip(kind.link_friction(shapes))
+        };
+        let Some((law, link_friction)) = model.effects.placed().iter().find_map(of) else {
             return Ok(None);
         };
         let elastic = |k: Kind| k.transmission(&[0.0; SHAPES]).is_some();
@@ -52,6 +58,7 @@ impl Elastic {
         let [_, stiffness, damping] = law;
         Ok(Some(Self {
             law,
+            link_friction,
             rotor,
             rate: (stiffness / reduced).sqrt() + damping / reduced,
             link: None,

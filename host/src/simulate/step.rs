@@ -47,7 +47,7 @@ pub struct Stepper<'a> {
     next: Vec<f64>,
     /// Viscous friction, n × n.
     damping: Vec<f64>,
-    /// Directions along which Coulomb friction acts, one row each: the joints, then the motors of coupled drives.
+    /// Directions along which Coulomb friction acts, one row each: the coordinates, then the motors of coupled drives.
     along: Vec<f64>,
     /// Coulomb friction along them.
     coulomb: Vec<f64>,
@@ -119,9 +119,15 @@ impl<'a> Stepper<'a> {
             }
             columns = vec![0.0; n * n * MOTOR_COLUMNS];
         }
+        if let Some(elastic) = &elastic {
+            let whole = coulomb[0];
+            coulomb[0] = (1.0 - elastic.link_friction) * whole;
+            coulomb.push(elastic.link_friction * whole);
+        }
         let contacts = coulomb.len();
         let mut along = vec![0.0; contacts * n];
-        for i in 0..joints {
+        // An elastic gear has two masses and a friction for each.
+        for i in 0..n {
             along[i * n + i] = 1.0;
         }
         let stepper = Self {
@@ -192,6 +198,9 @@ impl<'a> Stepper<'a> {
         if let Some(elastic) = &self.elastic {
             let (rotor, link) = self.mass.split_at_mut(3);
             rotor.copy_from_slice(&[elastic.rotor, 0.0, 0.0]);
+            let viscous = self.damping[0];
+            self.damping[0] = (1.0 - elastic.link_friction) * viscous;
+            self.damping[3] = elastic.link_friction * viscous;
             inertia_matrix(&self.model.chain, &self.smooth, &self.middle[1..], link)?;
             return Ok(());
         }
@@ -461,7 +470,8 @@ impl<'a> Stepper<'a> {
             }
             let along = &self.along[c * n..(c + 1) * n];
             let touched = |i: usize| along[i] != 0.0;
-            if c < self.loads.len() {
+            // The first directions are the coordinates themselves.
+            if c < n {
                 self.next[c] = 0.0;
             } else if (0..n).all(|i| !touched(i) || self.next[i].abs() < AT_REST) {
                 for i in 0..n {

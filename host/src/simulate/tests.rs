@@ -316,3 +316,65 @@ fn coupled_friction_that_would_drive_is_refused() {
     let error = Stepper::new(&model).err().unwrap().to_string();
     assert!(error.contains("-0.5"), "{error}");
 }
+
+/// The pendulum without gravity behind a shaft that twists, `share` of its friction on the link's side.
+fn elastic_joint(share: f64) -> Robot {
+    let mut text = pendulum(1.0, 0.2).to_toml().unwrap();
+    text += &format!(
+        r#"
+        [joint.drive]
+        gear_ratio = 50.0
+        rotor_inertia = 2.0e-5
+        torque_constant = 0.05
+        [[effect]]
+        kind = "joint_elasticity"
+        joint = "link"
+        stiffness = 200.0
+        damping = 2.0
+        link_friction = {share:?}
+        "#
+    );
+    let mut robot = Robot::from_toml(&text, std::path::Path::new("elastic.toml")).unwrap();
+    robot.gravity = [0.0; 3];
+    robot
+}
+
+/// Position and velocity of motor and link after a constant torque from rest.
+fn pushed(robot: &Robot, torque: f64, seconds: f64) -> [[f64; 2]; 2] {
+    let model = Model::from_robot(robot).unwrap();
+    let mut stepper = Stepper::new(&model).unwrap();
+    let (mut q, mut v) = (vec![0.0], vec![0.0]);
+    for _ in 0..(seconds / 1e-3).round() as usize {
+        stepper.step(&mut q, &mut v, &[torque], 1e-3).unwrap();
+    }
+    [[q[0], v[0]], stepper.link().unwrap()]
+}
+
+#[test]
+fn friction_behind_an_elastic_gear_holds_the_link_while_the_motor_winds_it_up() {
+    // All of it behind: nothing holds the motor, which comes to rest where the spring balances the torque.
+    let [motor, link] = pushed(&elastic_joint(1.0), 0.5, 3.0);
+    assert_eq!(link, [0.0; 2]);
+    assert!((motor[0] - 0.5 / 200.0).abs() < 1e-9, "{motor:?}");
+    // All of it before: nothing moves.
+    assert_eq!(pushed(&elastic_joint(0.0), 0.5, 3.0), [[0.0; 2]; 2]);
+    // Half: the motor breaks loose and winds until spring and its own friction hold it; the link never moves.
+    let [motor, link] = pushed(&elastic_joint(0.5), 0.8, 3.0);
+    assert_eq!(link, [0.0; 2]);
+    assert_eq!(motor[1], 0.0);
+    let spring = 200.0 * motor[0];
+    assert!((0.3..0.5).contains(&spring), "{spring}");
+}
+
+#[test]
+fn the_side_of_the_friction_changes_the_twist_but_not_the_steady_speed() {
+    for share in [0.0, 0.4, 1.0] {
+        let [motor, link] = pushed(&elastic_joint(share), 1.2, 20.0);
+        // 1.2 = 1.0 + 0.2·v.
+        assert!((motor[1] - 1.0).abs() < 1e-6, "{share}: {motor:?}");
+        assert!((link[1] - 1.0).abs() < 1e-6, "{share}: {link:?}");
+        // What passes the gear is the friction behind it.
+        let spring = 200.0 * (motor[0] - link[0]);
+        assert!((spring - share * 1.2).abs() < 1e-6, "{share}: {spring}");
+    }
+}

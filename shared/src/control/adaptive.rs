@@ -86,12 +86,14 @@ pub fn regressor<T: Real>(
     [acceleration, cosine, sine, velocity, direction, T::ONE]
 }
 
-/// Joint torque for one tick, and a step of the adaptation. `gains.derivative` must be above zero.
+/// Joint torque for one tick, and a step of the adaptation; `feed` is known beside the model, N·m.
+/// `gains.derivative` must be above zero.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
     measured: Measured<T>,
     reference: Reference<T>,
+    feed: T,
 ) -> Torque<T> {
     let gains = &config.gains;
     let slope = gains.proportional / gains.derivative;
@@ -110,7 +112,8 @@ pub fn step<T: Real<Mask = bool>>(
     }
     let [_, _, _, _, coulomb, _] = state.theta;
     let friction = direction * coulomb;
-    let torque = Torque::within(config.torque_limit, model - gains.derivative * s, friction);
+    let wish = model - gains.derivative * s + feed;
+    let torque = Torque::within(config.torque_limit, wish, friction);
     if !torque.limited {
         let adaptation = &config.adaptation;
         let zone = adaptation.dead_zone;

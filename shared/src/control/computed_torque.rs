@@ -14,11 +14,12 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Joint torque for one tick. `design_inertia` must be above zero.
+/// Joint torque for one tick; `feed` is known beside the model, N·m. `design_inertia` must be above zero.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
     reference: Reference<T>,
+    feed: T,
 ) -> Torque<T> {
     let model = &config.model;
     let acceleration = reference.acceleration
@@ -40,6 +41,6 @@ pub fn step<T: Real<Mask = bool>>(
         measured.velocity,
         planned,
     );
-    let wish = load + model.viscous * measured.velocity + model.offset + friction;
+    let wish = load + model.viscous * measured.velocity + model.offset + friction + feed;
     Torque::within(config.torque_limit, wish, friction)
 }

@@ -38,17 +38,21 @@ pub struct State<T> {
     pub adaptive: adaptive::State<T>,
 }
 
-/// Joint torque for one tick by the law in force.
+/// Joint torque for one tick by the law in force. `feed` is a torque that is known beside the model
+/// ([`compensation`](crate::compensation)), N·m; it counts within the torque limit.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
     measured: Measured<T>,
     reference: Reference<T>,
+    feed: T,
 ) -> Torque<T> {
     match config.kind {
-        ControlKind::ProportionalDerivative => pd::step(config, measured, reference),
-        ControlKind::ComputedTorque => computed_torque::step(config, measured, reference),
-        ControlKind::Adaptive => adaptive::step(config, &mut state.adaptive, measured, reference),
+        ControlKind::ProportionalDerivative => pd::step(config, measured, reference, feed),
+        ControlKind::ComputedTorque => computed_torque::step(config, measured, reference, feed),
+        ControlKind::Adaptive => {
+            adaptive::step(config, &mut state.adaptive, measured, reference, feed)
+        }
     }
 }
 
@@ -112,7 +116,7 @@ mod tests {
         let rate = (1.0 / config.period) as u32;
         for tick in 0..seconds * rate {
             let t = f64::from(tick) * config.period;
-            let torque = step(config, &mut state, x, reference(t));
+            let torque = step(config, &mut state, x, reference(t), 0.0);
             assert!(!torque.limited);
             advance(&LINK, &mut x, torque.value, config.period);
             let after = lyapunov(&state, x, t + config.period);
@@ -200,7 +204,7 @@ mod tests {
                 position: 0.0,
                 velocity: noise,
             };
-            let _ = step(&config, &mut state, measured, Reference::default());
+            let _ = step(&config, &mut state, measured, Reference::default(), 0.0);
         }
         assert_eq!(state, before);
     }
@@ -230,7 +234,7 @@ mod tests {
             velocity: -1.0,
         };
         for _ in 0..1_000_000 {
-            let _ = step(&config, &mut state, measured, Reference::default());
+            let _ = step(&config, &mut state, measured, Reference::default(), 0.0);
         }
         let gained = state.adaptive.theta[1] - 2.9;
         assert!((gained - 2e-3).abs() < 1e-6, "{gained}");
@@ -257,6 +261,7 @@ mod tests {
                     velocity: 0.0,
                 },
                 Reference::default(),
+                0.0,
             );
             assert!(torque.limited && torque.value.abs() == 0.5);
             assert_eq!(state, before);

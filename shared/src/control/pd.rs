@@ -10,11 +10,12 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Joint torque for one tick.
+/// Joint torque for one tick; `feed` is known beside the model, N·m.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
     reference: Reference<T>,
+    feed: T,
 ) -> Torque<T> {
     let model = &config.model;
     let feedback = config.gains.proportional * (reference.position - measured.position)
@@ -27,6 +28,6 @@ pub fn step<T: Real<Mask = bool>>(
         measured.velocity,
         load,
     );
-    let wish = feedback + load + model.offset + friction;
+    let wish = feedback + load + model.offset + friction + feed;
     Torque::within(config.torque_limit, wish, friction)
 }

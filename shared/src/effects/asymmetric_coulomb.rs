@@ -36,7 +36,7 @@ impl Law for AsymmetricCoulomb {
             Confusion {
                 with: "torque_offset",
                 exact: true,
-                separated_by: "slow ramps after rest from both sides",
+                separated_by: "the same motion with what pulls on the joint taken off, for a torque from outside; no motion alone",
             },
         ],
         needs: &[Need::Reversals(2)],

@@ -40,8 +40,10 @@ mod viscous_warmup_time;
 pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
 pub use backlash::transmitted;
 
+use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::compensation::Role;
 use crate::scalar::Real;
 
 /// Most gains of one effect.
@@ -97,8 +99,11 @@ trait Law {
 
 macro_rules! registry {
     ($($(#[$meta:meta])* $kind:ident in $module:ident),+ $(,)?) => {
-        /// Which effect.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        /// Which effect. On the wire it is its place in the registry; the wire's fingerprint holds the names in
+        /// their order, so that ends with different registries refuse each other.
+        #[derive(
+            Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, Schema,
+        )]
         pub enum Kind {
             $($(#[$meta])* $kind),+
         }
@@ -124,6 +129,25 @@ macro_rules! registry {
             ) -> [T; GAINS] {
                 match self {
                     $(Self::$kind => $module::$kind::terms(shapes, memory, at)),+
+                }
+            }
+
+            /// The same without the laws that nothing compensates, whose code a chip need not hold: 0.
+            #[inline(always)]
+            pub(crate) fn compensated_terms<T: Real>(
+                self,
+                shapes: &[T; SHAPES],
+                memory: &mut [T; MEMORY],
+                at: &Instant<T>,
+            ) -> [T; GAINS] {
+                match self {
+                    $(Self::$kind => {
+                        if const { Role::by(&<$module::$kind as Law>::ABOUT).is_some() } {
+                            $module::$kind::terms(shapes, memory, at)
+                        } else {
+                            [T::ZERO; GAINS]
+                        }
+                    }),+
                 }
             }
         }
@@ -221,7 +245,7 @@ impl Kind {
 }
 
 /// One effect with its parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Effect<T> {
     /// Which.
     pub kind: Kind,

@@ -31,7 +31,7 @@ impl Law for TorqueOffset {
             Confusion {
                 with: "asymmetric_coulomb",
                 exact: true,
-                separated_by: "slow ramps after rest from both sides",
+                separated_by: "the same motion with what pulls on the joint taken off, for a torque from outside; no motion alone",
             },
             Confusion {
                 with: "current_offset",

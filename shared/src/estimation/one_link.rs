@@ -141,6 +141,12 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
     pub fn interrupt(&mut self) {
         self.state.filter = filtered::State::default();
     }
+
+    /// Everything that was learnt is forgotten.
+    pub fn restart(&mut self) {
+        self.state = State::default();
+    }
+
     /// See [`report`].
     pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
         report(&self.config, &self.state)

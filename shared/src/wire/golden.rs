@@ -15,6 +15,7 @@ use serde::de::DeserializeOwned;
 use super::message::*;
 use super::{MAX_FRAME, MessageDecoder, encode};
 use crate::control::{ControlKind, Gains};
+use crate::effects::{Effect, Kind};
 use crate::estimation::{EstimatorKind, EstimatorSettings};
 use crate::friction::Friction;
 use crate::link::LinkParameters;
@@ -134,6 +135,18 @@ fn requests() -> Vec<(&'static str, RequestBody, &'static str)> {
             "0a820214ac02484d04bc00"
         ),
         ("GetCapture", RequestBody::GetCapture, "08820215a965c6a600"),
+        (
+            "SetEffects",
+            RequestBody::SetEffects(
+                core::iter::once(Effect {
+                    kind: Kind::Stribeck,
+                    gains: [0.25, 0.0, 0.0, 0.0],
+                    shapes: [0.05, 0.0, 0.0, 0.0]
+                })
+                .collect()
+            ),
+            "0582021601010103803e010101010101010101010105cdcc4c3d010101010101010101010105e814ec7600"
+        ),
     ]
 }
 
@@ -248,6 +261,14 @@ fn reports() -> Vec<(&'static str, Report, &'static str)> {
             "0a01ae0201080c27f31c00"
         ),
         (
+            "Acknowledge, not compensable",
+            Report::Acknowledge(Acknowledge {
+                id: 303,
+                result: Err(Refusal::NotCompensable(Kind::Stribeck))
+            }),
+            "0601af020109057d98913400"
+        ),
+        (
             "Capture",
             Report::Capture(SnapshotPart {
                 first: 2040,
@@ -330,6 +351,7 @@ fn request_number(body: &RequestBody) -> usize {
         RequestBody::Store => 19,
         RequestBody::Capture(_) => 20,
         RequestBody::GetCapture => 21,
+        RequestBody::SetEffects(_) => 22,
     }
 }
 
@@ -350,12 +372,12 @@ fn report_number(report: &Report) -> usize {
 #[test]
 fn every_request_has_its_bytes() {
     let mut right = true;
-    let mut seen = [false; 22];
+    let mut seen = [false; 23];
     for (name, body, expected) in requests() {
         seen[request_number(&body)] = true;
         right &= check(name, &Request { id: 258, body }, expected);
     }
-    assert_eq!(seen, [true; 22]);
+    assert_eq!(seen, [true; 23]);
     assert!(right, "the format has changed: see the head of this file");
 }
 

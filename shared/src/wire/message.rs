@@ -8,7 +8,9 @@ use heapless::{String, Vec};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::compensation::EFFECTS;
 use crate::control::{ControlKind, Gains};
+use crate::effects::{Effect, Kind};
 use crate::estimation::EstimatorSettings;
 use crate::friction::Friction;
 use crate::link::LinkParameters;
@@ -81,6 +83,8 @@ pub enum RequestBody {
     Capture(u16),
     /// Send the capture, part by part, once it stands still; one part without samples where none was triggered.
     GetCapture,
+    /// Replace the effects that are compensated beside the friction law; none to compensate none.
+    SetEffects(Vec<Effect<f32>, EFFECTS>),
 }
 
 /// Rig to host.
@@ -160,6 +164,8 @@ pub enum Refusal {
     NoStorage,
     /// The memory did not take the settings; those stored before still stand.
     StorageFailed,
+    /// Effects of this kind have no torque and no corrected reading that would undo them.
+    NotCompensable(Kind),
 }
 
 /// Consecutive state samples, oldest first.

@@ -3,6 +3,7 @@
 use postcard_schema::key::Key;
 
 use super::message::{BATCH, PARAMETERS, Report, Request, SNAPSHOT_PART};
+use crate::compensation::EFFECTS;
 use crate::trajectory::{AMPLITUDES, HARMONICS, LEVELS, SPEEDS};
 
 /// Version of the conversation: framing, and what each message asks of the other end.
@@ -29,7 +30,8 @@ pub const fn schema() -> u64 {
         hash = fold(hash, HARMONICS as u64);
         hash = fold(hash, AMPLITUDES as u64);
         hash = fold(hash, LEVELS as u64);
-        fold(hash, SPEEDS as u64)
+        hash = fold(hash, SPEEDS as u64);
+        fold(hash, EFFECTS as u64)
     };
     FINGERPRINT
 }

@@ -197,7 +197,11 @@ impl Board {
     /// The encoder's true count at `now`, not wrapped.
     fn count(&self, now: Instant) -> i64 {
         let ahead = self.truth.motor_velocity * to_seconds(now - self.last);
-        let phase = (self.truth.motor_position * self.counts_per_radian).rem_euclid(1.0);
+        let config = self.plant.config();
+        let encoder = config.sensors.encoder;
+        // How far into the count that was sampled: by the encoder's own zero, or edges would come twice.
+        let reading = encoder.reading(self.truth.motor_position, config.mechanism.ratio);
+        let phase = reading.rem_euclid(1.0);
         self.sampled + (phase + ahead * self.counts_per_radian).floor() as i64
     }
 

@@ -173,3 +173,37 @@ fn rig_record_and_rig_identify_work_against_the_board_s_serial_port() {
     println!("{table}");
     assert!(fair, "\n{table}");
 }
+
+/// A description with an effect, sent and stored; the health; a burst of single ticks.
+#[test]
+fn rig_board_works_against_the_board_s_serial_port() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (robot, burst) = (at("model.toml"), at("burst.csv"));
+    rig(&["init", "one-link", "--out", text(&robot)]);
+    let mut description = std::fs::read_to_string(&robot).unwrap();
+    description += "\n[[effect]]\nkind = \"cogging\"\ncosine = 0.1\nsine = -0.05\norder = 12.0\n";
+    std::fs::write(&robot, &description).unwrap();
+    let board = Board::start();
+    let at_board = |rest: &[&str]| rig(&[&["board", "--port", &board.port], rest].concat());
+    at_board(&["upload", "--model", text(&robot)]);
+    at_board(&["store"]);
+    at_board(&["health"]);
+    at_board(&["capture", "--after", "200", "--out", text(&burst)]);
+    let all = std::fs::read_to_string(&burst).unwrap();
+    let times: Vec<f64> = all
+        .lines()
+        .filter_map(|line| line.split(',').next()?.parse().ok())
+        .collect();
+    assert!(times.len() > 1000, "{} ticks", times.len());
+    let even = |pair: &[f64]| (pair[1] - pair[0] - 1e-4).abs() < 1e-9;
+    assert!(times.windows(2).all(even), "a tick is missing");
+
+    // What nothing compensates is refused by name.
+    description += "\n[[effect]]\nkind = \"measurement_delay\"\ndelay = 0.001\n";
+    std::fs::write(&robot, description).unwrap();
+    let arguments = ["rig", "board", "--port", &board.port, "upload", "--model"];
+    let refused = Cli::parse_from(arguments.iter().copied().chain([text(&robot)])).run();
+    let sentence = refused.unwrap_err().to_string();
+    assert!(sentence.contains("measurement_delay"), "{sentence}");
+}

@@ -1,4 +1,5 @@
 //! That answers are counted as they should.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::BTreeMap;
 

@@ -120,6 +120,7 @@ pub fn next(
             file: Some(FILE.to_owned()),
             separation: Some(apart),
             duration: Some(primitive.hands.passes().len() as f64 * primitive.trajectory.duration()),
+            trajectory: None,
         },
         trajectory: Some(file_of(robot, joint, &stand, &primitive)),
     }))
@@ -280,6 +281,7 @@ fn by_lookup(
             file: motion.as_ref().map(|_| FILE.to_owned()),
             separation: None,
             duration: motion.as_ref().map(|(p, _)| p.trajectory.duration()),
+            trajectory: None,
         },
         trajectory: motion.map(|(primitive, stand)| file_of(robot, joint, &stand, &primitive)),
     }

@@ -5,6 +5,7 @@
 //! presliding has four elements, warming is driven by heat, and so on; step, controller and sensors lie between the truth
 //! and what is recorded. Equal scenarios give equal bytes.
 
+mod arm;
 mod dice;
 mod hidden;
 mod record;
@@ -20,6 +21,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+pub use arm::{Arm, ArmRecordings, ArmScenario, Fault};
 pub use hidden::{Effect, Hidden};
 pub use record::Intrusion;
 pub use reference::Excitation;

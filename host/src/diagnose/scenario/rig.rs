@@ -74,10 +74,12 @@ impl Noise {
 pub(super) fn healthy(seed: u64, noise: &Noise) -> PlantConfig {
     let mut dice = Dice::new(seed, 0);
     let mut near = |value: f64| value * dice.uniform(1.0 - SPREAD, 1.0 + SPREAD);
-    let mut config = PlantConfig::default();
-    config.tick = 1.0 / TICK_RATE;
-    config.substeps = SUBSTEPS;
-    config.initial_position = HANGING;
+    let mut config = PlantConfig {
+        tick: 1.0 / TICK_RATE,
+        substeps: SUBSTEPS,
+        initial_position: HANGING,
+        ..PlantConfig::default()
+    };
 
     let ratio = 50.0;
     let motor = &mut config.motor;

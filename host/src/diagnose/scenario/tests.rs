@@ -1,4 +1,5 @@
 //! What the recordings hold.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
 

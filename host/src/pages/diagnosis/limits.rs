@@ -51,6 +51,8 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
             .with(Block::Code(format!(
                 "rig record --port DEVICE --robot ROBOT --trajectory {file} --out next.csv"
             ))),
+        // What only has to be recorded says how by itself.
+        None if names.len() < 2 => section,
         None => section.with(Block::Text(
             "This one needs hands: no motion that the rig could run by itself would do.".into(),
         )),

@@ -63,7 +63,7 @@ fn half_a_minute_at_rest() {
 }
 
 #[test]
-#[ignore = "takes about as long as it says; cargo test -p rig-mcu --features unicorn hour -- --ignored"]
+#[ignore = "takes half an hour of one processor: docs/firmware.md says how to run it"]
 fn an_hour_at_rest() {
     at_rest(3600.0);
 }

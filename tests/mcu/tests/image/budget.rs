@@ -1,6 +1,9 @@
 //! What the image costs: instructions and cycles of the control tick, flash, RAM, stack.
 
+use heapless::Vec;
 use rig_mcu::chip::CONTROL_EXCEPTION;
+use rig_shared::compensation::EFFECTS;
+use rig_shared::effects::{Effect, Kind};
 use rig_shared::wire::message::RequestBody;
 use rig_tests::{driven, excitation};
 use serde::Deserialize;
@@ -23,6 +26,18 @@ struct Budget {
 /// Cycles between two control ticks.
 const PERIOD: f64 = 17_000.0;
 
+/// As many effects as a rig can compensate, of the dear sort: dry friction is asked twice a tick.
+fn dear_effects() -> Vec<Effect<f32>, EFFECTS> {
+    let stribeck = |excess, velocity| Effect {
+        kind: Kind::Stribeck,
+        gains: [excess, 0.0, 0.0, 0.0],
+        shapes: [velocity, 0.0, 0.0, 0.0],
+    };
+    (1..=EFFECTS)
+        .map(|k| stribeck(0.01 * k as f32, 0.1 * k as f32))
+        .collect()
+}
+
 #[test]
 fn the_image_keeps_to_its_budget() {
     let text = include_str!("../../budget.toml");
@@ -37,7 +52,10 @@ fn the_image_keeps_to_its_budget() {
     };
     let run = driven(
         &mut line,
-        vec![RequestBody::SetPrecompensation(precompensation)],
+        vec![
+            RequestBody::SetPrecompensation(precompensation),
+            RequestBody::SetEffects(dear_effects()),
+        ],
         excitation(40, 5, 1),
         0.2,
     );

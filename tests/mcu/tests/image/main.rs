@@ -16,7 +16,6 @@ use rig_host::link::{EmulatedPort, Session, SessionSettings};
 use rig_host::plant::PlantConfig;
 use rig_mcu::image::Image;
 use rig_mcu::rig::{EmulatedBoard, Line, power_on};
-use rig_shared::safety::FaultRecord;
 use rig_shared::wire::message::{Health, Report, RequestBody};
 use rig_tests::{calibrated, excitation, snapshot, wait};
 

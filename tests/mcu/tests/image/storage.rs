@@ -1,13 +1,17 @@
 //! Settings that survive a power cycle, and flash that does not.
 
 use rig_host::link::LinkError;
+use rig_host::plant::PlantConfig;
+use rig_host::plant::effect::cogging::Cogging;
 use rig_mcu::cpu::Memory;
 use rig_mcu::map;
 use rig_mcu::peripheral::rcc::Cause;
+use rig_shared::trajectory::{SlowReversals, Trajectory};
 use rig_shared::wire::message::{Refusal, RequestBody, ResetCause, SettingsOrigin};
-use rig_tests::{calibrated, wait};
+use rig_tests::{calibrated, cogging_of, driven, truth_of, wait};
 
-use crate::{BoardSession, bench, board, health};
+use crate::{BoardSession, bench, board, greeted, health, image, place, plant};
+use rig_mcu::rig::power_on;
 
 /// Resets the board and waits until it has calibrated itself.
 fn again(mut line: BoardSession, cause: Cause) -> BoardSession {
@@ -75,4 +79,64 @@ fn stored_settings_come_back_and_damaged_ones_do_not() {
     assert_eq!(report.reset, ResetCause::Software);
     assert_eq!(report.settings, SettingsOrigin::Damaged);
     line.request(fast).unwrap();
+}
+
+/// RMS tracking error of slow reversals, mrad.
+fn tracking(line: &mut BoardSession) -> f64 {
+    let motion = SlowReversals::new(0.05_f32, 0.1, &[0.1], 1).unwrap();
+    let run = driven(line, vec![], Trajectory::SlowReversals(motion), 0.2);
+    assert!(run.faults.is_empty(), "{:?}", run.faults);
+    1e3 * run.tracking_rms(0.0, f64::MAX)
+}
+
+/// Cogging in the plant, named over the wire and stored: compensated, again after a power cycle, and not where what was
+/// stored is damaged.
+#[test]
+fn effects_survive_a_power_cycle_and_damaged_ones_are_not_used() {
+    let rig = PlantConfig {
+        motor: rig_host::plant::Motor {
+            cogging: Some(Cogging {
+                amplitude: 0.006,
+                order: 12.0,
+                phase: 0.7,
+            }),
+            ..plant(1).motor
+        },
+        ..plant(1)
+    };
+    let mut line = greeted(power_on(image(), rig.clone(), 1).unwrap());
+    calibrated(&mut line);
+    place(&mut line);
+    let (_, settings) = rig_firmware::nameplate::one_link();
+    let mut precompensation = settings.precompensation;
+    precompensation.enabled = true;
+    let mut told = truth_of(&rig);
+    told.push(RequestBody::SetPrecompensation(precompensation));
+    for body in told.clone() {
+        line.request(body).unwrap();
+    }
+    let without = tracking(&mut line);
+    let effects = std::iter::once(cogging_of(&rig)).collect();
+    line.request(RequestBody::SetEffects(effects)).unwrap();
+    let with = tracking(&mut line);
+    line.request(RequestBody::Store).unwrap();
+
+    let mut line = again(line, Cause::PowerOn);
+    assert_eq!(health(&mut line).settings, SettingsOrigin::Stored);
+    place(&mut line);
+    let after = tracking(&mut line);
+
+    damage(&mut line, 0);
+    let mut line = again(line, Cause::PowerOn);
+    assert_eq!(health(&mut line).settings, SettingsOrigin::Damaged);
+    place(&mut line);
+    for body in told {
+        line.request(body).unwrap();
+    }
+    let fallen = tracking(&mut line);
+    println!(
+        "RMS {without:.3} mrad without, {with:.3} with, {after:.3} after a power cycle, {fallen:.3} with damaged flash"
+    );
+    assert!(with < without / 2.0 && after < without / 2.0);
+    assert!(fallen > 0.8 * without);
 }

@@ -1,0 +1,66 @@
+//! Effects beyond the standard model in the control tick: what they are asked with, and where their answers go.
+
+use rig_shared::compensation::{self, Now, Reading};
+use rig_shared::trajectory::Reference;
+
+use crate::config::Config;
+use crate::state::State;
+
+/// What the tick knows before its readings are corrected.
+#[inline(always)]
+pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
+    let per_count = state.derived.motor_radians_per_count;
+    let turn = config.encoder.counts_per_motor_turn as i32;
+    // Exact to a count as long as the counts are below 2³¹.
+    let counts = state.counts as i32;
+    let within = counts.checked_rem_euclid(turn).unwrap_or_default();
+    Now {
+        reference: Reference::default(),
+        position: state.position,
+        velocity: state.velocity,
+        gear_ratio: config.drive.gear_ratio,
+        motor_angle: counts as f32 * per_count,
+        angle_in_turn: within as f32 * per_count,
+        placed: state.placed,
+        // The estimator's update is the dearest thing that a tick does.
+        busy: state.estimation.ticks + 1 >= config.rates.estimator_decimation,
+        drive_torque: state.drive_torque,
+        load: 0.0,
+        // To a tenth of a second, without the conversion of a 64-bit number.
+        time: (state.tick >> 10) as u32 as f32 * (1024.0 * state.derived.period),
+        warming: state.warming,
+        period: state.derived.period,
+    }
+}
+
+/// Takes the encoder's error off position and velocity.
+#[inline(always)]
+pub(crate) fn correct(config: &Config, state: &mut State) {
+    if !state.compensation.has_position() {
+        state.position_error = 0.0;
+        return;
+    }
+    let Reading { error, slope } = state.compensation.reading(&now(config, state));
+    state.position -= error;
+    state.velocity -= slope * state.velocity;
+    state.position_error = error;
+}
+
+/// What the effects ask for while the rig drives.
+#[inline(always)]
+pub(crate) fn torque(config: &Config, state: &mut State) -> compensation::Output<f32> {
+    if !state.compensation.has_torque() {
+        return compensation::Output::default();
+    }
+    let model = &state.settings.model;
+    // The planned load, as the friction law's: the feedback would carry measurement noise into it.
+    let load = model.inertia * state.reference.acceleration + model.gravity_torque(state.position);
+    let now = Now {
+        reference: state.reference,
+        load,
+        ..now(config, state)
+    };
+    state
+        .compensation
+        .torque(&state.settings.precompensation, &mut state.effects, &now)
+}

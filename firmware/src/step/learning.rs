@@ -1,0 +1,87 @@
+//! What a control tick tells the on-line estimator, and what it reports.
+
+use rig_shared::link::PARAMETER_COUNT;
+use rig_shared::safety::Mode;
+use rig_shared::wire::message::Estimate;
+
+use crate::config::Config;
+use crate::state::State;
+use crate::window::{Tick, Window};
+
+/// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
+const OFFSET: usize = PARAMETER_COUNT - 1;
+
+/// Feeds the on-line estimator when a window is full, and reports at its own, slower pace.
+///
+/// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
+/// same two windows: all belong to the instant between them, and no column lags another.
+pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
+    // Half a window later than the telemetry's, so that not both are made in one tick.
+    if state.tick < u64::from(config.rates.estimator_decimation / 2) {
+        return None;
+    }
+    let window = state
+        .estimation
+        .push(tick, config.rates.estimator_decimation)?;
+    if state.forget {
+        state.forget = false;
+        state.previous = None;
+        state.estimator.restart();
+        return None;
+    }
+    // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
+    // doubt: neither says anything about the rig's parameters.
+    if !state.mode.drives() {
+        state.previous = None;
+        state.estimator.interrupt();
+    } else if let Some(before) = state.previous.replace(window) {
+        learn(config, state, &before, &window);
+    }
+    if state.mode == Mode::Calibrating {
+        return None;
+    }
+    state.updates_since_report += 1;
+    if state.updates_since_report < config.rates.estimate_report_decimation {
+        return None;
+    }
+    state.updates_since_report = 0;
+    Some(estimate_report(state))
+}
+
+/// One update from two consecutive windows.
+fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
+    let ticks = f32::from(config.rates.estimator_decimation);
+    let per_count = state.derived.radians_per_count / ticks;
+    let errors = [before, window].map(|w| w.mean(w.position_error));
+    // The difference is taken in integers: exact at any position.
+    let qd = ((window.position - before.position) as f32 * per_count - (errors[1] - errors[0]))
+        / state.derived.estimator_period;
+    let q =
+        0.5 * ((window.position + before.position) as f32 * per_count - (errors[0] + errors[1]));
+    let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
+    // What the effects explain is none of the model's: left in, its parameters would take it for theirs.
+    let explained = 0.5 * (window.mean(window.explained) + before.mean(before.explained));
+    let torque = current * state.derived.torque_per_ampere - explained;
+    state.estimator.step(q, qd, torque);
+}
+
+/// The estimate as it goes over the wire.
+fn estimate_report(state: &State) -> Estimate {
+    let report = state.estimator.report();
+    let mut estimate = Estimate {
+        tick: state.tick,
+        value: [0.0; PARAMETER_COUNT],
+        std: [0.0; PARAMETER_COUNT],
+        trusted: [false; PARAMETER_COUNT],
+        residual_rms: report.residual_rms,
+    };
+    estimate.value = report.value;
+    estimate.std = report.std;
+    // The current offset was measured from finitely many samples; its error is a constant torque that no motion
+    // shows, and goes into `off` alone.
+    let measured = state.calibration.std * state.derived.torque_per_ampere;
+    estimate.std[OFFSET] =
+        libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);
+    estimate.trusted = report.trusted;
+    estimate
+}

@@ -1,0 +1,253 @@
+//! `rig board`: how the board is, what it keeps, and its control ticks one by one.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::{ArgGroup, Args as ClapArgs, Subcommand};
+use rig_shared::wire::message::{Greeting, Health, Report, RequestBody, SettingsOrigin};
+
+use super::error::CommandError;
+use super::record::{effects_of, emulated, open_probe, upload};
+use super::ui::Ui;
+use crate::data::{Column, CsvWriter};
+use crate::emulated::Nameplate;
+use crate::link::experiment::when_calibrated;
+use crate::link::serial::DEFAULT_BAUD;
+use crate::link::{EmulatedPort, Port, SerialLine, Session, SessionSettings};
+use crate::robot::Robot;
+
+/// Health comes once a second.
+const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
+/// Longest silence between two parts of a capture, beyond the ticks that are still to be captured.
+const PART_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Talks to the rig's board: its health, its stored settings, its single control ticks.
+#[derive(Debug, ClapArgs)]
+#[command(group = ArgGroup::new("where").required(true).args(["port", "probe", "emulated"]))]
+pub(crate) struct Args {
+    /// Serial port of the rig, such as /dev/ttyACM0 or COM3
+    #[arg(long)]
+    port: Option<String>,
+    /// The board's debug probe instead of its serial port
+    #[arg(long)]
+    probe: bool,
+    /// The emulated rig instead of hardware; it keeps nothing and has no health of its own
+    #[arg(long)]
+    emulated: bool,
+    /// Speed of the serial port, baud
+    #[arg(long, default_value_t = DEFAULT_BAUD)]
+    baud: u32,
+    /// Seed of the emulated rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Says how the board is: why it started, with which settings, what its control tick takes
+    Health,
+    /// Keeps the settings that are in force for the next power on
+    Store,
+    /// Fetches a burst of single control ticks (10 kHz) as CSV
+    Capture {
+        /// Ticks between now and the end of the burst; the burst itself is as long as the board keeps
+        #[arg(long, default_value_t = 1000)]
+        after: u16,
+        /// Replace the file if it exists
+        #[arg(long)]
+        force: bool,
+        /// File to write, .csv
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Sends limits, model, friction and effects of a description, precompensation on, and stores them
+    Upload {
+        /// Robot description, such as the model.toml of a diagnosis
+        #[arg(long)]
+        model: PathBuf,
+        /// Do not store: the next power on forgets them
+        #[arg(long)]
+        unstored: bool,
+    },
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence: the port, the rig's refusal, the file.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    // What can be wrong with the arguments is said before the rig is disturbed.
+    let sent = match &args.action {
+        Action::Upload { model, .. } => requests(model)?,
+        Action::Capture { out, force, .. } if out.exists() && !force => {
+            return Err(CommandError::Exists { path: out.clone() });
+        }
+        _ => Vec::new(),
+    };
+    if let Some(name) = &args.port {
+        act(SerialLine::open(name, args.baud)?, args, sent, ui)
+    } else if args.probe {
+        act(open_probe()?, args, sent, ui)
+    } else {
+        act(
+            EmulatedPort::new(emulated(None, args.seed)?),
+            args,
+            sent,
+            ui,
+        )
+    }
+}
+
+/// What a description asks the rig to be told, friction and effects compensated.
+fn requests(model: &Path) -> Result<Vec<RequestBody>, CommandError> {
+    let robot = Robot::load(model)?;
+    let mut all = upload(&Nameplate::from_robot(&robot)?, true);
+    all.push(effects_of(&robot)?);
+    Ok(all)
+}
+
+fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result<(), CommandError> {
+    let mut session = Session::open(port, SessionSettings::default())?;
+    match &args.action {
+        Action::Health => {
+            let health = health(&mut session)?;
+            ui.say(&describe(session.greeting(), &health));
+        }
+        Action::Store => {
+            when_calibrated(&mut session, RequestBody::Store)?;
+            ui.say("The settings in force are stored; the next power on begins with them.");
+        }
+        Action::Capture { after, out, .. } => {
+            let ticks = capture(&mut session, *after, out)?;
+            ui.say(&format!("{}: {ticks} control ticks", out.display()));
+        }
+        Action::Upload { model, unstored } => {
+            when_calibrated(&mut session, RequestBody::Disarm)?;
+            for body in sent {
+                when_calibrated(&mut session, body)?;
+            }
+            let kept = if *unstored {
+                "until the next power on"
+            } else {
+                when_calibrated(&mut session, RequestBody::Store)?;
+                "and stored"
+            };
+            ui.say(&format!("{}: sent to the rig {kept}.", model.display()));
+        }
+    }
+    Ok(())
+}
+
+fn health<P: Port>(session: &mut Session<P>) -> Result<Health, CommandError> {
+    let until = session.port().now() + HEALTH_PATIENCE;
+    loop {
+        let left = until.saturating_sub(session.port().now());
+        match session.next_report(left)? {
+            Some(Report::Health(health)) => return Ok(health),
+            Some(_) => {}
+            None => {
+                return Err(CommandError::Sentence(format!(
+                    "The rig has not told its health in {} s; only a board tells it, the emulated rig has none.",
+                    HEALTH_PATIENCE.as_secs()
+                )));
+            }
+        }
+    }
+}
+
+fn describe(greeting: &Greeting, health: &Health) -> String {
+    let settings = match health.settings {
+        SettingsOrigin::Defaults => "the firmware's own; none were ever stored",
+        SettingsOrigin::Stored => "as stored",
+        SettingsOrigin::OlderCopy => "the older of two stored copies; the newer one is damaged",
+        SettingsOrigin::Damaged => "the firmware's own; what is stored is damaged",
+        SettingsOrigin::Unusable => {
+            "the firmware's own; what is stored is another firmware's, or cannot be used"
+        }
+    };
+    let period = f64::from(health.clock_hz) / f64::from(greeting.control_rate_hz);
+    let share = |cycles: u32| 100.0 * f64::from(cycles) / period;
+    format!(
+        "firmware        {}\n\
+         running for     {:.1} s\n\
+         started by      {:?}\n\
+         settings        {settings}\n\
+         clock           {:.3} MHz, {}\n\
+         control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
+         stack           {} bytes never used\n\
+         line            {} damaged requests, {} telemetry samples without room",
+        greeting.firmware,
+        health.tick as f64 / f64::from(greeting.control_rate_hz),
+        health.reset,
+        f64::from(health.clock_hz) * 1e-6,
+        if health.crystal {
+            "from the crystal"
+        } else {
+            "from the chip's own oscillator: times may be wrong by 1 %"
+        },
+        share(health.tick_cycles_mean),
+        share(health.tick_cycles_max),
+        health.stack_free,
+        health.bad_requests,
+        health.dropped,
+    )
+}
+
+/// Fetches a capture into a file; gives its ticks.
+fn capture<P: Port>(
+    session: &mut Session<P>,
+    after: u16,
+    out: &Path,
+) -> Result<usize, CommandError> {
+    let greeting = session.greeting().clone();
+    let rate = f64::from(greeting.control_rate_hz);
+    let per_count = core::f64::consts::TAU
+        / (f64::from(greeting.counts_per_motor_turn) * f64::from(greeting.gear_ratio));
+    session.request(RequestBody::Capture(after))?;
+    session.request(RequestBody::GetCapture)?;
+    let columns = [
+        ("t", "s"),
+        ("q1", "rad"),
+        ("i1", "A"),
+        ("duty1", ""),
+        ("supply", "V"),
+        ("ref1", "rad"),
+    ];
+    let mut writer = CsvWriter::create(out, &columns.map(|(name, unit)| Column::new(name, unit)))?;
+    let patience = PART_PATIENCE + Duration::from_secs_f64(f64::from(after) / rate);
+    let begin = session.port().now();
+    let (mut ticks, mut total) = (0, usize::MAX);
+    while ticks < total {
+        let left = (begin + patience).saturating_sub(session.port().now());
+        let part = match session.next_report(left)? {
+            Some(Report::Capture(part)) => part,
+            Some(_) => continue,
+            None => {
+                return Err(CommandError::Sentence(format!(
+                    "The rig has sent {ticks} ticks of its capture and no more; ask again."
+                )));
+            }
+        };
+        if usize::from(part.first) != ticks {
+            return Err(CommandError::Sentence(format!(
+                "A part of the capture after tick {ticks} was lost on the line; ask again."
+            )));
+        }
+        total = usize::from(part.total);
+        ticks += part.samples.len();
+        for sample in &part.samples {
+            writer.push_row(&[
+                sample.tick as f64 / rate,
+                sample.position as f64 * per_count,
+                f64::from(sample.current),
+                f64::from(sample.duty),
+                f64::from(sample.supply),
+                f64::from(sample.reference),
+            ])?;
+        }
+    }
+    writer.finish()?;
+    Ok(ticks)
+}

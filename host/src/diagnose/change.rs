@@ -1,0 +1,207 @@
+//! What the refit of nominal parameters says against the description: a payload, a torque constant, a single value.
+
+use std::collections::BTreeMap;
+
+use rig_shared::effects::Kind;
+use rig_shared::multibody::column;
+
+use super::anchor::Anchor;
+use super::fit::{Evidence, Fit};
+use super::outcome::Value;
+use super::rows::{Column, Nominal, Rows};
+use super::search::{LEAST_GAIN, SIGNIFICANT};
+use super::solve::Solution;
+use crate::robot::{JointKind, Robot};
+
+/// Share of the whole change's gain that a part of the parameters must reach to speak for it.
+const SPEAKS_FOR_ALL: f64 = 0.9;
+
+/// Least relative change of inertia and gravity that is a payload's.
+const LEAST_CHANGE: f64 = 0.04;
+
+/// A change of nominal parameters.
+#[derive(Clone, Debug)]
+pub(super) struct Change {
+    /// What moved, in words.
+    pub(super) words: String,
+    /// Name of the effect, where it is one.
+    pub(super) effect: Option<Kind>,
+    /// Its parameters.
+    pub(super) parameters: BTreeMap<String, Value>,
+    /// Of freeing the parameters that speak for it.
+    pub(super) evidence: Evidence,
+}
+
+/// Compares the refit with the description. `known` is the torque that the effects found explain.
+pub(super) fn change(
+    robot: &Robot,
+    nominal: &Nominal,
+    anchor: &Anchor,
+    rows: &Rows,
+    plain: &Fit,
+    free: &[Column],
+    known: &[Column],
+    after: &Solution,
+) -> Option<Change> {
+    if !anchor.stated {
+        return None;
+    }
+    let prior = anchor.prior_coefficients();
+    let mut frozen = plain.clone();
+    for (column, factor) in free.iter().zip(&prior) {
+        frozen.subtract(column, *factor);
+    }
+    for column in known {
+        frozen.subtract(column, 1.0);
+    }
+    let evidence = |picked: &[usize]| {
+        let columns: Vec<Vec<f64>> = picked.iter().map(|k| frozen.weighted(&free[*k])).collect();
+        let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
+        frozen.evidence(&columns, &open)
+    };
+    let all: Vec<usize> = (0..free.len()).collect();
+    let whole = evidence(&all)?;
+    if whole.gain < LEAST_GAIN || whole.p_value > SIGNIFICANT {
+        return None;
+    }
+    let moved_most = (0..free.len())
+        .map(|k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(f64::MIN_POSITIVE))
+        .fold(0.0, f64::max);
+    if moved_most < LEAST_CHANGE {
+        return None;
+    }
+    let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
+    if let Some(load) = payload(robot, nominal, anchor, after, &prior)
+        && let Some(e) = evidence(&load.1)
+        && speaks(&e)
+    {
+        return Some(Change {
+            words: "Inertia and gravity have grown in the ratio of a mass at one place: a payload."
+                .into(),
+            effect: Some(Kind::Payload),
+            parameters: load.0,
+            evidence: e,
+        });
+    }
+    let mut scale: Column = vec![None; rows.joints()];
+    for (column, factor) in free.iter().zip(&prior) {
+        for (to, from) in scale.iter_mut().zip(column) {
+            let Some(from) = from else { continue };
+            let to = to.get_or_insert_with(|| vec![0.0; from.len()]);
+            for (t, f) in to.iter_mut().zip(from) {
+                *t += factor * f;
+            }
+        }
+    }
+    let open = [[f64::NEG_INFINITY, f64::INFINITY]];
+    if let Some(e) = frozen.evidence(&[frozen.weighted(&scale)], &open)
+        && speaks(&e)
+    {
+        let percent = 100.0 * e.gains[0];
+        return Some(Change {
+            words: format!(
+                "All parameters have changed by {percent:.1} % together: the torque constant (or the scale of the torque) is not what the description says."
+            ),
+            effect: None,
+            parameters: BTreeMap::new(),
+            evidence: e,
+        });
+    }
+    let name = |k: usize| match anchor.free[k].as_slice() {
+        [(b, _)] => nominal.base.expression(*b),
+        _ => "gravity".into(),
+    };
+    for k in 0..free.len() {
+        if let Some(e) = evidence(&[k])
+            && speaks(&e)
+        {
+            return Some(Change {
+                words: format!(
+                    "{} has changed from {} to {}.",
+                    name(k),
+                    crate::report::format_significant(prior[k], 4),
+                    crate::report::format_value(after.values[k], after.std(k))
+                ),
+                effect: None,
+                parameters: BTreeMap::new(),
+                evidence: e,
+            });
+        }
+    }
+    let moved: Vec<String> = (0..free.len())
+        .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
+        .map(name)
+        .collect();
+    Some(Change {
+        words: format!(
+            "Several nominal parameters differ from the description: {}.",
+            moved.join(", ")
+        ),
+        effect: None,
+        parameters: BTreeMap::new(),
+        evidence: whole,
+    })
+}
+
+/// Mass and distance of a payload on a single link, and the free directions that it moves.
+fn payload(
+    robot: &Robot,
+    nominal: &Nominal,
+    anchor: &Anchor,
+    after: &Solution,
+    prior: &[f64],
+) -> Option<(BTreeMap<String, Value>, Vec<usize>)> {
+    let [joint] = robot.joints.as_slice() else {
+        return None;
+    };
+    if joint.kind != JointKind::Revolute || !anchor.gravity_held {
+        return None;
+    }
+    let inertia = anchor.free.iter().position(
+        |d| matches!(d.as_slice(), [(b, _)] if nominal.base.columns[*b] == column::INERTIA + 5),
+    )?;
+    let moment = anchor.free.iter().position(|d| {
+        d.iter()
+            .all(|(b, _)| (1..=2).contains(&nominal.base.columns[*b]))
+    })?;
+    // First moment and inertia of a point mass m at distance l: m·l and m·l².
+    let (dm, dj) = (
+        after.values[moment] - prior[moment],
+        after.values[inertia] - prior[inertia],
+    );
+    // A refit beside effects that are not quite the library's moves both by a per cent.
+    let material = |change: f64, prior: f64| change > LEAST_CHANGE * prior.abs();
+    if !(material(dm, prior[moment]) && material(dj, prior[inertia])) {
+        return None;
+    }
+    let (distance, mass) = (dj / dm, dm * dm / dj);
+    let (vm, vj, c) = (
+        after.covariance[(moment, moment)],
+        after.covariance[(inertia, inertia)],
+        after.covariance[(moment, inertia)],
+    );
+    let spread = |gm: f64, gj: f64| {
+        (gm * gm * vm + gj * gj * vj + 2.0 * gm * gj * c)
+            .max(0.0)
+            .sqrt()
+    };
+    let value = |value: f64, std: f64, unit: &str| Value {
+        value,
+        std,
+        unit: unit.into(),
+    };
+    let parameters = BTreeMap::from([
+        (
+            "mass".to_owned(),
+            value(mass, spread(2.0 * dm / dj, -dm * dm / (dj * dj)), "kg"),
+        ),
+        (
+            "distance".to_owned(),
+            value(distance, spread(-dj / (dm * dm), 1.0 / dm), "m"),
+        ),
+    ]);
+    // A mass on a link lies within some metres of its axis.
+    (0.01..3.0)
+        .contains(&distance)
+        .then_some((parameters, vec![inertia, moment]))
+}

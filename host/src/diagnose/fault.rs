@@ -1,0 +1,32 @@
+//! The diagnosis of recordings that cannot be what they say.
+
+use super::outcome::{DataFault, Diagnosis, Verdict};
+use super::sentences;
+use crate::robot::Robot;
+
+/// Says what is wrong and nothing else: no model means anything on such data.
+pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
+    let mut diagnosis = Diagnosis {
+        schema: "rig-diagnosis/1".into(),
+        robot: robot.name.clone(),
+        verdict: Verdict::DataFault,
+        words: Vec::new(),
+        noise_floor_rms: Vec::new(),
+        noise_floor_how: String::new(),
+        places: Vec::new(),
+        steps: Vec::new(),
+        gap_closed: None,
+        absorbed: Vec::new(),
+        not_testable: Vec::new(),
+        detectable: Vec::new(),
+        next_experiment: None,
+        remainder: None,
+        data_faults,
+        waterfall: Vec::new(),
+        tried: Vec::new(),
+        maps: Vec::new(),
+        curves: Vec::new(),
+    };
+    diagnosis.words = sentences::verdict(&diagnosis);
+    diagnosis
+}

@@ -1,0 +1,87 @@
+//! What follows from a finished search: the description, pictures, sentences, limits.
+
+use super::anchor::Anchor;
+use super::fit::Fit;
+use super::model::{Fitted, described};
+use super::outcome::Diagnosis;
+use super::rows::{Nominal, Rows};
+use super::runs::Run;
+use super::search::{Profile, Search};
+use super::solve::Solution;
+use super::{DiagnoseError, limits, pictures, sentences};
+use crate::robot::Robot;
+
+/// What the search has left behind.
+pub(super) struct Found<'a, 'r> {
+    /// As it was given.
+    pub(super) robot: &'a Robot,
+    /// Its base parameters.
+    pub(super) nominal: &'a Nominal,
+    /// Which of them were free.
+    pub(super) anchor: &'a Anchor,
+    /// The library with the training data.
+    pub(super) search: &'a Search<'r>,
+    /// The training data, less what held parameters give.
+    pub(super) rows: &'a Rows,
+    /// The nominal model on them.
+    pub(super) base: &'a Fit<'r>,
+    /// Everything fitted together.
+    pub(super) after: &'a Solution,
+    /// The effects.
+    pub(super) chosen: &'a [Profile],
+    /// Noise floor, joint by joint.
+    pub(super) floors: &'a [f64],
+    /// Of the bootstrap.
+    pub(super) seed: u64,
+    /// Recordings to draw.
+    pub(super) drawn: Drawn<'a>,
+}
+
+/// Recordings with what the models leave of their torque, joint by joint over the rows.
+pub(super) struct Drawn<'a> {
+    /// In the order of the rows.
+    pub(super) runs: &'a [Run],
+    /// Where the rows are.
+    pub(super) rows: &'a Rows,
+    /// Left by the refitted nominal model and by the one with all effects.
+    pub(super) left: [Vec<Vec<f64>>; 2],
+}
+
+/// Fills what the search itself does not, and gives the description with what was found.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<Robot, DiagnoseError> {
+    let free = found.anchor.free.len();
+    let mut at = free;
+    let mut effects = Vec::new();
+    for profile in found.chosen {
+        let gains = &found.after.values[at..at + profile.columns.len()];
+        at += profile.columns.len();
+        effects.push(Fitted {
+            candidate: profile.candidate,
+            gains,
+            shapes: profile.shapes,
+        });
+    }
+    let (model, remarks) = described(
+        found.robot,
+        found.nominal,
+        found.anchor,
+        &found.after.values[..free],
+        &found.search.source.values,
+        &effects,
+    );
+    diagnosis.maps = pictures::maps(found);
+    diagnosis.curves = pictures::curves(found);
+    for (step, profile) in diagnosis.steps.iter_mut().zip(found.chosen) {
+        step.why = sentences::why(found, step, profile);
+    }
+    diagnosis.noise_floor_how = sentences::floor_how(found);
+    diagnosis.not_testable = limits::not_testable(found)?;
+    diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
+    diagnosis.next_experiment = limits::next(found, diagnosis, &model)?;
+    diagnosis.words = sentences::verdict(diagnosis);
+    diagnosis.words.extend(remarks);
+    Ok(model)
+}

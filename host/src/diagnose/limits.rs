@@ -1,0 +1,281 @@
+//! What the recordings cannot show, from which size on they would have shown an effect, and what to record next.
+//!
+//! Leaves out: sizes of what acts between motor and link, which are shapes and not gains.
+
+use rig_shared::effects::{Channel, Effect, Kind, Need};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
+
+use super::columns::Candidate;
+use super::engine::effect_of;
+use super::experiment::{self, Nominal};
+use super::finish::Found;
+use super::fit::{Fit, dot_self};
+use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
+use super::search::{LEAST_GAIN, Profile, SIGNIFICANT, grid, is_first_law, rivals, with};
+use super::{DiagnoseError, testable};
+use crate::robot::{Robot, unit_of};
+use crate::simulate::Model;
+
+/// Most points of a grid that are looked at.
+const POINTS: usize = 12;
+/// How often a size called detectable is found.
+const POWER: f64 = 0.9;
+
+/// Effects that the recordings cannot show.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseError> {
+    let runs = found.search.source.runs;
+    let n = found.robot.joints.len();
+    let last = with(found.base, found.chosen, None);
+    let mut list: Vec<NotTestable> = Vec::new();
+    for &kind in Kind::ALL.iter().filter(|k| is_first_law(**k)) {
+        let coupling = kind.about().needs.contains(&Need::OtherJoint);
+        if coupling && n == 1 {
+            continue;
+        }
+        let name = kind.about().name;
+        for j in 0..n {
+            let known = |list: &[NotTestable]| {
+                let own = &found.robot.joints[j].name;
+                list.iter().any(|t| t.effect == name && t.joint == *own)
+            };
+            let taken = found
+                .chosen
+                .iter()
+                .any(|p| p.candidate.joint == j && p.candidate.kind.about().name == name);
+            if taken || known(&list) {
+                continue;
+            }
+            let lacking = testable::not_testable(kind, found.robot, j, runs);
+            if let Some(lacking) = lacking {
+                list.push(lacking);
+                continue;
+            }
+            let own = (found.search.library.iter().enumerate())
+                .filter(|(_, c)| c.kind == kind && c.joint == j);
+            let mut tried = false;
+            let mut distinct = false;
+            for (c, candidate) in own {
+                if candidate.kind.about().channel == Channel::Transmission {
+                    distinct = true;
+                }
+                tried = true;
+                for (place, shapes) in points(kind) {
+                    if distinct {
+                        break;
+                    }
+                    let columns = found.search.cached(c, place, &shapes)?;
+                    distinct = last.distinct(&columns).is_some();
+                }
+            }
+            if tried && !distinct {
+                list.push(disguised(found, kind, j));
+            }
+        }
+    }
+    Ok(list)
+}
+
+/// An effect whose torque is what other parameters give as well.
+fn disguised(found: &Found, kind: Kind, joint: usize) -> NotTestable {
+    let about = kind.about();
+    let runs = found.search.source.runs;
+    let exact = testable::confounded(kind, joint, runs);
+    NotTestable {
+        effect: about.name.to_owned(),
+        joint: found.robot.joints[joint].name.clone(),
+        why: "along this motion its torque is a combination of what the model's other parameters give"
+            .to_owned(),
+        experiment: exact.first().map_or_else(
+            || "state the friction, mass and first moments in the description, or record a motion with more positions, speeds and loads".to_owned(),
+            |c| c.separated_by.to_owned(),
+        ),
+    }
+}
+
+/// Points spread over an effect's grid, with their numbers.
+fn points(kind: Kind) -> impl Iterator<Item = (usize, [f64; rig_shared::effects::SHAPES])> {
+    let all = grid(kind);
+    let step = all.len().div_ceil(POINTS).max(1);
+    all.into_iter().enumerate().step_by(step)
+}
+
+/// The smallest size of each effect that was tested and not found: the median over its shapes of the gain that would have
+/// taken away the least share that counts and been found nine times in ten at the level that counts.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn detectable(
+    found: &Found,
+    without: &[NotTestable],
+) -> Result<Vec<Detectable>, DiagnoseError> {
+    let last = with(found.base, found.chosen, None);
+    let trials = found.search.trials();
+    let mut list = Vec::new();
+    for (c, candidate) in found.search.library.iter().enumerate() {
+        let about = candidate.kind.about();
+        let joint = &found.robot.joints[candidate.joint];
+        let hidden = without
+            .iter()
+            .any(|t| t.effect == about.name && t.joint == joint.name);
+        let taken = (found.chosen.iter()).any(|p| rivals(&p.candidate, candidate));
+        let gains = found.search.source.gains(candidate.kind);
+        if hidden
+            || taken
+            || !is_first_law(candidate.kind)
+            || about.channel == Channel::Transmission
+        {
+            continue;
+        }
+        let mut sizes: Vec<(f64, usize)> = Vec::new();
+        for (place, shapes) in points(candidate.kind) {
+            let columns = found.search.cached(c, place, &shapes)?;
+            let Some(projected) = last.distinct(&columns) else {
+                continue;
+            };
+            sizes.extend(
+                (projected.iter().enumerate())
+                    .filter_map(|(g, column)| {
+                        Some((smallest(&last, column, projected.len(), trials)?, g))
+                    })
+                    .max_by(|a, b| a.0.total_cmp(&b.0)),
+            );
+        }
+        sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(&(size, g)) = sizes.get(sizes.len() / 2)
+            && let Some(gain) = gains.get(g)
+        {
+            list.push(Detectable {
+                effect: about.name.to_owned(),
+                joint: joint.name.clone(),
+                parameter: gain.name.to_owned(),
+                size,
+                unit: unit_of(gain, joint.kind),
+            });
+        }
+    }
+    Ok(list)
+}
+
+/// Gain of a projected column from which on it is taken. `count` columns are judged together.
+fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f64> {
+    let left = fit.left();
+    let length = dot_self(column);
+    // The RMS that is to fall by the least gain is that with the effect in it.
+    let kept = (1.0 - LEAST_GAIN).powi(2);
+    let visible = (dot_self(left) * (1.0 - kept) / kept / length).sqrt();
+    let of_row = fit.block_of_rows();
+    let mut scores = vec![0.0; fit.blocks()];
+    for (at, (c, r)) in column.iter().zip(left).enumerate() {
+        scores[of_row[at % of_row.len()]] += c * r;
+    }
+    let (g, k) = (fit.blocks() as f64, count as f64);
+    let std = (dot_self(&scores) * g / (g - 1.0)).sqrt() / length;
+    let freedom = (g - k).max(1.0);
+    let level = FisherSnedecor::new(k, freedom)
+        .ok()?
+        .inverse_cdf(1.0 - SIGNIFICANT / trials.max(1) as f64);
+    let statistic = level * k * (g - 1.0) / freedom;
+    let more = Normal::standard().inverse_cdf(POWER);
+    let size = visible.max(std * (statistic.sqrt() + more));
+    (size.is_finite() && size > 0.0).then_some(size)
+}
+
+/// What to record next: what separates the first step whose name is open, else what makes the first effect testable.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn next(
+    found: &Found,
+    diagnosis: &Diagnosis,
+    model: &Robot,
+) -> Result<Option<NextExperiment>, DiagnoseError> {
+    for (k, (step, profile)) in diagnosis.steps.iter().zip(found.chosen).enumerate() {
+        if step.set.len() < 2 {
+            continue;
+        }
+        let joint = profile.candidate.joint;
+        let Some(nominal) = nominal_of(model, joint)? else {
+            continue;
+        };
+        let fit = with(found.base, found.chosen, Some(k));
+        let mut list: Vec<(Effect<f64>, Nominal)> = vec![(effect(profile), nominal)];
+        for name in step.set.iter().filter(|name| **name != step.effect) {
+            let of_name = |c: &Candidate| c.joint == joint && c.kind.about().name == *name;
+            let Some(c) = found.search.library.iter().position(of_name) else {
+                continue;
+            };
+            if let Some(rival) = found.search.profile(&fit, c, None)? {
+                list.push((effect(&rival), nominal));
+            }
+        }
+        if let Some(proposal) = experiment::next(found.robot, joint, &list, found.floors[joint])? {
+            return Ok(Some(NextExperiment {
+                trajectory: proposal.trajectory.map(|t| t.to_toml(found.robot)),
+                ..proposal.experiment
+            }));
+        }
+    }
+    Ok(diagnosis
+        .not_testable
+        .first()
+        .map(|lacking| NextExperiment {
+            kind: "what is not testable yet".to_owned(),
+            separates: vec![lacking.effect.clone()],
+            text: format!(
+                "For {} at joint {}: {}.",
+                lacking.effect, lacking.joint, lacking.experiment
+            ),
+            file: None,
+            separation: None,
+            duration: None,
+            trajectory: None,
+        }))
+}
+
+fn effect(profile: &Profile) -> Effect<f64> {
+    effect_of(
+        profile.candidate.kind,
+        &profile.evidence.gains,
+        &profile.shapes,
+    )
+}
+
+/// Parameters of a joint while the others stand in the middle of their ranges; none for a description without dynamics.
+fn nominal_of(model: &Robot, joint: usize) -> Result<Option<Nominal>, DiagnoseError> {
+    let failed = |e: crate::simulate::SimulateError| DiagnoseError::Model(e.to_string());
+    let dynamics = Model::from_robot(model).map_err(failed)?;
+    let n = model.joints.len();
+    let mut stand = model.middle_position();
+    let rest = vec![0.0; n];
+    let mut torque = vec![0.0; n];
+    let mut at = |angle: f64| {
+        stand[joint] = angle;
+        dynamics.inverse_dynamics(&stand, &rest, &rest, &mut torque)?;
+        Ok(torque[joint])
+    };
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let [ahead, up, back] = [at(0.0), at(quarter), at(2.0 * quarter)];
+    let (ahead, up, back) = (
+        ahead.map_err(failed)?,
+        up.map_err(failed)?,
+        back.map_err(failed)?,
+    );
+    let middle = 0.5 * (ahead + back);
+    let mut inertia = vec![0.0; n * n];
+    dynamics
+        .inertia_matrix(&model.middle_position(), &mut inertia)
+        .map_err(failed)?;
+    let friction = model.joints[joint].friction.clone().unwrap_or_default();
+    let own = inertia[joint * n + joint];
+    Ok((own > 0.0).then_some([
+        own,
+        0.5 * (ahead - back),
+        up - middle,
+        friction.viscous,
+        friction.coulomb,
+        middle,
+    ]))
+}

@@ -1,0 +1,175 @@
+//! The description with what was found in it.
+//!
+//! Leaves out: second order in the angle of a tilted base where there is more than one joint.
+
+use nalgebra::{DVector, Rotation3, Vector3};
+use rig_shared::effects::{Channel, Kind, SHAPES};
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::anchor::Anchor;
+use super::columns::Candidate;
+use super::engine::effect_of;
+use super::rows::Nominal;
+use crate::identify::{Combinations, described as standard, redistributed};
+use crate::robot::{Robot, RobotEffect};
+
+/// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
+const LEAST_WEIGHT: f64 = 0.1;
+/// A transmission's share further from 1 than this is said.
+const UNEVEN: f64 = 0.1;
+
+/// An effect with its fitted gains (as many as its columns) and shapes.
+pub(super) struct Fitted<'a> {
+    /// Which, and where.
+    pub(super) candidate: Candidate,
+    /// In the order of its columns.
+    pub(super) gains: &'a [f64],
+    /// In the order of the registry.
+    pub(super) shapes: [f64; SHAPES],
+}
+
+/// `robot` with the base parameters `values` and the effects; `formed_at` are the base parameters that the effects'
+/// columns were formed with. The second result says what the description cannot hold.
+pub(super) fn described(
+    robot: &Robot,
+    nominal: &Nominal,
+    anchor: &Anchor,
+    coefficients: &[f64],
+    formed_at: &[f64],
+    effects: &[Fitted],
+) -> (Robot, Vec<String>) {
+    let mut values = anchor.values(coefficients);
+    let mut gravity = robot.gravity;
+    if let Some(tilt) = (effects.iter()).find(|e| e.candidate.kind == Kind::GravityTilt) {
+        gravity = turned(nominal, gravity, tilt.gains, formed_at, &mut values);
+    }
+    let base = Combinations {
+        combination: &nominal.base.combination,
+        columns: &nominal.base.columns,
+        values: &values,
+    };
+    let (mut model, mut remarks) = redistributed(
+        robot,
+        &base,
+        Some(&weights(robot, base.combination.ncols())),
+    );
+    model.gravity = gravity;
+    for fitted in effects {
+        let kind = fitted.candidate.kind;
+        if kind == Kind::GravityTilt {
+            continue;
+        }
+        let transmission = kind.about().channel == Channel::Transmission;
+        if let ([share], true) = (fitted.gains, transmission)
+            && (share - 1.0).abs() > UNEVEN
+        {
+            remarks.push(format!(
+                "The data show {share:.2} times the torque that the {} of joint {} gives with the description's inertia and load; the description holds it once.",
+                kind.about().title, robot.joints[fitted.candidate.joint].name
+            ));
+        }
+        let gains = if transmission { &[][..] } else { fitted.gains };
+        model
+            .effects
+            .push(within(robot, fitted, gains, &mut remarks));
+    }
+    (model, remarks)
+}
+
+/// Gravity turned as the fitted angles say. For one joint the torque is exactly that of the fit, whose angle multiplies the
+/// first moments that its column was formed with.
+fn turned(
+    nominal: &Nominal,
+    gravity: [f64; 3],
+    angles: &[f64],
+    formed_at: &[f64],
+    values: &mut [f64],
+) -> [f64; 3] {
+    let axes = nominal.tilt_axes();
+    let moments: Vec<usize> = (nominal.base.columns.iter().enumerate())
+        .filter(|(_, c)| nominal.joints() == 1 && (1..=2).contains(&(*c % COLUMNS)))
+        .map(|(k, _)| k)
+        .collect();
+    let length = |values: &[f64]| {
+        moments
+            .iter()
+            .map(|k| values[*k].powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    let (before, now) = (length(formed_at), length(values));
+    let mut sum = Vector3::zeros();
+    for (axis, angle) in axes.iter().zip(angles) {
+        let slope = if now > 0.0 {
+            angle * before / now
+        } else {
+            *angle
+        };
+        sum += Vector3::from(*axis) * slope;
+    }
+    let slope = sum.norm();
+    if slope == 0.0 {
+        return gravity;
+    }
+    for k in moments {
+        values[k] *= slope.hypot(1.0);
+    }
+    let turn = Rotation3::from_scaled_axis(sum * (slope.atan() / slope));
+    (turn.inverse() * Vector3::from(gravity)).into()
+}
+
+/// The effect as a table of the description, its values within what a description may hold.
+fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
+    let Candidate { kind, joint, other } = fitted.candidate;
+    let mut effect = effect_of(kind, gains, &fitted.shapes);
+    let name = |j: usize| robot.joints[j].name.clone();
+    let about = kind.about();
+    let places = about.gains.iter().zip(&mut effect.gains);
+    for (p, value) in places.chain(about.shapes.iter().zip(&mut effect.shapes)) {
+        let [low, high] = p.bounds;
+        let kept = value.clamp(low, high);
+        if kept != *value {
+            remarks.push(format!(
+                "{} of {} at joint {} came out as {value} {}, which cannot be; {kept} stands in the description.",
+                p.name, about.name, name(joint), p.unit
+            ));
+            *value = kept;
+        }
+    }
+    RobotEffect {
+        joint: Some(name(joint)),
+        other: other.map(name),
+        effect,
+    }
+}
+
+/// How easily each standard parameter moves: as large as it is, at least a share of the largest of its kind.
+fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
+    let prior = standard(robot, columns);
+    let links = robot.joints.len() * COLUMNS;
+    let kind = |c: usize| match c.checked_sub(links) {
+        None if (column::FIRST_MOMENT..column::INERTIA).contains(&(c % COLUMNS)) => {
+            column::FIRST_MOMENT
+        }
+        None if (column::INERTIA..=column::DRIVE_INERTIA).contains(&(c % COLUMNS)) => {
+            column::INERTIA
+        }
+        None => c % COLUMNS,
+        Some(motor) => COLUMNS + motor % rig_shared::transmission::MOTOR_COLUMNS,
+    };
+    DVector::from_fn(columns, |c, _| {
+        let largest = (0..prior.len())
+            .filter(|o| kind(*o) == kind(c))
+            .fold(0.0, |m: f64, o| m.max(prior[o].abs()));
+        let own = prior.get(c).map_or(0.0, |p| p.abs());
+        // Nothing of the kind is stated: all of it moves alike.
+        if largest > 0.0 {
+            own.max(LEAST_WEIGHT * largest)
+        } else {
+            1.0
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;

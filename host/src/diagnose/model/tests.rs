@@ -1,0 +1,99 @@
+//! The description written is the fit.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use rig_shared::effects::Kind;
+
+use crate::diagnose::engine::treatment_of;
+use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
+use crate::diagnose::{Diagnosis, Options, diagnose};
+use crate::prepare::{Choice, PrepareOptions, Recording};
+use crate::robot::Robot;
+use crate::validate::{Options as Checks, validate};
+
+fn found(effect: Effect, seed: u64) -> (Made, Diagnosis, Robot) {
+    let hidden = Hidden { joint: 0, effect };
+    let made = Scenario {
+        seconds: [40.0, 20.0],
+        ..Scenario::new(vec![hidden], seed)
+    }
+    .make()
+    .unwrap();
+    let (diagnosis, model) = diagnose(
+        &made.robot,
+        &[&made.train, made.repeat.as_ref().unwrap()],
+        &[&made.holdout],
+        &Options {
+            // A torque check leaves these out.
+            without: vec![Kind::Backlash, Kind::JointElasticity],
+            ..Options::default()
+        },
+        &mut |_| (),
+    )
+    .unwrap();
+    // As it is read from the file.
+    let text = model.to_toml().unwrap();
+    let read = Robot::from_toml(&text, Path::new("model.toml")).unwrap();
+    assert_eq!(read, model);
+    (made, diagnosis, read)
+}
+
+/// RMS of the torque residual over the training recordings, filtered and thinned as the diagnosis does.
+fn left(robot: &Robot, made: &Made) -> f64 {
+    let recordings: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
+    let treatment = treatment_of(&recordings, robot).unwrap();
+    let checks = Checks {
+        most_samples: 100,
+        prepare: PrepareOptions {
+            decimation: Choice::Fixed(treatment.decimation),
+            ..PrepareOptions::default()
+        },
+        ..Checks::default()
+    };
+    let result = validate(robot, &recordings, &checks, &mut |_| ()).unwrap();
+    let squares: f64 = (result.recordings.iter())
+        .map(|r| r.torque[0].residual.rms.powi(2))
+        .sum();
+    (0.5 * squares).sqrt()
+}
+
+#[test]
+fn the_description_predicts_what_the_fit_does_with_weakening_friction() {
+    let effect = Effect::Stribeck {
+        ratio: 1.7,
+        velocity: 0.1,
+    };
+    let (made, diagnosis, model) = found(effect, 3);
+    let names: Vec<&str> = diagnosis.steps.iter().map(|s| s.effect.as_str()).collect();
+    assert_eq!(names, ["stribeck"]);
+    assert_eq!(model.effects.len(), 1);
+    let [before, after] = diagnosis.steps[0].train_rms;
+    let own = left(&model, &made);
+    // The torque check masks by single rows, the diagnosis by their neighbourhood: beside reversals, where the friction
+    // changes most, they do not judge the same rows.
+    assert!((own / after - 1.0).abs() < 0.2, "{own} {after}");
+    assert!(own < 0.7 * before, "{own} {before}");
+    assert!(left(&made.robot, &made) > 1.3 * own);
+}
+
+#[test]
+fn a_tilted_base_is_gravity_turned() {
+    let effect = Effect::GravityTilt { angle: 0.08 };
+    let (made, diagnosis, model) = found(effect, 5);
+    let names: Vec<&str> = diagnosis.steps.iter().map(|s| s.effect.as_str()).collect();
+    assert_eq!(names, ["gravity_tilt"]);
+    assert!(model.effects.is_empty());
+    let turned = |g: [f64; 3], h: [f64; 3]| {
+        let dot: f64 = g.iter().zip(&h).map(|(a, b)| a * b).sum();
+        let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (dot / (length(g) * length(h))).acos()
+    };
+    let angle = turned(model.gravity, made.robot.gravity);
+    assert!((angle - 0.08).abs() < 0.01, "{angle}");
+    let [_, after] = diagnosis.steps[0].train_rms;
+    let own = left(&model, &made);
+    assert!((own / after - 1.0).abs() < 0.05, "{own} {after}");
+    assert!(left(&made.robot, &made) > 1.3 * own);
+}

@@ -1,0 +1,253 @@
+//! Pictures of a diagnosis: the residual over the coordinate that gives an effect away, and curves over time.
+
+use rig_shared::effects::Kind;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::finish::Found;
+use super::fit::Fit;
+use super::locate::{BINS, Coordinate, bins, coordinates, locate};
+use super::outcome::{Curves, Map};
+use super::rows::Rows;
+use super::search::{Profile, with};
+use crate::robot::{Joint, JointKind};
+
+/// Length of the stretch that is drawn over time, s.
+const STRETCH: f64 = 4.0;
+/// Most points of one curve.
+const MOST_POINTS: usize = 2000;
+
+/// Residual maps: one a step, and one a joint of what is left.
+pub(super) fn maps(found: &Found) -> Vec<Map> {
+    let rows = found.rows;
+    let source = &found.search.source;
+    let joints = &found.robot.joints;
+    let of = |j: usize| coordinates(rows, source.runs, &source.predicted, found.robot, j);
+    let mut list = Vec::new();
+    for (k, profile) in found.chosen.iter().enumerate() {
+        let j = profile.candidate.joint;
+        let before = with(found.base, &found.chosen[..k], None);
+        let after = with(found.base, &found.chosen[..=k], None);
+        let coordinate = telling(profile, of(j), &joints[j]);
+        list.extend(coordinate.map(|c| Map {
+            step: Some(k),
+            ..map(rows, &c, [&before, &after], j, &joints[j])
+        }));
+    }
+    let last = with(found.base, found.chosen, None);
+    for (j, joint) in joints.iter().enumerate() {
+        let all = of(j);
+        let places = locate(
+            rows,
+            &all,
+            &last.residual(j),
+            last.block_of_rows(),
+            j,
+            &joint.name,
+            found.floors[j],
+            found.seed,
+        );
+        let most = places.first().map(|p| p.coordinate.clone());
+        let coordinate = all.into_iter().find(|c| Some(c.name) == most.as_deref());
+        list.extend(coordinate.map(|c| Map {
+            // Without a step its law would be the sum of all.
+            law: Vec::new(),
+            ..map(rows, &c, [found.base, &last], j, joint)
+        }));
+    }
+    list
+}
+
+/// The coordinate over which an effect shows.
+fn telling(profile: &Profile, all: Vec<Coordinate>, joint: &Joint) -> Option<Coordinate> {
+    let wave = |order: f64| {
+        let ratio = (joint.drive.as_ref())
+            .map(|d| d.gear_ratio)
+            .filter(|r| *r != 0.0)
+            .unwrap_or(1.0);
+        let position = all.iter().find(|c| c.name == "position")?;
+        let turn = std::f64::consts::TAU;
+        Some(Coordinate {
+            name: "motor angle within one wave",
+            unit: "rad",
+            values: (position.values.iter())
+                .map(|q| (order * ratio * q).rem_euclid(turn))
+                .collect(),
+        })
+    };
+    let name = match profile.candidate.kind {
+        Kind::Cogging
+        | Kind::TorqueRipple
+        | Kind::GearEccentricity
+        | Kind::EncoderEccentricityMotor => return wave(profile.shapes[0]),
+        Kind::PositionFriction
+        | Kind::Spring
+        | Kind::GravityTilt
+        | Kind::Payload
+        | Kind::EncoderEccentricityJoint => "position",
+        Kind::PreslidingDahl | Kind::PreslidingLugre | Kind::PreslidingMaxwell | Kind::Backlash => {
+            "way since the last reversal, by direction"
+        }
+        Kind::JointElasticity => "acceleration",
+        Kind::ViscousWarmupTime => "time since the start",
+        Kind::ViscousWarmupTemperature => "temperature",
+        Kind::LoadFriction => "torque on the gear along the motion",
+        Kind::TorqueSaturation => "torque of the drive",
+        Kind::MeasurementDelay => "change of the drive's torque",
+        Kind::InertiaCoupling => "velocity of another joint",
+        Kind::Stribeck
+        | Kind::AsymmetricCoulomb
+        | Kind::QuadraticDrag
+        | Kind::CurrentOffset
+        | Kind::DriveDeadzone
+        | Kind::TorqueOffset => "velocity",
+    };
+    all.into_iter().find(|c| c.name == name)
+}
+
+/// Mean residuals of a joint over a coordinate; what lies between them is the law as far as the rest of the model does not
+/// take it up.
+fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize, own: &Joint) -> Map {
+    let (place, edges) = bins(&over.values, &rows.keep[joint], BINS);
+    let [before, after] = fits.map(|fit| {
+        let residual = fit.residual(joint);
+        means(&place, &residual, fit.block_of_rows())
+    });
+    let mut map = Map {
+        joint: own.name.clone(),
+        coordinate: over.name.to_owned(),
+        unit: over.unit.to_owned(),
+        residual_unit: if own.kind == JointKind::Revolute {
+            "N*m"
+        } else {
+            "N"
+        }
+        .to_owned(),
+        ..Map::default()
+    };
+    for b in 0..BINS {
+        if let (Some(before), Some(after)) = (before[b], after[b]) {
+            map.at.push(0.5 * (edges[b] + edges[b + 1]));
+            map.before.push(before);
+            map.after.push(after);
+            map.law.push(before[0] - after[0]);
+        }
+    }
+    map
+}
+
+/// Mean of each bin and half the width of its 95 % interval from the spread between blocks; none where fewer than two
+/// blocks have rows in it.
+fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Option<[f64; 2]>> {
+    let blocks = block.iter().max().map_or(0, |b| b + 1);
+    let mut sums = vec![vec![[0.0; 2]; BINS]; blocks];
+    for ((bin, r), b) in place.iter().zip(residual).zip(block) {
+        if let Some(bin) = bin {
+            let entry = &mut sums[*b][*bin];
+            entry[0] += r;
+            entry[1] += 1.0;
+        }
+    }
+    (0..BINS)
+        .map(|bin| {
+            let list: Vec<[f64; 2]> = (sums.iter().map(|s| s[bin]))
+                .filter(|s| s[1] > 0.0)
+                .collect();
+            let g = list.len() as f64;
+            let [sum, count] = list
+                .iter()
+                .fold([0.0; 2], |a, s| [a[0] + s[0], a[1] + s[1]]);
+            let mean = sum / count;
+            let squares: f64 = list.iter().map(|s| (s[0] - s[1] * mean).powi(2)).sum();
+            let std = (squares * g / (g - 1.0)).sqrt() / count;
+            let wide = StudentsT::new(0.0, 1.0, g - 1.0).ok()?.inverse_cdf(0.975);
+            (g > 1.0).then_some([mean, wide * std])
+        })
+        .collect()
+}
+
+/// For each joint with an effect (else the one that leaves the most over its floor) the stretch of a recording where the
+/// effects change the prediction most.
+pub(super) fn curves(found: &Found) -> Vec<Curves> {
+    let mut joints: Vec<usize> = found.chosen.iter().map(|p| p.candidate.joint).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    if joints.is_empty() {
+        let over = |j: &usize| found.base.rms(*j) / found.floors[*j].max(f64::MIN_POSITIVE);
+        joints.extend((0..found.robot.joints.len()).max_by(|a, b| over(a).total_cmp(&over(b))));
+    }
+    joints
+        .into_iter()
+        .filter_map(|j| stretch(found, j))
+        .collect()
+}
+
+fn stretch(found: &Found, joint: usize) -> Option<Curves> {
+    let drawn = &found.drawn;
+    let rows = drawn.rows;
+    let [without, with] = [0, 1].map(|k| &drawn.left[k][joint]);
+    let length = ((STRETCH / rows.period).ceil() as usize).max(2);
+    let keep = &rows.keep[joint];
+    // Without effects both are the same: where the model misses most.
+    let weight = |k: usize| {
+        if !keep[k] {
+            0.0
+        } else if found.chosen.is_empty() {
+            without[k].powi(2)
+        } else {
+            (without[k] - with[k]).powi(2)
+        }
+    };
+    let mut best: Option<(f64, usize, usize, usize)> = None;
+    for (r, pair) in rows.starts.windows(2).enumerate() {
+        let end = |from: usize| (from + length).min(pair[1]);
+        if end(pair[0]) <= pair[0] {
+            continue;
+        }
+        let mut sum: f64 = (pair[0]..end(pair[0])).map(weight).sum();
+        let mut from = pair[0];
+        loop {
+            if best.is_none_or(|b| sum > b.0) {
+                best = Some((sum, r, from, end(from)));
+            }
+            if from + length >= pair[1] {
+                break;
+            }
+            sum += weight(from + length) - weight(from);
+            from += 1;
+        }
+    }
+    let (_, r, from, to) = best?;
+    let run = &drawn.runs[r];
+    let (mut torque, mut time) = (Vec::new(), Vec::new());
+    rows.thinning.push(&run.joints[joint].tau, &mut torque);
+    rows.thinning.pick(&run.t, &mut time);
+    let step = (to - from).div_ceil(MOST_POINTS);
+    let picked: Vec<usize> = (from..to).step_by(step).collect();
+    let start = rows.starts[r];
+    let measured: Vec<f64> = picked.iter().map(|k| torque[k - start]).collect();
+    // Rows that are not used, where the joint stands or is at its limit, stay open.
+    let predicted = |left: &[f64]| -> Vec<f64> {
+        let pairs = picked.iter().zip(&measured);
+        pairs
+            .map(|(k, tau)| if keep[*k] { tau - left[*k] } else { f64::NAN })
+            .collect()
+    };
+    Some(Curves {
+        joint: found.robot.joints[joint].name.clone(),
+        recording: run.label.clone(),
+        t: picked.iter().map(|k| time[k - start]).collect(),
+        torque: [
+            measured.clone(),
+            predicted(without),
+            if found.chosen.is_empty() {
+                Vec::new()
+            } else {
+                predicted(with)
+            },
+        ],
+        motion: Default::default(),
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+//! Pictures of a known gap.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::diagnose::scenario::{Effect, Hidden, Scenario};
+use crate::diagnose::{Options, diagnose};
+
+/// What shows weakening friction is the speed: before the step the residual leaves its own band, after it it does not, and
+/// the curves of the hold-out lie closer with the effect than without.
+#[test]
+fn weakening_friction_is_drawn_over_the_speed() {
+    let effect = Effect::Stribeck {
+        ratio: 1.7,
+        velocity: 0.1,
+    };
+    let made = Scenario {
+        seconds: [40.0, 20.0],
+        ..Scenario::new(vec![Hidden { joint: 0, effect }], 3)
+    }
+    .make()
+    .unwrap();
+    let (found, _) = diagnose(
+        &made.robot,
+        &[&made.train, made.repeat.as_ref().unwrap()],
+        &[&made.holdout],
+        &Options::default(),
+        &mut |_| (),
+    )
+    .unwrap();
+    assert_eq!(found.steps[0].effect, "stribeck");
+    let map = found.maps.iter().find(|m| m.step == Some(0)).unwrap();
+    assert_eq!(map.coordinate, "velocity");
+    assert!(map.at.windows(2).all(|w| w[0] <= w[1]));
+    let off = |list: &[[f64; 2]]| list.iter().filter(|v| v[0].abs() > v[1]).count();
+    assert!(off(&map.before) > map.at.len() / 2, "{:?}", map.before);
+    let size = |list: &[[f64; 2]]| list.iter().map(|v| v[0] * v[0]).sum::<f64>();
+    assert!(size(&map.after) < 0.3 * size(&map.before), "{map:?}");
+    assert!(found.maps.iter().any(|m| m.step.is_none()));
+
+    let curves = &found.curves[0];
+    assert_eq!(curves.recording, "holdout");
+    assert!((3.0..=4.1).contains(&(curves.t[curves.t.len() - 1] - curves.t[0])));
+    let error = |k: usize| -> f64 {
+        let pairs = curves.torque[0].iter().zip(&curves.torque[k]);
+        pairs
+            .filter(|(_, b)| b.is_finite())
+            .map(|(a, b)| (a - b).powi(2))
+            .sum()
+    };
+    assert!(error(2) < 0.5 * error(1), "{} {}", error(1), error(2));
+
+    // Words with figures, and limits of the data.
+    assert!(found.words.iter().any(|w| w.contains("stribeck at joint")));
+    assert!(found.steps[0].why.contains("hold-out"));
+    assert!(found.noise_floor_how.contains("train and repeat"));
+    let untestable = |name: &str| found.not_testable.iter().any(|t| t.effect == name);
+    assert!(
+        untestable("drive_deadzone")
+            || found
+                .detectable
+                .iter()
+                .all(|d| d.effect != "drive_deadzone")
+    );
+    assert!(
+        found
+            .detectable
+            .iter()
+            .all(|d| d.size > 0.0 && d.effect != "stribeck")
+    );
+    let cogging = found
+        .detectable
+        .iter()
+        .find(|d| d.effect == "cogging")
+        .unwrap();
+    // The noise floor is some 0.05 N·m: a hundredth of it cannot show, and thirty times it cannot hide.
+    assert!((5e-4..1.5).contains(&cogging.size), "{}", cogging.size);
+    println!(
+        "{:#?}\n{:#?}\n{:#?}",
+        found.words, found.steps, found.detectable
+    );
+    println!("{:#?}\n{:#?}", found.not_testable, found.next_experiment);
+}

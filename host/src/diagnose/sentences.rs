@@ -1,0 +1,227 @@
+//! A diagnosis in sentences.
+
+use super::finish::Found;
+use super::floor::repeats;
+use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
+use super::search::Profile;
+use crate::report::format_significant;
+use crate::robot::{Joint, JointKind};
+
+/// From so many standard deviations on a parameter has moved.
+const MOVED: f64 = 3.0;
+
+fn number(x: f64) -> String {
+    format_significant(x, 3)
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", format_significant(100.0 * share, 3))
+}
+
+fn unit(w: &Waterfall) -> &'static str {
+    if w.unit == "N" { "N" } else { "N·m" }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// The verdict with its figures.
+pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
+    let mut words = Vec::new();
+    match d.verdict {
+        Verdict::DataFault => {
+            let n = d.data_faults.len();
+            words.push(format!(
+                "{n} thing{} about the recordings cannot be, so nothing was fitted.",
+                if n == 1 { "" } else { "s" }
+            ));
+            return words;
+        }
+        Verdict::NothingMissing => {
+            words.push(
+                "With its parameters fitted again the description explains the torque; no effect had to be added."
+                    .to_owned(),
+            );
+            words.extend(closest(d));
+        }
+        Verdict::ParameterChange => {
+            words.push(
+                "The equations of the description hold, but not all of its values.".to_owned(),
+            );
+        }
+        Verdict::Explained | Verdict::Remainder => {}
+    }
+    if !d.steps.is_empty() {
+        words.push(effects(d));
+    }
+    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    if let Some(remainder) = &d.remainder {
+        words.push(format!(
+            "At joint {} an RMS of {} beyond the noise floor stays without a name, {} times the floor.",
+            remainder.joint,
+            number(remainder.rms),
+            format_significant(remainder.ratio, 2)
+        ));
+    }
+    let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
+    if let Some(a) = moved.filter(|_| !d.steps.is_empty()) {
+        words.push(format!(
+            "Without {} the fit had bent its parameters: {} came out as {} instead of {} {}.",
+            if d.steps.len() == 1 { "it" } else { "them" },
+            a.parameter,
+            number(a.before),
+            number(a.after),
+            a.unit
+        ));
+    }
+    words
+}
+
+/// What was found and what it is worth.
+fn effects(d: &Diagnosis) -> String {
+    let names: Vec<String> = (d.steps.iter())
+        .map(|s| {
+            let rivals: Vec<String> = (s.set.iter())
+                .filter(|name| **name != s.effect)
+                .cloned()
+                .collect();
+            let or = if rivals.is_empty() {
+                String::new()
+            } else {
+                format!(" (or {})", rivals.join(" or "))
+            };
+            format!("{}{or} at joint {}", s.effect, s.joint)
+        })
+        .collect();
+    let held = d.steps.iter().all(|s| s.holdout_rms.is_some());
+    let on = if held {
+        "on recordings that took no part in the fit"
+    } else {
+        "on the recordings of the fit; none were held back"
+    };
+    let share = d.gap_closed.map_or(String::new(), |share| {
+        format!(", and close {} of the gap {on}", percent(share))
+    });
+    let verb = if names.len() == 1 { "was" } else { "were" };
+    format!(
+        "{} {verb} missing{}.",
+        listed(&names),
+        if names.len() == 1 {
+            share.replacen("close ", "closes ", 1)
+        } else {
+            share
+        }
+    )
+}
+
+/// RMS of a joint from the refitted description to the last model.
+fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
+    let (list, on) = if w.holdout.is_empty() {
+        (&w.train, "on the training data")
+    } else {
+        (&w.holdout, "on the hold-out")
+    };
+    let (first, last) = (list.first()?, list.last()?);
+    let from = if d.steps.is_empty() {
+        format!("The torque residual of joint {} is", w.joint)
+    } else {
+        format!(
+            "The torque residual of joint {} falls from {} to",
+            w.joint,
+            number(*first)
+        )
+    };
+    Some(format!(
+        "{from} {} {} RMS {on}; the noise floor is {} {}.",
+        number(*last),
+        unit(w),
+        number(w.floor),
+        unit(w)
+    ))
+}
+
+/// The candidate that came closest to being taken.
+fn closest(d: &Diagnosis) -> Option<String> {
+    let closest = (d.tried.iter())
+        .filter(|t| !t.refused.is_empty())
+        .max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    Some(format!(
+        "Of {} effects and places that were tried, {} at joint {} came closest: {}.",
+        d.tried.len(),
+        closest.effect,
+        closest.joint,
+        closest.refused
+    ))
+}
+
+/// Why to believe a step.
+pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
+    let e = &profile.evidence;
+    let j = profile.candidate.joint;
+    let (unit, floor) = (effort(&found.robot.joints[j]), found.floors[j]);
+    let unseen = step.holdout_rms.map_or(String::new(), |[before, after]| {
+        format!(
+            "On the hold-out, which took no part in the fit, the residual of joint {} goes from {} to {} {unit} RMS, with a noise floor of {} {unit}. ",
+            step.joint,
+            number(before),
+            number(after),
+            number(floor)
+        )
+    });
+    let runner = match (&step.runner_up, step.runner_up_gap_closed) {
+        (Some(name), Some(share)) => {
+            format!(
+                " {name}, the next best, would have closed {}.",
+                percent(share)
+            )
+        }
+        _ => String::new(),
+    };
+    format!(
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{runner}",
+        percent(e.gain),
+        format_significant(e.gain_sigmas, 2)
+    )
+}
+
+/// Unit of a joint's effort, as printed.
+fn effort(joint: &Joint) -> &'static str {
+    match joint.kind {
+        JointKind::Revolute => "N·m",
+        JointKind::Prismatic => "N",
+    }
+}
+
+/// How the noise floor was found.
+pub(super) fn floor_how(found: &Found) -> String {
+    let runs = found.search.source.runs;
+    let pairs = repeats(runs);
+    let figures: Vec<String> = (found.robot.joints.iter().zip(found.floors))
+        .map(|(joint, floor)| format!("{} {} {}", joint.name, number(*floor), effort(joint)))
+        .collect();
+    match pairs.first() {
+        Some(&(a, b)) => {
+            let more = if pairs.len() > 1 {
+                format!(" and {} more pairs", pairs.len() - 1)
+            } else {
+                String::new()
+            };
+            format!(
+                "What differs between repeated runs of one motion ({} and {}{more}), over √2, after the low-pass: {}.",
+                runs[a].label,
+                runs[b].label,
+                figures.join(", ")
+            )
+        }
+        None => format!(
+            "No motion was recorded twice, so the floor is what the last model leaves: {}. What repeats from run to run could hide in it.",
+            figures.join(", ")
+        ),
+    }
+}

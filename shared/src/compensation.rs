@@ -1,0 +1,519 @@
+//! Effects beyond the standard model, turned into what a controller does about them.
+//!
+//! What is done follows from where the effect acts ([`Role`]):
+//!
+//! * **Dry friction** goes the way of the friction law ([`precompensation`](crate::precompensation)): the direction is
+//!   the reference's near rest and the measurement's beyond the threshold, and a share of the torque is given,
+//!   `gain_at_rest` to `gain`. At which speed? Where friction falls with speed (Stribeck), a torque held at the
+//!   reference's speed exceeds the friction of a link that has run ahead, and drives it further; where it rises,
+//!   a torque at the measured speed takes damping from the loop. So an effect that falls with speed is evaluated at
+//!   the faster of reference and link, any other at the reference: no torque grows with the measured speed.
+//! * **What stands at a position** as well as in motion (cogging, eccentricity, springs, tilt) is given in full at the
+//!   measured position: it is a known torque like gravity, and wrong by the error of the position alone. Its speed
+//!   is the reference's, for the reason above.
+//! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
+//!   of the current** is taken off the reading.
+//!
+//! Whatever else there is has no torque or reading that would undo it (elastic or loose transmission, delay, memory of
+//! distance), and is refused.
+//!
+//! Beside the torque to give, a tick says what of the drive's torque the effects *explain*: the same laws at the
+//! measured motion, in full. An estimator of the standard model must not see that part, or its parameters absorb it.
+//!
+//! Leaves out: what the feed-forward does not reach because of the current loop's lag; effects that name another
+//! joint.
+
+use core::fmt;
+
+use crate::effects::{About, Channel, Direction, Effect, Instant, Kind, Memory, Parameter, Scale};
+use crate::precompensation::{PrecompensationSettings, direction, finite, share};
+use crate::scalar::{Real, Scalar};
+use crate::trajectory::Reference;
+
+/// Most effects that a rig compensates.
+pub const EFFECTS: usize = 4;
+
+/// The effects of a rig, from the front.
+pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
+
+/// Slow and fast, rad/s: whether an effect falls with speed.
+const SPEEDS: [f64; 2] = [1e-3, 10.0];
+/// The slope of the encoder's error is taken over this angle of the motor, rad: within 1 % for an error of once a
+/// turn, a hundred times above the rounding of `f32`.
+const SLOPE_SPAN: f64 = 0.02;
+
+/// What is done about an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A torque with the friction law's direction and share.
+    Dry,
+    /// A torque at the measured position, in full.
+    Standing,
+    /// A correction of the measured position.
+    Position,
+    /// A correction of the measured current.
+    Current,
+}
+
+impl Role {
+    /// What is done about effects of this kind; `None` where nothing can be.
+    pub const fn of(kind: Kind) -> Option<Self> {
+        Self::by(kind.about())
+    }
+
+    /// The same by what is known of the effect.
+    pub(crate) const fn by(about: &About) -> Option<Self> {
+        match (about.channel, about.direction) {
+            (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
+            // A mass on the link belongs into the model, which knows where gravity points.
+            (Channel::Torque | Channel::Load, Direction::Indifferent)
+                if about.compensable && !same(about.name, "payload") =>
+            {
+                Some(Self::Standing)
+            }
+            // Of what a sensor reads wrongly, only a known function of the position, or a constant, can be taken off.
+            (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
+                Some(Self::Position)
+            }
+            (Channel::Effort, _) if same(about.name, "current_offset") => Some(Self::Current),
+            _ => None,
+        }
+    }
+}
+
+/// Equality of texts at compile time.
+const fn same(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let mut k = 0;
+    while k < a.len() && k < b.len() && a[k] == b[k] {
+        k += 1;
+    }
+    k == a.len() && k == b.len()
+}
+
+/// Why an effect cannot be compensated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EffectFault {
+    /// No torque and no correction undoes effects of this kind.
+    NotCompensable(Kind),
+    /// This parameter is not a number within its physical bounds.
+    Parameter(&'static str),
+    /// A value beyond the effect's parameters is not 0.
+    Surplus,
+}
+
+impl fmt::Display for EffectFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotCompensable(kind) => write!(
+                f,
+                "{} cannot be compensated by a torque or a corrected reading",
+                kind.about().title
+            ),
+            Self::Parameter(name) => {
+                write!(f, "the effect's {name} is not within its physical bounds")
+            }
+            Self::Surplus => f.write_str("values beyond the effect's parameters must be 0"),
+        }
+    }
+}
+
+impl core::error::Error for EffectFault {}
+
+/// An effect that has passed its checks, with what follows from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Compensated<T> {
+    effect: Effect<T>,
+    role: Role,
+    /// All shapes are whole: the motor's angle within a turn says as much as the angle itself, and better.
+    whole: bool,
+    /// It is smaller at high speed than at low speed.
+    falls: bool,
+}
+
+impl<T: Scalar> Compensated<T> {
+    fn new(effect: Effect<T>) -> Result<Self, EffectFault> {
+        let kind = effect.kind;
+        let role = Role::of(kind).ok_or(EffectFault::NotCompensable(kind))?;
+        let about = kind.about();
+        within(about.gains, &effect.gains, false)?;
+        within(about.shapes, &effect.shapes, true)?;
+        let whole = |shape: &T| shape.to_f64() as i64 as f64 == shape.to_f64();
+        let sliding = |speed: f64| {
+            let at = Instant {
+                velocity: T::from_f64(speed),
+                direction: T::ONE,
+                load: T::ONE,
+                ..Instant::default()
+            };
+            evaluate(&effect, &mut Memory::default(), &at).abs()
+        };
+        Ok(Self {
+            effect,
+            role,
+            whole: effect.shapes.iter().all(whole),
+            falls: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
+        })
+    }
+}
+
+/// Every law of the registry is in here: once, not at every place that asks.
+#[inline(never)]
+fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: &Instant<T>) -> T {
+    let terms = effect
+        .kind
+        .compensated_terms(&effect.shapes, &mut memory.0, at);
+    let sum = effect
+        .gains
+        .iter()
+        .zip(terms)
+        .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term);
+    finite(sum)
+}
+
+/// `divided`: the law divides by those that are searched in ratios, and has no value where they are 0.
+fn within<T: Scalar>(
+    parameters: &[Parameter],
+    values: &[T],
+    divided: bool,
+) -> Result<(), EffectFault> {
+    for (k, value) in values.iter().enumerate() {
+        let value = value.to_f64();
+        let Some(parameter) = parameters.get(k) else {
+            if value == 0.0 {
+                continue;
+            }
+            return Err(EffectFault::Surplus);
+        };
+        let [low, high] = parameter.bounds;
+        let open = divided && parameter.scale == Scale::Logarithmic;
+        let above = if open { low < value } else { low <= value };
+        if !(above && value <= high && value.is_finite()) {
+            return Err(EffectFault::Parameter(parameter.name));
+        }
+    }
+    Ok(())
+}
+
+/// What a control tick knows. Joint-side, SI.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Now<T> {
+    /// Where the link should be.
+    pub reference: Reference<T>,
+    /// Measured position, rad.
+    pub position: T,
+    /// Measured velocity, rad/s.
+    pub velocity: T,
+    /// Motor turns per joint turn.
+    pub gear_ratio: T,
+    /// Angle of the motor, rad.
+    pub motor_angle: T,
+    /// The same within one turn, without the rounding of many turns.
+    pub angle_in_turn: T,
+    /// Whether somebody has said where the link stands: nothing can stand at a position that nobody knows.
+    pub placed: bool,
+    /// Whether the tick has enough else to do: the laws then stand as they are for one tick more.
+    pub busy: bool,
+    /// Torque that the drive gives, N·m.
+    pub drive_torque: T,
+    /// Torque that the gear transmits, N·m.
+    pub load: T,
+    /// Running time, s.
+    pub time: T,
+    /// Temperature above that at the start, K.
+    pub warming: T,
+    /// Time since the last tick, s.
+    pub period: T,
+}
+
+impl<T: Real> Now<T> {
+    /// The motor's angle as an effect wants it.
+    #[inline(always)]
+    fn angle(&self, whole: bool) -> T {
+        if whole {
+            self.angle_in_turn
+        } else {
+            self.motor_angle
+        }
+    }
+
+    /// At the reference's acceleration, at rest.
+    #[inline(always)]
+    fn instant(&self, whole: bool) -> Instant<T> {
+        Instant {
+            position: self.position,
+            velocity: T::ZERO,
+            acceleration: self.reference.acceleration,
+            direction: T::ZERO,
+            motor_angle: self.angle(whole),
+            drive_torque: self.drive_torque,
+            // Laws of what a sensor reads late, and of masses, are not compensated.
+            drive_rate: T::ZERO,
+            gravity: T::ZERO,
+            load: self.load,
+            time: self.time,
+            warming: self.warming,
+            other: [T::ZERO; 3],
+            period: self.period,
+        }
+    }
+}
+
+/// What effects ask for in a control tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output<T> {
+    /// Torque to give beside the law's, N·m.
+    pub feed: T,
+    /// What the drive has to give because of the effects at the measured motion, N·m: not for an estimator to see.
+    pub explained: T,
+}
+
+/// What effects do to the measured position.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading<T> {
+    /// Too much in the position, rad.
+    pub error: T,
+    /// Too much in the velocity, as a share of it.
+    pub slope: T,
+}
+
+/// What effects remember.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State<T: Real> {
+    memories: [Memory<T>; EFFECTS],
+    /// Value of each law where the torque to give is taken from.
+    planned: [T; EFFECTS],
+    /// Value of each dry law at the measured motion.
+    sliding: [T; EFFECTS],
+    turn: usize,
+}
+
+impl<T: Real> State<T> {
+    /// Ticks have been left out: what was worked out before them no longer holds.
+    pub fn interrupt(&mut self) {
+        self.planned = [T::ZERO; EFFECTS];
+        self.sliding = [T::ZERO; EFFECTS];
+        self.turn = 0;
+    }
+}
+
+/// One law to be evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Job {
+    effect: u8,
+    /// At the measured motion, instead of where the torque to give is taken from.
+    sliding: bool,
+}
+
+/// The effects of a rig, checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Compensation<T> {
+    effects: [Option<Compensated<T>>; EFFECTS],
+    /// What is evaluated in turn, one law a tick.
+    jobs: [Job; 2 * EFFECTS],
+    count: u8,
+    /// Ticks until a law's turn comes again.
+    round: T,
+    /// Some effect is in the position.
+    position: bool,
+}
+
+impl<T: Scalar> Compensation<T> {
+    /// Checks all effects.
+    ///
+    /// # Errors
+    /// What is wrong with the first that cannot be used.
+    pub fn new(effects: &Effects<T>) -> Result<Self, EffectFault> {
+        let mut all = Self::default();
+        for (k, effect) in effects.iter().enumerate() {
+            let Some(effect) = effect else { continue };
+            let checked = Compensated::new(*effect)?;
+            all.effects[k] = Some(checked);
+            match checked.role {
+                Role::Dry => {
+                    all.add(k, false);
+                    all.add(k, true);
+                }
+                Role::Standing => all.add(k, false),
+                Role::Position => all.position = true,
+                Role::Current => {}
+            }
+        }
+        Ok(all)
+    }
+
+    fn add(&mut self, effect: usize, sliding: bool) {
+        if let Some(job) = self.jobs.get_mut(usize::from(self.count)) {
+            *job = Job {
+                effect: effect as u8,
+                sliding,
+            };
+            self.count += 1;
+            self.round += T::ONE;
+        }
+    }
+
+    /// The effects as they were given.
+    pub fn effects(&self) -> Effects<T> {
+        self.effects.map(|one| one.map(|one| one.effect))
+    }
+
+    /// Whether there is a torque to work out.
+    #[inline(always)]
+    pub fn has_torque(&self) -> bool {
+        self.count > 0
+    }
+
+    /// Whether there is anything to take off the position.
+    #[inline(always)]
+    pub fn has_position(&self) -> bool {
+        self.position
+    }
+
+    /// Constant error of the measured current, A, where a torque in N·m is so many per ampere.
+    pub fn current_error(&self, torque_per_ampere: T) -> T {
+        let mut sum = T::ZERO;
+        for one in self.effects.iter().flatten() {
+            if one.role != Role::Current {
+                continue;
+            }
+            let error = evaluate(&one.effect, &mut Memory::default(), &Instant::default());
+            let amperes = one.effect.kind.about().gains.first();
+            sum += if amperes.is_some_and(|gain| gain.unit == "A") {
+                error
+            } else {
+                error / torque_per_ampere
+            };
+        }
+        sum
+    }
+
+    /// What the encoder reads too much at this angle. Evaluated at the reading instead of the truth: wrong by the
+    /// error's own square.
+    #[inline(always)]
+    pub fn reading(&self, now: &Now<T>) -> Reading<T> {
+        let mut reading = Reading::default();
+        if !self.position || !now.placed {
+            return reading;
+        }
+        let span = T::from_f64(SLOPE_SPAN);
+        for one in self.effects.iter().flatten() {
+            if one.role != Role::Position {
+                continue;
+            }
+            let mut instant = now.instant(one.whole);
+            let here = evaluate(&one.effect, &mut Memory::default(), &instant);
+            instant.position += span / now.gear_ratio;
+            instant.motor_angle += span;
+            let ahead = evaluate(&one.effect, &mut Memory::default(), &instant);
+            reading.error += here;
+            reading.slope += (ahead - here) * now.gear_ratio / span;
+        }
+        reading
+    }
+
+    /// Torque to give, and torque that is explained. The result is finite for any input.
+    ///
+    /// One law is evaluated a tick, in turn, and stands until its turn comes again: a single effect of position at
+    /// every tick, four dry ones every eighth, and each in the middle of the time that it stands for.
+    #[inline(always)]
+    pub fn torque(
+        &self,
+        settings: &PrecompensationSettings<T>,
+        state: &mut State<T>,
+        now: &Now<T>,
+    ) -> Output<T> {
+        if !now.busy {
+            self.evaluate_next(settings, state, now);
+        }
+        let share = if settings.enabled {
+            share(
+                settings,
+                finite(now.reference.velocity),
+                finite(now.velocity),
+            )
+        } else {
+            T::ZERO
+        };
+        let mut output = Output::default();
+        let torques = state.planned.iter().zip(&state.sliding);
+        for (one, (planned, sliding)) in self.effects.iter().zip(torques) {
+            match one.map(|one| one.role) {
+                Some(Role::Dry) => {
+                    output.feed += share * *planned;
+                    output.explained += *sliding;
+                }
+                Some(Role::Standing) => {
+                    output.feed += *planned;
+                    output.explained += *planned;
+                }
+                _ => {}
+            }
+        }
+        output
+    }
+
+    #[inline(always)]
+    fn evaluate_next(
+        &self,
+        settings: &PrecompensationSettings<T>,
+        state: &mut State<T>,
+        now: &Now<T>,
+    ) {
+        let Some(job) = self.jobs.get(state.turn) else {
+            return;
+        };
+        state.turn = if state.turn + 1 < usize::from(self.count) {
+            state.turn + 1
+        } else {
+            0
+        };
+        let k = usize::from(job.effect);
+        let (Some(Some(one)), Some(memory)) = (self.effects.get(k), state.memories.get_mut(k))
+        else {
+            return;
+        };
+        let (wanted, measured) = (finite(now.reference.velocity), finite(now.velocity));
+        let mut instant = now.instant(one.whole);
+        instant.period = now.period * self.round;
+        // Until half of the time that it stands for has passed.
+        let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
+        instant.position += way;
+        instant.motor_angle += way * now.gear_ratio;
+        let (place, memory) = if job.sliding {
+            instant.velocity = measured;
+            instant.direction = measured.sgn();
+            (&mut state.sliding, &mut { *memory })
+        } else {
+            let dry = one.role == Role::Dry;
+            let ahead = wanted.abs().lt(measured.abs());
+            // The faster speed, in the reference's direction.
+            let backwards = wanted.lt(T::ZERO);
+            let faster = T::select(backwards, -measured.abs(), measured.abs());
+            instant.velocity = if dry && one.falls && ahead {
+                faster
+            } else {
+                wanted
+            };
+            instant.direction = if dry {
+                direction(wanted, measured, settings.velocity_threshold)
+            } else {
+                wanted.sgn()
+            };
+            (&mut state.planned, memory)
+        };
+        let nowhere = one.role == Role::Standing && !now.placed;
+        let torque = if nowhere {
+            T::ZERO
+        } else {
+            evaluate(&one.effect, memory, &instant)
+        };
+        if let Some(place) = place.get_mut(k) {
+            *place = torque;
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "compensation_test.rs"]
+mod tests;

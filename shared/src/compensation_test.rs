@@ -1,0 +1,295 @@
+//! Effects as torques and corrections: against the friction law where both have the same effect, and over the whole
+//! registry for what holds of every effect.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use super::*;
+use crate::friction::Friction;
+use crate::precompensation;
+use proptest::prelude::*;
+
+const SETTINGS: PrecompensationSettings<f64> = PrecompensationSettings {
+    enabled: true,
+    gain: 0.95,
+    gain_at_rest: 0.7,
+    velocity_threshold: 0.05,
+};
+
+fn only(effect: Effect<f64>) -> Effects<f64> {
+    let mut effects = Effects::default();
+    effects[0] = Some(effect);
+    effects
+}
+
+fn stribeck(breakaway: f64, velocity: f64) -> Effect<f64> {
+    Effect {
+        kind: Kind::Stribeck,
+        gains: [breakaway, 0.0, 0.0, 0.0],
+        shapes: [velocity, 0.0, 0.0, 0.0],
+    }
+}
+
+fn cogging(cosine: f64, sine: f64, order: f64) -> Effect<f64> {
+    Effect {
+        kind: Kind::Cogging,
+        gains: [cosine, sine, 0.0, 0.0],
+        shapes: [order, 0.0, 0.0, 0.0],
+    }
+}
+
+/// An effect of this kind in the middle of what rigs have.
+fn typical(kind: Kind) -> Effect<f64> {
+    let about = kind.about();
+    let middle = |parameters: &[Parameter], k: usize| {
+        parameters.get(k).map_or(0.0, |p| {
+            (0.5 * (p.range[0] + p.range[1])).round().max(p.range[0])
+        })
+    };
+    Effect {
+        kind,
+        gains: core::array::from_fn(|k| middle(about.gains, k)),
+        shapes: core::array::from_fn(|k| middle(about.shapes, k)),
+    }
+}
+
+fn at(reference: f64, measured: f64) -> Now<f64> {
+    Now {
+        reference: Reference {
+            velocity: reference,
+            ..Reference::default()
+        },
+        velocity: measured,
+        placed: true,
+        period: 1e-4,
+        ..Now::default()
+    }
+}
+
+/// Once every effect has had its turn.
+fn settled<T: Scalar>(
+    effects: &Effects<T>,
+    settings: &PrecompensationSettings<T>,
+    now: &Now<T>,
+) -> Output<T> {
+    let compensation = Compensation::new(effects).unwrap();
+    let mut state = State::default();
+    let mut output = Output::default();
+    for _ in 0..2 * EFFECTS {
+        output = compensation.torque(settings, &mut state, now);
+    }
+    output
+}
+
+fn torque(effects: &Effects<f64>, now: &Now<f64>) -> Output<f64> {
+    settled(effects, &SETTINGS, now)
+}
+
+#[test]
+fn stribeck_as_an_effect_is_stribeck_in_the_friction_law() {
+    let effects = only(stribeck(0.25, 0.1));
+    let law = Friction {
+        breakaway_excess: 0.25,
+        stribeck_velocity: 0.1,
+        ..Friction::default()
+    };
+    for reference in [-0.4, -0.05, -1e-4, 0.0, 1e-4, 0.02, 0.3] {
+        for k in -100..=100 {
+            let measured = f64::from(k) * 5e-3;
+            let by_law = precompensation::torque(&SETTINGS, &law, reference, measured, 0.0);
+            let by_effect = torque(&effects, &at(reference, measured)).feed;
+            assert!(
+                (by_law - by_effect).abs() < 1e-12,
+                "{reference} {measured}: {by_law} {by_effect}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_is_explained_is_the_whole_law_at_the_measured_motion() {
+    let effects = only(stribeck(0.25, 0.1));
+    let output = torque(&effects, &at(0.3, -0.06));
+    assert!((output.explained + 0.25 * libm::exp(-0.36)).abs() < 1e-12);
+    // Switched off, friction is not given, but it is there all the same.
+    let off = PrecompensationSettings {
+        enabled: false,
+        ..SETTINGS
+    };
+    let silent = settled(&effects, &off, &at(0.3, -0.06));
+    assert_eq!((silent.feed, silent.explained), (0.0, output.explained));
+}
+
+#[test]
+fn cogging_is_given_in_full_at_rest_and_only_where_the_link_stands() {
+    let effects = only(cogging(0.2, -0.1, 24.0));
+    for angle in [0.0, 0.013, 1.0, 6.0] {
+        let mut now = Now {
+            motor_angle: angle,
+            angle_in_turn: angle,
+            ..at(0.0, 0.0)
+        };
+        let (s, c) = libm::sincos(24.0 * angle);
+        let wanted = 0.2 * c - 0.1 * s;
+        let output = torque(&effects, &now);
+        assert!((output.feed - wanted).abs() < 1e-12);
+        assert_eq!(output.feed, output.explained);
+        // Nobody has said where the link stands: then no angle means anything.
+        now.placed = false;
+        assert_eq!(torque(&effects, &now), Output::default());
+    }
+}
+
+#[test]
+fn a_whole_order_takes_the_angle_within_a_turn_and_a_broken_one_does_not() {
+    let now = Now {
+        motor_angle: 100.0 * core::f64::consts::TAU + 0.4,
+        angle_in_turn: 0.4,
+        ..at(0.0, 0.0)
+    };
+    let whole = torque(&only(cogging(1.0, 0.0, 24.0)), &now).feed;
+    assert_eq!(whole, libm::cos(24.0 * 0.4));
+    let broken = torque(&only(cogging(1.0, 0.0, 24.5)), &now).feed;
+    assert_eq!(broken, libm::cos(24.5 * now.motor_angle));
+}
+
+#[test]
+fn effects_add_up() {
+    let (a, b) = (stribeck(0.25, 0.1), cogging(0.2, -0.1, 24.0));
+    let now = Now {
+        angle_in_turn: 0.3,
+        ..at(0.1, 0.08)
+    };
+    let both = [Some(a), None, Some(b), None];
+    let sum = torque(&only(a), &now).feed + torque(&only(b), &now).feed;
+    assert!((torque(&both, &now).feed - sum).abs() < 1e-15);
+}
+
+#[test]
+fn no_effect_drives_a_link_that_runs_ahead_and_dry_ones_stop_with_the_reference() {
+    for kind in Kind::ALL {
+        if Role::of(*kind) != Some(Role::Dry) {
+            continue;
+        }
+        let effects = only(typical(*kind));
+        assert_eq!(torque(&effects, &at(0.0, 0.02)).feed, 0.0, "{kind:?}");
+        for reference in [0.06, 0.3] {
+            let mut last = torque(&effects, &at(reference, reference)).feed.abs();
+            for k in 1..=400 {
+                let measured = reference + f64::from(k) * 5e-3;
+                // At one place, wherever the link is going.
+                let now = Now {
+                    period: 0.0,
+                    ..at(reference, measured)
+                };
+                let next = torque(&effects, &now).feed.abs();
+                // From a slow to a fast link the share may still rise.
+                let share_left = SETTINGS.gain / share(&SETTINGS, reference, reference);
+                assert!(next <= share_left * last + 1e-12, "{kind:?} {measured}");
+                last = next;
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
+    let mut used = 0;
+    for kind in Kind::ALL {
+        let effects = only(typical(*kind));
+        match (Role::of(*kind), Compensation::new(&effects)) {
+            (None, Err(EffectFault::NotCompensable(named))) => assert_eq!(named, *kind),
+            (Some(_), Ok(compensation)) => {
+                used += 1;
+                for value in [f64::NAN, f64::INFINITY, -1e300, 0.0, 1.0] {
+                    let now = Now {
+                        position: value,
+                        velocity: value,
+                        motor_angle: value,
+                        angle_in_turn: value,
+                        drive_torque: value,
+                        load: value,
+                        time: value,
+                        warming: value,
+                        reference: Reference {
+                            position: value,
+                            velocity: value,
+                            acceleration: value,
+                        },
+                        placed: true,
+                        busy: false,
+                        gear_ratio: 50.0,
+                        period: 1e-4,
+                    };
+                    let mut state = State::default();
+                    for _ in 0..9 {
+                        let output = compensation.torque(&SETTINGS, &mut state, &now);
+                        assert!(output.feed.is_finite(), "{kind:?} {value}");
+                        assert!(output.explained.is_finite(), "{kind:?} {value}");
+                        let reading = compensation.reading(&now);
+                        assert!(reading.error.is_finite() && reading.slope.is_finite());
+                    }
+                }
+            }
+            other => panic!("{kind:?}: {other:?}"),
+        }
+    }
+    assert!(used >= 3);
+}
+
+#[test]
+fn what_is_wrong_with_an_effect_is_named() {
+    let fault = |effect| Compensation::new(&only(effect)).unwrap_err();
+    let parameter = |name| EffectFault::Parameter(name);
+    assert_eq!(fault(stribeck(f64::NAN, 0.1)), parameter("breakaway"));
+    assert_eq!(fault(stribeck(-0.1, 0.1)), parameter("breakaway"));
+    assert_eq!(fault(stribeck(0.1, f64::INFINITY)), parameter("velocity"));
+    // 0/0 at rest.
+    assert_eq!(fault(stribeck(0.1, 0.0)), parameter("velocity"));
+    assert_eq!(fault(cogging(0.1, 0.1, 1.0)), parameter("order"));
+    let mut surplus = stribeck(0.1, 0.1);
+    surplus.gains[3] = 1.0;
+    assert_eq!(fault(surplus), EffectFault::Surplus);
+    let memory = typical(Kind::PreslidingDahl);
+    let refused = fault(memory);
+    assert_eq!(refused, EffectFault::NotCompensable(Kind::PreslidingDahl));
+    assert!(std::format!("{refused}").starts_with("presliding friction cannot be compensated"));
+    assert!(Compensation::new(&only(stribeck(0.0, 0.1))).is_ok());
+}
+
+proptest! {
+    #[test]
+    fn single_precision_agrees(
+        reference in -1.0..1.0_f32,
+        measured in -1.0..1.0_f32,
+        angle in 0.0..core::f32::consts::TAU,
+    ) {
+        let single = |effect: Effect<f64>| Effect {
+            kind: effect.kind,
+            gains: effect.gains.map(|x| x as f32),
+            shapes: effect.shapes.map(|x| x as f32),
+        };
+        let given = [stribeck(0.25, 0.1), cogging(0.2, -0.1, 24.0)];
+        let settings = PrecompensationSettings {
+            enabled: true,
+            gain: 0.95_f32,
+            gain_at_rest: 0.7,
+            velocity_threshold: 0.05,
+        };
+        let now = Now::<f32> {
+            reference: Reference { velocity: reference, ..Reference::default() },
+            velocity: measured,
+            angle_in_turn: angle,
+            placed: true,
+            ..Now::default()
+        };
+        let effects = [Some(single(given[0])), Some(single(given[1])), None, None];
+        let f32s = settled(&effects, &settings, &now);
+        let wide = Now::<f64> {
+            angle_in_turn: angle.into(),
+            ..at(reference.into(), measured.into())
+        };
+        let f64s = torque(&[Some(given[0]), Some(given[1]), None, None], &wide);
+        // An order of 24 takes the angle's rounding with it.
+        prop_assert!((f64::from(f32s.feed) - f64s.feed).abs() < 1e-5);
+        prop_assert!((f64::from(f32s.explained) - f64s.explained).abs() < 1e-5);
+    }
+}

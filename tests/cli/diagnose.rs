@@ -1,0 +1,69 @@
+//! `rig diagnose` from files to files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::run::{rig, robot, succeed};
+
+/// 20 s of the one-link rig with inertia, gravity and friction; `change` is done to position and torque.
+fn recording(folder: &Path, change: impl Fn(f64, f64) -> (f64, f64)) -> PathBuf {
+    let mut text = String::from("t,q1,tau1\n");
+    for k in 0..20_000 {
+        let t = k as f64 * 1e-3;
+        let q = 1.5 * (3.0 * t).sin() + 0.3 * (11.0 * t).cos();
+        let qd = 4.5 * (3.0 * t).cos() - 3.3 * (11.0 * t).sin();
+        let qdd = -13.5 * (3.0 * t).sin() - 36.3 * (11.0 * t).cos();
+        let tau = 0.12 * qdd + 2.9 * q.cos() + 0.3 * qd + 0.4 * qd.signum();
+        let (q, tau) = change(q, tau);
+        text += &format!("{t:.3},{q:.9},{tau:.6}\n");
+    }
+    let path = folder.join("recording.csv");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// What `rig diagnose` writes and says of a recording.
+fn diagnosed(change: impl Fn(f64, f64) -> (f64, f64)) -> (Value, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let data = recording(folder.path(), change);
+    let said = succeed(
+        rig()
+            .arg("diagnose")
+            .arg("--robot")
+            .arg(robot("one-link.toml"))
+            .arg("--data")
+            .arg(&data)
+            .arg("--out")
+            .arg(&out),
+    );
+    for file in ["model.toml", "report.html"] {
+        assert!(out.join(file).is_file(), "{file} is missing");
+    }
+    let text = fs::read_to_string(out.join("diagnosis.json")).unwrap();
+    (serde_json::from_str(&text).unwrap(), said)
+}
+
+fn fault(change: impl Fn(f64, f64) -> (f64, f64), kind: &str, names: &str) {
+    let (found, said) = diagnosed(change);
+    assert_eq!(found["verdict"], "data-fault", "{found}");
+    assert_eq!(found["steps"], serde_json::json!([]));
+    let faults = found["data_faults"].as_array().unwrap();
+    let named = faults
+        .iter()
+        .any(|f| f["kind"] == kind && f["text"].as_str().unwrap_or_default().contains(names));
+    assert!(named, "no {kind} of {names} in {faults:?}");
+    assert!(said.contains("The data are at fault"), "{said}");
+}
+
+#[test]
+fn degrees_are_a_fault_of_the_data() {
+    fault(|q, tau| (q.to_degrees(), tau), "unit", "q1");
+}
+
+#[test]
+fn a_torque_with_its_sign_swapped_is_a_fault_of_the_data() {
+    fault(|q, tau| (q, -tau), "sign", "tau1");
+}
