@@ -33,7 +33,7 @@ pub(super) enum Role {
     Reference(usize),
     Voltage(usize),
     /// Times the value of that column.
-    Duty(usize, usize),
+    Duty(usize, usize, f64),
     Temperature(usize),
     /// No meaning to the model.
     None,
@@ -133,6 +133,10 @@ pub(super) fn layout(
             )));
         }
     }
+    // One joint needs no number on its duty cycle.
+    let bare = joints == 1 && !names.iter().any(|name| name == "duty1");
+    let split =
+        |name: &str| split(name).or_else(|| (bare && name == "duty").then_some(("duty", 1)));
     for name in names {
         if let Some((quantity, k)) = split(name)
             && (k == 0 || k > joints)
@@ -178,7 +182,7 @@ pub(super) fn layout(
                     "temp" => (Role::Temperature(joint), false),
                     _ => match supply {
                         _ if find(&format!("u{k}")).is_some() => (Role::None, true),
-                        Some(column) => (Role::Duty(joint, column), true),
+                        Some(column) => (Role::Duty(joint, column, duty_scale(robot, joint)), true),
                         None => {
                             warnings.push(Warning::DutyWithoutSupply {
                                 column: name.clone(),
@@ -218,6 +222,14 @@ pub(super) fn layout(
         motors,
         warnings,
     })
+}
+
+/// Share of the supply per unit of a joint's duty column.
+fn duty_scale(robot: &Robot, joint: usize) -> f64 {
+    let drive = robot.joints.get(joint).and_then(|j| j.drive.as_ref());
+    drive
+        .and_then(|d| d.duty_full_scale)
+        .map_or(1.0, |full| 1.0 / full)
 }
 
 /// Whether the positions are the motors'.

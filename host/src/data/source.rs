@@ -366,7 +366,10 @@ impl Blocks<'_> {
                 Role::Acceleration(_) => (joint.qdd.as_mut(), value),
                 Role::Reference(_) => (joint.reference.as_mut(), value),
                 Role::Voltage(_) => (joint.voltage.as_mut(), value),
-                Role::Duty(_, supply) => (joint.voltage.as_mut(), value * self.values[supply]),
+                Role::Duty(_, supply, scale) => {
+                    let share = signed_register(value) * scale;
+                    (joint.voltage.as_mut(), share * self.values[supply])
+                }
                 Role::Temperature(_) => (joint.temperature.as_mut(), value),
                 Role::MotorPosition(k) => {
                     set(self.motors.as_mut().map(|m| &mut m.psi), k, value);
@@ -504,10 +507,20 @@ fn joint_of(role: Role) -> Option<usize> {
         | Role::Acceleration(k)
         | Role::Reference(k)
         | Role::Voltage(k)
-        | Role::Duty(k, _)
+        | Role::Duty(k, ..)
         | Role::MotorPosition(k)
         | Role::MotorEffort(k, _)
         | Role::Temperature(k) => Some(k),
+    }
+}
+
+/// Duty cycles are read from registers of 16 bits: what lies in the upper half of one is negative (two's complement), as
+/// no duty cycle is so large.
+fn signed_register(value: f64) -> f64 {
+    if value > f64::from(i16::MAX) && value <= f64::from(u16::MAX) {
+        value - 65_536.0
+    } else {
+        value
     }
 }
 

@@ -620,7 +620,7 @@ pub(super) fn label(kind: Kind) -> String {
     }
 }
 
-fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
+pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
     if before > floor {
         (before - after) / (before - floor)
     } else {

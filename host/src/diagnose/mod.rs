@@ -27,6 +27,7 @@ mod sentences;
 mod solve;
 pub mod testable;
 mod transmission;
+pub mod voltage;
 
 pub use engine::diagnose;
 pub use outcome::Diagnosis;
@@ -59,6 +60,11 @@ pub enum DiagnoseError {
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
+    /// A recording without a voltage.
+    #[error(
+        "{0} has no motor voltage; record u1, or duty1 with supply, or give recordings with torque or current."
+    )]
+    NoVoltage(String),
     /// A scenario that cannot be made.
     #[error("The scenario cannot be made: {0}")]
     Scenario(String),

@@ -343,6 +343,11 @@ fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
             "counts per motor turn",
             drive.encoder_counts_per_rev,
         ),
+        (
+            "duty_full_scale",
+            "units of the duty column",
+            drive.duty_full_scale,
+        ),
     ];
     for (key, unit, value) in optional {
         if let Some(v) = value {

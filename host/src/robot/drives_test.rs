@@ -18,7 +18,7 @@ fn says(text: &str) -> String {
 
 #[test]
 fn the_descriptions_that_come_with_the_program_load_and_are_written_back_equal() {
-    for kind in ["one-link", "edda", "irp6", "emps", "tx40"] {
+    for kind in ["one-link", "edda", "irp6", "emps", "tx40", "xl330"] {
         let robot = load(template(kind).unwrap()).unwrap();
         let written = robot.to_toml().unwrap();
         assert_eq!(load(&written).unwrap(), robot, "{written}");

@@ -50,6 +50,9 @@ pub const EDDA_TEMPLATE: &str = include_str!("../../robots/edda.toml");
 /// The Stäubli TX40 with its coupled wrist, as its published recording needs it.
 pub const TX40: &str = include_str!("../../robots/tx40.toml");
 
+/// The pendulum on a Dynamixel XL330 whose public recordings have a voltage and no current.
+pub const XL330: &str = include_str!("../../robots/xl330.toml");
+
 /// A serial robot as a file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -191,6 +194,9 @@ pub struct Drive {
     /// Counts per motor turn after quadrature
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder_counts_per_rev: Option<f64>,
+    /// Value of the recording's `duty` column that stands for the whole supply; 1 where absent
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub duty_full_scale: Option<f64>,
     /// 0 where brushed
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pole_pairs: Option<u32>,
@@ -225,6 +231,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
         "irp6" => Some(IRP6_TEMPLATE),
         "emps" => Some(EMPS),
         "tx40" => Some(TX40),
+        "xl330" => Some(XL330),
         _ => None,
     }
 }

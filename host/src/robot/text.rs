@@ -370,6 +370,12 @@ fn write_drive(out: &mut String, d: &Drive) {
         d.encoder_counts_per_rev,
         "counts per motor turn after quadrature",
     );
+    optional(
+        out,
+        "duty_full_scale",
+        d.duty_full_scale,
+        "value of the duty column that is the whole supply",
+    );
     if let Some(p) = d.pole_pairs {
         line(out, "pole_pairs", &p.to_string(), "0 where brushed");
     }

@@ -1,0 +1,267 @@
+//! The result of a voltage-driven diagnosis in words, numbers and as a description.
+
+use std::collections::BTreeMap;
+
+use super::plant::{NAMES, NOMINAL, Plant};
+use super::search::{Model, Trial, on_the_voltage};
+use crate::diagnose::engine::{closed, effect_of, label};
+use crate::diagnose::outcome::{
+    Absorbed, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall,
+};
+use crate::robot::{Drive, JointFriction, Robot, RobotEffect};
+use rig_shared::effects::SHAPES;
+
+/// Over this many floors something is left.
+const LEFT: f64 = 1.2;
+/// Rivals within this share of the best on recordings not fitted to are supported as well.
+const EQUAL: f64 = 0.03;
+
+/// Everything that was found.
+pub(super) struct Told<'a> {
+    pub robot: &'a Robot,
+    /// rad or m
+    pub floor: f64,
+    /// From model to model.
+    pub train: Vec<f64>,
+    /// The same on the hold-out; empty without one.
+    pub holdout: Vec<f64>,
+    pub deviations: Vec<Option<Vec<f64>>>,
+    /// The nominal one first.
+    pub models: Vec<Model>,
+    pub rounds: Vec<Vec<Trial>>,
+}
+
+impl Told<'_> {
+    fn joint(&self) -> String {
+        self.robot.joints[0].name.clone()
+    }
+
+    fn judged(&self) -> &[f64] {
+        if self.holdout.is_empty() {
+            &self.train
+        } else {
+            &self.holdout
+        }
+    }
+
+    /// Standard deviation of parameter `p` of model `k`; 0 where it was not fitted.
+    fn std(&self, k: usize, p: usize) -> f64 {
+        let place = self.models[k].free.iter().position(|f| *f == p);
+        let list = self.deviations[k].as_ref();
+        place.and_then(|c| list?.get(c).copied()).unwrap_or(0.0)
+    }
+
+    /// As `diagnosis.json` has it.
+    pub(super) fn diagnosis(&self) -> Diagnosis {
+        let judged = self.judged();
+        let (first, last) = (judged[0], judged[judged.len() - 1]);
+        let steps: Vec<Step> = (1..self.models.len()).map(|k| self.step(k)).collect();
+        let left = last > LEFT * self.floor;
+        let verdict = match (left, steps.is_empty()) {
+            (true, _) => Verdict::Remainder,
+            (false, true) => Verdict::NothingMissing,
+            (false, false) => Verdict::Explained,
+        };
+        let on = if self.holdout.is_empty() {
+            "the recordings it was fitted to"
+        } else {
+            "the recordings held back"
+        };
+        let mut words = vec![format!(
+            "No torque or current was recorded: the model ran freely on the recorded voltage, and its position was compared. It is off by {:.2} mrad (RMS) on {on}, {:.2} before any effect.",
+            1e3 * last,
+            1e3 * first
+        )];
+        if self
+            .models
+            .iter()
+            .flat_map(|m| &m.effects)
+            .any(|k| on_the_voltage(*k))
+        {
+            words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
+        }
+        if !last.is_finite() {
+            words.push("With the effects the recordings held back cannot be simulated: they ask more of the drive than the effects were fitted to. Give a recording of such voltages to learn from.".into());
+        }
+        let remainder = left.then(|| Remainder {
+            joint: self.joint(),
+            rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),
+            ratio: last / self.floor.max(f64::MIN_POSITIVE),
+            places: Vec::new(),
+            text: format!(
+                "the free-running position is off by {:.2} mrad, {:.1} times the encoder's step; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+                1e3 * last, last / self.floor.max(f64::MIN_POSITIVE)
+            ),
+        });
+        Diagnosis {
+            schema: "rig-diagnosis/1".into(),
+            robot: self.robot.name.clone(),
+            verdict,
+            words,
+            noise_floor_rms: vec![self.floor],
+            noise_floor_how: "the encoder's smallest step over √12, of the position: a lower bound, as nothing was recorded twice".into(),
+            places: Vec::new(),
+            gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
+            steps,
+            absorbed: self.absorbed(),
+            not_testable: Vec::new(),
+            detectable: Vec::new(),
+            next_experiment: None,
+            remainder,
+            data_faults: Vec::new(),
+            waterfall: vec![Waterfall {
+                joint: self.joint(),
+                unit: "rad".into(),
+                models: std::iter::once("refitted".to_owned())
+                    .chain(self.models.last().into_iter().flat_map(|m| m.effects.iter().map(|k| label(*k))))
+                    .collect(),
+                train: self.train.clone(),
+                holdout: self.holdout.clone(),
+                floor: self.floor,
+            }],
+            tried: self.tried(),
+            maps: Vec::new(),
+            curves: Vec::new(),
+        }
+    }
+
+    fn step(&self, k: usize) -> Step {
+        let model = &self.models[k];
+        let kind = model.effects[k - 1];
+        let round = &self.rounds[k - 1];
+        let own = round.iter().find(|t| t.kind == kind);
+        let best = own.and_then(|t| t.unseen).unwrap_or(self.train[k]);
+        let rival =
+            |t: &&Trial| t.kind != kind && t.p_value <= own.map_or(0.0, |o| o.p_value.max(0.05));
+        let near = |t: &&Trial| t.unseen.is_some_and(|rms| rms <= (1.0 + EQUAL) * best);
+        let mut set = vec![kind.about().name.to_owned()];
+        set.extend(
+            round
+                .iter()
+                .filter(rival)
+                .filter(near)
+                .map(|t| t.kind.about().name.to_owned()),
+        );
+        let other = (round.iter().filter(|t| t.kind != kind && !near(t)))
+            .filter_map(|t| Some((t, t.unseen?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let pair = |list: &[f64]| [list[k - 1], list[k]];
+        let holdout = (!self.holdout.is_empty()).then(|| pair(&self.holdout));
+        let judged = pair(self.judged());
+        let last = self.models.len() - 1;
+        Step {
+            effect: kind.about().name.into(),
+            law: kind.about().law.map(str::to_owned),
+            joint: self.joint(),
+            set,
+            parameters: self.parameters(last, k - 1),
+            p_value: own.map_or(1.0, |t| (t.p_value * round.len() as f64).min(1.0)),
+            runner_up: other.map(|(t, _)| label(t.kind)),
+            runner_up_gap_closed: other
+                .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
+            train_rms: pair(&self.train),
+            holdout_rms: holdout,
+            motion_rms: Some(judged),
+            gap_closed: closed(judged, self.floor),
+            why: format!(
+                "the free-running position of recordings that it was not fitted to is off by {:.2} mrad with it",
+                1e3 * best
+            ),
+        }
+    }
+
+    /// Of the `effect`-th effect of model `k`.
+    fn parameters(&self, k: usize, effect: usize) -> BTreeMap<String, Value> {
+        let model = &self.models[k];
+        let count =
+            |kind: &rig_shared::effects::Kind| kind.about().gains.len() + kind.about().shapes.len();
+        let at = NOMINAL + model.effects[..effect].iter().map(count).sum::<usize>();
+        let about = model.effects[effect].about();
+        (about.gains.iter().chain(about.shapes).enumerate())
+            .map(|(p, parameter)| {
+                let value = Value {
+                    value: model.theta[at + p],
+                    std: self.std(k, at + p),
+                    unit: parameter.unit.into(),
+                };
+                (parameter.name.to_owned(), value)
+            })
+            .collect()
+    }
+
+    fn absorbed(&self) -> Vec<Absorbed> {
+        let last = self.models.len() - 1;
+        if last == 0 {
+            return Vec::new();
+        }
+        let mut list: Vec<Absorbed> = (self.models[last].free.iter().filter(|p| **p < NOMINAL))
+            .map(|p| {
+                let [before, after] = [0, last].map(|k| self.models[k].theta[*p]);
+                Absorbed {
+                    parameter: NAMES[*p].0.into(),
+                    unit: NAMES[*p].1.into(),
+                    before,
+                    after,
+                    sigmas: (after - before).abs() / self.std(last, *p).max(f64::MIN_POSITIVE),
+                }
+            })
+            .collect();
+        list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        list
+    }
+
+    fn tried(&self) -> Vec<Tried> {
+        let of = |(step, round): (usize, &Vec<Trial>)| {
+            let before = self.train[step];
+            let one = |t: &Trial| Tried {
+                effect: label(t.kind),
+                joint: self.joint(),
+                step,
+                gain: 1.0 - t.unseen.unwrap_or(t.train).min(before) / before,
+                gain_sigmas: 0.0,
+                p_value: (t.p_value * round.len() as f64).min(1.0),
+                refused: t.refused.clone(),
+            };
+            round.iter().map(one).collect::<Vec<_>>()
+        };
+        self.rounds.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The description with what was found.
+    pub(super) fn robot(&self, plant: &Plant) -> Robot {
+        let mut robot = self.robot.clone();
+        let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {
+            return robot;
+        };
+        let t = &model.theta;
+        joint.friction = Some(JointFriction {
+            coulomb: t[3],
+            viscous: t[4],
+            offset: t[5],
+        });
+        let drive = joint.drive.get_or_insert_with(|| Drive {
+            gear_ratio: 1.0,
+            ..Drive::default()
+        });
+        let square = plant.ratio * plant.ratio;
+        drive.joint_inertia = t[0] - square * drive.rotor_inertia;
+        // Torque and voltage constant of a motor are one number in SI.
+        drive.torque_constant = t[2] / plant.ratio.abs();
+        drive.resistance = Some(t[2] / t[1]);
+        let mut at = NOMINAL;
+        for kind in &model.effects {
+            let about = kind.about();
+            let gains = &t[at..at + about.gains.len()];
+            at += about.gains.len();
+            let mut shapes = [0.0; SHAPES];
+            shapes[..about.shapes.len()].copy_from_slice(&t[at..at + about.shapes.len()]);
+            at += about.shapes.len();
+            robot.effects.push(RobotEffect {
+                joint: Some(self.joint()),
+                other: None,
+                effect: effect_of(*kind, gains, &shapes),
+            });
+        }
+        robot
+    }
+}

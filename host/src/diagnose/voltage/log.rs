@@ -1,0 +1,125 @@
+//! Recordings as a voltage-driven simulation takes them: rows as they were written, no filter, no even grid.
+
+use crate::diagnose::DiagnoseError;
+use crate::prepare::Recording;
+
+/// Rows on each side that the velocity at a row is taken from: a parabola through eleven rows.
+const SIDE: usize = 5;
+/// A voltage is known well enough between rows this many periods apart; farther apart there is a gap.
+const GAP: f64 = 5.0;
+/// Column that says whether the drive is on.
+const ENABLE: &str = "torque_enable";
+
+/// A stretch of a recording without a gap.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Log {
+    /// s
+    pub t: Vec<f64>,
+    /// rad or m
+    pub q: Vec<f64>,
+    /// V
+    pub u: Vec<f64>,
+    /// Whether the drive is on; an idle bridge lets no current flow, so that nothing brakes.
+    pub on: Vec<bool>,
+}
+
+impl Log {
+    /// Velocity and acceleration at a row by a parabola through its neighbours.
+    pub(super) fn slope(&self, row: usize) -> [f64; 2] {
+        let last = self.t.len().saturating_sub(1);
+        let (low, high) = (row.saturating_sub(SIDE), (row + SIDE).min(last));
+        let mut s = [0.0; 5];
+        let mut b = [0.0; 3];
+        for k in low..=high {
+            let (x, y) = (self.t[k] - self.t[row], self.q[k] - self.q[row]);
+            let mut power = 1.0;
+            for (n, sum) in s.iter_mut().enumerate() {
+                *sum += power;
+                if n < 3 {
+                    b[n] += power * y;
+                }
+                power *= x;
+            }
+        }
+        let a = nalgebra::Matrix3::new(s[0], s[1], s[2], s[1], s[2], s[3], s[2], s[3], s[4]);
+        a.lu()
+            .solve(&nalgebra::Vector3::from(b))
+            .map_or([0.0; 2], |c| [c[1], 2.0 * c[2]])
+    }
+
+    /// Pieces of about `length` seconds; the whole where it is infinite.
+    pub(super) fn windows(&self, length: f64) -> Vec<Segment> {
+        let mut list = Vec::new();
+        let (mut from, last) = (0, self.t.len().saturating_sub(1));
+        while from < last {
+            let end = self.t[from] + length;
+            let mut to = (from..=last).find(|k| self.t[*k] > end).unwrap_or(last + 1);
+            // A short rest joins the piece before it.
+            if self.t[last] - self.t[to.min(last)] < 0.5 * length {
+                to = last + 1;
+            }
+            list.push(Segment {
+                from,
+                to,
+                velocity: self.slope(from)[0],
+            });
+            from = to;
+        }
+        list
+    }
+}
+
+/// Rows of a log that are simulated from the recorded state of the first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    /// First row.
+    pub from: usize,
+    /// One past the last.
+    pub to: usize,
+    /// At the first row, rad/s or m/s.
+    pub velocity: f64,
+}
+
+/// Reads the first joint of `recordings`.
+///
+/// # Errors
+/// What reading gives; a recording without a voltage.
+pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseError> {
+    let mut list: Vec<Log> = Vec::new();
+    for source in recordings {
+        let first = list.len();
+        source.each_block(65_536, &mut |block| {
+            let follows = |log: &Log| {
+                let rows = log.t.len();
+                rows > 1
+                    && block.t.first().is_some_and(|t| {
+                        let period = (log.t[rows - 1] - log.t[0]) / (rows - 1) as f64;
+                        t - log.t[rows - 1] < GAP * period
+                    })
+            };
+            let joins = list.len() > first && list.last().is_some_and(follows);
+            if !(block.continues && list.len() > first || joins) {
+                list.push(Log::default());
+            }
+            let rows = block.len();
+            let on = block.extra.iter().find(|(name, _)| name == ENABLE);
+            let on = on.map_or_else(
+                || vec![true; rows],
+                |(_, c)| c.iter().map(|x| *x != 0.0).collect(),
+            );
+            if let (Some(log), Some(joint)) = (list.last_mut(), block.joints.into_iter().next()) {
+                log.t.extend(block.t);
+                log.q.extend(joint.q);
+                log.u.extend(joint.voltage.unwrap_or_default());
+                log.on.extend(on);
+            }
+            Ok(())
+        })?;
+        if list[first..].iter().any(|log| log.u.len() != log.t.len()) {
+            return Err(DiagnoseError::NoVoltage(source.label()));
+        }
+    }
+    // Shorter than two parabolas there is nothing to simulate.
+    list.retain(|log| log.t.len() > 4 * SIDE);
+    Ok(list)
+}

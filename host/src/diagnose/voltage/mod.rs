@@ -1,0 +1,169 @@
+//! The gap workflow for one joint that is driven by a known voltage, where neither torque nor current was measured.
+//!
+//! There is no torque to compare: the model runs freely from the recorded start of each recording with the recorded
+//! voltage, and the gap is that of the position, in rad (or m). Identifiable are the torque per volt and the back-EMF,
+//! the drive's inertia and friction, against the link's inertia and weight, which the description must state. Effects come
+//! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as [`search`] says; all
+//! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position.
+//!
+//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; the
+//! controller's own part, which is in the recorded voltage.
+
+mod describe;
+mod fit;
+mod log;
+mod plant;
+mod search;
+#[cfg(test)]
+mod tests;
+
+use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
+
+use self::describe::Told;
+use self::log::{Log, logs};
+use self::plant::Plant;
+use self::search::{Model, Search, library};
+use super::outcome::Diagnosis;
+use super::{DiagnoseError, Options};
+use crate::prepare::Recording;
+use crate::robot::{JointKind, Robot};
+
+/// Whether this is the workflow for these recordings: one joint, and every recording has a voltage and no torque.
+///
+/// # Errors
+/// What reading gives.
+pub fn applies(robot: &Robot, recordings: &[&dyn Recording]) -> Result<bool, DiagnoseError> {
+    let mut all = robot.joints.len() == 1 && !recordings.is_empty();
+    for recording in recordings {
+        recording.each_block(65_536, &mut |block| {
+            all &= block.joints.first().is_some_and(|joint| {
+                joint.tau.is_empty()
+                    && joint
+                        .voltage
+                        .as_ref()
+                        .is_some_and(|u| u.len() == block.t.len())
+            });
+            Ok(())
+        })?;
+    }
+    Ok(all)
+}
+
+/// Finds what the model of a voltage-driven joint lacks. The second result is the description with the effects and the
+/// parameters identified anew.
+///
+/// # Errors
+/// [`DiagnoseError`]: no recording, no voltage, more than one joint, a link without inertia, a motion that excites
+/// nothing.
+pub fn diagnose_voltage(
+    robot: &Robot,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Diagnosis, Robot), DiagnoseError> {
+    let plant = plant(robot)?;
+    let train = logs(training)?;
+    if train.is_empty() {
+        return Err(DiagnoseError::NoRecording);
+    }
+    let sealed = logs(holdout)?;
+    let search = |logs| Search {
+        plant: &plant,
+        logs,
+        library: library(&options.without),
+        threads: crate::prepare::threads(options.threads),
+    };
+    let bench = search(&train);
+    let nominal = bench.nominal().ok_or_else(|| {
+        DiagnoseError::Model(
+            "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion.".into(),
+        )
+    })?;
+    progress(0.2);
+    let mut rounds = Vec::new();
+    let models = bench.run(&nominal, &mut |round, trials| {
+        rounds.push(trials.to_vec());
+        progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
+    });
+    let judge = search(&sealed);
+    let rms = |bench: &Search<'_>, model: &Model| bench.rms(model);
+    let found = Told {
+        robot,
+        floor: floor(&train),
+        train: models.iter().map(|m| rms(&bench, m)).collect(),
+        holdout: if sealed.is_empty() {
+            Vec::new()
+        } else {
+            models.iter().map(|m| rms(&judge, m)).collect()
+        },
+        deviations: models.iter().map(|m| bench.deviations(m)).collect(),
+        models,
+        rounds,
+    };
+    let result = (found.diagnosis(), found.robot(&plant));
+    progress(1.0);
+    Ok(result)
+}
+
+/// What the description knows of the joint.
+fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
+    let [joint] = robot.joints.as_slice() else {
+        return Err(DiagnoseError::Model(format!(
+            "without torque or current only a robot of one joint is diagnosed, and this one has {}; record the current as well.",
+            robot.joints.len()
+        )));
+    };
+    let wrong = |error: &dyn std::fmt::Display| DiagnoseError::Model(error.to_string());
+    let chain = Chain::new(&robot.geometry(), robot.gravity).map_err(|e| wrong(&e))?;
+    let mut row = [0.0; COLUMNS];
+    if let Some(inertial) = &joint.inertial {
+        row[column::MASS] = inertial.mass;
+        row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&inertial.first_moment);
+        row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
+    }
+    let inertia = match joint.kind {
+        JointKind::Revolute => row[column::INERTIA + 5],
+        JointKind::Prismatic => row[column::MASS],
+    };
+    if !(inertia > 0.0) {
+        return Err(DiagnoseError::Model(
+            "without torque or current the link's own inertia is the scale of everything else; state it in [joint.inertial].".into(),
+        ));
+    }
+    let weight = |row: [f64; COLUMNS]| -> Result<[f64; 3], DiagnoseError> {
+        let mut at = [0.0; 3];
+        let angles = [0.0, std::f64::consts::FRAC_PI_2, std::f64::consts::PI];
+        for (to, q) in at.iter_mut().zip(angles) {
+            let mut torque = [0.0];
+            gravity_vector(&chain, &[row], &[q], &mut torque).map_err(|e| wrong(&e))?;
+            *to = torque[0];
+        }
+        let constant = 0.5 * (at[0] + at[2]);
+        Ok([at[0] - constant, at[1] - constant, constant])
+    };
+    let mut unit = [0.0; COLUMNS];
+    unit[column::FIRST_MOMENT] = 1.0;
+    Ok(Plant {
+        inertia,
+        gravity: weight(row)?,
+        per_moment: weight(unit)?,
+        ratio: joint.drive.as_ref().map_or(1.0, |drive| drive.gear_ratio),
+    })
+}
+
+/// What the encoder's steps leave of any position: the smallest over √12.
+fn floor(logs: &[Log]) -> f64 {
+    let steps = logs.iter().flat_map(|log| log.q.windows(2));
+    let largest = (logs.iter().flat_map(|log| &log.q)).fold(0.0_f64, |m, q| m.max(q.abs()));
+    let least = steps
+        .map(|pair| (pair[1] - pair[0]).abs())
+        // Less than that is rounding of the file.
+        .filter(|step| *step > 1.0e-6 * largest)
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() {
+        least / 12.0_f64.sqrt()
+    } else {
+        0.0
+    }
+}

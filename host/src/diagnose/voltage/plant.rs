@@ -1,0 +1,220 @@
+//! One joint that a voltage drives, simulated freely from a recorded start.
+//!
+//! J·q̈ + g(q) + viscous·q̇ + friction + offset = gain·(u − emf·q̇), current without delay (L neglected), none where the
+//! drive is off. Steps after Moreau (1988), as in [`crate::simulate`]: dry friction is whatever value within its bounds
+//! brings the joint to rest, so it really sticks. What is proportional to the velocity is taken at the end of the step.
+//!
+//! Leaves out: inductance, sag of the supply between rows, heating, play and elasticity of the gear.
+
+use rig_shared::effects::{Channel, Direction, GAINS, Instant, Kind, MEMORY, SHAPES};
+
+use super::log::{Log, Segment};
+
+/// Longest step, s.
+const STEP: f64 = 1.0e-3;
+/// Nominal parameters, in the order of [`NAMES`].
+pub(super) const NOMINAL: usize = 6;
+/// Drive inertia seen at the joint; torque per volt; back-EMF; Coulomb and viscous friction; constant torque.
+pub(super) const NAMES: [(&str, &str); NOMINAL] = [
+    ("Ia1", "kg*m^2"),
+    ("torque per volt", "N*m/V"),
+    ("back-EMF", "V*s/rad"),
+    ("fc1", "N*m"),
+    ("fv1", "N*m*s/rad"),
+    ("off1", "N*m"),
+];
+
+/// What is known of the joint.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plant {
+    /// Of the link, kg·m² or kg.
+    pub inertia: f64,
+    /// Torque against gravity: with cos q, with sin q, constant, N·m or N.
+    pub gravity: [f64; 3],
+    /// The same per kg·m of first moment along x, m/s².
+    pub per_moment: [f64; 3],
+    /// Motor turns per joint turn.
+    pub ratio: f64,
+}
+
+/// With cos q, with sin q, constant.
+fn wave(c: &[f64; 3], q: f64) -> f64 {
+    let (sin, cos) = q.sin_cos();
+    c[0] * cos + c[1] * sin + c[2]
+}
+
+/// Effects with their parameters, after the nominal ones in the list of a fit.
+struct Part {
+    kind: Kind,
+    gains: [f64; GAINS],
+    shapes: [f64; SHAPES],
+    memory: [f64; MEMORY],
+}
+
+fn parts(effects: &[Kind], theta: &[f64]) -> Vec<Part> {
+    let mut at = NOMINAL;
+    let mut take = |count: usize| {
+        at += count;
+        &theta[at - count..at]
+    };
+    effects
+        .iter()
+        .map(|kind| {
+            let mut part = Part {
+                kind: *kind,
+                gains: [0.0; GAINS],
+                shapes: [0.0; SHAPES],
+                memory: [0.0; MEMORY],
+            };
+            let about = kind.about();
+            part.gains[..about.gains.len()].copy_from_slice(take(about.gains.len()));
+            part.shapes[..about.shapes.len()].copy_from_slice(take(about.shapes.len()));
+            part
+        })
+        .collect()
+}
+
+impl Part {
+    fn torque(&mut self, at: &Instant<f64>, keep: bool) -> f64 {
+        let mut memory = self.memory;
+        let terms = self.kind.terms(&self.shapes, &mut memory, at);
+        if keep {
+            self.memory = memory;
+        }
+        self.gains.iter().zip(terms).map(|(g, t)| g * t).sum()
+    }
+}
+
+impl Plant {
+    /// Torque against gravity, N·m or N.
+    pub(super) fn weight(&self, q: f64) -> f64 {
+        wave(&self.gravity, q)
+    }
+
+    /// Simulated positions at the rows of `segment`, appended to `out`; false where friction would drive the joint or
+    /// the motion grows beyond all bounds.
+    pub(super) fn simulate(
+        &self,
+        effects: &[Kind],
+        theta: &[f64],
+        log: &Log,
+        segment: &Segment,
+        out: &mut Vec<f64>,
+    ) -> bool {
+        let &[armature, gain, emf, coulomb, viscous, offset, ..] = theta else {
+            return false;
+        };
+        let inertia = self.inertia + armature;
+        let mut parts = parts(effects, theta);
+        let late: f64 = (parts.iter())
+            .filter(|p| p.kind == Kind::MeasurementDelay)
+            .map(|p| p.gains[0])
+            .sum();
+        parts.retain(|p| p.kind != Kind::MeasurementDelay);
+        let mut voltage = Voltage {
+            log,
+            row: segment.from,
+        };
+        let (mut q, mut v) = (log.q[segment.from], segment.velocity);
+        let (mut acceleration, mut drive_before) = (0.0, 0.0);
+        for k in segment.from..segment.to {
+            out.push(q);
+            if k + 1 == segment.to {
+                break;
+            }
+            let interval = log.t[k + 1] - log.t[k];
+            let steps = (interval / STEP).ceil().max(1.0);
+            let dt = interval / steps;
+            let on = log.on[k];
+            for s in 0..steps as usize {
+                let now = log.t[k] + (s as f64 + 0.5) * dt;
+                let middle = q + 0.5 * dt * v;
+                let mut at = Instant {
+                    position: middle,
+                    velocity: v,
+                    acceleration,
+                    motor_angle: self.ratio * middle,
+                    gravity: wave(&self.per_moment, middle),
+                    time: now,
+                    period: dt,
+                    ..Instant::default()
+                };
+                let weight = self.weight(middle);
+                let mut effective = if on { voltage.at(now + late) } else { 0.0 };
+                if on {
+                    let net = effective - emf * v;
+                    at.drive_torque = gain * net;
+                    let lost: f64 = (parts.iter_mut())
+                        .filter(|p| p.kind.about().channel == Channel::Voltage)
+                        .map(|p| p.torque(&at, false))
+                        .sum();
+                    // What is lost stops the current; it does not turn it round.
+                    effective -= lost.abs().min(net.abs()) * net.signum();
+                    at.drive_torque = gain * (effective - emf * v);
+                }
+                at.drive_rate = (at.drive_torque - drive_before) / dt;
+                drive_before = at.drive_torque;
+                at.load = self.inertia * acceleration + weight;
+                let mut torque = if on { gain * effective } else { 0.0 } - weight - offset;
+                let (mut low, mut high) = (-coulomb, coulomb);
+                for part in &mut parts {
+                    let about = part.kind.about();
+                    if about.channel == Channel::Voltage {
+                        continue;
+                    }
+                    if about.direction == Direction::Indifferent {
+                        torque -= part.torque(&at, false);
+                        continue;
+                    }
+                    at.direction = 1.0;
+                    high += part.torque(&at, false);
+                    at.direction = -1.0;
+                    low += part.torque(&at, false);
+                }
+                if low > high {
+                    return false;
+                }
+                let braking = viscous + if on { gain * emf } else { 0.0 };
+                let mass = inertia + dt * braking;
+                let stop = inertia * v / dt + torque;
+                let next = dt * (stop - stop.clamp(low, high)) / mass;
+                acceleration = (next - v) / dt;
+                q += 0.5 * dt * (v + next);
+                v = next;
+                at.velocity = v;
+                at.direction = if v == 0.0 { 0.0 } else { v.signum() };
+                for part in &mut parts {
+                    part.torque(&at, true);
+                }
+            }
+            if !(q.abs() < 1.0e6 && v.abs() < 1.0e6) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// Voltage over time: on a line between two rows of one state of the drive, held where that changes.
+struct Voltage<'a> {
+    log: &'a Log,
+    row: usize,
+}
+
+impl Voltage<'_> {
+    fn at(&mut self, time: f64) -> f64 {
+        let log = self.log;
+        while self.row + 1 < log.t.len() && log.t[self.row + 1] <= time {
+            self.row += 1;
+        }
+        while self.row > 0 && log.t[self.row] > time {
+            self.row -= 1;
+        }
+        let (k, next) = (self.row, self.row + 1);
+        if next >= log.t.len() || log.on[k] != log.on[next] {
+            return log.u[k];
+        }
+        let share = ((time - log.t[k]) / (log.t[next] - log.t[k])).clamp(0.0, 1.0);
+        log.u[k] + share * (log.u[next] - log.u[k])
+    }
+}

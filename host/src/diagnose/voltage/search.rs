@@ -1,0 +1,345 @@
+//! Which effects a voltage-driven joint lacks: one at a time, by what the free-running motion of recordings not fitted to
+//! gains.
+
+use rig_shared::effects::{Channel, Kind, Parameter, Scale};
+
+use super::fit::{Problem, WINDOW, segments, start};
+use super::log::{Log, Segment};
+use super::plant::{NOMINAL, Plant};
+use crate::prepare::each_of;
+
+/// Folds of the cross-validation at most.
+const FOLDS: usize = 4;
+/// Blocks at least: fewer recordings are cut into pieces, so that a sign test can say something.
+const BLOCKS: usize = 8;
+/// Share of the error on recordings not fitted to that an effect has to take away.
+const LEAST_GAIN: f64 = 0.03;
+/// Level of the sign test over the blocks.
+const LEVEL: f64 = 0.05;
+/// Candidates of a round that go to the cross-validation, the best by training error first.
+const SHORT_LIST: usize = 3;
+/// Effects at most.
+const MOST: usize = 5;
+
+/// A model and its parameters: the nominal ones, then gains and shapes of each effect.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Model {
+    pub effects: Vec<Kind>,
+    pub theta: Vec<f64>,
+    pub bounds: Vec<[f64; 2]>,
+    pub free: Vec<usize>,
+}
+
+/// One that was tried.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    pub kind: Kind,
+    /// Fitted to all recordings; none where it could not be simulated.
+    pub model: Option<Model>,
+    /// RMS on them.
+    pub train: f64,
+    /// RMS on blocks not fitted to; none where it did not come so far.
+    pub unseen: Option<f64>,
+    /// Sign test, not corrected.
+    pub p_value: f64,
+    /// Why it was not taken; empty for the one that was.
+    pub refused: String,
+}
+
+/// What the search works on.
+pub(super) struct Search<'a> {
+    pub plant: &'a Plant,
+    pub logs: &'a [Log],
+    pub library: Vec<Kind>,
+    pub threads: usize,
+}
+
+/// Effects whose laws the simulation of one voltage-driven joint has.
+pub(super) fn library(without: &[Kind]) -> Vec<Kind> {
+    [
+        Kind::Stribeck,
+        Kind::AsymmetricCoulomb,
+        Kind::QuadraticDrag,
+        Kind::LoadFriction,
+        Kind::PreslidingDahl,
+        Kind::TorqueSaturation,
+        Kind::MeasurementDelay,
+        Kind::DriveDeadzone,
+        Kind::GravityTilt,
+        Kind::Spring,
+    ]
+    .into_iter()
+    .filter(|kind| !without.contains(kind))
+    .collect()
+}
+
+impl Search<'_> {
+    fn problem<'b>(&'b self, model: &'b Model, list: Vec<(usize, Segment)>) -> Problem<'b> {
+        Problem {
+            plant: self.plant,
+            logs: self.logs,
+            segments: list,
+            effects: &model.effects,
+            free: &model.free,
+            bounds: &model.bounds,
+        }
+    }
+
+    /// Whole recordings, or pieces where they are few.
+    pub(super) fn blocks(&self) -> Vec<(usize, Segment)> {
+        let whole = segments(self.logs, |_| true, f64::INFINITY);
+        if whole.len() >= BLOCKS || whole.is_empty() {
+            return whole;
+        }
+        let all: f64 = self.logs.iter().map(duration).sum();
+        segments(self.logs, |_| true, all / (BLOCKS + whole.len()) as f64)
+    }
+
+    /// RMS of the free-running position.
+    pub(super) fn rms(&self, model: &Model) -> f64 {
+        self.problem(model, self.blocks()).rms(&model.theta)
+    }
+
+    /// Standard deviations in the order of the free parameters.
+    pub(super) fn deviations(&self, model: &Model) -> Option<Vec<f64>> {
+        self.problem(model, self.blocks()).deviations(&model.theta)
+    }
+
+    fn fitted(&self, model: &Model, list: Vec<(usize, Segment)>) -> Model {
+        let theta = self.problem(model, list).fit(&model.theta);
+        Model {
+            theta,
+            ..model.clone()
+        }
+    }
+
+    /// The nominal model, from several starts; none where the motion does not excite it.
+    pub(super) fn nominal(&self) -> Option<Model> {
+        let viscous = (self.logs.iter()).any(|log| log.on.iter().any(|on| !on));
+        let first = start(self.plant, self.logs, viscous)?;
+        let free = |c: f64| [0.0, c];
+        let infinity = f64::INFINITY;
+        let model = Model {
+            effects: Vec::new(),
+            theta: first.clone(),
+            bounds: vec![
+                free(infinity),
+                [1.0e-9, infinity],
+                free(infinity),
+                free(infinity),
+                free(infinity),
+                [-infinity, infinity],
+            ],
+            // With the drive always on, viscous friction and back-EMF are one.
+            free: (0..NOMINAL).filter(|p| viscous || *p != 4).collect(),
+        };
+        let mut starts: Vec<Model> = [1.0, 0.5, 2.0]
+            .into_iter()
+            .map(|factor| {
+                let mut one = model.clone();
+                one.theta[3] *= factor;
+                one
+            })
+            .collect();
+        each_of(self.threads, &mut starts, &|_, one| {
+            let near = self.fitted(one, segments(self.logs, |_| true, WINDOW));
+            *one = self.better(
+                self.fitted(&near, self.blocks()),
+                self.fitted(one, self.blocks()),
+            );
+        });
+        starts.into_iter().reduce(|a, b| self.better(a, b))
+    }
+
+    fn better(&self, a: Model, b: Model) -> Model {
+        if self.rms(&b) < self.rms(&a) { b } else { a }
+    }
+
+    /// RMS of every block, of a model fitted to the other folds.
+    fn unseen(&self, model: &Model) -> Vec<f64> {
+        let blocks = self.blocks();
+        let folds = FOLDS.min(blocks.len()).max(1);
+        let mut errors = vec![0.0; blocks.len()];
+        for fold in 0..folds {
+            let rest = |at: usize| at % folds != fold;
+            let pick = |keep: bool| -> Vec<(usize, Segment)> {
+                let numbered = blocks.iter().enumerate();
+                numbered
+                    .filter(|(at, _)| rest(*at) == keep)
+                    .map(|(_, b)| *b)
+                    .collect()
+            };
+            let fitted = self.fitted(model, pick(true));
+            for at in (0..blocks.len()).filter(|at| !rest(*at)) {
+                errors[at] = self.problem(model, vec![blocks[at]]).rms(&fitted.theta);
+            }
+        }
+        errors
+    }
+
+    fn pooled(&self, errors: &[f64]) -> f64 {
+        let rows = self
+            .blocks()
+            .into_iter()
+            .map(|(_, s)| (s.to - s.from) as f64);
+        let (sum, count) = errors
+            .iter()
+            .zip(rows)
+            .fold((0.0, 0.0), |(s, c), (e, rows)| (s + rows * e * e, c + rows));
+        (sum / f64::max(count, 1.0)).sqrt()
+    }
+
+    /// `model` with one more effect, fitted to all recordings from several starts.
+    fn with(&self, model: &Model, kind: Kind) -> Option<Model> {
+        let mut found: Option<Model> = None;
+        for share in [0.25, 0.75] {
+            let mut more = model.clone();
+            more.effects.push(kind);
+            let about = kind.about();
+            for gain in about.gains {
+                more.theta.push(self.first_gain(gain, model));
+                more.bounds.push(gain.bounds);
+            }
+            for shape in about.shapes {
+                let [low, high] = shape.range;
+                more.theta.push(match shape.scale {
+                    Scale::Linear => low + share * (high - low),
+                    Scale::Logarithmic => low * (high / low).powf(share),
+                });
+                // What is far outside of what rigs have is another effect.
+                more.bounds.push([0.1 * low, 10.0 * high]);
+            }
+            more.free.extend(model.theta.len()..more.theta.len());
+            // Whole recordings alone end in the nearest of many valleys; windows alone weigh what windows show.
+            let near = self.fitted(&more, segments(self.logs, |_| true, WINDOW));
+            let fitted = self.better(
+                self.fitted(&more, self.blocks()),
+                self.fitted(&near, self.blocks()),
+            );
+            if self.rms(&fitted).is_finite() {
+                found = Some(match found {
+                    Some(other) => self.better(other, fitted),
+                    None => fitted,
+                });
+            }
+            if about.shapes.is_empty() {
+                break;
+            }
+        }
+        found
+    }
+
+    /// A small size for this joint, by the unit.
+    fn first_gain(&self, gain: &Parameter, model: &Model) -> f64 {
+        let weight = self.plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let torque = weight.max(model.theta[3]);
+        match gain.unit {
+            "1" => 0.1,
+            "s" => 1.0e-3,
+            "V" => 0.02 * self.largest_voltage(),
+            "1/(N*m)^2" => 0.1 / (torque * torque),
+            "N*m*s^2/rad^2" => 0.01 * model.theta[1] * model.theta[2],
+            _ if gain.name == "coulomb" => 0.5 * model.theta[3],
+            _ => 0.02 * torque,
+        }
+    }
+
+    fn largest_voltage(&self) -> f64 {
+        (self.logs.iter().flat_map(|log| &log.u)).fold(0.0, |m, u| m.max(u.abs()))
+    }
+
+    /// Adds effects while they are worth it. `report` is told of every trial of a round.
+    pub(super) fn run(
+        &self,
+        nominal: &Model,
+        report: &mut dyn FnMut(usize, &[Trial]),
+    ) -> Vec<Model> {
+        let mut models = vec![nominal.clone()];
+        while models.len() <= MOST {
+            let Some(model) = models.last().cloned() else {
+                break;
+            };
+            let mut trials: Vec<Trial> = (self.library.iter())
+                .filter(|kind| !model.effects.contains(kind))
+                .map(|kind| Trial {
+                    kind: *kind,
+                    model: None,
+                    train: f64::INFINITY,
+                    unseen: None,
+                    p_value: 1.0,
+                    refused: "cannot be simulated with these parameters".into(),
+                })
+                .collect();
+            each_of(self.threads, &mut trials, &|_, trial| {
+                trial.model = self.with(&model, trial.kind);
+                if let Some(found) = &trial.model {
+                    trial.train = self.rms(found);
+                    trial.refused = "others take away more".into();
+                }
+            });
+            trials.sort_by(|a, b| a.train.total_cmp(&b.train));
+            let before = self.unseen(&model);
+            let whole = self.pooled(&before);
+            let count = SHORT_LIST.min(trials.len());
+            each_of(self.threads, &mut trials[..count], &|_, trial| {
+                let Some(found) = &trial.model else { return };
+                let after = self.unseen(found);
+                let rms = self.pooled(&after);
+                trial.unseen = Some(rms);
+                let pairs = before.iter().zip(&after).filter(|(b, a)| a != b);
+                let wins = pairs.clone().filter(|(b, a)| a < b).count();
+                trial.p_value = sign_test(wins, pairs.count());
+                trial.refused = if !(rms <= (1.0 - LEAST_GAIN) * whole) {
+                    "takes less than 3 % off the motion of recordings it was not fitted to".into()
+                } else if trial.p_value > LEVEL {
+                    format!(
+                        "helps {wins} of {} recordings not fitted to, which may be chance",
+                        before.len()
+                    )
+                } else {
+                    String::new()
+                };
+            });
+            let best = (trials.iter().enumerate())
+                .filter(|(_, t)| t.refused.is_empty())
+                .min_by(|(_, a), (_, b)| {
+                    let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
+                    of(a).total_cmp(&of(b))
+                })
+                .map(|(k, _)| k);
+            for (k, trial) in trials.iter_mut().enumerate() {
+                if trial.refused.is_empty() && Some(k) != best {
+                    trial.refused = "another takes away more".into();
+                }
+            }
+            report(models.len() - 1, &trials);
+            match best.and_then(|k| trials.swap_remove(k).model) {
+                Some(next) => models.push(next),
+                None => break,
+            }
+        }
+        models
+    }
+}
+
+fn duration(log: &Log) -> f64 {
+    log.t.last().zip(log.t.first()).map_or(0.0, |(b, a)| b - a)
+}
+
+/// Chance of at least `wins` of `count` where winning and losing are equally likely.
+pub(super) fn sign_test(wins: usize, count: usize) -> f64 {
+    let mut term = 0.5_f64.powi(count as i32);
+    let mut sum = 0.0;
+    for k in 0..=count {
+        if k >= wins {
+            sum += term;
+        }
+        term *= (count - k) as f64 / (k + 1) as f64;
+    }
+    sum.min(1.0)
+}
+
+/// Whether the effect acts on the voltage.
+pub(super) fn on_the_voltage(kind: Kind) -> bool {
+    kind.about().channel == Channel::Voltage || kind == Kind::MeasurementDelay
+}
