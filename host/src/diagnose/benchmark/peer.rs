@@ -3,7 +3,7 @@
 //! Sequentially thresholded least squares (STLSQ: Brunton, Proctor, Kutz 2016, PNAS 113:3932, threshold by the hold-out) and
 //! forward regression with orthogonal least squares (FROLS: Billings 2013, ch. 3, number of terms by BIC with every
 //! sample counted as independent). Both work on the torque that a refit of the nominal model leaves, with columns
-//! projected on its complement, 40 Hz band, 100 Hz; [`dictionary`] is over a small grid of shapes.
+//! projected on its complement, 40 Hz band, 100 Hz; `dictionary` is over a small grid of shapes.
 //!
 //! Leaves out: backlash and dead time (no column is linear in them), LuGre (three shapes), more than one joint.
 

@@ -3,7 +3,7 @@
 //! There is no torque to compare: the model runs freely from the recorded start of each recording with the recorded
 //! voltage, and the gap is that of the position, in rad (or m). Identifiable are the torque per volt and the back-EMF,
 //! the drive's inertia and friction, against the link's inertia and weight, which the description must state. Effects come
-//! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as [`search`] says; all
+//! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as `search` says; all
 //! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position.
 //!
 //! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; the
