@@ -12,7 +12,7 @@ use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
 use super::transmission::Driven;
 use crate::prepare::{central_difference, second_difference};
-use crate::robot::Robot;
+use crate::robot::{Robot, unit_of};
 
 /// What the present model says of a run at the full rate.
 #[derive(Clone, Debug, Default)]
@@ -114,6 +114,15 @@ impl Source<'_> {
         }
     }
 
+    /// Unit of a candidate's parameter on its joint, ASCII. A tilt is an angle whatever the joint does.
+    pub(super) fn unit(&self, candidate: &Candidate, parameter: &Parameter) -> String {
+        if candidate.kind == Kind::GravityTilt {
+            parameter.unit.to_owned()
+        } else {
+            unit_of(parameter, self.robot.joints[candidate.joint].kind)
+        }
+    }
+
     /// One column a gain over one run, joint by joint, at the full rate.
     ///
     /// # Errors
@@ -178,16 +187,7 @@ impl Source<'_> {
         predicted: &Predicted,
     ) -> Vec<Vec<f64>> {
         let joint = &run.joints[candidate.joint];
-        let ratio = self.robot.joints[candidate.joint]
-            .drive
-            .as_ref()
-            .map_or(1.0, |d| {
-                if d.gear_ratio == 0.0 {
-                    1.0
-                } else {
-                    d.gear_ratio
-                }
-            });
+        let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
         let (load, drive) = (
             &predicted.load[candidate.joint],

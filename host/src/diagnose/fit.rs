@@ -153,9 +153,9 @@ impl<'a> Fit<'a> {
     }
 
     /// Takes a known torque off what is to be explained.
-    pub(super) fn subtract(&mut self, column: &Column, factor: f64) {
+    pub(super) fn subtract(&mut self, column: &Column) {
         let known = self.weighted(column);
-        axpy(-factor, &known, &mut self.residual);
+        axpy(-1.0, &known, &mut self.residual);
     }
 
     /// RMS of a joint's residual in its own unit, over the rows used.
@@ -468,6 +468,11 @@ impl<'a> Fit<'a> {
 }
 
 impl Evidence {
+    /// p-value corrected for `tried` trials (Bonferroni).
+    pub(super) fn corrected(&self, tried: usize) -> f64 {
+        (self.p_value * tried as f64).min(1.0)
+    }
+
     /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
     pub(super) fn ahead_of(&self, other: &Self) -> f64 {
         let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))

@@ -6,14 +6,14 @@ use rig_shared::effects::{Channel, Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::columns::Candidate;
-use super::engine::effect_of;
 use super::experiment::{self, Nominal};
 use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
-use super::search::{LEAST_GAIN, Profile, SIGNIFICANT, grid, is_first_law, rivals, with};
+use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
+use super::search::{is_first_law, rivals, with};
 use super::{DiagnoseError, testable};
-use crate::robot::{Robot, unit_of};
+use crate::robot::Robot;
 use crate::simulate::Model;
 
 /// Most points of a grid that are looked at.
@@ -152,7 +152,7 @@ pub(super) fn detectable(
                 joint: joint.name.clone(),
                 parameter: gain.name.to_owned(),
                 size,
-                unit: unit_of(gain, joint.kind),
+                unit: found.search.source.unit(candidate, gain),
             });
         }
     }
@@ -236,7 +236,7 @@ pub(super) fn next(
 }
 
 fn effect(profile: &Profile) -> Effect<f64> {
-    effect_of(
+    Effect::new(
         profile.candidate.kind,
         &profile.evidence.gains,
         &profile.shapes,

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
-pub use effects::{Placed, RobotEffect, unit_of};
+pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
 pub use urdf_out::Urdf;
 pub use workspace::Region;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use rig_shared::effects::Kind;
 
-use crate::diagnose::engine::treatment_of;
+use crate::diagnose::bench::treatment_of;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
 use crate::diagnose::{Diagnosis, Options, diagnose};
 use crate::prepare::{Choice, PrepareOptions, Recording};
