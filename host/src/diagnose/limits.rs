@@ -2,6 +2,7 @@
 //!
 //! Leaves out: sizes of what acts between motor and link, which are shapes and not gains.
 
+use nalgebra::DMatrix;
 use rig_shared::effects::{Channel, Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
@@ -166,13 +167,9 @@ fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f6
     // The RMS that is to fall by the least gain is that with the effect in it.
     let kept = (1.0 - LEAST_GAIN).powi(2);
     let visible = (dot_self(left) * (1.0 - kept) / kept / length).sqrt();
-    let of_row = fit.block_of_rows();
-    let mut scores = vec![0.0; fit.blocks()];
-    for (at, (c, r)) in column.iter().zip(left).enumerate() {
-        scores[of_row[at % of_row.len()]] += c * r;
-    }
+    let inverse = DMatrix::from_element(1, 1, 1.0 / length);
+    let std = fit.sandwich(&[column], &inverse, left)[(0, 0)].sqrt();
     let (g, k) = (fit.blocks() as f64, count as f64);
-    let std = (dot_self(&scores) * g / (g - 1.0)).sqrt() / length;
     let freedom = (g - k).max(1.0);
     let level = FisherSnedecor::new(k, freedom)
         .ok()?
