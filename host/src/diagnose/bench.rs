@@ -6,7 +6,8 @@ use rig_shared::effects::{Channel, Kind};
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
-use super::columns::{Candidate, Predicted, Source, predict};
+use super::columns::{Candidate, Source};
+use super::predicted::{Predicted, predict};
 use super::profile::Profile;
 use super::rows::{Column, Nominal, Rows, combined};
 use super::runs::{Run, runs_of};

@@ -6,8 +6,8 @@
 
 use rand::{RngExt, SeedableRng};
 
-use super::columns::Predicted;
 use super::outcome::Place;
+use super::predicted::Predicted;
 use super::rows::Rows;
 use super::runs::Run;
 use crate::prepare::central_difference;

@@ -21,6 +21,7 @@ mod locate;
 mod model;
 pub mod outcome;
 mod pictures;
+mod predicted;
 mod profile;
 mod refit;
 mod rows;
