@@ -44,7 +44,7 @@ pub struct Place {
 pub struct Value {
     /// SI
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation; 0 of a whole number, infinite where the motion does not tell.
     pub std: f64,
     /// ASCII
     pub unit: String,
