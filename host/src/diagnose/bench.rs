@@ -70,6 +70,14 @@ impl<'a> Bench<'a> {
                 &position,
             )?);
         }
+        self.rows(runs)
+    }
+
+    /// The rows of runs, less what the held parameters contribute.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn rows(&self, runs: Vec<Run>) -> Result<Loaded, DiagnoseError> {
         let mut rows = Rows::of(&runs, &self.nominal, &self.treatment)?;
         let held = self.anchor.held_torque(&rows);
         take_off(&mut rows.torque, &held);

@@ -17,8 +17,13 @@ use crate::robot::JointKind;
 /// Share of the whole change's gain that a part of the parameters must reach to speak for it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
 
-/// Least relative change of inertia and gravity that is a payload's.
+/// Least relative change of one nominal parameter at least: a refit beside effects that are not quite the library's moves all
+/// by a per cent.
 const LEAST_CHANGE: f64 = 0.04;
+/// Least relative change of inertia and gravity both that is a payload's …
+const LEAST_OF_BOTH: f64 = 0.01;
+/// … and that in standard deviations.
+const LEAST_SIGMAS: f64 = 4.0;
 
 /// A change of nominal parameters.
 #[derive(Clone, Debug)]
@@ -155,9 +160,10 @@ fn payload(
         after.values[moment] - prior[moment],
         after.values[inertia] - prior[inertia],
     );
-    // A refit beside effects that are not quite the library's moves both by a per cent.
-    let material = |change: f64, prior: f64| change > LEAST_CHANGE * prior.abs();
-    if !(material(dm, prior[moment]) && material(dj, prior[inertia])) {
+    let material = |change: f64, k: usize| {
+        change > LEAST_OF_BOTH * prior[k].abs() && change > LEAST_SIGMAS * after.std(k)
+    };
+    if !(material(dm, moment) && material(dj, inertia)) {
         return None;
     }
     let (distance, mass) = (dj / dm, dm * dm / dj);

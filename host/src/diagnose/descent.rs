@@ -22,6 +22,11 @@ impl Fall {
         [self.models[joint][k], self.models[joint][k + 1]]
     }
 
+    /// Of the last model, joint by joint.
+    pub(super) fn last(&self) -> Vec<f64> {
+        (0..self.models.len()).map(|j| self.whole(j)[1]).collect()
+    }
+
     /// Of the refitted description, and of the last model.
     pub(super) fn whole(&self, joint: usize) -> [f64; 2] {
         let list = &self.models[joint];

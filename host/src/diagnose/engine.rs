@@ -6,13 +6,14 @@ use super::descent::Descent;
 use super::fault::faulty;
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, closed, rank};
+use super::judge::{Judge, Judged, closed, left_of_held, rank};
+use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::outcome::{Diagnosis, Step, Tried, Verdict};
 use super::profile::Profile;
 use super::refit::{Joint, Refit};
 use super::sanity::faults;
-use super::search::Search;
+use super::search::{Search, with};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::robot::{Robot, title_of};
@@ -46,13 +47,37 @@ pub fn diagnose(
         }
     }
     progress(0.1);
-    let refit = Refit::of(&bench, &loaded.rows)?;
-    let mut search = Search::new(
-        bench.source(&loaded, &bench.anchor.values(&refit.before.values))?,
-        library(robot, &loaded.runs, &options.without),
-        crate::prepare::threads(options.threads),
-    );
-    let (found, tried) = searched(&bench, &loaded, &refit, &mut search, progress)?;
+    let lead = {
+        let refit = Refit::of(&bench, &loaded.rows)?;
+        let source = bench.source(&loaded, &bench.anchor.values(&refit.before.values))?;
+        leads(&source, &refit.base, &vec![0.0; robot.joints.len()])?
+    };
+    let loaded = moved(&bench, loaded, &lead)?;
+    let first = Pass::over(&bench, &loaded, options, progress)?;
+    let beside = with(&first.refit.base, &first.found, None);
+    // What was missing may have looked like a lead, or hidden one.
+    let better = leads(&first.search.source, &beside, &lead)?;
+    let again;
+    let (loaded, lead, pass) = if differ(&better, &lead, &loaded.runs) {
+        let more: Vec<f64> = better.iter().zip(&lead).map(|(b, l)| b - l).collect();
+        let runs = loaded.runs.clone();
+        drop((first, beside));
+        drop(loaded.rows);
+        again = moved(&bench, bench.rows(runs)?, &more)?;
+        let pass = Pass::over(&bench, &again, options, progress)?;
+        (&again, better, pass)
+    } else {
+        (&loaded, lead, first)
+    };
+    let sealed = sealed
+        .map(|sealed| moved(&bench, sealed, &lead))
+        .transpose()?;
+    let Pass {
+        refit,
+        search,
+        found,
+        tried,
+    } = pass;
     progress(0.85);
     let coordinates: Vec<_> = (0..robot.joints.len())
         .map(|j| {
@@ -68,11 +93,14 @@ pub fn diagnose(
         base: &refit.base,
         seed: options.seed,
     };
-    let judged = judge.judged(found);
+    let mut judged = judge.judged(found);
+    let descent = Descent::of(&bench, &refit, &judged.chosen, sealed.as_ref())?;
+    if let (None, Some(held)) = (&judged.left, &descent.holdout) {
+        judged.left = left_of_held(robot, &held.last(), &judged.floors);
+    }
     let Judged { chosen, floors, .. } = &judged;
     let joint = refit.joint(&search.source, chosen)?;
     let after = &joint.solution;
-    let descent = Descent::of(&bench, &refit, chosen, sealed.as_ref())?;
     progress(0.95);
     let mut steps = steps(&search, &refit, &judged, &joint, &descent)?;
     let change = change(&bench, &refit, &refit.explained(chosen, after), after);
@@ -84,6 +112,7 @@ pub fn diagnose(
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
+        torque_lead: lead,
         places: judge.places(floors),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
         steps,
@@ -98,7 +127,7 @@ pub fn diagnose(
         maps: Vec::new(),
         curves: Vec::new(),
     };
-    let drawn = sealed.as_ref().unwrap_or(&loaded);
+    let drawn = sealed.as_ref().unwrap_or(loaded);
     let found = Found {
         robot,
         nominal: &bench.nominal,
@@ -124,6 +153,37 @@ pub fn diagnose(
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok((diagnosis, model))
+}
+
+/// A search from the refitted nominal model on.
+struct Pass<'a> {
+    refit: Refit<'a>,
+    search: Search<'a>,
+    found: Vec<Profile>,
+    tried: Vec<Tried>,
+}
+
+impl<'a> Pass<'a> {
+    fn over(
+        bench: &'a Bench,
+        loaded: &'a Loaded,
+        options: &Options,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, DiagnoseError> {
+        let refit = Refit::of(bench, &loaded.rows)?;
+        let mut search = Search::new(
+            bench.source(loaded, &bench.anchor.values(&refit.before.values))?,
+            library(bench.robot, &loaded.runs, &options.without),
+            crate::prepare::threads(options.threads),
+        );
+        let (found, tried) = searched(bench, loaded, &refit, &mut search, progress)?;
+        Ok(Self {
+            refit,
+            search,
+            found,
+            tried,
+        })
+    }
 }
 
 /// The effects, and all that was tried.

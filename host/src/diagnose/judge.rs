@@ -18,6 +18,8 @@ const HALF: f64 = 0.5;
 /// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings: the filters'
 /// treatment of a true structure leaves up to a tenth more.
 const BEYOND_FLOOR: f64 = 1.25;
+/// … of the data held back, whose motion is another.
+const BEYOND_FLOOR_HELD: f64 = 1.5;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
@@ -149,6 +151,24 @@ impl Judge<'_, '_> {
             places,
         })
     }
+}
+
+/// What the last model leaves of data held back, where it leaves no more than noise of the training data: in the joint where
+/// it is most beyond the floor.
+pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Option<Remainder> {
+    let ratio = |j: usize| held[j] / floors[j];
+    let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
+    let name = &robot.joints[j].name;
+    (ratio(j) > BEYOND_FLOOR_HELD).then(|| Remainder {
+        joint: name.clone(),
+        rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
+        ratio: ratio(j),
+        text: format!(
+            "The data held back are left at {:.1} times the noise floor in joint {name}, the training data are not: they show something that the training data hardly do. Give a recording like them with --data.",
+            ratio(j)
+        ),
+        places: Vec::new(),
+    })
 }
 
 /// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first.

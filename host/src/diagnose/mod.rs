@@ -16,6 +16,7 @@ mod finish;
 mod fit;
 mod floor;
 mod judge;
+mod lead;
 mod limits;
 mod locate;
 mod model;

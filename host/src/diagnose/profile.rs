@@ -7,6 +7,7 @@ use rig_shared::effects::{Channel, Kind, Parameter, SHAPES, Scale};
 use super::DiagnoseError;
 use super::columns::Candidate;
 use super::fit::{Evidence, Fit};
+use super::lead::slack;
 use super::rows::Column;
 use super::search::Search;
 
@@ -155,6 +156,15 @@ fn coordinate(shape: &Parameter, value: f64) -> f64 {
     match shape.scale {
         Scale::Logarithmic => value.ln(),
         Scale::Linear | Scale::Whole => value,
+    }
+}
+
+/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit.
+fn searched(shape: &Parameter) -> [f64; 2] {
+    let ([low, high], [least, most]) = (shape.bounds, shape.range);
+    match shape.scale {
+        Scale::Logarithmic => [low.max(0.1 * least), high.min(10.0 * most)],
+        Scale::Linear | Scale::Whole => [low, high],
     }
 }
 
@@ -356,7 +366,7 @@ impl Search<'_> {
         let shape = &scales[place];
         let [step, fine] = spacing(shape, scales.len());
         let middle = coordinate(shape, best.1[place]);
-        let [least, most] = shape.bounds.map(|bound| coordinate(shape, bound));
+        let [least, most] = searched(shape).map(|bound| coordinate(shape, bound));
         let (mut low, mut high) = ((middle - step).max(least), (middle + step).min(most));
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
@@ -390,8 +400,11 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// What physics allows the gains to be.
+    /// What physics allows the gains to be; a delay within the instants of sampling is none.
     fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
+        if kind == Kind::MeasurementDelay {
+            return vec![[slack(self.source.runs), f64::INFINITY]];
+        }
         self.source.gains(kind).iter().map(|g| g.bounds).collect()
     }
 }

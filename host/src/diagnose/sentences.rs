@@ -65,6 +65,16 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
             format_significant(remainder.ratio, 2)
         ));
     }
+    for (lead, w) in d.torque_lead.iter().zip(&d.waterfall) {
+        if *lead != 0.0 {
+            words.push(format!(
+                "The torque of joint {} was recorded {} ms {} it acts, less than a sample, as where a controller holds it until its next one; this was taken out first.",
+                w.joint,
+                number(1e3 * lead.abs()),
+                if *lead > 0.0 { "before" } else { "after" },
+            ));
+        }
+    }
     let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
     if let Some(a) = moved.filter(|_| !d.steps.is_empty()) {
         words.push(format!(

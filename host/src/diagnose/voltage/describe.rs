@@ -100,6 +100,7 @@ impl Told<'_> {
             words,
             noise_floor_rms: vec![self.floor],
             noise_floor_how: "the encoder's smallest step over √12, of the position: a lower bound, as nothing was recorded twice".into(),
+            torque_lead: Vec::new(),
             places: Vec::new(),
             gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
             steps,
