@@ -19,6 +19,8 @@ use super::runs::Run;
 const SEEN: f64 = 4.0;
 /// Share of a sample below which it changes nothing.
 const LEAST: f64 = 0.05;
+/// Share of a sample by which a lead must have changed for another search.
+const WORTH_A_SEARCH: f64 = 0.2;
 /// Most that a torque may come late without being late, s: sensors of one board are read within it.
 const LATE: f64 = 0.001;
 
@@ -65,7 +67,9 @@ pub(super) fn leads(
 /// Whether two sets of leads are worth another search.
 pub(super) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
     let rate = runs.first().map_or(0.0, |run| run.rate);
-    a.iter().zip(b).any(|(a, b)| (a - b).abs() * rate >= LEAST)
+    a.iter()
+        .zip(b)
+        .any(|(a, b)| (a - b).abs() * rate >= WORTH_A_SEARCH)
 }
 
 /// The recordings with each joint's torque where it acts.
