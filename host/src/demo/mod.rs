@@ -29,6 +29,9 @@ pub use run::Run;
 
 /// Speed of the slow reversals that the precompensation is judged by, rad/s.
 const SLOW: f64 = 0.05;
+/// Pause before every motion, s: the thermal time of the winding that the firmware reckons with. Without it two motions in a
+/// row can be more than the motor stands for good.
+const COOLING: f64 = 10.0;
 /// Rest after the slow reversals, in which a limit cycle would show, s.
 const REST: f64 = 5.0;
 /// Speeds of the friction sweep, rad/s: below, at and well above the Stribeck velocity of a servo gear
@@ -127,6 +130,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
                       settings: Vec<RequestBody>,
                       motion: &Trajectory<f64>,
                       rest| {
+        run::pause(session, COOLING)?;
         let run = Run::record(session, settings, motion, rest, &out.join(name))?;
         losses.push(run.losses);
         Ok::<_, DemoError>(run)

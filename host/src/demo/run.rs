@@ -12,6 +12,19 @@ use crate::data::{Column, RecordingWriter};
 use crate::link::experiment::{Experiment, run};
 use crate::link::{COLUMNS, Converter, Event, LossReport, Port, Row, Session, UNITS};
 
+/// Lets a rig hang at rest, disarmed, for some seconds of its own time.
+///
+/// # Errors
+/// What the link says.
+pub(super) fn pause<P: Port>(session: &mut Session<P>, seconds: f64) -> Result<(), DemoError> {
+    let waiting = Experiment {
+        rest: seconds,
+        ..Experiment::default()
+    };
+    run(session, &waiting, |_| ControlFlow::Continue(()))?;
+    Ok(())
+}
+
 /// A recorded run.
 pub struct Run {
     /// Every sample that came.

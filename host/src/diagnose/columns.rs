@@ -11,7 +11,7 @@ use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
-use super::transmission::Driven;
+use super::transmission::{ABREAST, Driven, Load};
 use crate::prepare::{central_difference, second_difference};
 use crate::robot::{Robot, unit_of};
 
@@ -59,20 +59,61 @@ impl Source<'_> {
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
     ) -> Result<Vec<Column>, DiagnoseError> {
-        let n = self.nominal.joints();
-        let mut columns: Vec<Column> = vec![vec![None; n]; self.gains(candidate.kind).len()];
+        let all = self.columns_of(candidate, std::slice::from_ref(shapes))?;
+        Ok(all.into_iter().next().unwrap_or_default())
+    }
+
+    /// One column a gain for each of several shapes.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn columns_of(
+        &self,
+        candidate: &Candidate,
+        shapes: &[[f64; SHAPES]],
+    ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
+        let none: Column = vec![None; self.nominal.joints()];
+        let mut all = vec![vec![none; self.gains(candidate.kind).len()]; shapes.len()];
         for r in 0..self.runs.len() {
-            let full = self.at_full_rate(candidate, shapes, r)?;
-            for (column, signals) in columns.iter_mut().zip(full) {
-                for (j, signal) in signals.iter().enumerate() {
-                    if let Some(signal) = signal {
-                        self.thinning
-                            .push(signal, column[j].get_or_insert_with(Vec::new));
+            for (some, columns) in shapes.chunks(ABREAST).zip(all.chunks_mut(ABREAST)) {
+                let full = self.at_full_rate(candidate, some, r)?;
+                let (mut places, mut signals) = (Vec::new(), Vec::new());
+                for (s, of_shapes) in full.into_iter().enumerate() {
+                    for (g, column) in of_shapes.into_iter().enumerate() {
+                        for (j, signal) in column.into_iter().enumerate() {
+                            if let Some(signal) = signal {
+                                places.push((s, g, j));
+                                signals.push(signal);
+                            }
+                        }
                     }
+                }
+                for ((s, g, j), thin) in places.into_iter().zip(self.thinning.thinned(&signals)) {
+                    columns[s][g][j].get_or_insert_default().extend(thin);
                 }
             }
         }
-        Ok(columns)
+        Ok(all)
+    }
+
+    /// What a gear adds to the torque of its joint over a run, one signal for each of the shapes: nothing where it is none.
+    fn twisted(
+        &self,
+        candidate: &Candidate,
+        shapes: &[[f64; SHAPES]],
+        r: usize,
+    ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+        let run = &self.runs[r];
+        let driven = self.driven(candidate.joint, r)?;
+        let load = Load {
+            period: 1.0 / run.rate,
+            speed: &run.joints[candidate.joint].qd,
+            load: &self.predicted[r].load[candidate.joint],
+            friction: self.friction(candidate.joint),
+        };
+        Ok((driven.excess(candidate.kind, shapes, &load).into_iter())
+            .map(|excess| excess.unwrap_or_else(|| vec![0.0; run.len()]))
+            .collect())
     }
 
     /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
@@ -115,59 +156,49 @@ impl Source<'_> {
         }
     }
 
-    /// One column a gain over one run, joint by joint, at the full rate.
+    /// For each of the shapes one column a gain over one run, joint by joint, at the full rate.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn at_full_rate(
+    fn at_full_rate(
         &self,
         candidate: &Candidate,
-        shapes: &[f64; SHAPES],
+        shapes: &[[f64; SHAPES]],
         r: usize,
-    ) -> Result<Vec<Column>, DiagnoseError> {
-        let (run, predicted) = (&self.runs[r], &self.predicted[r]);
-        let about = candidate.kind.about();
-        let gains = self.gains(candidate.kind).len();
-        let own = |signals: Vec<Vec<f64>>| -> Vec<Column> {
-            (signals.into_iter().take(gains))
-                .map(|signal| {
-                    let mut column: Column = vec![None; self.nominal.joints()];
-                    column[candidate.joint] = Some(signal);
-                    column
-                })
-                .collect()
+    ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
+        let own = |signal: Vec<f64>| {
+            let mut column: Column = vec![None; self.nominal.joints()];
+            column[candidate.joint] = Some(signal);
+            column
         };
-        match (candidate.kind, about.channel) {
-            (_, Channel::Transmission) => {
-                let driven = self.driven(candidate.joint, r)?;
-                let excess = driven.excess(
-                    candidate.kind,
-                    shapes,
-                    candidate.joint,
-                    run,
-                    predicted,
-                    self.friction(candidate.joint),
-                );
-                Ok(own(vec![excess.unwrap_or_else(|| vec![0.0; run.len()])]))
-            }
+        if candidate.kind.about().channel == Channel::Transmission {
+            let signals = self.twisted(candidate, shapes, r)?;
+            return Ok(signals.into_iter().map(|s| vec![own(s)]).collect());
+        }
+        let (run, predicted) = (&self.runs[r], &self.predicted[r]);
+        let gains = self.gains(candidate.kind).len();
+        let of_one = |shapes: &[f64; SHAPES]| match (candidate.kind, candidate.kind.about().channel)
+        {
             (Kind::MeasurementDelay, _) => {
-                let late = late(&predicted.torque[candidate.joint], DELAY * run.rate);
-                let change = (late.iter().zip(&predicted.torque[candidate.joint]))
+                let torque = &predicted.torque[candidate.joint];
+                let change = (late(torque, DELAY * run.rate).iter().zip(torque))
                     .map(|(late, now)| (late - now) / DELAY)
                     .collect();
-                Ok(own(vec![change]))
+                Ok(vec![own(change)])
             }
             (Kind::GravityTilt, _) => self.tilted(run),
             (_, Channel::Position) => {
                 let errors = self.terms(candidate, shapes, run, predicted);
-                let mut columns = Vec::with_capacity(gains);
-                for error in errors.iter().take(gains) {
-                    columns.push(self.misread(candidate.joint, error, run)?);
-                }
-                Ok(columns)
+                (errors.iter().take(gains))
+                    .map(|error| self.misread(candidate.joint, error, run))
+                    .collect()
             }
-            _ => Ok(own(self.terms(candidate, shapes, run, predicted))),
-        }
+            _ => {
+                let terms = self.terms(candidate, shapes, run, predicted);
+                Ok(terms.into_iter().take(gains).map(own).collect())
+            }
+        };
+        shapes.iter().map(of_one).collect()
     }
 
     /// The effect's terms sample by sample.

@@ -63,12 +63,9 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
                     distinct = true;
                 }
                 tried = true;
-                for (place, shapes) in points(kind) {
-                    if distinct {
-                        break;
-                    }
-                    let columns = found.search.cached(c, place, &shapes)?;
-                    distinct = last.distinct(&columns).is_some();
+                if !distinct {
+                    let columns = found.search.cached(c, &grid(kind))?;
+                    distinct = (places(kind)).any(|k| last.distinct(&columns[k]).is_some());
                 }
             }
             if tried && !distinct {
@@ -96,11 +93,10 @@ fn disguised(found: &Found, kind: Kind, joint: usize) -> NotTestable {
     }
 }
 
-/// Points spread over an effect's grid, with their numbers.
-fn points(kind: Kind) -> impl Iterator<Item = (usize, [f64; rig_shared::effects::SHAPES])> {
-    let all = grid(kind);
-    let step = all.len().div_ceil(POINTS).max(1);
-    all.into_iter().enumerate().step_by(step)
+/// Numbers of points spread over an effect's grid.
+fn places(kind: Kind) -> impl Iterator<Item = usize> {
+    let count = grid(kind).len();
+    (0..count).step_by(count.div_ceil(POINTS).max(1))
 }
 
 /// The smallest size of each effect that was tested and not found: the median over its shapes of the gain that would have
@@ -131,9 +127,9 @@ pub(super) fn detectable(
             continue;
         }
         let mut sizes: Vec<(f64, usize)> = Vec::new();
-        for (place, shapes) in points(candidate.kind) {
-            let columns = found.search.cached(c, place, &shapes)?;
-            let Some(projected) = last.distinct(&columns) else {
+        let columns = found.search.cached(c, &grid(candidate.kind))?;
+        for place in places(candidate.kind) {
+            let Some(projected) = last.distinct(&columns[place]) else {
                 continue;
             };
             sizes.extend(

@@ -31,6 +31,7 @@ pub mod sanity;
 pub mod scenario;
 mod search;
 mod sentences;
+mod simplex;
 mod solve;
 pub mod testable;
 mod transmission;

@@ -10,6 +10,8 @@ use super::fit::{Evidence, Fit};
 use super::lead::slack;
 use super::rows::Column;
 use super::search::Search;
+use super::simplex::Simplex;
+use super::transmission::ABREAST;
 
 /// Family-wise probability of a name although nothing is there.
 pub(super) const SIGNIFICANT: f64 = 0.01;
@@ -29,12 +31,14 @@ const PER_DECADE: f64 = 4.0;
 const LINEAR_STEPS: u32 = 8;
 /// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
 const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
-/// Starting points that are followed up.
-const FOLLOWED: usize = 3;
-/// Steps of the simplex.
-const SIMPLEX_STEPS: usize = 80;
+/// Starting points that are followed up, side by side.
+const FOLLOWED: usize = ABREAST;
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
+/// Steps of the recorded position below which a distance is not told from none: the direction of motion is not known to less.
+const STEPS_OF_A_DISTANCE: f64 = 2.0;
+/// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
+const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
 /// A shape is known well enough within this ratio, less one, or this share of a linear range.
 const FINE_ENOUGH: f64 = 0.01;
 
@@ -52,6 +56,8 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// What they do.
     pub(super) evidence: Evidence,
+    /// A shape that has run to the least of what is searched, where a law is its limit of none.
+    pub(super) vanished: Option<&'static str>,
 }
 
 impl Profile {
@@ -59,7 +65,11 @@ impl Profile {
     pub(super) fn refused(&self, tried: usize) -> Option<String> {
         let e = &self.evidence;
         let p = self.corrected(tried);
-        if p > SIGNIFICANT {
+        if let Some(shape) = self.vanished {
+            Some(format!(
+                "its {shape} goes to the least that can be told from none"
+            ))
+        } else if p > SIGNIFICANT {
             Some(format!("p = {p:.2}, corrected for {tried} trials"))
         } else if e.joint_gain < self.least_gain() {
             Some(format!(
@@ -159,13 +169,31 @@ fn coordinate(shape: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit.
-fn searched(shape: &Parameter) -> [f64; 2] {
+/// Where a refinement may go on a joint whose position is resolved that finely: beyond ten times its range a law is no longer
+/// told from its limit, nor is a distance below the position's steps.
+fn searched(shape: &Parameter, resolution: f64) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
-        Scale::Logarithmic => [low.max(0.1 * least), high.min(10.0 * most)],
+        Scale::Logarithmic => {
+            let told = if shape.unit == "rad" {
+                (STEPS_OF_A_DISTANCE * resolution).min(most)
+            } else {
+                0.0
+            };
+            [low.max(0.1 * least).max(told), high.min(10.0 * most)]
+        }
         Scale::Linear | Scale::Whole => [low, high],
     }
+}
+
+/// The shape that stands at the least of what is searched.
+fn vanished(kind: Kind, shapes: &[f64; SHAPES], resolution: f64) -> Option<&'static str> {
+    (kind.about().shapes.iter().zip(shapes))
+        .find(|(shape, value)| {
+            shape.scale == Scale::Logarithmic
+                && **value < (1.0 + AT_THE_END) * searched(shape, resolution)[0]
+        })
+        .map(|(shape, _)| shape.name)
 }
 
 /// The value there, within what physics allows.
@@ -222,8 +250,7 @@ impl Search<'_> {
                 best = Some((share, shapes, columns));
             }
         } else {
-            for (place, shapes) in points.iter().enumerate() {
-                let columns = self.cached(c, place, shapes)?;
+            for (shapes, columns) in points.iter().zip(self.cached(c, &points)?) {
                 let Some(share) = self.explained(fit, c, &columns) else {
                     continue;
                 };
@@ -247,13 +274,10 @@ impl Search<'_> {
             return Ok(None);
         }
         if gear {
-            self.descend(fit, c, &mut best)?;
-            for mut other in followed.into_iter().skip(1) {
-                self.descend(fit, c, &mut other)?;
-                if other.0 > best.0 {
-                    best = other;
-                }
+            if followed.is_empty() {
+                followed.push(best.clone());
             }
+            self.descend(fit, c, &followed, &mut best)?;
         }
         // The simplex has moved all shapes at once; one shape does not wait for another to move.
         let rounds = match about.shapes {
@@ -274,84 +298,71 @@ impl Search<'_> {
         let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
             return Ok(None);
         };
+        let vanished = if gear {
+            None
+        } else {
+            vanished(kind, &best.1, self.resolution[self.library[c].joint])
+        };
         Ok(Some(Profile {
             candidate: self.library[c],
             shapes: best.1,
             columns: best.2,
             evidence,
+            vanished,
         }))
     }
 
-    /// Nelder and Mead's simplex (1965) over the coordinates of all shapes at once: stiffness, damping and play pull on each
-    /// other.
-    fn descend(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
+    /// Simplices from each of the starts, side by side, over the coordinates of all shapes at once: stiffness, damping and
+    /// play pull on each other.
+    fn descend(
+        &self,
+        fit: &Fit,
+        c: usize,
+        starts: &[Best],
+        best: &mut Best,
+    ) -> Result<(), DiagnoseError> {
         let scales = self.library[c].kind.about().shapes;
-        let n = scales.len();
-        let start: Vec<f64> = (scales.iter().zip(&best.1))
-            .map(|(shape, value)| coordinate(shape, *value))
-            .collect();
-        let mut at = |x: &[f64]| -> Result<f64, DiagnoseError> {
-            let mut shapes = [0.0; SHAPES];
-            for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
-                *to = value_at(shape, *x);
-            }
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some(share) = self.explained(fit, c, &columns) else {
-                return Ok(0.0);
-            };
-            if share > best.0 {
-                *best = (share, shapes, columns);
-            }
-            Ok(-share)
-        };
-        let mut simplex = vec![(at(&start)?, start.clone())];
-        for k in 0..n {
-            let mut x = start.clone();
-            // Away from a bound.
-            let linear = scales[k].scale == Scale::Linear;
-            x[k] += if linear && x[k] > 0.5 { -0.4 } else { 0.4 };
-            simplex.push((at(&x)?, x));
-        }
-        for _ in 0..SIMPLEX_STEPS {
-            simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-            if simplex[n].0 - simplex[0].0 < 1e-4 * simplex[0].0.abs() {
-                break;
-            }
-            let middle: Vec<f64> = (0..n)
-                .map(|k| simplex[..n].iter().map(|s| s.1[k]).sum::<f64>() / n as f64)
-                .collect();
-            let along = |t: f64, worst: &[f64]| -> Vec<f64> {
-                middle
-                    .iter()
-                    .zip(worst)
-                    .map(|(m, w)| m + t * (w - m))
-                    .collect()
-            };
-            let worst = simplex[n].1.clone();
-            let x = along(-1.0, &worst);
-            let f = at(&x)?;
-            if f < simplex[0].0 {
-                let far = along(-2.0, &worst);
-                let g = at(&far)?;
-                simplex[n] = if g < f { (g, far) } else { (f, x) };
-            } else if f < simplex[n - 1].0 {
-                simplex[n] = (f, x);
-            } else {
-                let near = along(if f < simplex[n].0 { -0.5 } else { 0.5 }, &worst);
-                let g = at(&near)?;
-                if g < simplex[n].0.min(f) {
-                    simplex[n] = (g, near);
-                } else {
-                    let top = simplex[0].1.clone();
-                    for s in &mut simplex[1..] {
-                        let x: Vec<f64> =
-                            s.1.iter().zip(&top).map(|(x, t)| 0.5 * (x + t)).collect();
-                        *s = (at(&x)?, x);
+        let mut simplices: Vec<Simplex> = (starts.iter())
+            .map(|(_, shapes, _)| {
+                let at: Vec<f64> = (scales.iter().zip(shapes))
+                    .map(|(shape, value)| coordinate(shape, *value))
+                    .collect();
+                // Away from a bound.
+                let away = |shape: &Parameter, x: f64| {
+                    if shape.scale == Scale::Linear && x > 0.5 {
+                        -0.4
+                    } else {
+                        0.4
                     }
+                };
+                let steps: Vec<f64> = (scales.iter().zip(&at)).map(|(s, x)| away(s, *x)).collect();
+                Simplex::new(&at, &steps)
+            })
+            .collect();
+        loop {
+            let asked: Vec<(usize, [f64; SHAPES])> = (simplices.iter().enumerate())
+                .filter_map(|(k, simplex)| {
+                    let x = simplex.asks()?;
+                    let mut shapes = [0.0; SHAPES];
+                    for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
+                        *to = value_at(shape, x);
+                    }
+                    Some((k, shapes))
+                })
+                .collect();
+            if asked.is_empty() {
+                return Ok(());
+            }
+            let shapes: Vec<[f64; SHAPES]> = asked.iter().map(|(_, shapes)| *shapes).collect();
+            let columns = self.source.columns_of(&self.library[c], &shapes)?;
+            for ((k, shapes), columns) in asked.into_iter().zip(columns) {
+                let share = self.explained(fit, c, &columns).unwrap_or(0.0);
+                simplices[k].told(-share);
+                if share > best.0 {
+                    *best = (share, shapes, Arc::new(columns));
                 }
             }
         }
-        Ok(())
     }
 
     /// Golden section over one shape about the best point.
@@ -366,7 +377,8 @@ impl Search<'_> {
         let shape = &scales[place];
         let [step, fine] = spacing(shape, scales.len());
         let middle = coordinate(shape, best.1[place]);
-        let [least, most] = searched(shape).map(|bound| coordinate(shape, bound));
+        let resolution = self.resolution[self.library[c].joint];
+        let [least, most] = searched(shape, resolution).map(|bound| coordinate(shape, bound));
         let (mut low, mut high) = ((middle - step).max(least), (middle + step).min(most));
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {

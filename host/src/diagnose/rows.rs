@@ -1,11 +1,13 @@
 //! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
 
 use nalgebra::Vector3;
+use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::DiagnoseError;
 use super::runs::Run;
+use super::transmission::ABREAST;
 use crate::batch::{ChainBatch, RegressorBlock};
 use crate::identify::{Base, ModelKind, chain_of, transmission_of};
 use crate::prepare::{LowPass, Treatment};
@@ -72,6 +74,25 @@ impl Thinning {
     pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
         let smooth = self.low_pass.zero_phase(signal);
         out.extend(self.kept(signal.len()).map(|k| smooth[k]));
+    }
+
+    /// What is kept of signals of one length.
+    pub(super) fn thinned(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut thin = Vec::with_capacity(signals.len());
+        for four in signals.chunks(ABREAST) {
+            let samples = four[0].len();
+            let lane = |k: usize, s: usize| four.get(s).map_or(0.0, |signal| signal[k]);
+            let abreast: Vec<Lanes<ABREAST>> = (0..samples)
+                .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
+                .collect();
+            let smooth = self.low_pass.zero_phase(&abreast);
+            thin.extend((0..four.len()).map(|s| {
+                self.kept(samples)
+                    .map(|k| smooth[k].0[s])
+                    .collect::<Vec<f64>>()
+            }));
+        }
+        thin
     }
 
     /// Kept samples as they are, without the low-pass.

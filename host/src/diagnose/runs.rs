@@ -54,6 +54,19 @@ impl Run {
     }
 }
 
+/// The least step between two positions of a joint as recorded, rad or m: of an encoder a count, of a filtered position hardly
+/// anything. 0 of a joint that never moves.
+pub(super) fn resolution(runs: &[Run], joint: usize) -> f64 {
+    let steps = runs.iter().flat_map(|run| {
+        let raw = run.joints[joint].q_raw.windows(2);
+        raw.map(|pair| (pair[1] - pair[0]).abs())
+    });
+    let least = steps
+        .filter(|step| *step > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
 /// Reads `recording` stretch by stretch; positions are filtered by `position` (zero phase) and differentiated.
 ///
 /// # Errors

@@ -11,6 +11,7 @@ use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::profile::{LEAST_GAIN, LEAST_SIGMAS, Profile, grid};
 use super::rows::Column;
+use super::runs::resolution;
 
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
@@ -29,13 +30,18 @@ pub(super) struct Search<'a> {
     pub(super) library: Vec<Candidate>,
     /// Threads.
     pub(super) threads: usize,
-    cache: Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>,
+    /// Joint by joint.
+    pub(super) resolution: Vec<f64>,
+    cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
 impl<'a> Search<'a> {
     /// A search.
     pub(super) fn new(source: Source<'a>, library: Vec<Candidate>, threads: usize) -> Self {
         Self {
+            resolution: (0..source.nominal.joints())
+                .map(|joint| resolution(source.runs, joint))
+                .collect(),
             source,
             library,
             threads,
@@ -47,35 +53,27 @@ impl<'a> Search<'a> {
     fn renewed(&mut self, source: Source<'a>) {
         self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.retain(|(c, _), _| !depends_on_model(self.library[*c].kind));
+        cache.retain(|c, _| !depends_on_model(self.library[*c].kind));
     }
 
-    /// Columns of a point of a candidate's grid.
+    /// Columns of the points of a candidate's grid.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn cached(
         &self,
         c: usize,
-        point: usize,
-        shapes: &[f64; SHAPES],
-    ) -> Result<Arc<Vec<Column>>, DiagnoseError> {
-        let key = (c, point);
-        let held = |cache: &Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>| {
-            cache
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .get(&key)
-                .cloned()
-        };
-        if let Some(columns) = held(&self.cache) {
-            return Ok(columns);
+        points: &[[f64; SHAPES]],
+    ) -> Result<Vec<Arc<Vec<Column>>>, DiagnoseError> {
+        let cache = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(held) = cache().get(&c) {
+            return Ok(held.clone());
         }
-        let columns = Arc::new(self.source.columns(&self.library[c], shapes)?);
-        self.cache
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .insert(key, columns.clone());
+        let columns: Vec<Arc<Vec<Column>>> = (self.source.columns_of(&self.library[c], points)?)
+            .into_iter()
+            .map(Arc::new)
+            .collect();
+        cache().insert(c, columns.clone());
         Ok(columns)
     }
 

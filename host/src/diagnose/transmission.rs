@@ -9,13 +9,16 @@
 //! Leaves out: what the twist of one joint does to the others.
 
 use rig_shared::effects::{Kind, SHAPES, transmitted};
+use rig_shared::lanes::Lanes;
+use rig_shared::scalar::Real;
 
 use super::DiagnoseError;
 use super::columns::Source;
-use super::predicted::Predicted;
 use super::rows::motion_of;
 use super::runs::Run;
 
+/// Sets of shapes that go side by side.
+pub(super) const ABREAST: usize = 4;
 /// Steps a sample, at least: contact begins and ends within one.
 const FEWEST_STEPS: usize = 4;
 /// Most steps a sample, where stiffness asks for more the column is not formed.
@@ -63,65 +66,117 @@ impl Driven {
         })
     }
 
-    /// What the drive's torque differs by from a rigid gear's; none where the link has no inertia of its own, the contact is
-    /// too stiff for the steps or the gear softer than [`MOST_TWIST`] allows.
+    /// What the drive's torque differs by from a rigid gear's, one signal for each of the shapes; none where the link has no
+    /// inertia of its own, the contact is too stiff for the steps or the gear softer than [`MOST_TWIST`] allows.
     pub(super) fn excess(
         &self,
         kind: Kind,
-        shapes: &[f64; SHAPES],
-        joint: usize,
-        run: &Run,
-        predicted: &Predicted,
-        friction: [f64; 2],
-    ) -> Option<Vec<f64>> {
-        let [gap, stiffness, damping] = kind.transmission(shapes)?;
+        shapes: &[[f64; SHAPES]],
+        of: &Load,
+    ) -> Vec<Option<Vec<f64>>> {
+        let mut signals = vec![None; shapes.len()];
+        let steps: Vec<Option<usize>> = shapes.iter().map(|s| self.steps(kind, s, of)).collect();
+        let mut counts: Vec<usize> = steps.iter().flatten().copied().collect();
+        counts.sort_unstable();
+        counts.dedup();
+        for count in counts {
+            let alike: Vec<usize> = (0..shapes.len())
+                .filter(|k| steps[*k] == Some(count))
+                .collect();
+            for places in alike.chunks(ABREAST) {
+                let lane = |k: usize| shapes[places[k.min(places.len() - 1)]];
+                let found = if places.len() == 1 {
+                    self.driven::<f64>(kind, &lane(0), count, of)
+                        .map(|torque| vec![torque])
+                } else {
+                    let all: [[f64; SHAPES]; ABREAST] = std::array::from_fn(lane);
+                    let side_by_side = std::array::from_fn(|s| Lanes(all.map(|shape| shape[s])));
+                    self.driven::<Lanes<ABREAST>>(kind, &side_by_side, count, of)
+                        .map(|torque| {
+                            (0..places.len())
+                                .map(|k| torque.iter().map(|lanes| lanes.0[k]).collect())
+                                .collect()
+                        })
+                };
+                for (k, torque) in places.iter().zip(found.unwrap_or_default()) {
+                    signals[*k] = torque.iter().all(|t| t.is_finite()).then_some(torque);
+                }
+            }
+        }
+        signals
+    }
+
+    /// Steps a sample that these shapes ask for, a power of two so that several can go side by side.
+    fn steps(&self, kind: Kind, shapes: &[f64; SHAPES], of: &Load) -> Option<usize> {
+        let [_, stiffness, damping] = kind.transmission(shapes)?;
         let least = self.mass.iter().copied().fold(f64::INFINITY, f64::min);
-        if least.is_nan() || least <= 0.0 {
+        let most = of.load.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
+        if least.is_nan() || least <= 0.0 || most > MOST_TWIST * stiffness {
             return None;
         }
-        let period = 1.0 / run.rate;
         let fast = (stiffness / least).sqrt().max(damping / least);
-        let steps = ((period * fast / STEP).ceil() as usize).max(FEWEST_STEPS);
-        if steps > MOST_STEPS {
-            return None;
-        }
-        let h = period / steps as f64;
+        let steps = (of.period * fast / STEP).ceil().max(FEWEST_STEPS as f64) as usize;
+        (steps <= MOST_STEPS).then(|| steps.next_power_of_two())
+    }
+
+    /// The torque, one lane a set of shapes.
+    fn driven<T: Real>(
+        &self,
+        kind: Kind,
+        shapes: &[T; SHAPES],
+        steps: usize,
+        of: &Load,
+    ) -> Option<Vec<T>> {
+        let [gap, stiffness, damping] = kind.transmission(shapes)?;
         let share = kind.link_friction(shapes)?;
-        let [viscous, coulomb] = friction.map(|f| share * f.max(0.0));
-        let speed = &run.joints[joint].qd;
-        let load = &predicted.load[joint];
-        let first = load.first().copied()?;
-        let most = load.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
-        if most > MOST_TWIST * stiffness {
-            return None;
-        }
+        let number = T::from_f64;
+        let [viscous, coulomb] = of.friction.map(|f| share * number(f.max(0.0)));
+        let first = *of.load.first()?;
+        let per_step = 1.0 / steps as f64;
+        let h = of.period * per_step;
+        let half = number(0.5 * h);
         // At rest on the side that the load presses to.
-        let mut x = 0.5 * gap * first.signum() + first / stiffness;
-        let mut v = 0.0;
-        let mut out = Vec::with_capacity(load.len());
-        out.push(0.0);
-        for k in 1..load.len() {
-            let (from, to) = (load[k - 1], load[k]);
-            let (mass, slope) = (self.mass[k], self.slope[k]);
-            let mut sum = 0.0;
+        let mut x = number(0.5 * first.signum()) * gap + number(first) / stiffness;
+        let mut v = T::ZERO;
+        let mut out = Vec::with_capacity(of.load.len());
+        out.push(T::ZERO);
+        for k in 1..of.load.len() {
+            let (from, to) = (of.load[k - 1], of.load[k]);
+            let (before, after) = (of.speed[k - 1], of.speed[k]);
+            let slope = number(self.slope[k]);
+            // Divisions once a sample: a step waits for the one before it, and they would be most of the wait.
+            let per_torque = number(h / self.mass[k]);
+            let slides = T::ONE / (T::ONE + viscous * per_torque);
+            let sticks = coulomb * per_torque;
+            let mut sum = T::ZERO;
             for s in 0..steps {
-                let part = (s as f64 + 0.5) / steps as f64;
+                let part = (s as f64 + 0.5) * per_step;
                 // Half a step of the twist, the torque in the middle, the other half: second order.
-                let middle = x + 0.5 * h * v;
+                let middle = x + half * v;
                 let torque = transmitted(gap, stiffness, damping, middle, v);
-                let pull = from + part * (to - from) - slope * middle - torque;
+                let pull = number(from + part * (to - from)) - slope * middle - torque;
                 // The link's own velocity after the step, before and after its friction.
-                let motor = speed[k - 1] + part * (speed[k] - speed[k - 1]);
-                let free = motor - v - h * pull / mass;
-                let slid = free / (1.0 + h * viscous / mass);
-                let dry = (mass * slid / h).clamp(-coulomb, coulomb);
-                v = motor - slid + h * dry / mass;
-                x = middle + 0.5 * h * v;
+                let motor = number(before + part * (after - before));
+                let slid = (motor - v - per_torque * pull) * slides;
+                v = motor - slid + slid.clamp_to(-sticks, sticks);
+                x = middle + half * v;
                 sum += torque;
             }
-            let rigid = viscous * speed[k] + coulomb * speed[k].signum();
-            out.push(sum / steps as f64 - 0.5 * (from + to) - rigid);
+            let rigid = viscous * number(after) + coulomb * number(after.signum());
+            out.push(sum * number(per_step) - number(0.5 * (from + to)) - rigid);
         }
-        out.iter().all(|t| t.is_finite()).then_some(out)
+        Some(out)
     }
+}
+
+/// What drives the twist of a joint over a run.
+pub(super) struct Load<'a> {
+    /// Distance of the samples, s.
+    pub(super) period: f64,
+    /// Velocity of the motor over the ratio, rad/s.
+    pub(super) speed: &'a [f64],
+    /// Torque that a rigid gear would transmit, N·m.
+    pub(super) load: &'a [f64],
+    /// Viscous and Coulomb friction of the joint, N·m·s/rad and N·m.
+    pub(super) friction: [f64; 2],
 }
