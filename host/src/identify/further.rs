@@ -8,6 +8,7 @@ use super::essential::{EssentialSet, essential};
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
 use super::parts::Parts;
+use super::position::{PositionTorque, position_torques};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{StandardSet, prior_of, quadratic, quadratic_about, standard_set};
@@ -59,6 +60,17 @@ pub(super) fn own(problem: &Problem) -> Result<Option<Own>, IdentifyError> {
     }))
 }
 
+/// Torques with position that the data show, where the estimator has the description as its prior: without that they
+/// cannot be told from inertia.
+pub(super) fn beyond_description(problem: &Problem) -> Result<Vec<PositionTorque>, IdentifyError> {
+    match problem.options.estimator {
+        Estimator::Ridge | Estimator::Consistent if problem.robot.joints.len() > 1 => {
+            position_torques(problem, &prior(problem))
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
 fn prior(problem: &Problem) -> Prior {
     prior_of(
         problem.robot,
@@ -89,6 +101,8 @@ pub(super) struct Outcome<'a> {
     /// By equation, rows that the residual remembers.
     pub memory: Vec<f64>,
     pub parameters: &'a [BaseParameter],
+    /// RMS torques of training data and hold-out by joint, where torques with position were taken off the rows.
+    pub measured: Option<[Vec<f64>; 2]>,
 }
 
 /// Computes it.
@@ -168,6 +182,7 @@ pub(super) fn further(
             holdout,
             &problem.options.compare,
             &names,
+            result.measured.as_ref(),
         )?);
     }
     if let Some(own) = own {

@@ -24,6 +24,7 @@ mod describe;
 mod differential;
 mod essential;
 mod evaluate;
+mod evidence;
 mod excitation;
 mod factor;
 mod freed;
@@ -39,6 +40,7 @@ mod model;
 mod momentum;
 mod output_error;
 mod parts;
+mod position;
 mod prior;
 mod problem;
 mod pseudo_inertia;
@@ -74,6 +76,7 @@ pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
 pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
+pub use position::PositionTorque;
 pub(crate) use prior::described;
 pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};
@@ -426,6 +429,8 @@ pub struct Identification {
     pub base_parameters: Vec<BaseParameter>,
     /// Residuals by joint.
     pub joints: Vec<JointFigures>,
+    /// Torques with position that the description does not state and the data show; `ridge` and `consistent` look for them.
+    pub position_torques: Vec<PositionTorque>,
     /// What the data say nothing about.
     pub not_excited: Vec<NotExcited>,
     /// Sentences.

@@ -11,6 +11,7 @@ use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
 use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
+use super::position::{PositionTorque, with_position_torques};
 use super::problem::Problem;
 use super::residual::ResidualReport;
 use super::robust::{reweighted, spread_of};
@@ -43,6 +44,33 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
+    match solve(robot, training, holdout, options, None)? {
+        Solved::Whole(found) => Ok(*found),
+        Solved::Anew(torques) => match solve(robot, training, holdout, options, Some(&torques))? {
+            Solved::Whole(found) => Ok(*found),
+            Solved::Anew(_) => Err(IdentifyError::Unsettled {
+                what: "The search for torques with position",
+                passes: 1,
+            }),
+        },
+    }
+}
+
+/// An identification, or torques with position that it has to begin anew with.
+enum Solved {
+    Whole(Box<Identification>),
+    Anew(Vec<PositionTorque>),
+}
+
+fn solve(
+    described: &Robot,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    torques: Option<&[PositionTorque]>,
+) -> Result<Solved, IdentifyError> {
+    let with_torques = with_position_torques(described, torques.unwrap_or_default());
+    let robot = &with_torques;
     let chain = chain_of(robot)?;
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
@@ -263,6 +291,13 @@ pub fn identify(
         start: &weighted_beta,
         instants,
     };
+    if torques.is_none() {
+        let found = further::beyond_description(&problem)?;
+        if !found.is_empty() {
+            return Ok(Solved::Anew(found));
+        }
+    }
+    let known_torques = torques.unwrap_or_default();
     let own = further::own(&problem)?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
@@ -275,8 +310,14 @@ pub fn identify(
             (estimate, spread(&beta, &data.kept, p))
         }
     };
+    let by_position = |j: usize, q: f64| -> f64 {
+        let own = known_torques
+            .iter()
+            .filter(|t| t.joint == robot.joints[j].name);
+        own.map(|t| t.torque(q)).sum()
+    };
     let residuals = |recordings: &[&dyn Recording], surveys: &[Survey]| {
-        torque_residuals(recordings, surveys, &plan, &full)
+        torque_residuals(recordings, surveys, &plan, &full, &by_position)
     };
     let train = residuals(training, &surveys)?;
     let holdout_residuals = if holdout.is_empty() {
@@ -315,6 +356,13 @@ pub fn identify(
                 ModelKind::Integral => vec![estimate.memory_rows],
             },
             parameters: &base_parameters,
+            measured: (!known_torques.is_empty()).then(|| {
+                let rms = |of: &[ResidualReport]| of.iter().map(|r| r.torque_rms).collect();
+                [
+                    rms(&train),
+                    rms(holdout_residuals.as_deref().unwrap_or_default()),
+                ]
+            }),
         },
         holdout,
     )?;
@@ -369,10 +417,15 @@ pub fn identify(
             ));
         }
     }
-    let [taken, left] = effects.uncompensated();
+    let stated = Effects::of(described).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let [taken, left] = stated.uncompensated();
     warnings.extend(left);
-    let procedure = taken.into_iter().chain(beyond.procedure).collect();
-    Ok(Identification {
+    let procedure = taken
+        .into_iter()
+        .chain(known_torques.iter().map(PositionTorque::said))
+        .chain(beyond.procedure)
+        .collect();
+    Ok(Solved::Whole(Box::new(Identification {
         schema: "rig-identification/1".into(),
         robot: robot.name.clone(),
         model: options.model,
@@ -392,6 +445,7 @@ pub fn identify(
                 holdout_relative_error: holdout_residuals.as_ref().map(|h| h[j].relative_error),
             })
             .collect(),
+        position_torques: known_torques.to_vec(),
         not_excited,
         warnings,
         essential: beyond.essential,
@@ -411,7 +465,7 @@ pub fn identify(
                 .then(|| (window as f64 * treatment.dt(), window_reason)),
             treatment,
         },
-    })
+    })))
 }
 
 fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
