@@ -39,14 +39,6 @@ impl Seen {
         let left = (factor.right_side_squares() - z.norm_squared()).max(0.0);
         Self { r, z, left }
     }
-
-    /// The smallest β that leaves least.
-    pub(super) fn least_squares(&self) -> Vec<f64> {
-        let svd = self.r.clone().svd(true, true);
-        let smallest = 1e-10 * svd.singular_values.max();
-        svd.solve(&self.z, smallest)
-            .map_or(vec![0.0; self.z.len()], |x| x.as_slice().to_vec())
-    }
 }
 
 /// What is believed before the data: values, natural sizes, and which of them the description states.

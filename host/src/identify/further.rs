@@ -1,6 +1,7 @@
 //! What an identification holds beyond least squares: the other estimators, the essential and the physically
 //! consistent parameters, the comparison.
 
+use super::beyond::{Beyond, beyond};
 use super::compare::{Comparison, compare, fit};
 use super::consistent::consistent;
 use super::covariance::Estimate;
@@ -8,7 +9,6 @@ use super::essential::{EssentialSet, essential};
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
 use super::parts::Parts;
-use super::position::{PositionTorque, position_torques};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{StandardSet, prior_of, quadratic, quadratic_about, standard_set};
@@ -60,14 +60,17 @@ pub(super) fn own(problem: &Problem) -> Result<Option<Own>, IdentifyError> {
     }))
 }
 
-/// Torques with position that the data show, where the estimator has the description as its prior: without that they
-/// cannot be told from inertia.
-pub(super) fn beyond_description(problem: &Problem) -> Result<Vec<PositionTorque>, IdentifyError> {
+/// What the data show beyond the description, where the estimator has it as its prior: without that, torques with position
+/// cannot be told from inertia. `factors` are those of the fitted equations.
+pub(super) fn beyond_description(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+) -> Result<Beyond, IdentifyError> {
     match problem.options.estimator {
         Estimator::Ridge | Estimator::Consistent if problem.robot.joints.len() > 1 => {
-            position_torques(problem, &prior(problem))
+            beyond(problem, factors, &prior(problem))
         }
-        _ => Ok(Vec::new()),
+        _ => Ok(Beyond::default()),
     }
 }
 

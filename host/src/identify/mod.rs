@@ -15,6 +15,7 @@
 
 mod band;
 mod base;
+mod beyond;
 mod cache;
 mod closed;
 mod compare;
@@ -51,6 +52,8 @@ mod slow;
 mod solve;
 mod speed;
 mod standard;
+mod terms;
+mod tilt;
 mod total;
 mod twin;
 
@@ -82,6 +85,7 @@ pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};
 pub use solve::identify;
 pub use standard::{StandardParameter, StandardSet};
+pub use tilt::BaseTilt;
 
 use crate::prepare::{Masked, PrepareError, PrepareOptions, Survey, Treatment};
 use crate::robot::Robot;
@@ -431,6 +435,8 @@ pub struct Identification {
     pub joints: Vec<JointFigures>,
     /// Torques with position that the description does not state and the data show; `ridge` and `consistent` look for them.
     pub position_torques: Vec<PositionTorque>,
+    /// Gravity off the direction that the description states, where the data show it; the same estimators look for it.
+    pub base_tilt: Option<BaseTilt>,
     /// What the data say nothing about.
     pub not_excited: Vec<NotExcited>,
     /// Sentences.

@@ -2,6 +2,7 @@
 
 use super::band::explained_band;
 use super::base::{Base, chain_of, expression, transmission_of};
+use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
@@ -11,7 +12,6 @@ use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
 use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
-use super::position::{PositionTorque, with_position_torques};
 use super::problem::Problem;
 use super::residual::ResidualReport;
 use super::robust::{reweighted, spread_of};
@@ -46,20 +46,20 @@ pub fn identify(
     further::check(options)?;
     match solve(robot, training, holdout, options, None)? {
         Solved::Whole(found) => Ok(*found),
-        Solved::Anew(torques) => match solve(robot, training, holdout, options, Some(&torques))? {
+        Solved::Anew(more) => match solve(robot, training, holdout, options, Some(&more))? {
             Solved::Whole(found) => Ok(*found),
             Solved::Anew(_) => Err(IdentifyError::Unsettled {
-                what: "The search for torques with position",
+                what: "The search for what the description does not state",
                 passes: 1,
             }),
         },
     }
 }
 
-/// An identification, or torques with position that it has to begin anew with.
+/// An identification, or what it has to begin anew with.
 enum Solved {
     Whole(Box<Identification>),
-    Anew(Vec<PositionTorque>),
+    Anew(Beyond),
 }
 
 fn solve(
@@ -67,10 +67,12 @@ fn solve(
     training: &[&dyn Recording],
     holdout: &[&dyn Recording],
     options: &Options,
-    torques: Option<&[PositionTorque]>,
+    added: Option<&Beyond>,
 ) -> Result<Solved, IdentifyError> {
-    let with_torques = with_position_torques(described, torques.unwrap_or_default());
-    let robot = &with_torques;
+    let nothing = Beyond::default();
+    let known = added.unwrap_or(&nothing);
+    let with_known = with_beyond(described, &known.torques, known.tilt.as_ref());
+    let robot = &with_known;
     let chain = chain_of(robot)?;
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
@@ -104,13 +106,13 @@ fn solve(
         decided.admits(s)?;
     }
     let effects = Effects::of(robot).map_err(|e| IdentifyError::Model(e.to_string()))?;
-    let known = if effects.is_empty() {
+    let rid = if effects.is_empty() {
         [const { Vec::new() }; 3]
     } else {
         let free = |list| freed(list, &effects, &chain, &decided);
         [free(training)?, free(holdout)?, free(sources)?]
     };
-    let [known_training, known_holdout, known_sources] = known.each_ref().map(|l| plain(l));
+    let [known_training, known_holdout, known_sources] = rid.each_ref().map(|l| plain(l));
     let spooled = [Spooled::all(&known_training), Spooled::all(&known_holdout)];
     let [spooled_training, spooled_holdout] = spooled.each_ref().map(|l| plain(l));
     let (training, holdout, sources) = if effects.is_empty() {
@@ -291,13 +293,12 @@ fn solve(
         start: &weighted_beta,
         instants,
     };
-    if torques.is_none() {
-        let found = further::beyond_description(&problem)?;
+    if added.is_none() {
+        let found = further::beyond_description(&problem, &factors)?;
         if !found.is_empty() {
             return Ok(Solved::Anew(found));
         }
     }
-    let known_torques = torques.unwrap_or_default();
     let own = further::own(&problem)?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
@@ -311,7 +312,8 @@ fn solve(
         }
     };
     let by_position = |j: usize, q: f64| -> f64 {
-        let own = known_torques
+        let own = known
+            .torques
             .iter()
             .filter(|t| t.joint == robot.joints[j].name);
         own.map(|t| t.torque(q)).sum()
@@ -356,7 +358,7 @@ fn solve(
                 ModelKind::Integral => vec![estimate.memory_rows],
             },
             parameters: &base_parameters,
-            measured: (!known_torques.is_empty()).then(|| {
+            measured: (!known.torques.is_empty()).then(|| {
                 let rms = |of: &[ResidualReport]| of.iter().map(|r| r.torque_rms).collect();
                 [
                     rms(&train),
@@ -422,7 +424,7 @@ fn solve(
     warnings.extend(left);
     let procedure = taken
         .into_iter()
-        .chain(known_torques.iter().map(PositionTorque::said))
+        .chain(known.said())
         .chain(beyond.procedure)
         .collect();
     Ok(Solved::Whole(Box::new(Identification {
@@ -445,7 +447,8 @@ fn solve(
                 holdout_relative_error: holdout_residuals.as_ref().map(|h| h[j].relative_error),
             })
             .collect(),
-        position_torques: known_torques.to_vec(),
+        position_torques: known.torques.clone(),
+        base_tilt: known.tilt.clone(),
         not_excited,
         warnings,
         essential: beyond.essential,

@@ -98,3 +98,55 @@ fn plain_fits_look_for_nothing() {
     let found = identify(&robot, &[&recording], &[], &Options::default()).unwrap();
     assert!(found.position_torques.is_empty());
 }
+
+/// A base turned by 1.5 degrees, and one that is level as described.
+#[test]
+fn a_tilted_base_is_found_and_a_level_one_is_not() {
+    for (seed, degrees) in [(0, 1.5f64), (1, 1.5), (2, 0.0), (3, 0.0)] {
+        let tilt = degrees.to_radians();
+        let mut robot = arm(3, 60 + seed);
+        let level = robot.gravity;
+        let direction = (0.8, 0.6);
+        let size = level[2];
+        robot.gravity = [
+            size * tilt.sin() * direction.0,
+            size * tilt.sin() * direction.1,
+            size * tilt.cos(),
+        ];
+        let truth = robot.gravity;
+        let noise = Noise {
+            position: 2e-6,
+            torque: 0.05,
+            ..Default::default()
+        };
+        let recording = record(&robot, 40.0, 200.0, noise, seed);
+        robot.gravity = level;
+        for joint in &mut robot.joints {
+            let link = joint.inertial.as_mut().unwrap();
+            link.mass *= 1.2;
+            link.first_moment = link.first_moment.map(|x| 0.8 * x);
+            link.inertia = link.inertia.map(|x| 1.2 * x);
+        }
+        let options = Options {
+            estimator: Estimator::Ridge,
+            ..Default::default()
+        };
+        let found = identify(&robot, &[&recording], &[], &options).unwrap();
+        println!("{seed} {degrees}: {:?}", found.base_tilt);
+        assert!(found.position_torques.is_empty());
+        if degrees == 0.0 {
+            assert!(found.base_tilt.is_none());
+            continue;
+        }
+        let tilted = found.base_tilt.as_ref().unwrap();
+        assert!((tilted.angle - tilt).abs() < 4.0 * tilted.std && tilted.std < 0.2 * tilt);
+        for (shown, truth) in tilted.gravity.iter().zip(truth) {
+            assert!(
+                (shown - truth).abs() < 4.0 * 9.81 * tilted.std,
+                "{tilted:?} {truth}"
+            );
+        }
+        let (written, _) = identified_robot(&robot, &found);
+        assert_eq!(written.gravity, tilted.gravity);
+    }
+}
