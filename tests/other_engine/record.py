@@ -2,7 +2,8 @@
 """Records an arm with a dynamics engine that shares no line with this project: MuJoCo or Pinocchio.
 
 Writes into --out: robot.urdf (geometry; its inertial values are stand-ins, not the arm's), train.csv and holdout.csv
-(columns t, q1 ..., tau1 ...: SI, joint side), truth.json (engine, noise put in per joint).
+(columns t, q1 ..., tau1 ...: SI, joint side), truth.json (engine, noise put in per joint, and what least squares with
+Pinocchio's regressor at the exact motion leaves of the hold-out over that noise: the noise in the data lets no unbiased fit do better on average).
 
 The motion is a Fourier series over 20 s per joint, 5 harmonics, other coefficients in the hold-out. The engine gives
 the torque; friction fv*qd + fc*sgn(qd) and a constant are added by this script. Noise of the torque: Gaussian, below
@@ -128,6 +129,31 @@ def torque_of_pinocchio(text, q, qd, qdd):
     return np.array([pinocchio.rnea(model, data, *row) for row in zip(q, qd, qdd)])
 
 
+def regressor(text, q, qd, qdd):
+    """Inertial parameters of the links, then viscous and Coulomb friction and offset of each joint."""
+    import pinocchio
+
+    model = pinocchio.buildModelFromXML(text)
+    data = model.createData()
+    links = np.array([pinocchio.computeJointTorqueRegressor(model, data, *row) for row in zip(q, qd, qdd)])
+    n = q.shape[1]
+    friction = np.zeros((len(q), n, 3 * n))
+    for j in range(n):
+        friction[:, j, 3 * j : 3 * j + 3] = np.column_stack([qd[:, j], np.sign(qd[:, j]), np.ones(len(q))])
+    return np.concatenate([links, friction], axis=2)
+
+
+def exact_least_squares(recorded, sigma):
+    """RMS residual of the hold-out by joint, over its noise. Rows are weighted by the noise put in."""
+    regressors, torque = recorded["train"]
+    columns = regressors.shape[2]
+    rows = (regressors / sigma["train"][:, None]).reshape(-1, columns)
+    size = np.maximum(np.linalg.norm(rows, axis=0), 1e-12)
+    found = np.linalg.lstsq(rows / size, (torque / sigma["train"]).ravel(), rcond=1e-10)[0] / size
+    regressors, torque = recorded["holdout"]
+    return np.sqrt(np.mean((torque - regressors @ found) ** 2, axis=0)) / sigma["holdout"]
+
+
 def noise(generator, rows, joints):
     white = generator.normal(size=(rows, joints))
     spectrum = np.fft.rfft(white, axis=0)
@@ -153,17 +179,21 @@ def main():
     chosen.out.mkdir(parents=True, exist_ok=True)
     truth = {"engine": chosen.engine, "arm": chosen.arm, "seed": chosen.seed, "noise_share": NOISE_SHARE, "noise_rms": {}}
     peak = np.zeros(n)
+    recorded, sigmas = {}, {}
     for name in ("train", "holdout"):
         t, q, qd, qdd = motion(arm, generator)
         torque = engine(text, q, qd, qdd) + viscous * qd + coulomb * np.sign(qd) + offset
         sigma = NOISE_SHARE * np.sqrt(np.mean(torque**2, axis=0))
         torque = torque + sigma * noise(generator, len(t), n)
         truth["noise_rms"][name] = sigma.tolist()
+        few = slice(None, None, int(RATE / (10.0 * NOISE_BAND)))
+        recorded[name], sigmas[name] = (regressor(text, q[few], qd[few], qdd[few]), torque[few]), sigma
         peak = np.maximum(peak, np.abs(torque).max(axis=0))
         count = np.array([2.0 * np.pi / ENCODER if kind == "revolute" else 1.0 / ENCODER for *_, kind, _ in arm])
         table = np.column_stack([t, np.round(q / count) * count, torque])
         header = ",".join(["t"] + [f"q{i}" for i in range(1, n + 1)] + [f"tau{i}" for i in range(1, n + 1)])
         np.savetxt(chosen.out / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
+    truth["exact_least_squares"] = exact_least_squares(recorded, sigmas).tolist()
     stand_in = [(1.0, np.zeros(3), np.eye(3) * 0.01)] * n
     (chosen.out / "robot.urdf").write_text(urdf(chosen.arm, arm, stand_in, 2.0 * peak))
     (chosen.out / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")

@@ -104,8 +104,7 @@ fn double_pendulum() {
             &format!("double pendulum, {model:?}"),
             &errors(&found),
             &[24.7, 16.7],
-            // Why joint 1 is worse is not known.
-            &[(1, 25.6)],
+            &[],
         );
     }
 }
@@ -119,19 +118,45 @@ fn lwr() -> Option<(Robot, PathBuf)> {
 fn lwr_repeats_its_motion() {
     let Some((robot, data)) = lwr() else { return };
     for model in BOTH {
+        for estimator in [Estimator::Ridge, Estimator::Consistent] {
+            let found = fit(
+                &robot,
+                &[data.join("run1.csv")],
+                &[data.join("run2.csv")],
+                model,
+                estimator,
+            );
+            no_worse(
+                &format!("LWR4+ 1 → 2, {model:?}, {estimator:?}"),
+                &errors(&found),
+                &[18.0, 1.2, 8.5, 1.8, 28.1, 29.4, 58.2],
+                &[],
+            );
+        }
+    }
+}
+
+/// Its base was not level: three recordings, two motions and two speeds say so alike, each for itself.
+#[test]
+fn lwr_stood_on_a_base_that_is_not_level() {
+    let Some((robot, data)) = lwr() else { return };
+    assert_eq!(Estimator::for_robot(&robot), Estimator::Ridge);
+    for run in 1..=3 {
+        let training = [data.join(format!("run{run}.csv"))];
         let found = fit(
             &robot,
-            &[data.join("run1.csv")],
-            &[data.join("run2.csv")],
-            model,
-            Estimator::for_robot(&robot),
+            &training,
+            &[],
+            ModelKind::Differential,
+            Estimator::Ridge,
         );
-        no_worse(
-            &format!("LWR4+ 1 → 2, {model:?}"),
-            &errors(&found),
-            &[18.0, 1.2, 8.5, 1.8, 28.1, 29.4, 58.2],
-            // The plain fit learns what repeats, with a last link that no body can be.
-            &[(6, 31.2), (7, 62.3)],
+        let tilt = found.base_tilt.unwrap();
+        println!("LWR4+ run {run}: {tilt:?}");
+        let [x, y, _] = tilt.gravity;
+        let off = (x - 0.064).hypot(y + 0.245) / 9.81;
+        assert!(
+            off < 3.0 * tilt.std && tilt.std < 0.25 * tilt.angle,
+            "{off}"
         );
     }
 }
@@ -157,6 +182,12 @@ fn lwr_predicts_another_motion_better_with_what_the_description_says() {
             let plain = of(Estimator::Weighted);
             for estimator in [Estimator::Ridge, Estimator::Consistent] {
                 let found = of(estimator);
+                no_worse(
+                    &format!("LWR4+ {} → 3, {model:?}, {estimator:?}", training.len()),
+                    &found,
+                    &[82.0, 6.0, 51.0, 12.0, 110.0, 96.0, 142.0],
+                    &[],
+                );
                 println!(
                     "LWR4+ {} → 3, {model:?}: weighted {plain:.0?} %, {estimator:?} {found:.0?} %",
                     training.len()
@@ -260,10 +291,10 @@ fn tx40_predicts_the_rest_of_its_motion() {
     let robot = described("tx40.toml");
     let place = tempfile::tempdir().unwrap();
     let published = [8.4, 8.3, 15.6, 12.2, 45.1, 19.3];
-    // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file.
-    // After 7.5 s the arm rests, where no model here has its friction. Whether that is why joint 5 is worse is not shown.
-    let moving: &[(usize, f64)] = &[(6, 19.5)];
-    for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 52.5)])] {
+    // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file: what is left of joint 5 there is no
+    // larger than in training, only its torque is (docs/arms.md).
+    let moving: &[(usize, f64)] = &[];
+    for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 48.1)])] {
         let train = tx40_part(&data, place.path(), &format!("train{until}.csv"), 0..until);
         let rest = tx40_part(&data, place.path(), &format!("rest{until}.csv"), until..end);
         for model in BOTH {

@@ -153,7 +153,8 @@ fn distance(
     }
 }
 
-/// Fits with every estimator of `list` and judges.
+/// Fits with every estimator of `list` and judges. `measured` are the RMS torques of training data and hold-out, joint by
+/// joint, where the rows do not hold all of the torque.
 pub(super) fn compare(
     problem: &Problem,
     parts: &Parts,
@@ -161,12 +162,13 @@ pub(super) fn compare(
     holdout: &[&dyn Recording],
     list: &[Estimator],
     names: &[String],
+    measured: Option<&[Vec<f64>; 2]>,
 ) -> Result<Comparison, IdentifyError> {
     let weighted = least(problem, parts, problem.weights)?;
     let weighted_covariance = weighted.kept.covariance();
     let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;
     let held = judge(problem, holdout)?;
-    let torque = parts.torque_rms();
+    let torque = measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone());
     let mut rows = Vec::new();
     let mut instrumental: Option<Fitted> = None;
     for &estimator in list {
@@ -200,10 +202,15 @@ pub(super) fn compare(
                     holdout_relative_error: held.as_ref().map(|factors| {
                         factors
                             .iter()
-                            .map(|f| {
-                                (f.residual_squares(&fitted.full.whole)
-                                    / f.right_side_squares().max(f64::MIN_POSITIVE))
-                                .sqrt()
+                            .enumerate()
+                            .map(|(j, f)| {
+                                let rows = f.rows().max(1) as f64;
+                                let left = (f.residual_squares(&fitted.full.whole) / rows).sqrt();
+                                let all = measured.map_or_else(
+                                    || (f.right_side_squares() / rows).sqrt(),
+                                    |[_, holdout]| holdout[j],
+                                );
+                                left / all.max(f64::MIN_POSITIVE)
                             })
                             .collect()
                     }),

@@ -5,6 +5,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::Identification;
+use super::beyond::with_beyond;
 use super::prior::described;
 use crate::robot::{JointKind, Robot};
 
@@ -17,6 +18,11 @@ use crate::robot::{JointKind, Robot};
 /// had to be said.
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let details = &identification.details;
+    let robot = &with_beyond(
+        robot,
+        &identification.position_torques,
+        identification.base_tilt.as_ref(),
+    );
     if let Some(set) = &identification.standard_parameters {
         let mut pi = described(robot, details.combination.ncols());
         for (entry, value) in pi.iter_mut().zip(set.values()) {

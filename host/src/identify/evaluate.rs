@@ -84,12 +84,14 @@ pub(super) fn covariance(
 }
 
 /// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
-/// can be compared.
+/// can be compared. `by_position` is the torque (of a joint at a position) that was taken off
+/// before the fit without being stated: measured and predicted torque are shown with it.
 pub(crate) fn torque_residuals(
     recordings: &[&dyn Recording],
     surveys: &[Survey],
     plan: &Plan,
     full: &[f64],
+    by_position: &dyn Fn(usize, f64) -> f64,
 ) -> Result<Vec<ResidualReport>, IdentifyError> {
     let total: u64 = surveys
         .iter()
@@ -132,14 +134,15 @@ pub(crate) fn torque_residuals(
         each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
             for i in 0..rows.t.len() {
                 for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
+                    let known = by_position(j, rows.q[j][i]);
                     let predicted = product(&equation.x[i * p..(i + 1) * p], full);
                     stream.push(
                         index,
                         rows.t[i],
                         rows.q[j][i],
                         rows.qd[j][i],
-                        equation.y[i],
-                        predicted,
+                        equation.y[i] + known,
+                        predicted + known,
                         equation.keep[i],
                     );
                 }

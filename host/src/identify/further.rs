@@ -1,6 +1,7 @@
 //! What an identification holds beyond least squares: the other estimators, the essential and the physically
 //! consistent parameters, the comparison.
 
+use super::beyond::{Beyond, beyond};
 use super::compare::{Comparison, compare, fit};
 use super::consistent::consistent;
 use super::covariance::Estimate;
@@ -59,6 +60,20 @@ pub(super) fn own(problem: &Problem) -> Result<Option<Own>, IdentifyError> {
     }))
 }
 
+/// What the data show beyond the description, where the estimator has it as its prior: without that, torques with position
+/// cannot be told from inertia. `factors` are those of the fitted equations.
+pub(super) fn beyond_description(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+) -> Result<Beyond, IdentifyError> {
+    match problem.options.estimator {
+        Estimator::Ridge | Estimator::Consistent if problem.robot.joints.len() > 1 => {
+            beyond(problem, factors, &prior(problem))
+        }
+        _ => Ok(Beyond::default()),
+    }
+}
+
 fn prior(problem: &Problem) -> Prior {
     prior_of(
         problem.robot,
@@ -89,6 +104,8 @@ pub(super) struct Outcome<'a> {
     /// By equation, rows that the residual remembers.
     pub memory: Vec<f64>,
     pub parameters: &'a [BaseParameter],
+    /// RMS torques of training data and hold-out by joint, where torques with position were taken off the rows.
+    pub measured: Option<[Vec<f64>; 2]>,
 }
 
 /// Computes it.
@@ -168,6 +185,7 @@ pub(super) fn further(
             holdout,
             &problem.options.compare,
             &names,
+            result.measured.as_ref(),
         )?);
     }
     if let Some(own) = own {

@@ -15,6 +15,7 @@
 
 mod band;
 mod base;
+mod beyond;
 mod cache;
 mod closed;
 mod compare;
@@ -24,6 +25,7 @@ mod describe;
 mod differential;
 mod essential;
 mod evaluate;
+mod evidence;
 mod excitation;
 mod factor;
 mod freed;
@@ -39,6 +41,7 @@ mod model;
 mod momentum;
 mod output_error;
 mod parts;
+mod position;
 mod prior;
 mod problem;
 mod pseudo_inertia;
@@ -49,6 +52,8 @@ mod slow;
 mod solve;
 mod speed;
 mod standard;
+mod terms;
+mod tilt;
 mod total;
 mod twin;
 
@@ -74,11 +79,13 @@ pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
 pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
+pub use position::PositionTorque;
 pub(crate) use prior::described;
 pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};
 pub use solve::identify;
 pub use standard::{StandardParameter, StandardSet};
+pub use tilt::BaseTilt;
 
 use crate::prepare::{Masked, PrepareError, PrepareOptions, Survey, Treatment};
 use crate::robot::Robot;
@@ -426,6 +433,10 @@ pub struct Identification {
     pub base_parameters: Vec<BaseParameter>,
     /// Residuals by joint.
     pub joints: Vec<JointFigures>,
+    /// Torques with position that the description does not state and the data show; `ridge` and `consistent` look for them.
+    pub position_torques: Vec<PositionTorque>,
+    /// Gravity off the direction that the description states, where the data show it; the same estimators look for it.
+    pub base_tilt: Option<BaseTilt>,
     /// What the data say nothing about.
     pub not_excited: Vec<NotExcited>,
     /// Sentences.

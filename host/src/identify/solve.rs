@@ -2,6 +2,7 @@
 
 use super::band::explained_band;
 use super::base::{Base, chain_of, expression, transmission_of};
+use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{covariance, torque_residuals};
@@ -43,6 +44,35 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
+    match solve(robot, training, holdout, options, None)? {
+        Solved::Whole(found) => Ok(*found),
+        Solved::Anew(more) => match solve(robot, training, holdout, options, Some(&more))? {
+            Solved::Whole(found) => Ok(*found),
+            Solved::Anew(_) => Err(IdentifyError::Unsettled {
+                what: "The search for what the description does not state",
+                passes: 1,
+            }),
+        },
+    }
+}
+
+/// An identification, or what it has to begin anew with.
+enum Solved {
+    Whole(Box<Identification>),
+    Anew(Beyond),
+}
+
+fn solve(
+    described: &Robot,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    added: Option<&Beyond>,
+) -> Result<Solved, IdentifyError> {
+    let nothing = Beyond::default();
+    let known = added.unwrap_or(&nothing);
+    let with_known = with_beyond(described, &known.torques, known.tilt.as_ref());
+    let robot = &with_known;
     let chain = chain_of(robot)?;
     let transmission = transmission_of(robot)?;
     let joints = robot.joints.len();
@@ -76,13 +106,13 @@ pub fn identify(
         decided.admits(s)?;
     }
     let effects = Effects::of(robot).map_err(|e| IdentifyError::Model(e.to_string()))?;
-    let known = if effects.is_empty() {
+    let rid = if effects.is_empty() {
         [const { Vec::new() }; 3]
     } else {
         let free = |list| freed(list, &effects, &chain, &decided);
         [free(training)?, free(holdout)?, free(sources)?]
     };
-    let [known_training, known_holdout, known_sources] = known.each_ref().map(|l| plain(l));
+    let [known_training, known_holdout, known_sources] = rid.each_ref().map(|l| plain(l));
     let spooled = [Spooled::all(&known_training), Spooled::all(&known_holdout)];
     let [spooled_training, spooled_holdout] = spooled.each_ref().map(|l| plain(l));
     let (training, holdout, sources) = if effects.is_empty() {
@@ -263,6 +293,12 @@ pub fn identify(
         start: &weighted_beta,
         instants,
     };
+    if added.is_none() {
+        let found = further::beyond_description(&problem, &factors)?;
+        if !found.is_empty() {
+            return Ok(Solved::Anew(found));
+        }
+    }
     let own = further::own(&problem)?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
@@ -275,8 +311,15 @@ pub fn identify(
             (estimate, spread(&beta, &data.kept, p))
         }
     };
+    let by_position = |j: usize, q: f64| -> f64 {
+        let own = known
+            .torques
+            .iter()
+            .filter(|t| t.joint == robot.joints[j].name);
+        own.map(|t| t.torque(q)).sum()
+    };
     let residuals = |recordings: &[&dyn Recording], surveys: &[Survey]| {
-        torque_residuals(recordings, surveys, &plan, &full)
+        torque_residuals(recordings, surveys, &plan, &full, &by_position)
     };
     let train = residuals(training, &surveys)?;
     let holdout_residuals = if holdout.is_empty() {
@@ -315,6 +358,13 @@ pub fn identify(
                 ModelKind::Integral => vec![estimate.memory_rows],
             },
             parameters: &base_parameters,
+            measured: (!known.torques.is_empty()).then(|| {
+                let rms = |of: &[ResidualReport]| of.iter().map(|r| r.torque_rms).collect();
+                [
+                    rms(&train),
+                    rms(holdout_residuals.as_deref().unwrap_or_default()),
+                ]
+            }),
         },
         holdout,
     )?;
@@ -369,10 +419,15 @@ pub fn identify(
             ));
         }
     }
-    let [taken, left] = effects.uncompensated();
+    let stated = Effects::of(described).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let [taken, left] = stated.uncompensated();
     warnings.extend(left);
-    let procedure = taken.into_iter().chain(beyond.procedure).collect();
-    Ok(Identification {
+    let procedure = taken
+        .into_iter()
+        .chain(known.said())
+        .chain(beyond.procedure)
+        .collect();
+    Ok(Solved::Whole(Box::new(Identification {
         schema: "rig-identification/1".into(),
         robot: robot.name.clone(),
         model: options.model,
@@ -392,6 +447,8 @@ pub fn identify(
                 holdout_relative_error: holdout_residuals.as_ref().map(|h| h[j].relative_error),
             })
             .collect(),
+        position_torques: known.torques.clone(),
+        base_tilt: known.tilt.clone(),
         not_excited,
         warnings,
         essential: beyond.essential,
@@ -411,7 +468,7 @@ pub fn identify(
                 .then(|| (window as f64 * treatment.dt(), window_reason)),
             treatment,
         },
-    })
+    })))
 }
 
 fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {

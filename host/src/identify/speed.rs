@@ -9,11 +9,12 @@ use crate::prepare::Recording;
 
 /// Rows faster than this share of the RMS speed are believed from the start; no threshold lies higher.
 const BELIEVED: f64 = 0.5;
-/// The same where several joints move: their rows also say what the inertia of the others is, and friction of fast rows
-/// alone would be that of fast motion alone. On the Stäubli TX40, whose friction grows less than in proportion to speed,
-/// half the RMS speed leaves 43 of 60 parameters within two standard deviations of the published ones, 0.1 rad/s (4 % of
-/// its RMS speed) 58.
-const BELIEVED_OF_SEVERAL: f64 = 0.04;
+/// Where several joints move, the threshold is this share of the RMS speed. Their rows also say what the inertia of the
+/// others is, and friction of fast rows alone would be that of fast motion alone: on the Stäubli TX40, whose friction
+/// grows less than in proportion to speed, half the RMS speed leaves 43 of 60 parameters within two standard deviations of
+/// the published ones, 0.1 rad/s (4 % of its RMS speed) 58. Slower rows are few, and a test that they differ would
+/// hardly ever be answered: they are left out unasked.
+const SHARE_OF_SEVERAL: f64 = 0.04;
 /// Ratio of neighbouring bounds between bins of speed: half an octave.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Columns of a bin's own friction: braking and gathering speed.
@@ -51,7 +52,7 @@ fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
 /// Per joint, the speed from which on one Coulomb and one viscous coefficient describe its friction, rad/s or
 /// m/s, and a sentence of how it was found. `plan` brings the lowest thresholds that make sense, those of noise.
 ///
-/// From the believed speeds downwards each bin of speed in turn is given a Coulomb friction of its own beside the
+/// Of one joint: from the believed speeds downwards each bin of speed in turn is given a Coulomb friction of its own beside the
 /// full model (the test of Chow 1960 for a changed parameter); the first bin where it differs significantly,
 /// memory of the residuals allowed for, ends the range. Braking and gathering speed have one each: friction that
 /// lags behind a reversal is too high before and too low after it, and would cancel in a common one. No friction
@@ -62,16 +63,23 @@ pub(super) fn speed_thresholds(
 ) -> Result<(Vec<f64>, String), IdentifyError> {
     let spectra = &plan.treatment.spectra;
     let joints = spectra.len();
-    let believed = if joints > 1 {
-        BELIEVED_OF_SEVERAL
-    } else {
-        BELIEVED
-    };
+    if joints > 1 {
+        let thresholds = spectra.iter().zip(&plan.treatment.speed_threshold);
+        return Ok((
+            thresholds
+                .map(|(s, least)| least.max(SHARE_OF_SEVERAL * s.velocity_rms()))
+                .collect(),
+            format!(
+                "{} % of the RMS speed, or five standard deviations of the velocity's noise where that is more: slower rows are few, and their friction is seldom Coulomb and viscous.",
+                100.0 * SHARE_OF_SEVERAL
+            ),
+        ));
+    }
     let p = plan.columns.len();
     let bins: Vec<Vec<f64>> = spectra
         .iter()
         .zip(&plan.treatment.speed_threshold)
-        .map(|(s, least)| bounds(believed * s.velocity_rms(), *least))
+        .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
         .collect();
     let bin_of = |j: usize, speed: f64| bins[j].iter().take_while(|bound| speed < **bound).count();
     let mut factors: Vec<Vec<TriangularFactor>> = bins

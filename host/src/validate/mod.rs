@@ -278,16 +278,21 @@ pub fn validate(
         } else {
             &free
         };
-        let torque: Vec<TorqueCheck> =
-            torque_residuals(&[compared], std::slice::from_ref(survey), &plan, &values)?
-                .into_iter()
-                .zip(&robot.joints)
-                .map(|(residual, joint)| TorqueCheck {
-                    joint: joint.name.clone(),
-                    unit: joint.kind.units().1.to_owned(),
-                    residual,
-                })
-                .collect();
+        let torque: Vec<TorqueCheck> = torque_residuals(
+            &[compared],
+            std::slice::from_ref(survey),
+            &plan,
+            &values,
+            &|_, _| 0.0,
+        )?
+        .into_iter()
+        .zip(&robot.joints)
+        .map(|(residual, joint)| TorqueCheck {
+            joint: joint.name.clone(),
+            unit: joint.kind.units().1.to_owned(),
+            residual,
+        })
+        .collect();
         for check in &torque {
             if check.residual.rows == 0 {
                 warnings.push(format!(

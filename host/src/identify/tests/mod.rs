@@ -6,6 +6,7 @@ mod exact;
 mod judged;
 mod lwr4;
 mod made;
+mod position;
 
 use super::*;
 use crate::data::{Block, JointColumns};
