@@ -166,6 +166,7 @@ impl<'a> Search<'a> {
                 self.renewed(renew(&chosen)?);
                 self.refine_all(base, &mut chosen)?;
             }
+            chosen.retain(|profile| profile.vanished.is_none());
             if same(&before, &chosen) {
                 break;
             }
@@ -235,11 +236,12 @@ impl<'a> Search<'a> {
         }
         // Stand-ins go once the true effect is in.
         let mut i = 0;
-        while chosen.len() > 1 && i < chosen.len() {
+        while i < chosen.len() {
             let e = &chosen[i].evidence;
             let weak =
                 e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS;
-            if weak || in_the_shadow(chosen, i) {
+            let beside_others = chosen.len() > 1 && (weak || in_the_shadow(chosen, i));
+            if beside_others || chosen[i].vanished.is_some() {
                 chosen.remove(i);
                 self.refine_all(base, chosen)?;
                 i = 0;
