@@ -23,12 +23,15 @@
 //! Leaves out: what the feed-forward does not reach because of the current loop's lag; effects that name another
 //! joint.
 
-use core::fmt;
+mod now;
+mod role;
 
-use crate::effects::{About, Channel, Direction, Effect, Instant, Kind, Memory, Parameter, Scale};
+pub use now::Now;
+pub use role::{EffectFault, Role};
+
+use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
 use crate::precompensation::{PrecompensationSettings, direction, finite, share};
 use crate::scalar::{Real, Scalar};
-use crate::trajectory::Reference;
 
 /// Most effects that a rig compensates.
 pub const EFFECTS: usize = 4;
@@ -41,84 +44,6 @@ const SPEEDS: [f64; 2] = [1e-3, 10.0];
 /// The slope of the encoder's error is taken over this angle of the motor, rad: within 1 % for an error of once a
 /// turn, a hundred times above the rounding of `f32`.
 const SLOPE_SPAN: f64 = 0.02;
-
-/// What is done about an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// A torque with the friction law's direction and share.
-    Dry,
-    /// A torque at the measured position, in full.
-    Standing,
-    /// A correction of the measured position.
-    Position,
-    /// A correction of the measured current.
-    Current,
-}
-
-impl Role {
-    /// What is done about effects of this kind; `None` where nothing can be.
-    pub const fn of(kind: Kind) -> Option<Self> {
-        Self::by(kind.about())
-    }
-
-    /// The same by what is known of the effect.
-    pub(crate) const fn by(about: &About) -> Option<Self> {
-        match (about.channel, about.direction) {
-            (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
-            // A mass on the link belongs into the model, which knows where gravity points.
-            (Channel::Torque | Channel::Load, Direction::Indifferent)
-                if about.compensable && !same(about.name, "payload") =>
-            {
-                Some(Self::Standing)
-            }
-            // Of what a sensor reads wrongly, only a known function of the position, or a constant, can be taken off.
-            (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
-                Some(Self::Position)
-            }
-            (Channel::Effort, _) if same(about.name, "current_offset") => Some(Self::Current),
-            _ => None,
-        }
-    }
-}
-
-/// Equality of texts at compile time.
-const fn same(a: &str, b: &str) -> bool {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    let mut k = 0;
-    while k < a.len() && k < b.len() && a[k] == b[k] {
-        k += 1;
-    }
-    k == a.len() && k == b.len()
-}
-
-/// Why an effect cannot be compensated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EffectFault {
-    /// No torque and no correction undoes effects of this kind.
-    NotCompensable(Kind),
-    /// This parameter is not a number within its physical bounds.
-    Parameter(&'static str),
-    /// A value beyond the effect's parameters is not 0.
-    Surplus,
-}
-
-impl fmt::Display for EffectFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotCompensable(kind) => write!(
-                f,
-                "{} cannot be compensated by a torque or a corrected reading",
-                kind.about().title
-            ),
-            Self::Parameter(name) => {
-                write!(f, "the effect's {name} is not within its physical bounds")
-            }
-            Self::Surplus => f.write_str("values beyond the effect's parameters must be 0"),
-        }
-    }
-}
-
-impl core::error::Error for EffectFault {}
 
 /// An effect that has passed its checks, with what follows from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -193,70 +118,6 @@ fn within<T: Scalar>(
         }
     }
     Ok(())
-}
-
-/// What a control tick knows. Joint-side, SI.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Now<T> {
-    /// Where the link should be.
-    pub reference: Reference<T>,
-    /// Measured position, rad.
-    pub position: T,
-    /// Measured velocity, rad/s.
-    pub velocity: T,
-    /// Motor turns per joint turn.
-    pub gear_ratio: T,
-    /// Angle of the motor, rad.
-    pub motor_angle: T,
-    /// The same within one turn, without the rounding of many turns.
-    pub angle_in_turn: T,
-    /// Whether somebody has said where the link stands: nothing can stand at a position that nobody knows.
-    pub placed: bool,
-    /// Whether the tick has enough else to do: the laws then stand as they are for one tick more.
-    pub busy: bool,
-    /// Torque that the drive gives, N·m.
-    pub drive_torque: T,
-    /// Torque that the gear transmits, N·m.
-    pub load: T,
-    /// Running time, s.
-    pub time: T,
-    /// Temperature above that at the start, K.
-    pub warming: T,
-    /// Time since the last tick, s.
-    pub period: T,
-}
-
-impl<T: Real> Now<T> {
-    /// The motor's angle as an effect wants it.
-    #[inline(always)]
-    fn angle(&self, whole: bool) -> T {
-        if whole {
-            self.angle_in_turn
-        } else {
-            self.motor_angle
-        }
-    }
-
-    /// At the reference's acceleration, at rest.
-    #[inline(always)]
-    fn instant(&self, whole: bool) -> Instant<T> {
-        Instant {
-            position: self.position,
-            velocity: T::ZERO,
-            acceleration: self.reference.acceleration,
-            direction: T::ZERO,
-            motor_angle: self.angle(whole),
-            drive_torque: self.drive_torque,
-            // Laws of what a sensor reads late, and of masses, are not compensated.
-            drive_rate: T::ZERO,
-            gravity: T::ZERO,
-            load: self.load,
-            time: self.time,
-            warming: self.warming,
-            other: [T::ZERO; 3],
-            period: self.period,
-        }
-    }
 }
 
 /// What effects ask for in a control tick.

@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
+use crate::effects::Kind;
 use crate::friction::Friction;
 use crate::precompensation;
+use crate::trajectory::Reference;
 use proptest::prelude::*;
 
 const SETTINGS: PrecompensationSettings<f64> = PrecompensationSettings {

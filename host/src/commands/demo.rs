@@ -9,6 +9,7 @@ use super::error::CommandError;
 use super::input::command_line;
 use super::ui::Ui;
 use crate::demo;
+use crate::files::write_whole;
 use crate::report;
 
 /// Shows the whole way without hardware: excite, record, identify, compensate, report.
@@ -44,6 +45,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     let path = args.out.join("report.html");
     report::write(&path, &demo.page(&command_line())?)?;
+    let found = args.out.join("diagnosis.html");
+    report::write(&found, &demo.diagnosis_page(&command_line())?)?;
+    let json = serde_json::to_string_pretty(&demo.diagnosis).map_err(|error| {
+        CommandError::Sentence(format!("The diagnosis cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
     report::write_svg(&args.out.join("tracking.svg"), &demo.picture())?;
     for line in demo.summary()? {
         ui.say(&line);

@@ -7,7 +7,9 @@ use rig_shared::multibody::{COLUMNS, column, gravity_vector};
 
 use super::{Demo, DemoError, Run};
 use crate::identify::Identification;
-use crate::pages::{self, DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire};
+use crate::pages::{
+    self, Context, DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire,
+};
 use crate::report::{Document, Plot, format_significant, format_value};
 use crate::simulate::Model;
 
@@ -93,6 +95,20 @@ impl Demo {
         Ok(pages::demo(&self.figures(command)?))
     }
 
+    /// The page of the diagnosis.
+    ///
+    /// # Errors
+    /// A description that cannot be written.
+    pub fn diagnosis_page(&self, command: &str) -> Result<Document, DemoError> {
+        let context = Context {
+            command: command.to_owned(),
+            identified: Some(("model.toml".into(), self.model.to_toml()?)),
+            remarks: Vec::new(),
+            warnings: Vec::new(),
+        };
+        Ok(pages::diagnosis(&self.diagnosis, &context))
+    }
+
     /// The tracking error with and without precompensation, as a picture of its own.
     pub fn picture(&self) -> Plot {
         pages::tracking_plot(&tracking(&self.without, &self.with))
@@ -174,6 +190,7 @@ impl Demo {
                 .holdout_residuals
                 .clone()
                 .unwrap_or_default(),
+            diagnosis: Some(self.diagnosis.clone()),
             beyond_model: BEYOND_MODEL.map(Into::into).into(),
             warnings: self.differential.warnings.clone(),
             files: FILES
@@ -211,6 +228,11 @@ impl Demo {
             without / with,
         ));
         lines.push(rest_note(self.without.rest_span(), self.with.rest_span()));
+        lines.push(format!(
+            "diagnosis of the identified model: {}",
+            pages::verdict(self.diagnosis.verdict)
+        ));
+        lines.extend(self.diagnosis.words.iter().cloned());
         Ok(lines)
     }
 }
@@ -229,10 +251,14 @@ const BEYOND_MODEL: [&str; 6] = [
     "masses and centres of mass that differ from the description by up to 30 %",
 ];
 
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 11] = [
     (
         "train.csv",
         "the excitation that the parameters were identified from",
+    ),
+    (
+        "train-again.csv",
+        "the same motion again: what differs is noise",
     ),
     ("holdout.csv", "another excitation, used only to judge them"),
     ("sweep.csv", "constant speeds, for the friction map"),
@@ -246,6 +272,15 @@ const FILES: [(&str, &str); 7] = [
         "identified.toml",
         "the description with the identified values",
     ),
+    (
+        "model.toml",
+        "that description with the effects that it lacked",
+    ),
+    (
+        "diagnosis.html",
+        "where and why the identified model misses",
+    ),
+    ("diagnosis.json", "the same for programs"),
 ];
 
 /// Tracking errors of two runs of the same motion, side by side.

@@ -12,6 +12,7 @@ use rig_shared::wire::message::RequestBody;
 use thiserror::Error;
 
 use crate::data::{DataError, Source};
+use crate::diagnose::{self, DiagnoseError, Diagnosis, diagnose};
 use crate::emulated::{EmulatedRig, Nameplate, NameplateError, link_parameters};
 use crate::excite::{self, ExciteError};
 use crate::files::{WriteError, folder, write_whole};
@@ -57,6 +58,9 @@ pub enum DemoError {
     /// Identification.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// Diagnosis.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
     /// The model behind a figure.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -80,6 +84,10 @@ pub struct Demo {
     pub integral: Identification,
     /// Friction over speed.
     pub friction_map: FrictionMap,
+    /// What the identified description lacks.
+    pub diagnosis: Diagnosis,
+    /// That description with what was found.
+    pub model: Robot,
     /// The training run, with its on-line estimates.
     pub training: Run,
     /// The hold-out run.
@@ -134,6 +142,14 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         &design.file.joints[0].trajectory,
         0.5,
     )?;
+    progress(0.3);
+    record(
+        &mut session,
+        "train-again.csv",
+        vec![],
+        &design.file.joints[0].trajectory,
+        0.5,
+    )?;
     progress(0.4);
     let holdout = record(
         &mut session,
@@ -145,7 +161,7 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     progress(0.5);
     let sweep = sweep()?;
     record(&mut session, "sweep.csv", vec![], &sweep, 0.5)?;
-    progress(0.7);
+    progress(0.6);
 
     let open = |name: &str| Source::open(&out.join(name), &robot);
     let (train, hold) = (open("train.csv")?, open("holdout.csv")?);
@@ -175,7 +191,19 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         &out.join("identified.toml"),
         identified.to_toml()?.as_bytes(),
     )?;
-    progress(0.8);
+    let again = open("train-again.csv")?;
+    let (diagnosis, model) = diagnose(
+        &identified,
+        &[&train, &again, &sweep],
+        &[&hold],
+        &diagnose::Options {
+            seed,
+            ..diagnose::Options::default()
+        },
+        &mut |share| progress(0.6 + 0.3 * share),
+    )?;
+    write_whole(&out.join("model.toml"), model.to_toml()?.as_bytes())?;
+    progress(0.9);
 
     let reversals = reversals()?;
     let without = record(&mut session, "slow-without.csv", vec![], &reversals, REST)?;
@@ -188,6 +216,8 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         differential,
         integral,
         friction_map,
+        diagnosis,
+        model,
         training,
         holdout,
         without,

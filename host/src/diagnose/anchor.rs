@@ -6,7 +6,7 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use super::rows::{Column, Nominal, Rows};
+use super::rows::{Column, Nominal, Rows, combined};
 use crate::robot::Robot;
 
 /// A free direction in the space of base parameters: parameters and factors.
@@ -81,12 +81,17 @@ impl Anchor {
     pub(super) fn columns(&self, rows: &Rows) -> Vec<Column> {
         self.free
             .iter()
-            .map(|direction| combined(rows, direction))
+            .map(|direction| along(rows, direction))
             .collect()
     }
 
+    /// What the held parameters contribute to the torque.
+    pub(super) fn held_torque(&self, rows: &Rows) -> Column {
+        along(rows, &self.fixed())
+    }
+
     /// What the held parameters contribute at their prior, in the space that the free directions leave.
-    pub(super) fn fixed(&self) -> Direction {
+    fn fixed(&self) -> Direction {
         let mut rest: Vec<f64> = vec![0.0; self.prior.len()];
         for &k in &self.held {
             rest[k] = self.prior[k];
@@ -125,17 +130,8 @@ impl Anchor {
     }
 }
 
-/// The sum of nominal columns.
-pub(super) fn combined(rows: &Rows, direction: &[(usize, f64)]) -> Column {
-    let mut sum: Column = vec![None; rows.joints()];
-    for &(k, f) in direction {
-        for (to, from) in sum.iter_mut().zip(&rows.nominal[k]) {
-            let Some(from) = from else { continue };
-            let to = to.get_or_insert_with(|| vec![0.0; from.len()]);
-            for (t, x) in to.iter_mut().zip(from) {
-                *t += f * x;
-            }
-        }
-    }
-    sum
+/// The nominal columns along a direction.
+fn along(rows: &Rows, direction: &[(usize, f64)]) -> Column {
+    let terms = direction.iter().map(|&(k, f)| (&rows.nominal[k], f));
+    combined(rows.joints(), terms)
 }

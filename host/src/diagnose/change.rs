@@ -5,19 +5,25 @@ use std::collections::BTreeMap;
 use rig_shared::effects::Kind;
 use rig_shared::multibody::column;
 
-use super::anchor::Anchor;
-use super::fit::{Evidence, Fit};
+use super::bench::Bench;
+use super::fit::Evidence;
 use super::outcome::Value;
-use super::rows::{Column, Nominal, Rows};
-use super::search::{LEAST_GAIN, SIGNIFICANT};
+use super::profile::{LEAST_GAIN, SIGNIFICANT};
+use super::refit::Refit;
+use super::rows::{Column, combined};
 use super::solve::Solution;
-use crate::robot::{JointKind, Robot};
+use crate::robot::JointKind;
 
 /// Share of the whole change's gain that a part of the parameters must reach to speak for it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
 
-/// Least relative change of inertia and gravity that is a payload's.
+/// Least relative change of one nominal parameter at least: a refit beside effects that are not quite the library's moves all
+/// by a per cent.
 const LEAST_CHANGE: f64 = 0.04;
+/// Least relative change of inertia and gravity both that is a payload's …
+const LEAST_OF_BOTH: f64 = 0.01;
+/// … and that in standard deviations.
+const LEAST_SIGMAS: f64 = 4.0;
 
 /// A change of nominal parameters.
 #[derive(Clone, Debug)]
@@ -28,40 +34,35 @@ pub(super) struct Change {
     pub(super) effect: Option<Kind>,
     /// Its parameters.
     pub(super) parameters: BTreeMap<String, Value>,
-    /// Of freeing the parameters that speak for it.
-    pub(super) evidence: Evidence,
+    /// Of freeing the parameters that speak for it, corrected for the sets of parameters that were tried.
+    pub(super) p_value: f64,
 }
 
 /// Compares the refit with the description. `known` is the torque that the effects found explain.
 pub(super) fn change(
-    robot: &Robot,
-    nominal: &Nominal,
-    anchor: &Anchor,
-    rows: &Rows,
-    plain: &Fit,
-    free: &[Column],
-    known: &[Column],
+    bench: &Bench,
+    refit: &Refit,
+    known: &Column,
     after: &Solution,
 ) -> Option<Change> {
+    let (anchor, free) = (&bench.anchor, &refit.free);
     if !anchor.stated {
         return None;
     }
     let prior = anchor.prior_coefficients();
-    let mut frozen = plain.clone();
-    for (column, factor) in free.iter().zip(&prior) {
-        frozen.subtract(column, *factor);
-    }
-    for column in known {
-        frozen.subtract(column, 1.0);
-    }
+    let mut frozen = refit.frozen(anchor);
+    frozen.subtract(known);
     let evidence = |picked: &[usize]| {
         let columns: Vec<Vec<f64>> = picked.iter().map(|k| frozen.weighted(&free[*k])).collect();
         let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
         frozen.evidence(&columns, &open)
     };
+    // All, a payload's, all in one ratio, each alone: what may be tried counts, not what was until one spoke.
+    let tried = 3 + free.len();
+    let corrected = |e: &Evidence| e.corrected(tried);
     let all: Vec<usize> = (0..free.len()).collect();
     let whole = evidence(&all)?;
-    if whole.gain < LEAST_GAIN || whole.p_value > SIGNIFICANT {
+    if whole.gain < LEAST_GAIN || corrected(&whole) > SIGNIFICANT {
         return None;
     }
     let moved_most = (0..free.len())
@@ -71,7 +72,7 @@ pub(super) fn change(
         return None;
     }
     let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
-    if let Some(load) = payload(robot, nominal, anchor, after, &prior)
+    if let Some(load) = payload(bench, after, &prior)
         && let Some(e) = evidence(&load.1)
         && speaks(&e)
     {
@@ -80,19 +81,10 @@ pub(super) fn change(
                 .into(),
             effect: Some(Kind::Payload),
             parameters: load.0,
-            evidence: e,
+            p_value: corrected(&e),
         });
     }
-    let mut scale: Column = vec![None; rows.joints()];
-    for (column, factor) in free.iter().zip(&prior) {
-        for (to, from) in scale.iter_mut().zip(column) {
-            let Some(from) = from else { continue };
-            let to = to.get_or_insert_with(|| vec![0.0; from.len()]);
-            for (t, f) in to.iter_mut().zip(from) {
-                *t += factor * f;
-            }
-        }
-    }
+    let scale = combined(known.len(), free.iter().zip(prior.iter().copied()));
     let open = [[f64::NEG_INFINITY, f64::INFINITY]];
     if let Some(e) = frozen.evidence(&[frozen.weighted(&scale)], &open)
         && speaks(&e)
@@ -104,11 +96,11 @@ pub(super) fn change(
             ),
             effect: None,
             parameters: BTreeMap::new(),
-            evidence: e,
+            p_value: corrected(&e),
         });
     }
     let name = |k: usize| match anchor.free[k].as_slice() {
-        [(b, _)] => nominal.base.expression(*b),
+        [(b, _)] => bench.nominal.base.expression(*b),
         _ => "gravity".into(),
     };
     for k in 0..free.len() {
@@ -124,7 +116,7 @@ pub(super) fn change(
                 ),
                 effect: None,
                 parameters: BTreeMap::new(),
-                evidence: e,
+                p_value: corrected(&e),
             });
         }
     }
@@ -139,19 +131,18 @@ pub(super) fn change(
         ),
         effect: None,
         parameters: BTreeMap::new(),
-        evidence: whole,
+        p_value: corrected(&whole),
     })
 }
 
 /// Mass and distance of a payload on a single link, and the free directions that it moves.
 fn payload(
-    robot: &Robot,
-    nominal: &Nominal,
-    anchor: &Anchor,
+    bench: &Bench,
     after: &Solution,
     prior: &[f64],
 ) -> Option<(BTreeMap<String, Value>, Vec<usize>)> {
-    let [joint] = robot.joints.as_slice() else {
+    let (nominal, anchor) = (&bench.nominal, &bench.anchor);
+    let [joint] = bench.robot.joints.as_slice() else {
         return None;
     };
     if joint.kind != JointKind::Revolute || !anchor.gravity_held {
@@ -169,9 +160,10 @@ fn payload(
         after.values[moment] - prior[moment],
         after.values[inertia] - prior[inertia],
     );
-    // A refit beside effects that are not quite the library's moves both by a per cent.
-    let material = |change: f64, prior: f64| change > LEAST_CHANGE * prior.abs();
-    if !(material(dm, prior[moment]) && material(dj, prior[inertia])) {
+    let material = |change: f64, k: usize| {
+        change > LEAST_OF_BOTH * prior[k].abs() && change > LEAST_SIGMAS * after.std(k)
+    };
+    if !(material(dm, moment) && material(dj, inertia)) {
         return None;
     }
     let (distance, mass) = (dj / dm, dm * dm / dj);

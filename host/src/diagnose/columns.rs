@@ -8,20 +8,12 @@ use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAP
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 
 use super::DiagnoseError;
+use super::predicted::Predicted;
 use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
 use super::transmission::Driven;
 use crate::prepare::{central_difference, second_difference};
-use crate::robot::Robot;
-
-/// What the present model says of a run at the full rate.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Predicted {
-    /// Torque, joint by joint.
-    pub(super) torque: Vec<Vec<f64>>,
-    /// Torque that the gear transmits: without friction and the drive's own inertia.
-    pub(super) load: Vec<Vec<f64>>,
-}
+use crate::robot::{Robot, unit_of};
 
 /// What columns are formed from.
 pub(super) struct Source<'a> {
@@ -114,6 +106,15 @@ impl Source<'_> {
         }
     }
 
+    /// Unit of a candidate's parameter on its joint, ASCII. A tilt is an angle whatever the joint does.
+    pub(super) fn unit(&self, candidate: &Candidate, parameter: &Parameter) -> String {
+        if candidate.kind == Kind::GravityTilt {
+            parameter.unit.to_owned()
+        } else {
+            unit_of(parameter, self.robot.joints[candidate.joint].kind)
+        }
+    }
+
     /// One column a gain over one run, joint by joint, at the full rate.
     ///
     /// # Errors
@@ -178,16 +179,7 @@ impl Source<'_> {
         predicted: &Predicted,
     ) -> Vec<Vec<f64>> {
         let joint = &run.joints[candidate.joint];
-        let ratio = self.robot.joints[candidate.joint]
-            .drive
-            .as_ref()
-            .map_or(1.0, |d| {
-                if d.gear_ratio == 0.0 {
-                    1.0
-                } else {
-                    d.gear_ratio
-                }
-            });
+        let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
         let (load, drive) = (
             &predicted.load[candidate.joint],
@@ -376,44 +368,4 @@ fn late(signal: &[f64], samples: f64) -> Vec<f64> {
             (1.0 - part) * at(k, back) + part * at(k, back + 1)
         })
         .collect()
-}
-
-/// What the nominal model with these base parameters says of a run, and of the load on the gears.
-///
-/// # Errors
-/// [`DiagnoseError::Model`].
-pub(super) fn predict(
-    nominal: &Nominal,
-    robot: &Robot,
-    values: &[f64],
-    run: &Run,
-) -> Result<Predicted, DiagnoseError> {
-    let n = nominal.joints();
-    let mut predicted = Predicted {
-        torque: vec![vec![0.0; run.len()]; n],
-        load: vec![vec![0.0; run.len()]; n],
-    };
-    let motion = motion_of(run);
-    nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, column| {
-        for (to, y) in predicted.torque[j].iter_mut().zip(column) {
-            *to += values[k] * y;
-        }
-        if !nominal.is_drive(k) {
-            for (to, y) in predicted.load[j].iter_mut().zip(column) {
-                *to += values[k] * y;
-            }
-        }
-    })?;
-    let drives = robot.standard_parameters();
-    for j in 0..n {
-        // The drive's inertia is part of a combination with the link's: the description says how much is its own.
-        let own = drives[j][column::DRIVE_INERTIA];
-        let grouped = !nominal.has_own_drive_inertia(j);
-        if own != 0.0 && grouped {
-            for (to, a) in predicted.load[j].iter_mut().zip(&run.joints[j].qdd) {
-                *to -= own * a;
-            }
-        }
-    }
-    Ok(predicted)
 }

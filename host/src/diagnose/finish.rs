@@ -2,11 +2,13 @@
 
 use super::anchor::Anchor;
 use super::fit::Fit;
+use super::locate::Coordinate;
 use super::model::{Fitted, described};
 use super::outcome::Diagnosis;
+use super::profile::Profile;
 use super::rows::{Nominal, Rows};
 use super::runs::Run;
-use super::search::{Profile, Search};
+use super::search::Search;
 use super::solve::Solution;
 use super::{DiagnoseError, limits, pictures, sentences};
 use crate::robot::Robot;
@@ -29,6 +31,8 @@ pub(super) struct Found<'a, 'r> {
     pub(super) after: &'a Solution,
     /// The effects.
     pub(super) chosen: &'a [Profile],
+    /// Coordinates of the training data, joint by joint.
+    pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Noise floor, joint by joint.
     pub(super) floors: &'a [f64],
     /// Of the bootstrap.

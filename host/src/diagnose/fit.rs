@@ -1,17 +1,19 @@
 //! Weighted least squares on the rows with columns taken in one by one, and what one more column would explain.
 
-use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::{Column, Rows};
 
+mod evidence;
+mod folds;
+
+pub(super) use evidence::Evidence;
+use folds::Folded;
+
 /// Blocks that evidence is counted in: long enough that the residual has forgotten, at least so many.
 const FEWEST_BLOCKS: usize = 12;
-/// Parts for cross-validation.
-const FOLDS: usize = 10;
 /// A column of which less than this share of its length is left beside the others is one of them in disguise.
 const DISTINCT: f64 = 0.02;
 
@@ -30,51 +32,10 @@ pub(super) struct Fit<'a> {
     folded: OnceLock<Option<Folded>>,
 }
 
-/// The columns taken in, fold by fold.
-#[derive(Clone)]
-struct Folded {
-    /// Ranges of the weighted rows that lie in one fold, with it.
-    stretches: Vec<(Range<usize>, usize)>,
-    /// Inner products of the basis within each fold.
-    own: Vec<DMatrix<f64>>,
-    /// … with the residual.
-    right: Vec<DVector<f64>>,
-    /// Squared error of each block, and of each joint, with the basis refitted without the block's fold.
-    errors: Errors,
-}
-
-/// Squared errors on folds not fitted to.
-#[derive(Clone, Debug, PartialEq)]
-struct Errors {
-    of_block: Vec<f64>,
-    of_joint: Vec<f64>,
-}
-
 /// Inner products of candidates' columns with themselves and with the residual, what was taken in taken off.
 pub(super) struct Beside {
     gram: DMatrix<f64>,
     right: DVector<f64>,
-}
-
-/// What candidates' columns would do.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Evidence {
-    /// Coefficients of the columns.
-    pub(super) gains: Vec<f64>,
-    /// Their standard deviations, robust to correlation within blocks.
-    pub(super) stds: Vec<f64>,
-    /// Share of the residual's squares that they take away.
-    pub(super) explained: f64,
-    /// Share of the RMS that they take away on folds they were not fitted to.
-    pub(super) gain: f64,
-    /// The same for the joint that gains most: what one joint lacks is a small share of all joints together.
-    pub(super) joint_gain: f64,
-    /// The gain over its standard deviation between blocks.
-    pub(super) gain_sigmas: f64,
-    /// Of all coefficients together being zero; not corrected for anything.
-    pub(super) p_value: f64,
-    /// Squared error of each block without and with them, on folds not fitted to.
-    pub(super) block_errors: Vec<[f64; 2]>,
 }
 
 impl<'a> Fit<'a> {
@@ -153,9 +114,10 @@ impl<'a> Fit<'a> {
     }
 
     /// Takes a known torque off what is to be explained.
-    pub(super) fn subtract(&mut self, column: &Column, factor: f64) {
+    pub(super) fn subtract(&mut self, column: &Column) {
         let known = self.weighted(column);
-        axpy(-factor, &known, &mut self.residual);
+        axpy(-1.0, &known, &mut self.residual);
+        self.folded = OnceLock::new();
     }
 
     /// RMS of a joint's residual in its own unit, over the rows used.
@@ -220,9 +182,7 @@ impl<'a> Fit<'a> {
                     .map(|(_, x, y)| dot(x, y))
                     .sum();
                 let left = whole - along[a].dot(&along[b]);
-                // As `distinct` has it, by squares.
-                if a == b && (left.is_nan() || left <= DISTINCT * DISTINCT * whole || whole == 0.0)
-                {
+                if a == b && !is_own(left, whole) {
                     return None;
                 }
                 gram[(a, b)] = left;
@@ -260,10 +220,9 @@ impl<'a> Fit<'a> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
         for column in columns {
             let weighted = self.weighted(column);
-            let length = dot_self(&weighted).sqrt();
+            let whole = dot_self(&weighted);
             let rest = self.projected(weighted);
-            let left = dot_self(&rest).sqrt();
-            if left.is_nan() || left <= DISTINCT * length || length == 0.0 {
+            if !is_own(dot_self(&rest), whole) {
                 return None;
             }
             own.push(rest);
@@ -271,213 +230,30 @@ impl<'a> Fit<'a> {
         Some(own)
     }
 
-    /// Everything about projected columns.
-    pub(super) fn evidence(&self, columns: &[Vec<f64>], bounds: &[[f64; 2]]) -> Option<Evidence> {
-        let beside = Beside {
-            gram: DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
-                dot(&columns[a], &columns[b])
-            }),
-            right: DVector::from_iterator(
-                columns.len(),
-                columns.iter().map(|c| dot(c, &self.residual)),
-            ),
-        };
-        let (explained, gains) = self.explained(&beside, bounds)?;
-        let (k, blocks) = (columns.len(), self.blocks);
-        let n = self.rows.count;
-        // Scores of the blocks under the alternative: what is left after the columns.
-        let mut rest = self.residual.clone();
-        for (column, gain) in columns.iter().zip(&gains) {
-            axpy(-gain, column, &mut rest);
-        }
-        let mut scores = vec![DVector::<f64>::zeros(k); blocks];
-        for j in 0..self.rows.joints() {
-            for (row, &b) in self.block.iter().enumerate() {
-                let at = j * n + row;
-                for (c, column) in columns.iter().enumerate() {
-                    scores[b][c] += column[at] * rest[at];
-                }
-            }
-        }
-        let mut meat = DMatrix::<f64>::zeros(k, k);
-        for s in &scores {
-            meat += s * s.transpose();
-        }
-        let g = blocks as f64;
-        meat *= g / (g - 1.0).max(1.0);
-        let bread = beside.gram.cholesky()?.inverse();
-        let covariance = &bread * meat * &bread;
-        let stds = (0..k).map(|c| covariance[(c, c)].max(0.0).sqrt()).collect();
-        let beta = DVector::from_column_slice(&gains);
-        let wald = beta.dot(&covariance.cholesky()?.solve(&beta));
-        let freedom = (g - k as f64).max(1.0);
-        let statistic = wald / k as f64 * freedom / (g - 1.0).max(1.0);
-        let p_value = FisherSnedecor::new(k as f64, freedom)
-            .map(|f| f.sf(statistic.max(0.0)))
-            .unwrap_or(1.0)
-            .max(f64::MIN_POSITIVE);
-        let (plain, more) = self.cross_validated(columns)?;
-        let block_errors: Vec<[f64; 2]> = (plain.of_block.iter().zip(&more.of_block))
-            .map(|(a, b)| [*a, *b])
-            .collect();
-        let joint_gain = (plain.of_joint.iter().zip(&more.of_joint))
-            .filter(|(before, _)| **before > 0.0)
-            .map(|(before, after)| 1.0 - (after / before).sqrt())
-            .fold(f64::NEG_INFINITY, f64::max);
-        let (before, after) = block_errors
-            .iter()
-            .fold((0.0, 0.0), |(a, b), e| (a + e[0], b + e[1]));
-        let gain = 1.0 - (after / before).sqrt();
-        let mean = (before - after) / g;
-        let spread = block_errors
-            .iter()
-            .map(|e| (e[0] - e[1] - mean).powi(2))
-            .sum::<f64>()
-            / (g - 1.0).max(1.0);
-        let gain_sigmas = mean / (spread / g).sqrt().max(f64::MIN_POSITIVE);
-        Some(Evidence {
-            gains,
-            stds,
-            explained,
-            gain,
-            joint_gain,
-            gain_sigmas,
-            p_value,
-            block_errors,
-        })
-    }
-
-    /// Squared errors without and with the columns, everything refitted without each fold.
-    fn cross_validated(&self, columns: &[Vec<f64>]) -> Option<(&Errors, Errors)> {
-        let folded = self.folded.get_or_init(|| self.folded()).as_ref()?;
-        let (p, size) = (self.basis.len(), self.basis.len() + columns.len());
-        let mut own: Vec<DMatrix<f64>> = (folded.own.iter())
-            .map(|m| m.clone().resize(size, size, 0.0))
-            .collect();
-        let mut right: Vec<DVector<f64>> = (folded.right.iter())
-            .map(|r| r.clone().resize_vertically(size, 0.0))
-            .collect();
-        let all: Vec<&Vec<f64>> = self.basis.iter().chain(columns).collect();
-        for (range, fold) in &folded.stretches {
-            for a in p..size {
-                let left = &all[a][range.clone()];
-                right[*fold][a] += dot(left, &self.residual[range.clone()]);
-                for b in 0..=a {
-                    own[*fold][(a, b)] += dot(left, &all[b][range.clone()]);
-                }
-            }
-        }
-        for matrix in &mut own {
-            matrix.fill_upper_triangle_with_lower_triangle();
-        }
-        let more = self.errors(&all, &folded.stretches, &own, &right)?;
-        Some((&folded.errors, more))
-    }
-
-    /// What does not depend on the candidate.
-    fn folded(&self) -> Option<Folded> {
-        let p = self.basis.len();
-        let folds = FOLDS.min(self.blocks.max(2));
-        let fold_of = |b: usize| b * folds / self.blocks.max(1);
-        // Runs of rows of one fold, so that the sums go over slices.
-        let stretches = self.stretches(&fold_of);
-        let mut own = vec![DMatrix::<f64>::zeros(p, p); folds];
-        let mut right = vec![DVector::<f64>::zeros(p); folds];
-        for (range, fold) in &stretches {
-            for a in 0..p {
-                let left = &self.basis[a][range.clone()];
-                right[*fold][a] += dot(left, &self.residual[range.clone()]);
-                for b in 0..=a {
-                    own[*fold][(a, b)] += dot(left, &self.basis[b][range.clone()]);
-                }
-            }
-        }
-        for matrix in &mut own {
-            matrix.fill_upper_triangle_with_lower_triangle();
-        }
-        let basis: Vec<&Vec<f64>> = self.basis.iter().collect();
-        let errors = self.errors(&basis, &stretches, &own, &right)?;
-        Some(Folded {
-            stretches,
-            own,
-            right,
-            errors,
-        })
-    }
-
-    /// Squared errors of `columns`, whose inner products by folds are given, on each fold by a fit to the others.
-    fn errors(
+    /// Covariance of the coefficients of weighted columns from the scores of the blocks (Liang and Zeger 1986, Biometrika
+    /// 73): `inverse` of the columns' inner products, and the `rest` that they leave.
+    pub(super) fn sandwich(
         &self,
-        columns: &[&Vec<f64>],
-        stretches: &[(Range<usize>, usize)],
-        own: &[DMatrix<f64>],
-        right: &[DVector<f64>],
-    ) -> Option<Errors> {
-        let (n, size) = (self.rows.count, columns.len());
-        let mut total = DMatrix::zeros(size, size);
-        let mut total_right = DVector::zeros(size);
-        for (matrix, right) in own.iter().zip(right) {
-            total += matrix;
-            total_right += right;
-        }
-        let mut coefficients = Vec::with_capacity(own.len());
-        for (matrix, right) in own.iter().zip(right) {
-            coefficients.push(if size == 0 {
-                DVector::zeros(0)
-            } else {
-                (&total - matrix).cholesky()?.solve(&(&total_right - right))
-            });
-        }
-        let mut errors = Errors {
-            of_block: vec![0.0; self.blocks],
-            of_joint: vec![0.0; self.rows.joints()],
-        };
-        let mut left = Vec::new();
-        for (range, fold) in stretches {
-            left.clear();
-            left.extend_from_slice(&self.residual[range.clone()]);
-            for (column, c) in columns.iter().zip(coefficients[*fold].iter()) {
-                axpy(-c, &column[range.clone()], &mut left);
-            }
-            for (at, x) in range.clone().zip(&left) {
-                errors.of_block[self.block[at % n]] += x * x;
-                errors.of_joint[at / n] += x * x;
+        columns: &[impl AsRef<[f64]>],
+        inverse: &DMatrix<f64>,
+        rest: &[f64],
+    ) -> DMatrix<f64> {
+        let mut scores = DMatrix::<f64>::zeros(columns.len(), self.blocks);
+        for (c, column) in columns.iter().enumerate() {
+            let products = column.as_ref().iter().zip(rest).map(|(x, r)| x * r);
+            for (product, b) in products.zip(self.block.iter().cycle()) {
+                scores[(c, *b)] += product;
             }
         }
-        Some(errors)
-    }
-
-    /// Ranges of the weighted rows that lie in one fold, with it.
-    fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(Range<usize>, usize)> {
-        let n = self.rows.count;
-        let mut list: Vec<(Range<usize>, usize)> = Vec::new();
-        for j in 0..self.rows.joints() {
-            for (row, &b) in self.block.iter().enumerate() {
-                let (at, fold) = (j * n + row, fold_of(b));
-                match list.last_mut() {
-                    // A stretch stays within a joint.
-                    Some((range, f)) if *f == fold && range.end == at && row > 0 => {
-                        range.end = at + 1;
-                    }
-                    _ => list.push((at..at + 1, fold)),
-                }
-            }
-        }
-        list
+        let g = self.blocks as f64;
+        let meat = &scores * scores.transpose() * (g / (g - 1.0).max(1.0));
+        inverse * meat * inverse
     }
 }
 
-impl Evidence {
-    /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
-    pub(super) fn ahead_of(&self, other: &Self) -> f64 {
-        let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
-            .map(|(a, b)| b[1] - a[1])
-            .collect();
-        let n = differences.len().max(2) as f64;
-        let mean = differences.iter().sum::<f64>() / n;
-        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
-    }
+/// Whether a column is one of its own: its square, and what of it is left beside the others.
+fn is_own(left: f64, whole: f64) -> bool {
+    whole > 0.0 && left > DISTINCT * DISTINCT * whole
 }
 
 /// Inner product.

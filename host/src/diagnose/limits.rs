@@ -2,18 +2,19 @@
 //!
 //! Leaves out: sizes of what acts between motor and link, which are shapes and not gains.
 
+use nalgebra::DMatrix;
 use rig_shared::effects::{Channel, Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::columns::Candidate;
-use super::engine::effect_of;
 use super::experiment::{self, Nominal};
 use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
-use super::search::{LEAST_GAIN, Profile, SIGNIFICANT, grid, is_first_law, rivals, with};
+use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
+use super::search::{is_first_law, rivals, with};
 use super::{DiagnoseError, testable};
-use crate::robot::{Robot, unit_of};
+use crate::robot::Robot;
 use crate::simulate::Model;
 
 /// Most points of a grid that are looked at.
@@ -152,7 +153,7 @@ pub(super) fn detectable(
                 joint: joint.name.clone(),
                 parameter: gain.name.to_owned(),
                 size,
-                unit: unit_of(gain, joint.kind),
+                unit: found.search.source.unit(candidate, gain),
             });
         }
     }
@@ -166,13 +167,9 @@ fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f6
     // The RMS that is to fall by the least gain is that with the effect in it.
     let kept = (1.0 - LEAST_GAIN).powi(2);
     let visible = (dot_self(left) * (1.0 - kept) / kept / length).sqrt();
-    let of_row = fit.block_of_rows();
-    let mut scores = vec![0.0; fit.blocks()];
-    for (at, (c, r)) in column.iter().zip(left).enumerate() {
-        scores[of_row[at % of_row.len()]] += c * r;
-    }
+    let inverse = DMatrix::from_element(1, 1, 1.0 / length);
+    let std = fit.sandwich(&[column], &inverse, left)[(0, 0)].sqrt();
     let (g, k) = (fit.blocks() as f64, count as f64);
-    let std = (dot_self(&scores) * g / (g - 1.0)).sqrt() / length;
     let freedom = (g - k).max(1.0);
     let level = FisherSnedecor::new(k, freedom)
         .ok()?
@@ -236,7 +233,7 @@ pub(super) fn next(
 }
 
 fn effect(profile: &Profile) -> Effect<f64> {
-    effect_of(
+    Effect::new(
         profile.candidate.kind,
         &profile.evidence.gains,
         &profile.shapes,

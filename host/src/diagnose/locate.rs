@@ -6,11 +6,12 @@
 
 use rand::{RngExt, SeedableRng};
 
-use super::columns::Predicted;
 use super::outcome::Place;
+use super::predicted::Predicted;
 use super::rows::Rows;
 use super::runs::Run;
-use crate::robot::Robot;
+use crate::prepare::central_difference;
+use crate::robot::{JointKind, Robot};
 
 /// Bins of equal numbers of rows.
 pub(super) const BINS: usize = 24;
@@ -20,6 +21,7 @@ const DRAWS: usize = 999;
 const MOST_OF_IT: f64 = 0.75;
 
 /// A coordinate of one joint on the kept rows.
+#[derive(Clone)]
 pub(super) struct Coordinate {
     /// In words.
     pub(super) name: &'static str,
@@ -37,13 +39,7 @@ pub(super) fn coordinates(
     robot: &Robot,
     joint: usize,
 ) -> Vec<Coordinate> {
-    let ratio = robot.joints[joint].drive.as_ref().map_or(1.0, |d| {
-        if d.gear_ratio == 0.0 {
-            1.0
-        } else {
-            d.gear_ratio
-        }
-    });
+    let ratio = robot.joints[joint].gear_ratio();
     let mut list: Vec<Coordinate> = Vec::new();
     let mut add = |name: &'static str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
         let mut values = Vec::with_capacity(rows.count);
@@ -52,13 +48,11 @@ pub(super) fn coordinates(
         }
         list.push(Coordinate { name, unit, values });
     };
-    let revolute = robot.joints[joint].kind == crate::robot::JointKind::Revolute;
-    let (p, v, a) = if revolute {
-        ("rad", "rad/s", "rad/s^2")
-    } else {
-        ("m", "m/s", "m/s^2")
+    let (p, f) = robot.joints[joint].kind.units();
+    let (v, a, rate) = match robot.joints[joint].kind {
+        JointKind::Revolute => ("rad/s", "rad/s^2", "N*m/s"),
+        JointKind::Prismatic => ("m/s", "m/s^2", "N/s"),
     };
-    let f = if revolute { "N*m" } else { "N" };
     add("velocity", v, &|_, run| run.joints[joint].qd.clone());
     add("position", p, &|_, run| run.joints[joint].q.clone());
     add("acceleration", a, &|_, run| run.joints[joint].qdd.clone());
@@ -89,11 +83,9 @@ pub(super) fn coordinates(
         "s",
         &|_, run| since_reversal(run, joint).1,
     );
-    add(
-        "change of the drive's torque",
-        if revolute { "N*m/s" } else { "N/s" },
-        &|r, run| crate::prepare::central_difference(&predicted[r].torque[joint], 1.0 / run.rate),
-    );
+    add("change of the drive's torque", rate, &|r, run| {
+        central_difference(&predicted[r].torque[joint], 1.0 / run.rate)
+    });
     if runs.iter().all(|r| r.joints[joint].temperature.is_some()) {
         add("temperature", "degC", &|_, run| {
             run.joints[joint].temperature.clone().unwrap_or_default()

@@ -4,20 +4,27 @@
 mod anchor;
 #[cfg(test)]
 mod arm_tests;
+mod bench;
 pub mod benchmark;
 mod change;
 mod columns;
+mod descent;
 mod engine;
 pub mod experiment;
 mod fault;
 mod finish;
 mod fit;
 mod floor;
+mod judge;
+mod lead;
 mod limits;
 mod locate;
 mod model;
 pub mod outcome;
 mod pictures;
+mod predicted;
+mod profile;
+mod refit;
 mod rows;
 pub mod runs;
 pub mod sanity;

@@ -3,12 +3,11 @@
 //! Leaves out: second order in the angle of a tilted base where there is more than one joint.
 
 use nalgebra::{DVector, Rotation3, Vector3};
-use rig_shared::effects::{Channel, Kind, SHAPES};
+use rig_shared::effects::{Channel, Effect, Kind, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::anchor::Anchor;
 use super::columns::Candidate;
-use super::engine::effect_of;
 use super::rows::Nominal;
 use crate::identify::{Combinations, described as standard, redistributed};
 use crate::robot::{Robot, RobotEffect};
@@ -121,7 +120,7 @@ fn turned(
 /// The effect as a table of the description, its values within what a description may hold.
 fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
     let Candidate { kind, joint, other } = fitted.candidate;
-    let mut effect = effect_of(kind, gains, &fitted.shapes);
+    let mut effect = Effect::new(kind, gains, &fitted.shapes);
     let name = |j: usize| robot.joints[j].name.clone();
     let about = kind.about();
     let places = about.gains.iter().zip(&mut effect.gains);

@@ -44,7 +44,7 @@ pub struct Place {
 pub struct Value {
     /// SI
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation; 0 of a whole number, infinite where the motion does not tell.
     pub std: f64,
     /// ASCII
     pub unit: String,
@@ -262,6 +262,8 @@ pub struct Diagnosis {
     pub noise_floor_rms: Vec<f64>,
     /// How it was estimated, a sentence.
     pub noise_floor_how: String,
+    /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
+    pub torque_lead: Vec<f64>,
     /// Where the gap sits, most of it first.
     #[serde(rename = "where")]
     pub places: Vec<Place>,

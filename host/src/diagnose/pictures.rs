@@ -5,11 +5,12 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::finish::Found;
 use super::fit::Fit;
-use super::locate::{BINS, Coordinate, bins, coordinates, locate};
+use super::locate::{BINS, Coordinate, bins, locate};
 use super::outcome::{Curves, Map};
+use super::profile::Profile;
 use super::rows::Rows;
-use super::search::{Profile, with};
-use crate::robot::{Joint, JointKind};
+use super::search::with;
+use crate::robot::Joint;
 
 /// Length of the stretch that is drawn over time, s.
 const STRETCH: f64 = 4.0;
@@ -19,15 +20,13 @@ const MOST_POINTS: usize = 2000;
 /// Residual maps: one a step, and one a joint of what is left.
 pub(super) fn maps(found: &Found) -> Vec<Map> {
     let rows = found.rows;
-    let source = &found.search.source;
     let joints = &found.robot.joints;
-    let of = |j: usize| coordinates(rows, source.runs, &source.predicted, found.robot, j);
     let mut list = Vec::new();
     for (k, profile) in found.chosen.iter().enumerate() {
         let j = profile.candidate.joint;
         let before = with(found.base, &found.chosen[..k], None);
         let after = with(found.base, &found.chosen[..=k], None);
-        let coordinate = telling(profile, of(j), &joints[j]);
+        let coordinate = telling(profile, &found.coordinates[j], &joints[j]);
         list.extend(coordinate.map(|c| Map {
             step: Some(k),
             ..map(rows, &c, [&before, &after], j, &joints[j])
@@ -35,10 +34,10 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
     }
     let last = with(found.base, found.chosen, None);
     for (j, joint) in joints.iter().enumerate() {
-        let all = of(j);
+        let all = &found.coordinates[j];
         let places = locate(
             rows,
-            &all,
+            all,
             &last.residual(j),
             last.block_of_rows(),
             j,
@@ -47,23 +46,20 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
             found.seed,
         );
         let most = places.first().map(|p| p.coordinate.clone());
-        let coordinate = all.into_iter().find(|c| Some(c.name) == most.as_deref());
+        let coordinate = (all.iter()).find(|c| Some(c.name) == most.as_deref());
         list.extend(coordinate.map(|c| Map {
             // Without a step its law would be the sum of all.
             law: Vec::new(),
-            ..map(rows, &c, [found.base, &last], j, joint)
+            ..map(rows, c, [found.base, &last], j, joint)
         }));
     }
     list
 }
 
 /// The coordinate over which an effect shows.
-fn telling(profile: &Profile, all: Vec<Coordinate>, joint: &Joint) -> Option<Coordinate> {
+fn telling(profile: &Profile, all: &[Coordinate], joint: &Joint) -> Option<Coordinate> {
     let wave = |order: f64| {
-        let ratio = (joint.drive.as_ref())
-            .map(|d| d.gear_ratio)
-            .filter(|r| *r != 0.0)
-            .unwrap_or(1.0);
+        let ratio = joint.gear_ratio();
         let position = all.iter().find(|c| c.name == "position")?;
         let turn = std::f64::consts::TAU;
         Some(Coordinate {
@@ -101,7 +97,7 @@ fn telling(profile: &Profile, all: Vec<Coordinate>, joint: &Joint) -> Option<Coo
         | Kind::DriveDeadzone
         | Kind::TorqueOffset => "velocity",
     };
-    all.into_iter().find(|c| c.name == name)
+    all.iter().find(|c| c.name == name).cloned()
 }
 
 /// Mean residuals of a joint over a coordinate; what lies between them is the law as far as the rest of the model does not
@@ -116,12 +112,7 @@ fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize, own: &Join
         joint: own.name.clone(),
         coordinate: over.name.to_owned(),
         unit: over.unit.to_owned(),
-        residual_unit: if own.kind == JointKind::Revolute {
-            "N*m"
-        } else {
-            "N"
-        }
-        .to_owned(),
+        residual_unit: own.kind.units().1.to_owned(),
         ..Map::default()
     };
     for b in 0..BINS {

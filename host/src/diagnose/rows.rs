@@ -21,6 +21,24 @@ const PARALLEL: f64 = 1e-6;
 /// A signal on the kept rows, joint by joint; absent where it is zero throughout.
 pub(super) type Column = Vec<Option<Vec<f64>>>;
 
+/// Σ factor·column over the `joints` of the columns.
+pub(super) fn combined<'a>(
+    joints: usize,
+    terms: impl IntoIterator<Item = (&'a Column, f64)>,
+) -> Column {
+    let mut sum: Column = vec![None; joints];
+    for (column, factor) in terms {
+        for (to, from) in sum.iter_mut().zip(column) {
+            let Some(from) = from else { continue };
+            let to = to.get_or_insert_with(|| vec![0.0; from.len()]);
+            for (t, x) in to.iter_mut().zip(from) {
+                *t += factor * x;
+            }
+        }
+    }
+    sum
+}
+
 /// Low-pass and thinning that torque and every regressor column pass alike.
 #[derive(Clone, Debug)]
 pub(super) struct Thinning {

@@ -1,98 +1,26 @@
-//! Which effect, one after the other: profile, evidence, gates; then joint refinement, removal and exchange.
+//! Which effect, one after the other: each candidate at its best, gates; then joint refinement, removal and exchange.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rig_shared::effects::{Channel, Kind, SHAPES, Scale};
+use rig_shared::effects::{Channel, Kind, SHAPES};
 
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
-use super::fit::{Evidence, Fit};
+use super::fit::Fit;
+use super::profile::{LEAST_GAIN, LEAST_SIGMAS, Profile, grid};
 use super::rows::Column;
 
-/// Family-wise probability of a name although nothing is there.
-pub(super) const SIGNIFICANT: f64 = 0.01;
-/// Least share of the RMS that an effect must take away on folds it was not fitted to.
-pub(super) const LEAST_GAIN: f64 = 0.02;
-/// … and that many standard deviations of it.
-pub(super) const LEAST_SIGMAS: f64 = 2.0;
-/// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
-const LEAST_GAIN_OF_GEARS: f64 = 0.1;
-/// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
-const HOPELESS: f64 = 0.5 * LEAST_GAIN;
-/// … and a gear, from whose starting points the ridge is further away.
-const HOPELESS_GEAR: f64 = 0.02;
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
+/// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
+/// closes 93 % of the gap leaves so much …
+const SHADOW: f64 = 0.005;
+/// … and 86 % for gears, whose motion is driven by the measured one.
+const SHADOW_OF_A_GEAR: f64 = 0.02;
 /// Most effects.
 const MOST_EFFECTS: usize = 6;
-/// Points of a grid per decade of a logarithmic range.
-const PER_DECADE: f64 = 4.0;
-/// Points of a linear range, most.
-const MOST_POINTS: usize = 96;
-/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
-const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
-/// Starting points that are followed up.
-const FOLLOWED: usize = 3;
-/// Steps of the simplex.
-const SIMPLEX_STEPS: usize = 80;
-/// Golden-section steps of the refinement.
-const REFINEMENTS: usize = 14;
-
-/// Share explained, shapes, columns.
-type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
-
-/// A candidate at its best shapes.
-#[derive(Clone, Debug)]
-pub(super) struct Profile {
-    /// Which.
-    pub(super) candidate: Candidate,
-    /// Its shapes.
-    pub(super) shapes: [f64; SHAPES],
-    /// Its columns.
-    pub(super) columns: Arc<Vec<Column>>,
-    /// What they do.
-    pub(super) evidence: Evidence,
-}
-
-impl Profile {
-    /// Why it is not taken at a p-value corrected for `tried` trials; none where it passes.
-    pub(super) fn refused(&self, tried: usize) -> Option<String> {
-        let e = &self.evidence;
-        let p = self.corrected(tried);
-        if p > SIGNIFICANT {
-            Some(format!("p = {p:.2}, corrected for {tried} trials"))
-        } else if e.joint_gain < self.least_gain() {
-            Some(format!(
-                "takes away {:.1} % of the residual, less than {:.0} %",
-                100.0 * e.joint_gain,
-                100.0 * self.least_gain()
-            ))
-        } else if e.gain_sigmas < LEAST_SIGMAS {
-            Some(format!(
-                "its gain is only {:.1} of its standard deviations",
-                e.gain_sigmas
-            ))
-        } else {
-            None
-        }
-    }
-
-    fn least_gain(&self) -> f64 {
-        if self.candidate.kind.about().channel == Channel::Transmission {
-            LEAST_GAIN_OF_GEARS
-        } else {
-            LEAST_GAIN
-        }
-    }
-
-    /// p-value corrected for `tried` trials.
-    pub(super) fn corrected(&self, tried: usize) -> f64 {
-        (self.evidence.p_value * tried as f64).min(1.0)
-    }
-}
-
 /// The search over a library.
 pub(super) struct Search<'a> {
     /// What columns are formed from.
@@ -102,71 +30,6 @@ pub(super) struct Search<'a> {
     /// Threads.
     pub(super) threads: usize,
     cache: Mutex<HashMap<(usize, usize), Arc<Vec<Column>>>>,
-}
-
-/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
-/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
-fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
-    let mut list = Vec::new();
-    let shapes = kind.about().shapes;
-    let [low, high] = shapes[0].range;
-    const STEPS: usize = 11;
-    for k in 0..=STEPS {
-        let first = low * (high / low).powf(k as f64 / STEPS as f64);
-        for share in [0.05, 0.25, 0.5, 0.9] {
-            list.push(if kind == Kind::Backlash {
-                [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
-            } else {
-                // A few per cent of critical damping for a tenth of a kg·m².
-                [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
-            });
-        }
-    }
-    list
-}
-
-/// Grid of shapes of an effect.
-pub(super) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
-    if kind.about().channel == Channel::Transmission {
-        return starts(kind);
-    }
-    let shapes = kind.about().shapes;
-    let mut points = vec![[0.0; SHAPES]];
-    for (place, shape) in shapes.iter().enumerate() {
-        let [low, high] = shape.range;
-        let values: Vec<f64> = match shape.scale {
-            Scale::Logarithmic => {
-                let n = ((high / low).log10() * PER_DECADE / shapes.len() as f64)
-                    .ceil()
-                    .max(1.0);
-                (0..=n as usize)
-                    .map(|k| low * (high / low).powf(k as f64 / n))
-                    .collect()
-            }
-            Scale::Linear => {
-                // Orders are whole; anything else linear is stepped through.
-                let whole = (high - low).floor() as usize + 1;
-                if whole <= MOST_POINTS && low.fract() == 0.0 {
-                    (0..whole).map(|k| low + k as f64).collect()
-                } else {
-                    (0..=8)
-                        .map(|k| low + (high - low) * f64::from(k) / 8.0)
-                        .collect()
-                }
-            }
-        };
-        points = points
-            .into_iter()
-            .flat_map(|point| {
-                values.iter().map(move |v| {
-                    let mut point = point;
-                    point[place] = *v;
-                    point
-                })
-            })
-            .collect();
-    }
-    points
 }
 
 impl<'a> Search<'a> {
@@ -214,217 +77,6 @@ impl<'a> Search<'a> {
             .unwrap_or_else(PoisonError::into_inner)
             .insert(key, columns.clone());
         Ok(columns)
-    }
-
-    /// Share of the residual that a candidate's columns explain.
-    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
-        let bounds = self.bounds(self.library[c].kind);
-        let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
-        Some(share)
-    }
-
-    /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn profile(
-        &self,
-        fit: &Fit,
-        c: usize,
-        start: Option<[f64; SHAPES]>,
-    ) -> Result<Option<Profile>, DiagnoseError> {
-        let kind = self.library[c].kind;
-        let points = grid(kind);
-        let mut best: Option<Best> = None;
-        let gear = kind.about().channel == Channel::Transmission;
-        let mut followed: Vec<Best> = Vec::new();
-        if let Some(shapes) = start {
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            if let Some(share) = self.explained(fit, c, &columns) {
-                best = Some((share, shapes, columns));
-            }
-        } else {
-            for (place, shapes) in points.iter().enumerate() {
-                let columns = self.cached(c, place, shapes)?;
-                let Some(share) = self.explained(fit, c, &columns) else {
-                    continue;
-                };
-                if gear {
-                    followed.push((share, *shapes, columns.clone()));
-                    followed.sort_by(|a, b| b.0.total_cmp(&a.0));
-                    followed.truncate(FOLLOWED);
-                }
-                if best.as_ref().is_none_or(|b| share > b.0) {
-                    best = Some((share, *shapes, columns));
-                }
-            }
-        }
-        let Some(mut best) = best else {
-            return Ok(None);
-        };
-        let about = kind.about();
-        // One joint's share of the squares of all.
-        let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
-        if best.0 * (self.source.nominal.joints() as f64) < hopeless {
-            return Ok(None);
-        }
-        if gear {
-            self.descend(fit, c, &mut best)?;
-            for mut other in followed.into_iter().skip(1) {
-                self.descend(fit, c, &mut other)?;
-                if other.0 > best.0 {
-                    best = other;
-                }
-            }
-        }
-        for _ in 0..if about.channel == Channel::Transmission {
-            0
-        } else if about.shapes.len() > 1 {
-            2
-        } else {
-            1
-        } {
-            for (place, shape) in about.shapes.iter().enumerate() {
-                if shape.scale == Scale::Linear {
-                    // Whole orders: nothing between them.
-                    continue;
-                }
-                self.refine(fit, c, place, &mut best)?;
-            }
-        }
-        let Some(projected) = fit.distinct(&best.2) else {
-            return Ok(None);
-        };
-        let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
-            return Ok(None);
-        };
-        Ok(Some(Profile {
-            candidate: self.library[c],
-            shapes: best.1,
-            columns: best.2,
-            evidence,
-        }))
-    }
-
-    /// Nelder and Mead's simplex (1965) over the logarithms of all shapes at once: stiffness, damping and play pull on each
-    /// other.
-    fn descend(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
-        let scales = self.library[c].kind.about().shapes;
-        let n = scales.len();
-        let logarithmic = |k: usize| scales[k].scale == Scale::Logarithmic;
-        let start: Vec<f64> = (best.1[..n].iter().enumerate())
-            .map(|(k, s)| if logarithmic(k) { s.ln() } else { *s })
-            .collect();
-        let mut at = |x: &[f64]| -> Result<f64, DiagnoseError> {
-            let mut shapes = [0.0; SHAPES];
-            for (k, (to, x)) in shapes.iter_mut().zip(x).enumerate() {
-                let [low, high] = scales[k].bounds;
-                *to = if logarithmic(k) { x.exp() } else { *x }.clamp(low, high);
-            }
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some(share) = self.explained(fit, c, &columns) else {
-                return Ok(0.0);
-            };
-            if share > best.0 {
-                *best = (share, shapes, columns);
-            }
-            Ok(-share)
-        };
-        let mut simplex = vec![(at(&start)?, start.clone())];
-        for k in 0..n {
-            let mut x = start.clone();
-            // Away from a bound.
-            x[k] += if !logarithmic(k) && x[k] > 0.5 {
-                -0.4
-            } else {
-                0.4
-            };
-            simplex.push((at(&x)?, x));
-        }
-        for _ in 0..SIMPLEX_STEPS {
-            simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-            if simplex[n].0 - simplex[0].0 < 1e-4 * simplex[0].0.abs() {
-                break;
-            }
-            let middle: Vec<f64> = (0..n)
-                .map(|k| simplex[..n].iter().map(|s| s.1[k]).sum::<f64>() / n as f64)
-                .collect();
-            let along = |t: f64, worst: &[f64]| -> Vec<f64> {
-                middle
-                    .iter()
-                    .zip(worst)
-                    .map(|(m, w)| m + t * (w - m))
-                    .collect()
-            };
-            let worst = simplex[n].1.clone();
-            let x = along(-1.0, &worst);
-            let f = at(&x)?;
-            if f < simplex[0].0 {
-                let far = along(-2.0, &worst);
-                let g = at(&far)?;
-                simplex[n] = if g < f { (g, far) } else { (f, x) };
-            } else if f < simplex[n - 1].0 {
-                simplex[n] = (f, x);
-            } else {
-                let near = along(if f < simplex[n].0 { -0.5 } else { 0.5 }, &worst);
-                let g = at(&near)?;
-                if g < simplex[n].0.min(f) {
-                    simplex[n] = (g, near);
-                } else {
-                    let top = simplex[0].1.clone();
-                    for s in &mut simplex[1..] {
-                        let x: Vec<f64> =
-                            s.1.iter().zip(&top).map(|(x, t)| 0.5 * (x + t)).collect();
-                        *s = (at(&x)?, x);
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Golden section over one logarithmic shape about the best point.
-    fn refine(
-        &self,
-        fit: &Fit,
-        c: usize,
-        place: usize,
-        best: &mut Best,
-    ) -> Result<(), DiagnoseError> {
-        let shapes_count = self.library[c].kind.about().shapes.len() as f64;
-        let step = shapes_count / PER_DECADE * std::f64::consts::LN_10;
-        let middle = best.1[place].ln();
-        let (mut low, mut high) = (middle - step, middle + step);
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
-            let mut shapes = best.1;
-            shapes[place] = x.exp();
-            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
-            let Some(share) = self.explained(fit, c, &columns) else {
-                return Ok(f64::NEG_INFINITY);
-            };
-            if share > best.0 {
-                *best = (share, shapes, columns);
-            }
-            Ok(share)
-        };
-        let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-        let (mut fa, mut fb) = (at(a, best)?, at(b, best)?);
-        for _ in 0..REFINEMENTS {
-            if fa > fb {
-                (high, b, fb) = (b, a, fa);
-                a = high - golden * (high - low);
-                fa = at(a, best)?;
-            } else {
-                (low, a, fa) = (a, b, fb);
-                b = low + golden * (high - low);
-                fb = at(b, best)?;
-            }
-            if high - low < 0.01 {
-                break;
-            }
-        }
-        Ok(())
     }
 
     /// All candidates at their best, best gain first.
@@ -479,11 +131,6 @@ impl<'a> Search<'a> {
         Ok(profiles)
     }
 
-    /// What physics allows the gains to be.
-    fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
-        self.source.gains(kind).iter().map(|g| g.bounds).collect()
-    }
-
     /// Number of trials of a sweep.
     pub(super) fn trials(&self) -> usize {
         (self.library.iter())
@@ -492,16 +139,16 @@ impl<'a> Search<'a> {
             .sum()
     }
 
-    /// Finds effects one by one. `base` holds the nominal columns; `told` hears of every sweep and of the effects in the
-    /// model at that time; `renew` gives what columns are formed from once they are in.
+    /// Finds effects one by one. `base` holds the nominal columns; `told` hears of every sweep and of the number of effects
+    /// in the model at that time; `renew` gives what columns are formed from once they are in.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn run<'f>(
+    pub(super) fn run(
         &mut self,
-        base: &Fit<'f>,
+        base: &Fit,
         renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
-        told: &mut dyn FnMut(usize, &[Profile], &Fit<'f>),
+        told: &mut dyn FnMut(usize, &[Profile]),
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let trials = self.trials();
         let mut chosen: Vec<Profile> = Vec::new();
@@ -509,7 +156,7 @@ impl<'a> Search<'a> {
             let fit = with(base, &chosen, None);
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
             let profiles = self.sweep(&fit, &present)?;
-            told(chosen.len(), &profiles, &fit);
+            told(chosen.len(), &profiles);
             let Some(best) = first_to_take(profiles, trials) else {
                 break;
             };
@@ -592,7 +239,9 @@ impl<'a> Search<'a> {
         let mut i = 0;
         while chosen.len() > 1 && i < chosen.len() {
             let e = &chosen[i].evidence;
-            if e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS {
+            let weak =
+                e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS;
+            if weak || in_the_shadow(chosen, i) {
                 chosen.remove(i);
                 self.refine_all(base, chosen)?;
                 i = 0;
@@ -658,6 +307,22 @@ fn first_to_take(profiles: Vec<Profile>, trials: usize) -> Option<Profile> {
         }
     }
     Some(best)
+}
+
+/// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
+fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
+    let squares =
+        |p: &Profile| -> f64 { p.evidence.block_errors.iter().map(|e| e[0] - e[1]).sum() };
+    let own = squares(&chosen[i]);
+    (chosen.iter().enumerate()).any(|(k, other)| {
+        let shadow = match other.candidate.kind.about().channel {
+            Channel::Transmission => SHADOW_OF_A_GEAR,
+            _ => SHADOW,
+        };
+        k != i
+            && other.candidate.joint == chosen[i].candidate.joint
+            && own < shadow * squares(other)
+    })
 }
 
 fn same(a: &[Profile], b: &[Profile]) -> bool {

@@ -3,9 +3,9 @@
 use super::finish::Found;
 use super::floor::repeats;
 use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
-use super::search::Profile;
-use crate::report::format_significant;
-use crate::robot::{Joint, JointKind};
+use super::profile::Profile;
+use crate::report::{format_significant, format_unit};
+use crate::robot::Joint;
 
 /// From so many standard deviations on a parameter has moved.
 const MOVED: f64 = 3.0;
@@ -16,10 +16,6 @@ fn number(x: f64) -> String {
 
 fn percent(share: f64) -> String {
     format!("{} %", format_significant(100.0 * share, 3))
-}
-
-fn unit(w: &Waterfall) -> &'static str {
-    if w.unit == "N" { "N" } else { "N·m" }
 }
 
 /// `a`, `a and b`, `a, b and c`.
@@ -68,6 +64,16 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
             number(remainder.rms),
             format_significant(remainder.ratio, 2)
         ));
+    }
+    for (lead, w) in d.torque_lead.iter().zip(&d.waterfall) {
+        if *lead != 0.0 {
+            words.push(format!(
+                "The torque of joint {} was recorded {} ms {} it acts, less than a sample, as where a controller holds it until its next one; this was taken out first.",
+                w.joint,
+                number(1e3 * lead.abs()),
+                if *lead > 0.0 { "before" } else { "after" },
+            ));
+        }
     }
     let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
     if let Some(a) = moved.filter(|_| !d.steps.is_empty()) {
@@ -128,6 +134,7 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         (&w.holdout, "on the hold-out")
     };
     let (first, last) = (list.first()?, list.last()?);
+    let unit = format_unit(&w.unit);
     let from = if d.steps.is_empty() {
         format!("The torque residual of joint {} is", w.joint)
     } else {
@@ -138,11 +145,9 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         )
     };
     Some(format!(
-        "{from} {} {} RMS {on}; the noise floor is {} {}.",
+        "{from} {} {unit} RMS {on}; the noise floor is {} {unit}.",
         number(*last),
-        unit(w),
         number(w.floor),
-        unit(w)
     ))
 }
 
@@ -191,11 +196,8 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
 }
 
 /// Unit of a joint's effort, as printed.
-fn effort(joint: &Joint) -> &'static str {
-    match joint.kind {
-        JointKind::Revolute => "N·m",
-        JointKind::Prismatic => "N",
-    }
+fn effort(joint: &Joint) -> String {
+    format_unit(joint.kind.units().1)
 }
 
 /// How the noise floor was found.

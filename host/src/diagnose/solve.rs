@@ -34,13 +34,13 @@ pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Opti
         }
     }
     if slopes.is_empty() {
-        let covariance = sandwich(plain, &weighted, &inverse, &rest);
+        let covariance = plain.sandwich(&weighted, &inverse, &rest);
         return Some(Solution { values, covariance });
     }
     let mut all = weighted;
     all.extend(slopes.iter().map(|c| plain.weighted(c)));
     let (_, inverse) = normal(&all, torque)?;
-    let covariance = sandwich(plain, &all, &inverse, &rest);
+    let covariance = plain.sandwich(&all, &inverse, &rest);
     Some(Solution { values, covariance })
 }
 
@@ -70,26 +70,4 @@ fn normal(columns: &[Vec<f64>], torque: &[f64]) -> Option<(Vec<f64>, DMatrix<f64
     }
     let values = (0..k).map(|a| solution[a] / lengths[a]).collect();
     Some((values, inverse))
-}
-
-/// Covariance from the scores of the blocks (Liang and Zeger 1986).
-fn sandwich(
-    plain: &Fit,
-    columns: &[Vec<f64>],
-    inverse: &DMatrix<f64>,
-    rest: &[f64],
-) -> DMatrix<f64> {
-    let k = columns.len();
-    let blocks = plain.blocks();
-    let of_row = plain.block_of_rows();
-    let mut scores = DMatrix::<f64>::zeros(k, blocks);
-    for (at, r) in rest.iter().enumerate() {
-        let b = of_row[at % of_row.len()];
-        for (c, column) in columns.iter().enumerate() {
-            scores[(c, b)] += column[at] * r;
-        }
-    }
-    let g = blocks as f64;
-    let meat = &scores * scores.transpose() * (g / (g - 1.0).max(1.0));
-    inverse * meat * inverse
 }

@@ -11,7 +11,8 @@
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 
 use super::DiagnoseError;
-use super::columns::{Predicted, Source};
+use super::columns::Source;
+use super::predicted::Predicted;
 use super::rows::motion_of;
 use super::runs::Run;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use rig_shared::effects::{Direction, Effect, GAINS, SHAPES};
+use rig_shared::effects::{Direction, Effect};
 use rig_shared::multibody::{inverse_dynamics, kinetic_energy, potential_energy};
 use rig_shared::scalar::Real as _;
 
@@ -26,17 +26,10 @@ fn rig() -> Robot {
 }
 
 fn with(mut robot: Robot, kind: Kind, gains: &[f64], shapes: &[f64]) -> Robot {
-    let mut effect = Effect {
-        kind,
-        gains: [0.0; GAINS],
-        shapes: [0.0; SHAPES],
-    };
-    effect.gains[..gains.len()].copy_from_slice(gains);
-    effect.shapes[..shapes.len()].copy_from_slice(shapes);
     robot.effects.push(RobotEffect {
         joint: None,
         other: None,
-        effect,
+        effect: Effect::new(kind, gains, shapes),
     });
     robot
 }

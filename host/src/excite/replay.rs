@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{ExciteError, SampledReference};
 use crate::data::{Column, RecordingWriter};
-use crate::robot::{JointKind, Robot};
+use crate::robot::Robot;
 use crate::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
 
 /// The model stands in its controller for so long before the recording begins that gravity has found its balance, s.
@@ -150,10 +150,7 @@ impl Replay {
     pub fn save(&self, path: &Path, robot: &Robot) -> Result<(), ExciteError> {
         let mut columns = vec![Column::new("t", "s")];
         for (k, joint) in robot.joints.iter().enumerate() {
-            let (length, force) = match joint.kind {
-                JointKind::Revolute => ("rad", "N*m"),
-                JointKind::Prismatic => ("m", "N"),
-            };
+            let (length, force) = joint.kind.units();
             let speed = format!("{length}/s");
             for (name, unit) in [
                 ("q", length),

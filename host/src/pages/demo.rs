@@ -1,6 +1,9 @@
 //! The page of the demonstration: the emulated rig, identified by its own firmware and host.
 
+mod missing;
+
 use super::parts;
+use crate::diagnose::Diagnosis;
 use crate::identify::{FrictionMap, ResidualReport};
 use crate::report::{
     Axis, Block, Column, Document, Fact, Marker, NoteKind, Plot, Role, Section, Series, Style,
@@ -114,6 +117,8 @@ pub struct DemoFigures {
     pub wire: Wire,
     /// Residuals on data held back, one a joint.
     pub holdout: Vec<ResidualReport>,
+    /// What the identified model lacks.
+    pub diagnosis: Option<Diagnosis>,
     /// What the emulated rig contains and the model does not.
     pub beyond_model: Vec<String>,
     /// Sentences for the top of the page.
@@ -132,6 +137,7 @@ pub fn demo(figures: &DemoFigures) -> Document {
     sections.push(holdout(figures));
     sections.push(friction(figures));
     sections.push(wire(figures));
+    sections.extend(figures.diagnosis.as_ref().map(missing::section));
     sections.push(beyond(figures));
     let mut repeat =
         Section::new("repeat", "How to repeat this", "").with(Block::Code(figures.command.clone()));

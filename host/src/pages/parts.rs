@@ -1,5 +1,7 @@
 //! Pieces that several pages share.
 
+pub(super) use crate::report::format_unit as unit;
+
 use crate::identify::{Dependence, FrictionFit, FrictionMap, ResidualReport, Series as Curves};
 use crate::prepare::Treatment;
 use crate::report::{
@@ -7,11 +9,6 @@ use crate::report::{
     format_significant, format_value,
 };
 use crate::robot::{Joint, JointKind};
-
-/// A unit as print has it: `kg*m^2` is `kg·m²`.
-pub(super) fn unit(ascii: &str) -> String {
-    ascii.replace("^2", "²").replace('*', "·")
-}
 
 /// Torque or force.
 pub(super) fn effort(kind: JointKind) -> &'static str {

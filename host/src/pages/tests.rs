@@ -223,6 +223,7 @@ fn figures() -> DemoFigures {
             text: "Three samples were lost.".into(),
         },
         holdout: Vec::new(),
+        diagnosis: None,
         beyond_model: vec!["Cogging of the motor".into()],
         warnings: vec!["The demonstration's warning.".into()],
         files: vec![("data.csv".into(), "the recording".into())],

@@ -73,6 +73,12 @@ pub fn format_significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// A unit as print has it: `kg*m^2` is `kg·m²`.
+#[must_use]
+pub fn format_unit(ascii: &str) -> String {
+    ascii.replace("^2", "²").replace('*', "·")
+}
+
 /// A value and its standard deviation, both rounded to the deviation's two significant digits
 /// (the rule of the Guide to the Expression of Uncertainty in Measurement, JCGM 100:2008, 7.2.6):
 /// `format_value(95.1123, 0.1083)` is `95.11 ± 0.11`.

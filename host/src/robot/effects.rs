@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
-use rig_shared::effects::{Channel, Effect, GAINS, Kind, Parameter, SHAPES};
+use rig_shared::effects::{Channel, Effect, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
 use super::check::{EFFECT_NAMES, Fault, Step};
@@ -66,6 +66,15 @@ pub fn unit_of(parameter: &Parameter, kind: JointKind) -> String {
             .replace("(N*m)", "N")
             .replace("N*m", "N")
             .replace("rad", "m"),
+    }
+}
+
+/// Name of an effect with its law, as `name (law)`.
+pub fn title_of(kind: Kind) -> String {
+    let about = kind.about();
+    match about.law {
+        Some(law) => format!("{} ({law})", about.name),
+        None => about.name.to_owned(),
     }
 }
 
@@ -189,21 +198,12 @@ impl RobotEffect {
                     )
                 })
         };
-        let mut effect = Effect {
-            kind,
-            gains: [0.0; GAINS],
-            shapes: [0.0; SHAPES],
-        };
-        for (to, p) in effect.gains.iter_mut().zip(kind.about().gains) {
-            *to = value(p)?;
-        }
-        for (to, p) in effect.shapes.iter_mut().zip(kind.about().shapes) {
-            *to = value(p)?;
-        }
+        let gains: Vec<f64> = (kind.about().gains.iter().map(value)).collect::<Result<_, _>>()?;
+        let shapes: Vec<f64> = (kind.about().shapes.iter().map(value)).collect::<Result<_, _>>()?;
         Ok(Self {
             joint: text("joint")?,
             other: text("other")?,
-            effect,
+            effect: Effect::new(kind, &gains, &shapes),
         })
     }
 
@@ -216,11 +216,7 @@ impl RobotEffect {
 
     /// As `name (law)`.
     pub fn title(&self) -> String {
-        let about = self.effect.kind.about();
-        match about.law {
-            Some(law) => format!("{} ({law})", about.name),
-            None => about.name.to_owned(),
-        }
+        title_of(self.effect.kind)
     }
 }
 

@@ -13,21 +13,11 @@ fn with(effect: &str) -> Result<Robot, String> {
 /// Every parameter at the low end of its searched range.
 fn smallest(kind: Kind) -> RobotEffect {
     let about = kind.about();
-    let mut effect = Effect {
-        kind,
-        gains: [0.0; GAINS],
-        shapes: [0.0; SHAPES],
-    };
-    for (to, p) in effect.gains.iter_mut().zip(about.gains) {
-        *to = p.range[0];
-    }
-    for (to, p) in effect.shapes.iter_mut().zip(about.shapes) {
-        *to = p.range[0];
-    }
+    let of = |list: &[Parameter]| list.iter().map(|p| p.range[0]).collect::<Vec<f64>>();
     RobotEffect {
         joint: Some("a".into()),
         other: has_other(kind).then(|| "b".into()),
-        effect,
+        effect: Effect::new(kind, &of(about.gains), &of(about.shapes)),
     }
 }
 

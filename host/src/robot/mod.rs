@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
-pub use effects::{Placed, RobotEffect, unit_of};
+pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
 pub use urdf_out::Urdf;
 pub use workspace::Region;
@@ -82,6 +82,16 @@ pub enum JointKind {
     Prismatic,
 }
 
+impl JointKind {
+    /// Units of position and effort (torque or force), ASCII.
+    pub const fn units(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Revolute => ("rad", "N*m"),
+            Self::Prismatic => ("m", "N"),
+        }
+    }
+}
+
 /// One joint with the link that it moves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -113,6 +123,14 @@ pub struct Joint {
     /// The position controller, for simulation; absent means the recording's torque is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controller: Option<Controller>,
+}
+
+impl Joint {
+    /// Motor turns per joint turn, with sign; 1 without a drive and where a screw alone moves the joint.
+    pub fn gear_ratio(&self) -> f64 {
+        let ratio = self.drive.as_ref().map(|drive| drive.gear_ratio);
+        ratio.filter(|ratio| *ratio != 0.0).unwrap_or(1.0)
+    }
 }
 
 /// Inertial parameters of a link in its own frame.

@@ -278,6 +278,9 @@ fn urdf_drives_friction_and_limits_are_kept() {
         })
     );
     assert_eq!(one.drive.as_ref().map(|d| d.gear_ratio), Some(-50.0));
+    assert_eq!((one.gear_ratio(), two.gear_ratio()), (-50.0, 1.0));
+    assert_eq!(one.kind.units(), ("rad", "N*m"));
+    assert_eq!(two.kind.units(), ("m", "N"));
     assert_eq!(
         (two.kind, &two.limits, &two.friction, &two.drive),
         (JointKind::Prismatic, &None, &None, &None)

@@ -220,10 +220,11 @@ fn write_region(out: &mut String, region: &Region) {
 }
 
 fn write_joint(out: &mut String, joint: &Joint) {
-    let (kind, angle, force) = match joint.kind {
-        JointKind::Revolute => ("revolute", "rad", "N*m"),
-        JointKind::Prismatic => ("prismatic", "m", "N"),
+    let kind = match joint.kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Prismatic => "prismatic",
     };
+    let (angle, force) = joint.kind.units();
     out.push_str("\n[[joint]]\n");
     line(out, "name", &quoted(&joint.name), "unique in the robot");
     line(out, "kind", &quoted(kind), "revolute or prismatic");

@@ -159,10 +159,7 @@ impl Robot {
             JointKind::Revolute => "kg*m^2",
             JointKind::Prismatic => "kg",
         };
-        let torque = |kind| match kind {
-            JointKind::Revolute => "N*m",
-            JointKind::Prismatic => "N",
-        };
+        let torque = |kind: JointKind| kind.units().1;
         if let Some(entries) = list(column::DRIVE_INERTIA, inertia) {
             remarks.push(format!("URDF has no place for the inertia of the drives, seen at the joints: {entries}; give it to the simulator as armature or rotor inertia."));
         }

@@ -29,7 +29,7 @@ use serde::Serialize;
 use crate::effects::Compensated;
 use crate::identify::{IdentifyError, Plan, ResidualReport, chain_of, torque_residuals};
 use crate::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment};
-use crate::robot::{JointKind, Robot};
+use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
 
 /// Settings of a validation.
@@ -205,14 +205,6 @@ pub struct Validation {
     pub treatment: Treatment,
 }
 
-/// Units of position and torque of a joint, ASCII.
-pub(crate) fn units(kind: JointKind) -> (&'static str, &'static str) {
-    match kind {
-        JointKind::Revolute => ("rad", "N*m"),
-        JointKind::Prismatic => ("m", "N"),
-    }
-}
-
 /// Share of the torque unexplained above which a warning says so; [`crate::identify`] uses the same.
 const UNEXPLAINED: f64 = 0.3;
 
@@ -292,7 +284,7 @@ pub fn validate(
                 .zip(&robot.joints)
                 .map(|(residual, joint)| TorqueCheck {
                     joint: joint.name.clone(),
-                    unit: units(joint.kind).1.to_owned(),
+                    unit: joint.kind.units().1.to_owned(),
                     residual,
                 })
                 .collect();

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError, units};
+use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
 use crate::data::Block;
 use crate::prepare::{Recording, Survey};
 use crate::robot::{Controller, Robot};
@@ -184,7 +184,7 @@ pub(super) fn check(
         .zip(&change)
         .enumerate()
         .map(|(j, ((e, joint), change))| {
-            let (position_unit, torque_unit) = units(joint.kind);
+            let (position_unit, torque_unit) = joint.kind.units();
             MotionCheck {
                 joint: joint.name.clone(),
                 position_unit: position_unit.to_owned(),

@@ -29,10 +29,12 @@ pub enum Direction {
 /// How a parameter is searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// In equal steps.
+    /// Any number, in equal steps.
     Linear,
-    /// In equal ratios.
+    /// Any number, in equal ratios.
     Logarithmic,
+    /// Whole numbers alone, such as the order of a wave: nothing lies between two of them.
+    Whole,
 }
 
 /// One parameter.

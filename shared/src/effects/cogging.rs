@@ -2,7 +2,7 @@
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
+    Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -39,7 +39,7 @@ impl Law for Cogging {
             unit: "1",
             bounds: [2.0, f64::INFINITY],
             range: [4.0, 84.0],
-            scale: Scale::Linear,
+            scale: Scale::Whole,
             meaning: "periods per turn of the motor, a whole number",
         }],
         signature: "periodic in the motor's angle, the same at any current",
@@ -55,7 +55,6 @@ impl Law for Cogging {
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        let (sine, cosine) = (shapes[0] * at.motor_angle).sin_cos();
-        [cosine, sine, T::ZERO, T::ZERO]
+        wave(shapes[0], at.motor_angle)
     }
 }

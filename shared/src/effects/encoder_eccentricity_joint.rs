@@ -2,7 +2,7 @@
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
+    Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -39,7 +39,7 @@ impl Law for EncoderEccentricityJoint {
             unit: "1",
             bounds: [1.0, f64::INFINITY],
             range: [1.0, 4.0],
-            scale: Scale::Linear,
+            scale: Scale::Whole,
             meaning: "periods per turn of the joint, a whole number",
         }],
         signature: "periodic with each turn of the joint, growing with the square of the speed",
@@ -62,7 +62,6 @@ impl Law for EncoderEccentricityJoint {
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        let (sine, cosine) = (shapes[0] * at.position).sin_cos();
-        [cosine, sine, T::ZERO, T::ZERO]
+        wave(shapes[0], at.position)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
+    Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -39,7 +39,7 @@ impl Law for GearEccentricity {
             unit: "1",
             bounds: [f64::MIN_POSITIVE, f64::INFINITY],
             range: [1.0, 3.0],
-            scale: Scale::Linear,
+            scale: Scale::Whole,
             meaning: "periods per turn of the motor; 1 for the stage on its shaft, below 1 for later stages",
         }],
         signature: "periodic with each turn of the motor, the same at any current",
@@ -72,7 +72,6 @@ impl Law for GearEccentricity {
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        let (sine, cosine) = (shapes[0] * at.motor_angle).sin_cos();
-        [cosine, sine, T::ZERO, T::ZERO]
+        wave(shapes[0], at.motor_angle)
     }
 }

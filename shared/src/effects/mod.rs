@@ -84,6 +84,13 @@ pub struct Instant<T> {
     pub period: T,
 }
 
+/// Cosine and sine of an order of an angle, as [`Law::terms`] has them.
+#[inline(always)]
+fn wave<T: Real>(order: T, angle: T) -> [T; GAINS] {
+    let (sine, cosine) = (order * angle).sin_cos();
+    [cosine, sine, T::ZERO, T::ZERO]
+}
+
 /// The equations of one effect.
 trait Law {
     /// What it is.
@@ -266,6 +273,17 @@ impl<T: Real> Default for Memory<T> {
 }
 
 impl<T: Real> Effect<T> {
+    /// An effect of a kind with its `gains` and `shapes` in the order of [`About`]; 0 beyond them. An effect has room
+    /// for [`GAINS`] and [`SHAPES`] of them: what is beyond that is no value of any kind, and is not looked at.
+    pub fn new(kind: Kind, gains: &[T], shapes: &[T]) -> Self {
+        let value = |list: &[T], k: usize| list.get(k).copied().unwrap_or(T::ZERO);
+        Self {
+            kind,
+            gains: core::array::from_fn(|k| value(gains, k)),
+            shapes: core::array::from_fn(|k| value(shapes, k)),
+        }
+    }
+
     /// Torque that the drive has to give because of it, N·m, and the hidden state one period on.
     #[inline(always)]
     pub fn torque(&self, memory: &mut Memory<T>, at: &Instant<T>) -> T {

@@ -13,19 +13,10 @@ fn example(kind: Kind) -> Effect<f64> {
     let middle = |p: &Parameter| match p.scale {
         Scale::Linear => 0.5 * (p.range[0] + p.range[1]),
         Scale::Logarithmic => (p.range[0] * p.range[1]).sqrt(),
+        Scale::Whole => (0.5 * (p.range[0] + p.range[1])).round(),
     };
-    let mut effect = Effect {
-        kind,
-        gains: [0.0; GAINS],
-        shapes: [0.0; SHAPES],
-    };
-    for (to, p) in effect.gains.iter_mut().zip(about.gains) {
-        *to = middle(p);
-    }
-    for (to, p) in effect.shapes.iter_mut().zip(about.shapes) {
-        *to = middle(p);
-    }
-    effect
+    let of = |list: &[Parameter]| list.iter().map(middle).collect::<Vec<f64>>();
+    Effect::new(kind, &of(about.gains), &of(about.shapes))
 }
 
 /// Instants along positions at a constant period, velocities between them taken as constant.
@@ -106,11 +97,12 @@ fn every_kind_says_all_there_is_to_say() {
             assert!(
                 p.bounds[0] <= p.range[0] && p.range[0] < p.range[1] && p.range[1] <= p.bounds[1]
             );
-            assert!(
-                p.scale == Scale::Linear || p.range[0] > 0.0,
-                "{kind:?}: {}",
-                p.name
-            );
+            let searchable = match p.scale {
+                Scale::Linear => true,
+                Scale::Logarithmic => p.range[0] > 0.0,
+                Scale::Whole => p.range.iter().all(|end| end.fract() == 0.0),
+            };
+            assert!(searchable, "{kind:?}: {}", p.name);
         }
         // Only what acts between motor and link has no torque of its own.
         assert_eq!(
@@ -138,6 +130,18 @@ fn every_kind_says_all_there_is_to_say() {
             assert_eq!(c.exact, back, "{} and {}", about.name, c.with);
         }
     }
+}
+
+#[test]
+fn an_effect_takes_its_values_in_their_order_and_zero_beyond() {
+    let effect = Effect::new(Kind::Cogging, &[0.3, -0.2], &[14.0]);
+    assert_eq!(effect.kind, Kind::Cogging);
+    assert_eq!(effect.gains, [0.3, -0.2, 0.0, 0.0]);
+    assert_eq!(effect.shapes, [14.0, 0.0, 0.0, 0.0]);
+    // Of a gear that is held by its shapes alone there is no gain to state.
+    let gear = Effect::new(Kind::JointElasticity, &[], &[2.0e3, 4.0, 0.5]);
+    assert_eq!(gear.gains, [0.0; GAINS]);
+    assert_eq!(gear.shapes, [2.0e3, 4.0, 0.5, 0.0]);
 }
 
 #[test]

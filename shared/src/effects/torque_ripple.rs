@@ -2,7 +2,7 @@
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
+    Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -39,7 +39,7 @@ impl Law for TorqueRipple {
             unit: "1",
             bounds: [1.0, f64::INFINITY],
             range: [1.0, 84.0],
-            scale: Scale::Linear,
+            scale: Scale::Whole,
             meaning: "periods per turn of the motor, a whole number; 6 times the pole pairs from the back-EMF, 1 and 2 times from the current sensors",
         }],
         signature: "periodic in the motor's angle, proportional to the current",
@@ -67,7 +67,7 @@ impl Law for TorqueRipple {
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        let (sine, cosine) = (shapes[0] * at.motor_angle).sin_cos();
+        let [cosine, sine, ..] = wave(shapes[0], at.motor_angle);
         [
             at.drive_torque * cosine,
             at.drive_torque * sine,

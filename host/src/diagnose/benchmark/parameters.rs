@@ -27,9 +27,9 @@ impl Compared {
         (self.found - self.truth).abs() / self.truth.abs()
     }
 
-    /// Whether the 95 % interval holds the truth.
+    /// Whether the 95 % interval holds the truth; one without an end holds nothing.
     pub fn covered(&self) -> bool {
-        (self.found - self.truth).abs() <= 1.96 * self.std
+        self.std.is_finite() && (self.found - self.truth).abs() <= 1.96 * self.std
     }
 }
 

@@ -240,9 +240,13 @@ fn shapes_of(rival: &Effect<f64>) -> Vec<[f64; SHAPES]> {
             let mut shapes = rival.shapes;
             shapes[s] = match shape.scale {
                 Scale::Linear => from + share * (to - from),
+                Scale::Whole => (from + share * (to - from)).round(),
                 Scale::Logarithmic => from * (to / from).powf(share),
             };
-            list.push(shapes);
+            // A narrow range of whole numbers has fewer of them than steps.
+            if !list.contains(&shapes) {
+                list.push(shapes);
+            }
         }
     }
     list

@@ -19,14 +19,7 @@ fn robot() -> Robot {
 const NOMINAL: Nominal = [0.17, 2.94, 0.0, 0.3, 0.4, 0.0];
 
 fn effect(kind: Kind, gains: &[f64], shapes: &[f64]) -> (Effect<f64>, Nominal) {
-    let mut made = Effect {
-        kind,
-        gains: [0.0; 4],
-        shapes: [0.0; 4],
-    };
-    made.gains[..gains.len()].copy_from_slice(gains);
-    made.shapes[..shapes.len()].copy_from_slice(shapes);
-    (made, NOMINAL)
+    (Effect::new(kind, gains, shapes), NOMINAL)
 }
 
 fn middle_of_range(kind: Kind) -> (Effect<f64>, Nominal) {
@@ -267,22 +260,8 @@ fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
     let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
     let nominal = [95.0, 0.0, 0.0, 203.0, 20.0, -3.0];
     let rivals = [
-        (
-            Effect {
-                kind: Kind::Stribeck,
-                gains: [5.0, 0.0, 0.0, 0.0],
-                shapes: [0.005, 0.0, 0.0, 0.0],
-            },
-            nominal,
-        ),
-        (
-            Effect {
-                kind: Kind::PreslidingDahl,
-                gains: [20.0, 0.0, 0.0, 0.0],
-                shapes: [1e-4, 0.0, 0.0, 0.0],
-            },
-            nominal,
-        ),
+        (Effect::new(Kind::Stribeck, &[5.0], &[0.005]), nominal),
+        (Effect::new(Kind::PreslidingDahl, &[20.0], &[1e-4]), nominal),
     ];
     let found = next(&emps, 0, &rivals, 2.0).unwrap().unwrap();
     println!("{}", found.experiment.text);

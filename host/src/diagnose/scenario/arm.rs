@@ -1,15 +1,14 @@
 //! Recordings of an arm of several joints with one joint at fault.
 //!
-//! The arm is the library's rigid-body mechanics, stepped four times a control period; what is hidden in it, its controller,
-//! current loop, sensors and surroundings are this file's own. Equal arms give equal recordings.
+//! The arm is the library's rigid-body mechanics, stepped four times a control period; what is hidden in it has equations of
+//! its own, and its controller, current loop, sensors and surroundings are this file's. Equal arms give equal recordings.
 //!
 //! Leaves out: twist and play of the gears, sampling that jitters.
 
 use std::f64::consts::TAU;
 
-use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column, inertia_matrix};
-
 use super::dice::Dice;
+use super::fault::{Fault, Hidden};
 use crate::data::{Block, JointColumns};
 use crate::diagnose::DiagnoseError;
 use crate::prepare::InMemory;
@@ -34,8 +33,6 @@ const OF_LIMIT: [f64; 3] = [0.03, 0.015, 3e-3];
 const NOISE: [f64; 3] = [3e-3, 5e-4, 1.5e-3];
 /// Memory of the surroundings' torque, s.
 const SURROUNDINGS: f64 = 0.05;
-/// Speed over which dry friction of a fault turns, rad/s.
-const TURN: f64 = 5e-3;
 /// Share of a recording that is run at full speed; the rest at a sixth of it.
 const FAST: f64 = 0.6;
 
@@ -48,27 +45,6 @@ pub enum Arm {
     Upright,
     /// Six geared joints, each with its own drive.
     Six,
-}
-
-/// What is wrong with one joint. Torques are those that the drive has to give.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
-    /// Friction that falls with the speed: torque, N·m, and speed at which half of it is left, rad/s.
-    Stribeck([f64; 2]),
-    /// More friction forwards than backwards, N·m.
-    AsymmetricCoulomb(f64),
-    /// A wave once a motor turn, with a second harmonic of a tenth: amplitude, N·m, and phase, rad.
-    GearEccentricity([f64; 2]),
-    /// Friction per torque that the gear transmits.
-    LoadFriction(f64),
-    /// Torque per acceleration of the joint before, kg·m².
-    InertiaCoupling(f64),
-    /// The base turned about x and y, rad.
-    GravityTilt([f64; 2]),
-    /// A point mass, kg, at a place in the link's frame, m.
-    Payload([f64; 4]),
-    /// The reading is this much more than the position, rad.
-    JointOffset(f64),
 }
 
 /// What is to be recorded.
@@ -215,10 +191,8 @@ impl ArmScenario {
         let limits: Vec<f64> = robot.joints.iter().map(limit).collect();
         let step: Vec<f64> = (robot.joints.iter())
             .map(|j| {
-                let drive = j.drive.as_ref();
-                let counts = drive.and_then(|d| d.encoder_counts_per_rev);
-                let ratio = drive.map_or(1.0, |d| d.gear_ratio);
-                TAU / (counts.unwrap_or(COUNTS[0]) * ratio)
+                let counts = j.drive.as_ref().and_then(|d| d.encoder_counts_per_rev);
+                TAU / (counts.unwrap_or(COUNTS[0]) * j.gear_ratio())
             })
             .collect();
         let offset = |j: usize| match self.fault {
@@ -286,7 +260,7 @@ impl ArmScenario {
                     applied[j] = current[j] + outside[j];
                 }
                 hidden.take(&q, &v, &mut applied)?;
-                hidden.before.copy_from_slice(&v);
+                hidden.before(&v);
                 stepper.step(&mut q, &mut v, &applied, dt)?;
                 hidden.after(&v, dt);
                 if let Some(j) = (0..n).find(|j| !(v[*j].abs() < 1e3)) {
@@ -298,72 +272,6 @@ impl ArmScenario {
             }
         }
         Ok(block)
-    }
-}
-
-/// Torque of a fault, from the state and the acceleration of the step before.
-struct Hidden {
-    fault: Option<(usize, Fault)>,
-    ratio: f64,
-    chain: Chain<f64>,
-    /// Without friction, offset and the drive's inertia.
-    link: Vec<[f64; COLUMNS]>,
-    before: Vec<f64>,
-    acceleration: Vec<f64>,
-}
-
-impl Hidden {
-    fn new(fault: Option<(usize, Fault)>, robot: &Robot, model: &Model) -> Self {
-        let joint = fault.map_or(0, |f| f.0);
-        let drive = robot.joints[joint].drive.as_ref();
-        let mut link = model.parameters.clone();
-        for row in &mut link {
-            row[column::DRIVE_INERTIA..].fill(0.0);
-        }
-        let rest = vec![0.0; robot.joints.len()];
-        Self {
-            fault,
-            ratio: drive.map_or(1.0, |d| d.gear_ratio),
-            chain: model.chain.clone(),
-            link,
-            before: rest.clone(),
-            acceleration: rest,
-        }
-    }
-
-    fn take(&self, q: &[f64], v: &[f64], applied: &mut [f64]) -> Result<(), SimulateError> {
-        let Some((j, fault)) = self.fault else {
-            return Ok(());
-        };
-        let turned = (v[j] / TURN).tanh();
-        applied[j] -= match fault {
-            // Rational, not Gaussian.
-            Fault::Stribeck([more, speed]) => more * turned / (1.0 + (v[j] / speed).powi(2)),
-            Fault::AsymmetricCoulomb(half) => half * turned.abs(),
-            Fault::GearEccentricity([amplitude, phase]) => {
-                let angle = self.ratio * q[j] + phase;
-                amplitude * (angle.sin() + 0.1 * (2.0 * angle).sin())
-            }
-            Fault::LoadFriction(share) => {
-                let n = q.len();
-                let mut load = vec![0.0; n];
-                let mut mass = vec![0.0; n * n];
-                bias_torque(&self.chain, &self.link, q, v, &mut load)?;
-                inertia_matrix(&self.chain, &self.link, q, &mut mass)?;
-                let moved = mass[j * n..(j + 1) * n].iter();
-                let inertial: f64 = moved.zip(&self.acceleration).map(|(m, a)| m * a).sum();
-                share * (load[j] + inertial).abs() * turned
-            }
-            Fault::InertiaCoupling(inertia) => inertia * self.acceleration[j - 1],
-            Fault::GravityTilt(_) | Fault::Payload(_) | Fault::JointOffset(_) => 0.0,
-        };
-        Ok(())
-    }
-
-    fn after(&mut self, v: &[f64], dt: f64) {
-        for ((a, now), before) in self.acceleration.iter_mut().zip(v).zip(&self.before) {
-            *a = (now - before) / dt;
-        }
     }
 }
 

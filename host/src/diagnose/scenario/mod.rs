@@ -6,7 +6,9 @@
 //! and what is recorded. Equal scenarios give equal bytes.
 
 mod arm;
+mod catalogue;
 mod dice;
+mod fault;
 mod hidden;
 mod record;
 mod reference;
@@ -21,7 +23,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use arm::{Arm, ArmRecordings, ArmScenario, Fault};
+pub use arm::{Arm, ArmRecordings, ArmScenario};
+pub use fault::Fault;
 pub use hidden::{Effect, Hidden};
 pub use record::Intrusion;
 pub use reference::Excitation;

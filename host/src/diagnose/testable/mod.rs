@@ -13,6 +13,7 @@ use rig_shared::effects::{Channel, Confusion, Kind, Need};
 
 use super::Run;
 use super::outcome::NotTestable;
+use crate::report::format_unit;
 use crate::robot::{JointKind, Robot};
 
 use evidence::Evidence;
@@ -85,7 +86,7 @@ fn lacking(
     let own = &robot.joints[joint];
     let revolute = own.kind == JointKind::Revolute;
     let unit = if revolute { "rad/s" } else { "m/s" };
-    let force = if revolute { "N·m" } else { "N" };
+    let force = format_unit(own.kind.units().1);
     match need {
         Need::Reversals(least) => (evidence.reversals < least).then(|| {
             (

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use super::plant::{NAMES, NOMINAL, Plant};
 use super::search::{Model, Trial, on_the_voltage};
-use crate::diagnose::engine::{closed, effect_of, label};
+use crate::diagnose::judge::closed;
 use crate::diagnose::outcome::{
     Absorbed, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall,
 };
-use crate::robot::{Drive, JointFriction, Robot, RobotEffect};
-use rig_shared::effects::SHAPES;
+use crate::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
+use rig_shared::effects::Effect;
 
 /// Over this many floors something is left.
 const LEFT: f64 = 1.2;
@@ -100,6 +100,7 @@ impl Told<'_> {
             words,
             noise_floor_rms: vec![self.floor],
             noise_floor_how: "the encoder's smallest step over √12, of the position: a lower bound, as nothing was recorded twice".into(),
+            torque_lead: Vec::new(),
             places: Vec::new(),
             gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
             steps,
@@ -113,7 +114,7 @@ impl Told<'_> {
                 joint: self.joint(),
                 unit: "rad".into(),
                 models: std::iter::once("refitted".to_owned())
-                    .chain(self.models.last().into_iter().flat_map(|m| m.effects.iter().map(|k| label(*k))))
+                    .chain(self.models.last().into_iter().flat_map(|m| m.effects.iter().map(|k| title_of(*k))))
                     .collect(),
                 train: self.train.clone(),
                 holdout: self.holdout.clone(),
@@ -156,7 +157,7 @@ impl Told<'_> {
             set,
             parameters: self.parameters(last, k - 1),
             p_value: own.map_or(1.0, |t| (t.p_value * round.len() as f64).min(1.0)),
-            runner_up: other.map(|(t, _)| label(t.kind)),
+            runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
             train_rms: pair(&self.train),
@@ -214,7 +215,7 @@ impl Told<'_> {
         let of = |(step, round): (usize, &Vec<Trial>)| {
             let before = self.train[step];
             let one = |t: &Trial| Tried {
-                effect: label(t.kind),
+                effect: title_of(t.kind),
                 joint: self.joint(),
                 step,
                 gain: 1.0 - t.unseen.unwrap_or(t.train).min(before) / before,
@@ -253,13 +254,12 @@ impl Told<'_> {
             let about = kind.about();
             let gains = &t[at..at + about.gains.len()];
             at += about.gains.len();
-            let mut shapes = [0.0; SHAPES];
-            shapes[..about.shapes.len()].copy_from_slice(&t[at..at + about.shapes.len()]);
+            let shapes = &t[at..at + about.shapes.len()];
             at += about.shapes.len();
             robot.effects.push(RobotEffect {
                 joint: Some(self.joint()),
                 other: None,
-                effect: effect_of(*kind, gains, &shapes),
+                effect: Effect::new(*kind, gains, shapes),
             });
         }
         robot

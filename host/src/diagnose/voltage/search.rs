@@ -203,7 +203,7 @@ impl Search<'_> {
             for shape in about.shapes {
                 let [low, high] = shape.range;
                 more.theta.push(match shape.scale {
-                    Scale::Linear => low + share * (high - low),
+                    Scale::Linear | Scale::Whole => low + share * (high - low),
                     Scale::Logarithmic => low * (high / low).powf(share),
                 });
                 // What is far outside of what rigs have is another effect.

@@ -18,7 +18,7 @@ const STRIDE: usize = 10;
 const MOVING: f64 = 0.01;
 /// Orders that are tried: of gears, slots, poles and their multiples.
 const ORDERS: [f64; 11] = [1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 14.0, 24.0, 36.0, 42.0, 84.0];
-/// Points of the grid over a logarithmic range.
+/// Points of the grid over a range of any numbers.
 const POINTS: usize = 6;
 
 /// One column of the dictionary.
@@ -184,7 +184,10 @@ fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
         point
     };
     match shape.scale {
-        Scale::Linear => {
+        Scale::Linear => (0..POINTS)
+            .map(|k| at(low + (high - low) * (k as f64 + 0.5) / POINTS as f64))
+            .collect(),
+        Scale::Whole => {
             let within = ORDERS.iter().filter(|o| (low..=high).contains(*o));
             within.map(|order| at(*order)).collect()
         }

@@ -1,0 +1,220 @@
+//! What stays the same during a diagnosis: the robot, its nominal model, how recordings are treated.
+
+use std::sync::Mutex;
+
+use rig_shared::effects::{Channel, Kind};
+
+use super::DiagnoseError;
+use super::anchor::Anchor;
+use super::columns::{Candidate, Source};
+use super::predicted::{Predicted, predict};
+use super::profile::Profile;
+use super::rows::{Column, Nominal, Rows, combined};
+use super::runs::{Run, runs_of};
+use crate::prepare::{Choice, PrepareOptions, Recording, Survey, Treatment};
+use crate::robot::Robot;
+
+/// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
+const LEAST_BAND: f64 = 30.0;
+
+/// Recordings under one treatment.
+pub(super) struct Loaded {
+    /// At the full rate.
+    pub(super) runs: Vec<Run>,
+    /// Less what the held parameters contribute.
+    pub(super) rows: Rows,
+}
+
+/// Everything that stays the same during a diagnosis.
+pub(super) struct Bench<'a> {
+    /// As it was given.
+    pub(super) robot: &'a Robot,
+    /// Its base parameters.
+    pub(super) nominal: Nominal,
+    /// Which of them are free.
+    pub(super) anchor: Anchor,
+    treatment: Treatment,
+}
+
+impl<'a> Bench<'a> {
+    /// For a robot and the recordings that decide on the treatment of all.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`].
+    pub(super) fn of(robot: &'a Robot, training: &[&dyn Recording]) -> Result<Self, DiagnoseError> {
+        let nominal = Nominal::of(robot)?;
+        let anchor = Anchor::of(robot, &nominal);
+        Ok(Self {
+            robot,
+            anchor,
+            nominal,
+            treatment: treatment_of(training, robot)?,
+        })
+    }
+
+    /// Reads recordings and takes off what the held parameters contribute.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`].
+    pub(super) fn load(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
+        let position = self
+            .treatment
+            .position_filter()
+            .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))?;
+        let mut runs = Vec::new();
+        for (k, recording) in recordings.iter().enumerate() {
+            runs.extend(runs_of(
+                *recording,
+                k,
+                self.treatment.sample_rate,
+                &position,
+            )?);
+        }
+        self.rows(runs)
+    }
+
+    /// The rows of runs, less what the held parameters contribute.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn rows(&self, runs: Vec<Run>) -> Result<Loaded, DiagnoseError> {
+        let mut rows = Rows::of(&runs, &self.nominal, &self.treatment)?;
+        let held = self.anchor.held_torque(&rows);
+        take_off(&mut rows.torque, &held);
+        Ok(Loaded { runs, rows })
+    }
+
+    /// What columns are formed from, with a model of these base parameters.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn source<'s>(
+        &'s self,
+        loaded: &'s Loaded,
+        values: &[f64],
+    ) -> Result<Source<'s>, DiagnoseError> {
+        let predicted = (loaded.runs.iter())
+            .map(|run| predict(&self.nominal, self.robot, values, run))
+            .collect::<Result<Vec<Predicted>, _>>()?;
+        Ok(Source {
+            robot: self.robot,
+            runs: &loaded.runs,
+            nominal: &self.nominal,
+            thinning: &loaded.rows.thinning,
+            predicted,
+            values: values.to_vec(),
+            driven: Mutex::default(),
+        })
+    }
+
+    /// What a model leaves of recordings' torque, joint by joint over the rows. `coefficients` are those of the free nominal
+    /// directions, then of the effects' columns.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn remaining(
+        &self,
+        loaded: &Loaded,
+        coefficients: &[f64],
+        chosen: &[Profile],
+    ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+        let (nominal, gains) = coefficients.split_at(self.anchor.free.len());
+        let source = self.source(loaded, &self.anchor.values(nominal))?;
+        let rows = &loaded.rows;
+        let mut columns = self.anchor.columns(rows);
+        for profile in chosen {
+            columns.extend(source.columns(&profile.candidate, &profile.shapes)?);
+        }
+        let factors = nominal.iter().chain(gains).copied();
+        let mut residual = rows.torque.clone();
+        take_off(
+            &mut residual,
+            &combined(rows.joints(), columns.iter().zip(factors)),
+        );
+        Ok(residual)
+    }
+
+    /// RMS per joint of what a model leaves on the rows used.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn unseen(
+        &self,
+        sealed: &Loaded,
+        coefficients: &[f64],
+        chosen: &[Profile],
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        let residual = self.remaining(sealed, coefficients, chosen)?;
+        Ok((residual.iter().zip(&sealed.rows.keep))
+            .map(|(r, keep)| {
+                let used = || r.iter().zip(keep).filter(|(_, k)| **k);
+                let squares: f64 = used().map(|(r, _)| r * r).sum();
+                (squares / used().count().max(1) as f64).sqrt()
+            })
+            .collect())
+    }
+}
+
+/// Takes a column off signals, joint by joint.
+fn take_off(signals: &mut [Vec<f64>], column: &Column) {
+    for (signal, column) in signals.iter_mut().zip(column) {
+        for (s, c) in signal.iter_mut().zip(column.iter().flatten()) {
+            *s -= c;
+        }
+    }
+}
+
+/// Decides how recordings are treated: as for an identification, but with a band that shows more than the motion's own.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub(super) fn treatment_of(
+    recordings: &[&dyn Recording],
+    robot: &Robot,
+) -> Result<Treatment, DiagnoseError> {
+    let n = robot.joints.len();
+    let surveys = (recordings.iter())
+        .map(|r| Survey::take(*r, n))
+        .collect::<Result<Vec<_>, _>>()?;
+    let limits: Vec<Option<f64>> = (robot.joints.iter())
+        .map(|j| j.limits.as_ref().and_then(|l| l.torque))
+        .collect();
+    let first = Treatment::decide(&surveys, &PrepareOptions::default(), &limits)?;
+    let band = (10.0 * first.motion_frequency)
+        .max(LEAST_BAND)
+        .min(first.cutoff);
+    let step = ((0.4 * first.sample_rate / band).floor() as usize).max(1);
+    let options = PrepareOptions {
+        decimation: Choice::Fixed(step.min(first.decimation.max(1))),
+        ..PrepareOptions::default()
+    };
+    Ok(Treatment::decide(&surveys, &options, &limits)?)
+}
+
+/// Every effect on every joint that the torque can show.
+pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Candidate> {
+    let n = robot.joints.len();
+    let mut list = Vec::new();
+    for &kind in Kind::ALL {
+        if without.contains(&kind)
+            || kind.about().channel == Channel::Voltage
+            || kind == Kind::Payload
+        {
+            continue;
+        }
+        for joint in 0..n {
+            let at = |other| Candidate { kind, joint, other };
+            let warm = runs.iter().all(|r| r.joints[joint].temperature.is_some());
+            match kind {
+                Kind::InertiaCoupling => {
+                    list.extend((0..n).filter(|k| *k != joint).map(|k| at(Some(k))))
+                }
+                Kind::ViscousWarmupTemperature if !warm => {}
+                // One tilt for the whole base.
+                Kind::GravityTilt if joint > 0 => {}
+                _ => list.push(at(None)),
+            }
+        }
+    }
+    list
+}

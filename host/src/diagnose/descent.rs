@@ -1,0 +1,134 @@
+//! The RMS of the torque residual from model to model.
+
+use super::DiagnoseError;
+use super::bench::{Bench, Loaded};
+use super::outcome::Waterfall;
+use super::profile::Profile;
+use super::refit::Refit;
+use super::search::with;
+use crate::robot::{Robot, title_of};
+
+/// RMS on one set of recordings, joint by joint.
+pub(super) struct Fall {
+    /// What the description as it stands leaves.
+    pub(super) frozen: Vec<f64>,
+    /// What the refitted description leaves, then each model with one more effect.
+    pub(super) models: Vec<Vec<f64>>,
+}
+
+impl Fall {
+    /// Before and after the `k`-th effect.
+    pub(super) fn step(&self, joint: usize, k: usize) -> [f64; 2] {
+        [self.models[joint][k], self.models[joint][k + 1]]
+    }
+
+    /// Of the last model, joint by joint.
+    pub(super) fn last(&self) -> Vec<f64> {
+        (0..self.models.len()).map(|j| self.whole(j)[1]).collect()
+    }
+
+    /// Of the refitted description, and of the last model.
+    pub(super) fn whole(&self, joint: usize) -> [f64; 2] {
+        let list = &self.models[joint];
+        [list[0], list[list.len() - 1]]
+    }
+}
+
+/// RMS on the training data and on those that nothing was fitted to.
+pub(super) struct Descent {
+    /// Each model refitted jointly.
+    pub(super) train: Fall,
+    /// With the coefficients of the training data; none without a hold-out.
+    pub(super) holdout: Option<Fall>,
+}
+
+impl Descent {
+    /// Through the effects in the order that they were found in.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn of(
+        bench: &Bench,
+        refit: &Refit,
+        chosen: &[Profile],
+        sealed: Option<&Loaded>,
+    ) -> Result<Self, DiagnoseError> {
+        let n = bench.robot.joints.len();
+        let frozen = refit.frozen(&bench.anchor);
+        let mut train = Fall {
+            frozen: (0..n).map(|j| frozen.rms(j)).collect(),
+            models: vec![Vec::new(); n],
+        };
+        for count in 0..=chosen.len() {
+            let fit = with(&refit.base, &chosen[..count], None);
+            for (j, list) in train.models.iter_mut().enumerate() {
+                list.push(fit.rms(j));
+            }
+        }
+        let Some(sealed) = sealed else {
+            let holdout = None;
+            return Ok(Self { train, holdout });
+        };
+        let mut holdout = Fall {
+            frozen: bench.unseen(sealed, &bench.anchor.prior_coefficients(), &[])?,
+            models: vec![Vec::new(); n],
+        };
+        for count in 0..=chosen.len() {
+            let part = &chosen[..count];
+            let found = bench.unseen(sealed, &refit.solution(part)?.values, part)?;
+            for (list, rms) in holdout.models.iter_mut().zip(found) {
+                list.push(rms);
+            }
+        }
+        Ok(Self {
+            train,
+            holdout: Some(holdout),
+        })
+    }
+
+    /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
+    /// parameters count as a step.
+    pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> f64 {
+        let fall = self.holdout.as_ref().unwrap_or(&self.train);
+        let (mut gap, mut closed) = (0.0, 0.0);
+        for (j, floor) in floors.iter().enumerate() {
+            let [refitted, last] = fall.whole(j);
+            let first = if changed {
+                fall.frozen[j].max(refitted)
+            } else {
+                refitted
+            };
+            gap += (first - floor) / floor;
+            closed += (first - last) / floor;
+        }
+        closed / gap
+    }
+
+    /// As a result has it.
+    pub(super) fn waterfall(
+        &self,
+        robot: &Robot,
+        chosen: &[Profile],
+        floors: &[f64],
+    ) -> Vec<Waterfall> {
+        let models: Vec<String> = (["frozen description", "refitted"].map(str::to_owned))
+            .into_iter()
+            .chain(chosen.iter().map(|p| title_of(p.candidate.kind)))
+            .collect();
+        let list = |fall: &Fall, j: usize| {
+            let mut list = vec![fall.frozen[j]];
+            list.extend(&fall.models[j]);
+            list
+        };
+        (robot.joints.iter().enumerate())
+            .map(|(j, joint)| Waterfall {
+                joint: joint.name.clone(),
+                unit: joint.kind.units().1.to_owned(),
+                models: models.clone(),
+                train: list(&self.train, j),
+                holdout: (self.holdout.as_ref()).map_or_else(Vec::new, |fall| list(fall, j)),
+                floor: floors[j],
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,111 @@
+//! What candidates' columns would do, and how sure that is.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::{Beside, Fit, axpy, dot};
+
+/// What candidates' columns would do.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::diagnose) struct Evidence {
+    /// Coefficients of the columns.
+    pub(in crate::diagnose) gains: Vec<f64>,
+    /// Their standard deviations, robust to correlation within blocks.
+    pub(in crate::diagnose) stds: Vec<f64>,
+    /// Share of the residual's squares that they take away.
+    pub(in crate::diagnose) explained: f64,
+    /// Share of the RMS that they take away on folds they were not fitted to.
+    pub(in crate::diagnose) gain: f64,
+    /// The same for the joint that gains most: what one joint lacks is a small share of all joints together.
+    pub(in crate::diagnose) joint_gain: f64,
+    /// The gain over its standard deviation between blocks.
+    pub(in crate::diagnose) gain_sigmas: f64,
+    /// Of all coefficients together being zero; not corrected for anything.
+    pub(in crate::diagnose) p_value: f64,
+    /// Squared error of each block without and with them, on folds not fitted to.
+    pub(in crate::diagnose) block_errors: Vec<[f64; 2]>,
+}
+
+impl Evidence {
+    /// p-value corrected for `tried` trials (Bonferroni).
+    pub(in crate::diagnose) fn corrected(&self, tried: usize) -> f64 {
+        (self.p_value * tried as f64).min(1.0)
+    }
+
+    /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
+    pub(in crate::diagnose) fn ahead_of(&self, other: &Self) -> f64 {
+        let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
+            .map(|(a, b)| b[1] - a[1])
+            .collect();
+        let n = differences.len().max(2) as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Fit<'_> {
+    /// Everything about projected columns.
+    pub(in crate::diagnose) fn evidence(
+        &self,
+        columns: &[Vec<f64>],
+        bounds: &[[f64; 2]],
+    ) -> Option<Evidence> {
+        let beside = Beside {
+            gram: DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+                dot(&columns[a], &columns[b])
+            }),
+            right: DVector::from_iterator(
+                columns.len(),
+                columns.iter().map(|c| dot(c, &self.residual)),
+            ),
+        };
+        let (explained, gains) = self.explained(&beside, bounds)?;
+        let (k, g) = (columns.len(), self.blocks as f64);
+        // What is left under the alternative: after the columns.
+        let mut rest = self.residual.clone();
+        for (column, gain) in columns.iter().zip(&gains) {
+            axpy(-gain, column, &mut rest);
+        }
+        let inverse = beside.gram.cholesky()?.inverse();
+        let covariance = self.sandwich(columns, &inverse, &rest);
+        let stds = (0..k).map(|c| covariance[(c, c)].max(0.0).sqrt()).collect();
+        let beta = DVector::from_column_slice(&gains);
+        let wald = beta.dot(&covariance.cholesky()?.solve(&beta));
+        let freedom = (g - k as f64).max(1.0);
+        let statistic = wald / k as f64 * freedom / (g - 1.0).max(1.0);
+        let p_value = FisherSnedecor::new(k as f64, freedom)
+            .map(|f| f.sf(statistic.max(0.0)))
+            .unwrap_or(1.0)
+            .max(f64::MIN_POSITIVE);
+        let (plain, more) = self.cross_validated(columns)?;
+        let block_errors: Vec<[f64; 2]> = (plain.of_block.iter().zip(&more.of_block))
+            .map(|(a, b)| [*a, *b])
+            .collect();
+        let joint_gain = (plain.of_joint.iter().zip(&more.of_joint))
+            .filter(|(before, _)| **before > 0.0)
+            .map(|(before, after)| 1.0 - (after / before).sqrt())
+            .fold(f64::NEG_INFINITY, f64::max);
+        let (before, after) = block_errors
+            .iter()
+            .fold((0.0, 0.0), |(a, b), e| (a + e[0], b + e[1]));
+        let gain = 1.0 - (after / before).sqrt();
+        let mean = (before - after) / g;
+        let spread = block_errors
+            .iter()
+            .map(|e| (e[0] - e[1] - mean).powi(2))
+            .sum::<f64>()
+            / (g - 1.0).max(1.0);
+        let gain_sigmas = mean / (spread / g).sqrt().max(f64::MIN_POSITIVE);
+        Some(Evidence {
+            gains,
+            stds,
+            explained,
+            gain,
+            joint_gain,
+            gain_sigmas,
+            p_value,
+            block_errors,
+        })
+    }
+}

@@ -1,0 +1,211 @@
+//! What stands at the end of a search: the noise floor, what is left beyond it, which other names a step may have.
+
+use rig_shared::effects::Kind;
+
+use super::fit::Fit;
+use super::floor;
+use super::locate::{Coordinate, locate};
+use super::outcome::{Place, Remainder, Step};
+use super::profile::{Profile, SIGNIFICANT};
+use super::rows::Rows;
+use super::runs::Run;
+use super::search::with;
+use super::testable;
+use crate::robot::Robot;
+
+/// Share of its gap that a step must close to stand beside a remainder.
+const HALF: f64 = 0.5;
+/// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings: the filters'
+/// treatment of a true structure leaves up to a tenth more.
+const BEYOND_FLOOR: f64 = 1.25;
+/// … of the data held back, whose motion is another.
+const BEYOND_FLOOR_HELD: f64 = 1.5;
+/// … and, without a repeat, where a coordinate explains this share of its squares.
+const SHARE_LEFT: f64 = 0.1;
+/// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
+const AS_GOOD: f64 = 0.9;
+/// Standard deviations of a paired difference between blocks.
+const NO_DIFFERENCE: f64 = 2.5;
+
+/// The training data that effects are judged on.
+pub(super) struct Judge<'a, 'r> {
+    /// As it was given.
+    pub(super) robot: &'a Robot,
+    /// The training data.
+    pub(super) rows: &'a Rows,
+    /// Their coordinates, joint by joint.
+    pub(super) coordinates: &'a [Vec<Coordinate>],
+    /// Runs that repeat each other.
+    pub(super) pairs: Vec<(usize, usize)>,
+    /// The refitted nominal model on them.
+    pub(super) base: &'a Fit<'r>,
+    /// Of the bootstrap.
+    pub(super) seed: u64,
+}
+
+/// What stands.
+pub(super) struct Judged {
+    /// The effects.
+    pub(super) chosen: Vec<Profile>,
+    /// Noise floor, joint by joint.
+    pub(super) floors: Vec<f64>,
+    /// What is left beyond it.
+    pub(super) left: Option<Remainder>,
+}
+
+impl Judge<'_, '_> {
+    /// Which of the effects found stand, and what they leave.
+    pub(super) fn judged(&self, found: Vec<Profile>) -> Judged {
+        let judged = self.as_found(found);
+        if judged.left.is_none() {
+            return judged;
+        }
+        // Beside something unknown, a name that closes less than half of what was there is a guess at it.
+        let Judged { chosen, floors, .. } = judged;
+        let closes = |k: usize| {
+            let j = chosen[k].candidate.joint;
+            let at = |count: usize| with(self.base, &chosen[..count], None).rms(j);
+            closed([at(k), at(k + 1)], floors[j]) >= HALF
+        };
+        let stand: Vec<Profile> = (chosen.iter().enumerate())
+            .filter(|(k, _)| closes(*k))
+            .map(|(_, profile)| profile.clone())
+            .collect();
+        self.as_found(stand)
+    }
+
+    fn as_found(&self, chosen: Vec<Profile>) -> Judged {
+        let fit = with(self.base, &chosen, None);
+        let floors: Vec<f64> = (0..self.rows.joints())
+            .map(|j| {
+                floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), j)
+                    .unwrap_or_else(|| fit.rms(j))
+            })
+            .collect();
+        let left = self.remainder(&fit, &floors);
+        Judged {
+            chosen,
+            floors,
+            left,
+        }
+    }
+
+    /// Where the residual of the refitted nominal model sits.
+    pub(super) fn places(&self, floors: &[f64]) -> Vec<Place> {
+        (0..self.rows.joints())
+            .flat_map(|j| self.places_of(self.base, j, floors[j]))
+            .collect()
+    }
+
+    fn places_of(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
+        locate(
+            self.rows,
+            &self.coordinates[joint],
+            &fit.residual(joint),
+            fit.block_of_rows(),
+            joint,
+            &self.robot.joints[joint].name,
+            floor,
+            self.seed,
+        )
+    }
+
+    /// What is left beyond the floor and goes with the motion, in the joint where it is most.
+    fn remainder(&self, fit: &Fit, floors: &[f64]) -> Option<Remainder> {
+        (0..floors.len())
+            .filter_map(|j| self.remainder_of(fit, j, floors[j]))
+            .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+    }
+
+    fn remainder_of(&self, fit: &Fit, joint: usize, floor: f64) -> Option<Remainder> {
+        let repeated = !self.pairs.is_empty();
+        let rms = fit.rms(joint);
+        let places = self.places_of(fit, joint, if repeated { floor } else { 0.0 });
+        let shown = (places.iter())
+            .find(|p| p.p_value < SIGNIFICANT)
+            .filter(|p| repeated || p.share > SHARE_LEFT);
+        // Without a repeat the floor is what no coordinate of the motion explains.
+        let ratio = if repeated {
+            rms / floor
+        } else {
+            shown.map_or(1.0, |p| 1.0 / (1.0 - p.share).max(0.01).sqrt())
+        };
+        let left = if repeated {
+            ratio > BEYOND_FLOOR
+        } else {
+            shown.is_some()
+        };
+        let shown = shown.map_or("It goes with no single coordinate of the motion.", |p| {
+            &p.text
+        });
+        let name = &self.robot.joints[joint].name;
+        let text = format!(
+            "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {shown}",
+            100.0 * (ratio - 1.0)
+        );
+        left.then(|| Remainder {
+            joint: name.clone(),
+            rms: (rms * rms - (rms / ratio).powi(2)).max(0.0).sqrt(),
+            ratio,
+            text,
+            places,
+        })
+    }
+}
+
+/// What the last model leaves of data held back, where it leaves no more than noise of the training data: in the joint where
+/// it is most beyond the floor.
+pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Option<Remainder> {
+    let ratio = |j: usize| held[j] / floors[j];
+    let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
+    let name = &robot.joints[j].name;
+    (ratio(j) > BEYOND_FLOOR_HELD).then(|| Remainder {
+        joint: name.clone(),
+        rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
+        ratio: ratio(j),
+        text: format!(
+            "The data held back are left at {:.1} times the noise floor in joint {name}, the training data are not: they show something that the training data hardly do. Give a recording like them with --data.",
+            ratio(j)
+        ),
+        places: Vec::new(),
+    })
+}
+
+/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first.
+pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
+    let mut names = vec![step.effect.clone()];
+    let mut exact = |kind: Kind| {
+        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+            if !names.iter().any(|n| n == confusion.with) {
+                names.push(confusion.with.to_owned());
+            }
+        }
+    };
+    exact(own.candidate.kind);
+    for rival in rivals {
+        let name = rival.candidate.kind.about().name;
+        if names.iter().any(|n| n == name) {
+            continue;
+        }
+        let equal = rival.candidate.joint == own.candidate.joint
+            && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+            && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE;
+        if equal {
+            names.push(name.to_owned());
+        } else if step.runner_up.is_none() {
+            step.runner_up = Some(name.to_owned());
+            step.runner_up_gap_closed =
+                Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
+        }
+    }
+    step.set = names;
+}
+
+/// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.
+pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
+    if before > floor {
+        (before - after) / (before - floor)
+    } else {
+        0.0
+    }
+}

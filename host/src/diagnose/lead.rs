@@ -1,0 +1,136 @@
+//! How much earlier than it acts a torque was recorded, where that is less than a sample.
+//!
+//! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
+//! after it (Franklin, Powell and Workman 1998, section 4.3). Fast motion shows it as a residual that goes with the torque's
+//! rate of change, larger than many effects. It is a property of the recording, not of the rig, and taken out before anything
+//! is searched for. Torque that comes later than the instants of sampling explain is an effect: `measurement_delay`.
+//!
+//! Leaves out: holds longer than the recording's period (a slower controller recorded faster).
+
+use rig_shared::effects::Kind;
+
+use super::DiagnoseError;
+use super::bench::{Bench, Loaded};
+use super::columns::{Candidate, Source};
+use super::fit::Fit;
+use super::runs::Run;
+
+/// Standard deviations from which a lead counts.
+const SEEN: f64 = 4.0;
+/// Share of a sample below which it changes nothing.
+const LEAST: f64 = 0.05;
+/// Share of a sample by which a lead must have changed for another search.
+const WORTH_A_SEARCH: f64 = 0.2;
+/// Most that a torque may come late without being late, s: sensors of one board are read within it.
+const LATE: f64 = 0.001;
+
+/// What the instants of sampling alone may differ by, s: a sample, but no more than a board needs.
+pub(super) fn slack(runs: &[Run]) -> f64 {
+    runs.first().map_or(0.0, |run| (1.0 / run.rate).min(LATE))
+}
+
+/// How long before it acts (negative: after) each joint's torque was recorded, s: the `present` lead with what `fit` still
+/// shows. Where that is more than the instants of sampling explain it is something else, and 0 here.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn leads(
+    source: &Source,
+    fit: &Fit,
+    present: &[f64],
+) -> Result<Vec<f64>, DiagnoseError> {
+    let Some(rate) = source.runs.first().map(|run| run.rate) else {
+        return Ok(present.to_vec());
+    };
+    let late = slack(source.runs);
+    (present.iter().enumerate())
+        .map(|(joint, &present)| {
+            let candidate = Candidate {
+                kind: Kind::MeasurementDelay,
+                joint,
+                other: None,
+            };
+            let columns = source.columns(&candidate, &Default::default())?;
+            let evidence = fit
+                .distinct(&columns)
+                .and_then(|own| fit.evidence(&own, &[[f64::NEG_INFINITY, f64::INFINITY]]));
+            let lead = match evidence {
+                Some(e) if e.gains[0].abs() > SEEN * e.stds[0] => present - e.gains[0],
+                _ => present,
+            };
+            let counts = lead.abs() * rate >= LEAST && (-late..=1.0 / rate).contains(&lead);
+            Ok(if counts { lead } else { 0.0 })
+        })
+        .collect()
+}
+
+/// Whether two sets of leads are worth another search.
+pub(super) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
+    let rate = runs.first().map_or(0.0, |run| run.rate);
+    a.iter()
+        .zip(b)
+        .any(|(a, b)| (a - b).abs() * rate >= WORTH_A_SEARCH)
+}
+
+/// The recordings with each joint's torque where it acts.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded, DiagnoseError> {
+    if by.iter().all(|lead| *lead == 0.0) {
+        return Ok(loaded);
+    }
+    let mut runs = loaded.runs;
+    for run in &mut runs {
+        let rate = run.rate;
+        for (joint, lead) in run.joints.iter_mut().zip(by) {
+            joint.tau = later(&joint.tau, lead * rate);
+        }
+    }
+    bench.rows(runs)
+}
+
+/// A signal `samples` (at most one, either way) later, by the cubic through the four nearest samples.
+fn later(signal: &[f64], samples: f64) -> Vec<f64> {
+    if samples == 0.0 {
+        return signal.to_vec();
+    }
+    let last = signal.len().saturating_sub(1) as isize;
+    let at = |k: isize| signal[k.clamp(0, last) as usize];
+    let whole = samples.floor();
+    // Between the sample before and the one after the place wanted, counted from the former.
+    let x = 1.0 - (samples - whole);
+    let before = |k: usize| k as isize - whole as isize - 1;
+    let weights = [
+        -x * (x - 1.0) * (x - 2.0) / 6.0,
+        (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0,
+        -(x + 1.0) * x * (x - 2.0) / 2.0,
+        (x + 1.0) * x * (x - 1.0) / 6.0,
+    ];
+    (0..signal.len())
+        .map(|k| {
+            (weights.iter().zip(-1..=2))
+                .map(|(w, place)| w * at(before(k) + place))
+                .sum()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moved_wave_is_the_wave_later() {
+        let wave = |t: f64| (0.2 * t).sin() + 0.3 * (0.05 * t).cos();
+        let signal: Vec<f64> = (0..400).map(|k| wave(f64::from(k))).collect();
+        for samples in [0.5, 1.0, 0.1, -0.4, -1.0] {
+            let moved = later(&signal, samples);
+            for k in 5..395 {
+                let wanted = wave(f64::from(k as u32) - samples);
+                // The cubic's error: 3/128 of the fourth derivative, 0.2⁴.
+                assert!((moved[k] - wanted).abs() < 5e-5, "{samples} {k}");
+            }
+        }
+    }
+}

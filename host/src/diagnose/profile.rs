@@ -1,0 +1,410 @@
+//! A candidate at the shapes that explain most, and whether that is enough to take it.
+
+use std::sync::Arc;
+
+use rig_shared::effects::{Channel, Kind, Parameter, SHAPES, Scale};
+
+use super::DiagnoseError;
+use super::columns::Candidate;
+use super::fit::{Evidence, Fit};
+use super::lead::slack;
+use super::rows::Column;
+use super::search::Search;
+
+/// Family-wise probability of a name although nothing is there.
+pub(super) const SIGNIFICANT: f64 = 0.01;
+/// Least share of the RMS that an effect must take away on folds it was not fitted to.
+pub(super) const LEAST_GAIN: f64 = 0.02;
+/// … and that many standard deviations of it.
+pub(super) const LEAST_SIGMAS: f64 = 2.0;
+/// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
+const LEAST_GAIN_OF_GEARS: f64 = 0.1;
+/// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
+const HOPELESS: f64 = 0.5 * LEAST_GAIN;
+/// … and a gear, from whose starting points the ridge is further away.
+const HOPELESS_GEAR: f64 = 0.02;
+/// Points of a grid per decade of a logarithmic range.
+const PER_DECADE: f64 = 4.0;
+/// Steps of a grid over a linear range.
+const LINEAR_STEPS: u32 = 8;
+/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
+const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
+/// Starting points that are followed up.
+const FOLLOWED: usize = 3;
+/// Steps of the simplex.
+const SIMPLEX_STEPS: usize = 80;
+/// Golden-section steps of the refinement.
+const REFINEMENTS: usize = 14;
+/// A shape is known well enough within this ratio, less one, or this share of a linear range.
+const FINE_ENOUGH: f64 = 0.01;
+
+/// Share explained, shapes, columns.
+type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
+
+/// A candidate at its best shapes.
+#[derive(Clone, Debug)]
+pub(super) struct Profile {
+    /// Which.
+    pub(super) candidate: Candidate,
+    /// Its shapes.
+    pub(super) shapes: [f64; SHAPES],
+    /// Its columns.
+    pub(super) columns: Arc<Vec<Column>>,
+    /// What they do.
+    pub(super) evidence: Evidence,
+}
+
+impl Profile {
+    /// Why it is not taken at a p-value corrected for `tried` trials; none where it passes.
+    pub(super) fn refused(&self, tried: usize) -> Option<String> {
+        let e = &self.evidence;
+        let p = self.corrected(tried);
+        if p > SIGNIFICANT {
+            Some(format!("p = {p:.2}, corrected for {tried} trials"))
+        } else if e.joint_gain < self.least_gain() {
+            Some(format!(
+                "takes away {:.1} % of the residual, less than {:.0} %",
+                100.0 * e.joint_gain,
+                100.0 * self.least_gain()
+            ))
+        } else if e.gain_sigmas < LEAST_SIGMAS {
+            Some(format!(
+                "its gain is only {:.1} of its standard deviations",
+                e.gain_sigmas
+            ))
+        } else {
+            None
+        }
+    }
+
+    fn least_gain(&self) -> f64 {
+        if self.candidate.kind.about().channel == Channel::Transmission {
+            LEAST_GAIN_OF_GEARS
+        } else {
+            LEAST_GAIN
+        }
+    }
+
+    /// p-value corrected for `tried` trials.
+    pub(super) fn corrected(&self, tried: usize) -> f64 {
+        self.evidence.corrected(tried)
+    }
+}
+
+/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
+/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
+fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
+    let mut list = Vec::new();
+    let shapes = kind.about().shapes;
+    let [low, high] = shapes[0].range;
+    const STEPS: usize = 11;
+    for k in 0..=STEPS {
+        let first = low * (high / low).powf(k as f64 / STEPS as f64);
+        for share in [0.05, 0.25, 0.5, 0.9] {
+            list.push(if kind == Kind::Backlash {
+                [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
+            } else {
+                // A few per cent of critical damping for a tenth of a kg·m².
+                [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
+            });
+        }
+    }
+    list
+}
+
+/// Grid of shapes of an effect.
+pub(super) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
+    if kind.about().channel == Channel::Transmission {
+        return starts(kind);
+    }
+    let shapes = kind.about().shapes;
+    let mut points = vec![[0.0; SHAPES]];
+    for (place, shape) in shapes.iter().enumerate() {
+        let [low, high] = shape.range;
+        let values: Vec<f64> = match shape.scale {
+            Scale::Logarithmic => {
+                let n = ((high / low).log10() * PER_DECADE / shapes.len() as f64)
+                    .ceil()
+                    .max(1.0);
+                (0..=n as usize)
+                    .map(|k| low * (high / low).powf(k as f64 / n))
+                    .collect()
+            }
+            Scale::Linear => (0..=LINEAR_STEPS)
+                .map(|k| low + (high - low) * f64::from(k) / f64::from(LINEAR_STEPS))
+                .collect(),
+            Scale::Whole => (0..=(high - low).floor() as u32)
+                .map(|k| low + f64::from(k))
+                .collect(),
+        };
+        points = points
+            .into_iter()
+            .flat_map(|point| {
+                values.iter().map(move |v| {
+                    let mut point = point;
+                    point[place] = *v;
+                    point
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+/// A shape's value as the search moves it: its logarithm where ratios count.
+fn coordinate(shape: &Parameter, value: f64) -> f64 {
+    match shape.scale {
+        Scale::Logarithmic => value.ln(),
+        Scale::Linear | Scale::Whole => value,
+    }
+}
+
+/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit.
+fn searched(shape: &Parameter) -> [f64; 2] {
+    let ([low, high], [least, most]) = (shape.bounds, shape.range);
+    match shape.scale {
+        Scale::Logarithmic => [low.max(0.1 * least), high.min(10.0 * most)],
+        Scale::Linear | Scale::Whole => [low, high],
+    }
+}
+
+/// The value there, within what physics allows.
+fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
+    let [low, high] = shape.bounds;
+    match shape.scale {
+        Scale::Logarithmic => coordinate.exp(),
+        Scale::Linear | Scale::Whole => coordinate,
+    }
+    .clamp(low, high)
+}
+
+/// Distance of the grid's points along a coordinate of one of `count` shapes, and the one at which a refinement ends.
+fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
+    let [low, high] = shape.range;
+    match shape.scale {
+        Scale::Logarithmic => [
+            count as f64 / PER_DECADE * std::f64::consts::LN_10,
+            FINE_ENOUGH,
+        ],
+        Scale::Linear | Scale::Whole => [
+            (high - low) / f64::from(LINEAR_STEPS),
+            FINE_ENOUGH * (high - low),
+        ],
+    }
+}
+
+impl Search<'_> {
+    /// Share of the residual that a candidate's columns explain.
+    fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
+        let bounds = self.bounds(self.library[c].kind);
+        let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
+        Some(share)
+    }
+
+    /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn profile(
+        &self,
+        fit: &Fit,
+        c: usize,
+        start: Option<[f64; SHAPES]>,
+    ) -> Result<Option<Profile>, DiagnoseError> {
+        let kind = self.library[c].kind;
+        let points = grid(kind);
+        let mut best: Option<Best> = None;
+        let gear = kind.about().channel == Channel::Transmission;
+        let mut followed: Vec<Best> = Vec::new();
+        if let Some(shapes) = start {
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            if let Some(share) = self.explained(fit, c, &columns) {
+                best = Some((share, shapes, columns));
+            }
+        } else {
+            for (place, shapes) in points.iter().enumerate() {
+                let columns = self.cached(c, place, shapes)?;
+                let Some(share) = self.explained(fit, c, &columns) else {
+                    continue;
+                };
+                if gear {
+                    followed.push((share, *shapes, columns.clone()));
+                    followed.sort_by(|a, b| b.0.total_cmp(&a.0));
+                    followed.truncate(FOLLOWED);
+                }
+                if best.as_ref().is_none_or(|b| share > b.0) {
+                    best = Some((share, *shapes, columns));
+                }
+            }
+        }
+        let Some(mut best) = best else {
+            return Ok(None);
+        };
+        let about = kind.about();
+        // One joint's share of the squares of all.
+        let hopeless = if gear { HOPELESS_GEAR } else { HOPELESS };
+        if best.0 * (self.source.nominal.joints() as f64) < hopeless {
+            return Ok(None);
+        }
+        if gear {
+            self.descend(fit, c, &mut best)?;
+            for mut other in followed.into_iter().skip(1) {
+                self.descend(fit, c, &mut other)?;
+                if other.0 > best.0 {
+                    best = other;
+                }
+            }
+        }
+        // The simplex has moved all shapes at once; one shape does not wait for another to move.
+        let rounds = match about.shapes {
+            _ if gear => 0,
+            [] | [_] => 1,
+            _ => 2,
+        };
+        for _ in 0..rounds {
+            for (place, shape) in about.shapes.iter().enumerate() {
+                if shape.scale != Scale::Whole {
+                    self.refine(fit, c, place, &mut best)?;
+                }
+            }
+        }
+        let Some(projected) = fit.distinct(&best.2) else {
+            return Ok(None);
+        };
+        let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
+            return Ok(None);
+        };
+        Ok(Some(Profile {
+            candidate: self.library[c],
+            shapes: best.1,
+            columns: best.2,
+            evidence,
+        }))
+    }
+
+    /// Nelder and Mead's simplex (1965) over the coordinates of all shapes at once: stiffness, damping and play pull on each
+    /// other.
+    fn descend(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
+        let scales = self.library[c].kind.about().shapes;
+        let n = scales.len();
+        let start: Vec<f64> = (scales.iter().zip(&best.1))
+            .map(|(shape, value)| coordinate(shape, *value))
+            .collect();
+        let mut at = |x: &[f64]| -> Result<f64, DiagnoseError> {
+            let mut shapes = [0.0; SHAPES];
+            for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
+                *to = value_at(shape, *x);
+            }
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            let Some(share) = self.explained(fit, c, &columns) else {
+                return Ok(0.0);
+            };
+            if share > best.0 {
+                *best = (share, shapes, columns);
+            }
+            Ok(-share)
+        };
+        let mut simplex = vec![(at(&start)?, start.clone())];
+        for k in 0..n {
+            let mut x = start.clone();
+            // Away from a bound.
+            let linear = scales[k].scale == Scale::Linear;
+            x[k] += if linear && x[k] > 0.5 { -0.4 } else { 0.4 };
+            simplex.push((at(&x)?, x));
+        }
+        for _ in 0..SIMPLEX_STEPS {
+            simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if simplex[n].0 - simplex[0].0 < 1e-4 * simplex[0].0.abs() {
+                break;
+            }
+            let middle: Vec<f64> = (0..n)
+                .map(|k| simplex[..n].iter().map(|s| s.1[k]).sum::<f64>() / n as f64)
+                .collect();
+            let along = |t: f64, worst: &[f64]| -> Vec<f64> {
+                middle
+                    .iter()
+                    .zip(worst)
+                    .map(|(m, w)| m + t * (w - m))
+                    .collect()
+            };
+            let worst = simplex[n].1.clone();
+            let x = along(-1.0, &worst);
+            let f = at(&x)?;
+            if f < simplex[0].0 {
+                let far = along(-2.0, &worst);
+                let g = at(&far)?;
+                simplex[n] = if g < f { (g, far) } else { (f, x) };
+            } else if f < simplex[n - 1].0 {
+                simplex[n] = (f, x);
+            } else {
+                let near = along(if f < simplex[n].0 { -0.5 } else { 0.5 }, &worst);
+                let g = at(&near)?;
+                if g < simplex[n].0.min(f) {
+                    simplex[n] = (g, near);
+                } else {
+                    let top = simplex[0].1.clone();
+                    for s in &mut simplex[1..] {
+                        let x: Vec<f64> =
+                            s.1.iter().zip(&top).map(|(x, t)| 0.5 * (x + t)).collect();
+                        *s = (at(&x)?, x);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Golden section over one shape about the best point.
+    fn refine(
+        &self,
+        fit: &Fit,
+        c: usize,
+        place: usize,
+        best: &mut Best,
+    ) -> Result<(), DiagnoseError> {
+        let scales = self.library[c].kind.about().shapes;
+        let shape = &scales[place];
+        let [step, fine] = spacing(shape, scales.len());
+        let middle = coordinate(shape, best.1[place]);
+        let [least, most] = searched(shape).map(|bound| coordinate(shape, bound));
+        let (mut low, mut high) = ((middle - step).max(least), (middle + step).min(most));
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
+            let mut shapes = best.1;
+            shapes[place] = value_at(shape, x);
+            let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+            let Some(share) = self.explained(fit, c, &columns) else {
+                return Ok(f64::NEG_INFINITY);
+            };
+            if share > best.0 {
+                *best = (share, shapes, columns);
+            }
+            Ok(share)
+        };
+        let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
+        let (mut fa, mut fb) = (at(a, best)?, at(b, best)?);
+        for _ in 0..REFINEMENTS {
+            if fa > fb {
+                (high, b, fb) = (b, a, fa);
+                a = high - golden * (high - low);
+                fa = at(a, best)?;
+            } else {
+                (low, a, fa) = (a, b, fb);
+                b = low + golden * (high - low);
+                fb = at(b, best)?;
+            }
+            if high - low < fine {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// What physics allows the gains to be; a delay within the instants of sampling is none.
+    fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
+        if kind == Kind::MeasurementDelay {
+            return vec![[slack(self.source.runs), f64::INFINITY]];
+        }
+        self.source.gains(kind).iter().map(|g| g.bounds).collect()
+    }
+}

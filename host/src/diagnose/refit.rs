@@ -1,0 +1,243 @@
+//! Nominal parameters and effects fitted together.
+
+use std::collections::BTreeMap;
+
+use rig_shared::effects::{Parameter, SHAPES, Scale};
+
+use super::DiagnoseError;
+use super::anchor::Anchor;
+use super::bench::Bench;
+use super::columns::Source;
+use super::fit::Fit;
+use super::floor;
+use super::outcome::{Absorbed, Value};
+use super::profile::Profile;
+use super::rows::{Column, Rows, combined};
+use super::search::with;
+use super::solve::{Solution, solve};
+
+/// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
+const DIFFERENCE: f64 = 0.01;
+
+/// The nominal model on the training data, its free parameters fitted anew.
+pub(super) struct Refit<'r> {
+    /// Columns of the free nominal directions.
+    pub(super) free: Vec<Column>,
+    /// Nothing taken in.
+    pub(super) plain: Fit<'r>,
+    /// The free nominal columns taken in.
+    pub(super) base: Fit<'r>,
+    /// Coefficients of the free nominal directions.
+    pub(super) before: Solution,
+    joints: usize,
+}
+
+impl<'r> Refit<'r> {
+    /// Weighs the joints by what a first fit without weights leaves of them.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where the motion does not tell the nominal parameters apart.
+    pub(super) fn of(bench: &Bench, rows: &'r Rows) -> Result<Self, DiagnoseError> {
+        let n = rows.joints();
+        let free = bench.anchor.columns(rows);
+        let fitted = |mut fit: Fit<'r>| {
+            for column in &free {
+                fit.push(column);
+            }
+            fit
+        };
+        let first = fitted(Fit::new(rows, vec![1.0; n], 0.1));
+        let scale: Vec<f64> = (0..n)
+            .map(|j| 1.0 / first.rms(j).max(f64::MIN_POSITIVE))
+            .collect();
+        let residuals: Vec<Vec<f64>> = (0..n).map(|j| first.residual(j)).collect();
+        let plain = Fit::new(rows, scale, floor::memory(rows, &residuals));
+        let base = fitted(plain.clone());
+        let before = solve(&plain, &free.iter().collect::<Vec<_>>(), &[]).ok_or_else(|| {
+            DiagnoseError::Model(
+                "its nominal parameters are not excited by this motion; record a livelier one."
+                    .into(),
+            )
+        })?;
+        Ok(Self {
+            free,
+            plain,
+            base,
+            before,
+            joints: n,
+        })
+    }
+
+    /// The free nominal columns, then those of the effects.
+    fn columns<'c>(&'c self, chosen: &'c [Profile]) -> Vec<&'c Column> {
+        let effects = chosen.iter().flat_map(|p| p.columns.iter());
+        self.free.iter().chain(effects).collect()
+    }
+
+    /// Coefficients of the free nominal directions and of the effects' columns.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where the motion does not tell them apart.
+    pub(super) fn solution(&self, chosen: &[Profile]) -> Result<Solution, DiagnoseError> {
+        solve(&self.plain, &self.columns(chosen), &[]).ok_or_else(|| {
+            DiagnoseError::Model("its parameters with the effects are not all excited.".into())
+        })
+    }
+
+    /// Nominal parameters, gains and shapes together.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn joint(
+        &self,
+        source: &Source,
+        chosen: &[Profile],
+    ) -> Result<Joint, DiagnoseError> {
+        let solution = self.solution(chosen)?;
+        let mut stds = vec![[0.0; SHAPES]; chosen.len()];
+        let mut beside = with(&self.base, chosen, None);
+        let mut slopes = Vec::new();
+        let mut places = Vec::new();
+        let mut at = self.free.len();
+        for (k, profile) in chosen.iter().enumerate() {
+            let gains = &solution.values[at..at + profile.columns.len()];
+            at += profile.columns.len();
+            for (place, shape) in profile.candidate.kind.about().shapes.iter().enumerate() {
+                if shape.scale == Scale::Whole {
+                    continue;
+                }
+                let slope = slope(source, profile, place, shape, gains)?;
+                // A shape that changes nothing, or what others change as well, is not known.
+                stds[k][place] = f64::INFINITY;
+                if beside.push(&slope) {
+                    slopes.push(slope);
+                    places.push((k, place));
+                }
+            }
+        }
+        let Some(linearised) = solve(&self.plain, &self.columns(chosen), &slopes) else {
+            return Ok(Joint { solution, stds });
+        };
+        for (s, (k, place)) in places.into_iter().enumerate() {
+            stds[k][place] = linearised.std(solution.values.len() + s);
+        }
+        Ok(Joint {
+            solution: linearised,
+            stds,
+        })
+    }
+
+    /// Torque of the effects with their gains.
+    pub(super) fn explained(&self, chosen: &[Profile], after: &Solution) -> Column {
+        let columns = chosen.iter().flat_map(|p| p.columns.iter());
+        let gains = after.values[self.free.len()..].iter().copied();
+        combined(self.joints, columns.zip(gains))
+    }
+
+    /// What the description as it stands leaves.
+    pub(super) fn frozen(&self, anchor: &Anchor) -> Fit<'r> {
+        let prior = anchor.prior_coefficients();
+        let stated = combined(self.joints, self.free.iter().zip(prior));
+        let mut frozen = self.plain.clone();
+        frozen.subtract(&stated);
+        frozen
+    }
+
+    /// What moved among the nominal parameters when the effects came in, the surest first.
+    pub(super) fn absorbed(&self, bench: &Bench, after: &Solution) -> Vec<Absorbed> {
+        let base = &bench.nominal.base;
+        let mut list: Vec<Absorbed> = (bench.anchor.free.iter().enumerate())
+            .filter_map(|(k, direction)| {
+                let [(b, _)] = direction.as_slice() else {
+                    return None;
+                };
+                let (before, now) = (self.before.values[k], after.values[k]);
+                Some(Absorbed {
+                    parameter: base.expression(*b),
+                    unit: base.unit(*b).to_owned(),
+                    before,
+                    after: now,
+                    sigmas: (now - before).abs() / after.std(k).max(f64::MIN_POSITIVE),
+                })
+            })
+            .collect();
+        list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        list
+    }
+}
+
+/// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics
+/// allows.
+fn slope(
+    source: &Source,
+    profile: &Profile,
+    place: usize,
+    shape: &Parameter,
+    gains: &[f64],
+) -> Result<Column, DiagnoseError> {
+    let value = profile.shapes[place];
+    let [low, high] = shape.bounds;
+    let step = difference_step(shape, value);
+    let [above, below] = [value + step, value - step].map(|x| x.clamp(low, high));
+    let at = |x: f64| {
+        let mut shapes = profile.shapes;
+        shapes[place] = x;
+        source.columns(&profile.candidate, &shapes)
+    };
+    let (up, down) = (at(above)?, at(below)?);
+    let per_step = |gain: &f64| gain / (above - below);
+    let terms = (up.iter().zip(gains).map(|(c, g)| (c, per_step(g))))
+        .chain(down.iter().zip(gains).map(|(c, g)| (c, -per_step(g))));
+    Ok(combined(source.nominal.joints(), terms))
+}
+
+/// 1 % of the value; of the range where a linear one is nearer to zero than that is wide.
+fn difference_step(shape: &Parameter, value: f64) -> f64 {
+    let size = match shape.scale {
+        Scale::Linear => value.abs().max(shape.range[1] - shape.range[0]),
+        Scale::Logarithmic | Scale::Whole => value.abs(),
+    };
+    DIFFERENCE * size
+}
+
+/// Everything fitted together.
+pub(super) struct Joint {
+    /// Coefficients of the free nominal directions, then of the effects' columns; the covariance goes on with the shapes.
+    pub(super) solution: Solution,
+    /// Standard deviations of each effect's shapes: 0 of a whole number, infinite where the motion does not tell.
+    stds: Vec<[f64; SHAPES]>,
+}
+
+impl Joint {
+    /// Gains and shapes of the `k`-th effect with their standard deviations.
+    pub(super) fn parameters(
+        &self,
+        source: &Source,
+        chosen: &[Profile],
+        free: usize,
+        k: usize,
+    ) -> BTreeMap<String, Value> {
+        let profile = &chosen[k];
+        let kind = profile.candidate.kind;
+        let at = free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>();
+        let gains = (source.gains(kind).into_iter().enumerate()).map(|(g, gain)| {
+            (
+                gain,
+                self.solution.values[at + g],
+                self.solution.std(at + g),
+            )
+        });
+        let shapes = (kind.about().shapes.iter().enumerate())
+            .map(|(s, shape)| (*shape, profile.shapes[s], self.stds[k][s]));
+        (gains.chain(shapes))
+            .map(|(parameter, value, std)| {
+                let value = Value {
+                    value,
+                    std,
+                    unit: source.unit(&profile.candidate, &parameter),
+                };
+                (parameter.name.to_owned(), value)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,83 @@
+//! What is done about an effect, and why nothing can be.
+
+use core::fmt;
+
+use crate::effects::{About, Channel, Direction, Kind};
+
+/// What is done about an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A torque with the friction law's direction and share.
+    Dry,
+    /// A torque at the measured position, in full.
+    Standing,
+    /// A correction of the measured position.
+    Position,
+    /// A correction of the measured current.
+    Current,
+}
+
+impl Role {
+    /// What is done about effects of this kind; `None` where nothing can be.
+    pub const fn of(kind: Kind) -> Option<Self> {
+        Self::by(kind.about())
+    }
+
+    /// The same by what is known of the effect.
+    pub(crate) const fn by(about: &About) -> Option<Self> {
+        match (about.channel, about.direction) {
+            (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
+            // A mass on the link belongs into the model, which knows where gravity points.
+            (Channel::Torque | Channel::Load, Direction::Indifferent)
+                if about.compensable && !same(about.name, "payload") =>
+            {
+                Some(Self::Standing)
+            }
+            // Of what a sensor reads wrongly, only a known function of the position, or a constant, can be taken off.
+            (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
+                Some(Self::Position)
+            }
+            (Channel::Effort, _) if same(about.name, "current_offset") => Some(Self::Current),
+            _ => None,
+        }
+    }
+}
+
+/// Equality of texts at compile time.
+const fn same(a: &str, b: &str) -> bool {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let mut k = 0;
+    while k < a.len() && k < b.len() && a[k] == b[k] {
+        k += 1;
+    }
+    k == a.len() && k == b.len()
+}
+
+/// Why an effect cannot be compensated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EffectFault {
+    /// No torque and no correction undoes effects of this kind.
+    NotCompensable(Kind),
+    /// This parameter is not a number within its physical bounds.
+    Parameter(&'static str),
+    /// A value beyond the effect's parameters is not 0.
+    Surplus,
+}
+
+impl fmt::Display for EffectFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotCompensable(kind) => write!(
+                f,
+                "{} cannot be compensated by a torque or a corrected reading",
+                kind.about().title
+            ),
+            Self::Parameter(name) => {
+                write!(f, "the effect's {name} is not within its physical bounds")
+            }
+            Self::Surplus => f.write_str("values beyond the effect's parameters must be 0"),
+        }
+    }
+}
+
+impl core::error::Error for EffectFault {}
