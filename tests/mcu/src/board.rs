@@ -34,6 +34,8 @@ pub struct BoardFaults {
     pub driver: bool,
     /// The fault line is pulled low, but the driver does not switch off by itself.
     pub fault_line: bool,
+    /// The chip's own supply, V, where it is not its 3.3. Too low for the processor is nothing that is modelled.
+    pub logic_supply: Option<f64>,
 }
 
 /// The encoder's index has passed.

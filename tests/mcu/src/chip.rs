@@ -380,6 +380,12 @@ impl Chip {
         if self.gpio[1].function(12) == Function::Alternate(6) {
             self.tim[0].set_break_pin(high);
         }
+        if let Some(supply) = self.board.faults.logic_supply
+            && self.pwr.detects_low(supply)
+            && self.syscfg.breaks_on_low_supply()
+        {
+            self.tim[0].trip();
+        }
     }
 
     /// What PWM and enable pin make of the bridge. PA8 and PA9 by alternate function 6 (DS12288 table 13).
