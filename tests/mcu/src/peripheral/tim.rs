@@ -347,7 +347,7 @@ impl Tim {
                 self.bank.put(CCR1 + 4 * k as u32, count);
                 let captured = 2 << k;
                 let missed = self.bank.get(SR) & captured != 0;
-                self.flag(captured | u32::from(missed) * (CC1OF << k));
+                self.flag(captured | (u32::from(missed) * (CC1OF << k)));
             }
         }
     }
