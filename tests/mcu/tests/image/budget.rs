@@ -111,7 +111,7 @@ fn every_motion_keeps_to_the_period() {
     // Most of the period, mean and worst.
     let motions = [
         ("linear chirp", chirp(Sweep::Linear), [0.31, 0.54]),
-        ("logarithmic chirp", chirp(Sweep::Logarithmic), [0.45, 0.69]),
+        ("logarithmic chirp", chirp(Sweep::Logarithmic), [0.45, 0.70]),
         (
             "slow reversals",
             Trajectory::SlowReversals(SlowReversals::new(0.1, 0.2, &[0.05], 1).unwrap()),
