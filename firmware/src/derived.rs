@@ -4,6 +4,7 @@ use rig_shared::control::{adaptive, current, law};
 use rig_shared::encoder;
 
 use crate::config::{Config, Settings};
+use crate::sample::EDGE_CLOCK_HZ;
 
 /// |s| below which the adaptive law learns nothing, rad/s: about the velocity observer's ripple and the
 /// tracking noise of a rig at rest, where learning would only be drift.
@@ -24,6 +25,8 @@ pub struct Derived {
     pub motor_radians_per_count: f32,
     /// Joint torque per motor current, N·m/A.
     pub torque_per_ampere: f32,
+    /// Control ticks in a period of the clock that times the encoder's edges.
+    pub ticks_per_edge_period: f32,
     /// Velocity observer.
     pub observer: encoder::Config<f32>,
     /// Position law.
@@ -48,6 +51,7 @@ impl Derived {
             motor_radians_per_count: core::f32::consts::TAU
                 / config.encoder.counts_per_motor_turn as f32,
             torque_per_ampere: config.drive.joint_torque(1.0),
+            ticks_per_edge_period: rate / EDGE_CLOCK_HZ as f32,
             observer: encoder::Config::new(config.encoder.observer_bandwidth, rate),
             law: law::Config {
                 kind: settings.control,

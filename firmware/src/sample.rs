@@ -2,11 +2,17 @@
 
 use rig_shared::units::{AdcCode, Duty, EncoderCount};
 
+/// Clock of the timer that captures the encoder's edges, Hz.
+pub const EDGE_CLOCK_HZ: u32 = 170_000_000;
+
 /// What one control tick sees, all taken at the same instant by one hardware trigger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Encoder timer, motor side.
     pub encoder: EncoderCount,
+    /// Time from the encoder's last edge to that reading, in periods of [`EDGE_CLOCK_HZ`], where a timer has captured
+    /// the edge.
+    pub edge_age: Option<u32>,
     /// Motor current, converter code.
     pub current: AdcCode,
     /// Supply voltage, converter code.

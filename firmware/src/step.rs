@@ -100,7 +100,15 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
 /// Raw codes to quantities: the one place where units begin.
 fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let scaling = &config.scaling;
-    let motion = encoder::step(&state.derived.observer, &mut state.encoder, sample.encoder);
+    let age = sample
+        .edge_age
+        .map(|age| age as f32 * state.derived.ticks_per_edge_period);
+    let motion = encoder::step(
+        &state.derived.observer,
+        &mut state.encoder,
+        sample.encoder,
+        age,
+    );
     let origin = *state.origin.get_or_insert(motion.counts);
     let counts = motion.counts - origin;
     // At the first tick both are zero: where the counter stands at power on is no jump.

@@ -16,6 +16,7 @@ pub mod lanes;
 pub mod link;
 pub mod model;
 pub mod multibody;
+mod pair;
 pub mod precompensation;
 pub mod safety;
 pub mod scalar;

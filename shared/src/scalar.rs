@@ -132,11 +132,26 @@ pub trait Real:
 
 /// A [`Real`] that is one number: what a controller or a trajectory of one rig runs on.
 pub trait Scalar: Real<Mask = bool> {
+    /// 2ⁿ + 1 with n half of the digits, rounded up: a product with it splits a value (Dekker 1971).
+    const SPLITTER: Self;
     /// The value in double precision, exactly.
     fn to_f64(self) -> f64;
+    /// Natural logarithm; NaN below zero.
+    fn ln(self) -> Self;
+    /// The nearest whole number.
+    fn rint(self) -> Self;
 }
 
 impl Scalar for f64 {
+    const SPLITTER: Self = 134_217_729.0;
+    #[inline(always)]
+    fn ln(self) -> Self {
+        libm::log(self)
+    }
+    #[inline(always)]
+    fn rint(self) -> Self {
+        libm::rint(self)
+    }
     #[inline(always)]
     fn to_f64(self) -> f64 {
         self
@@ -144,6 +159,15 @@ impl Scalar for f64 {
 }
 
 impl Scalar for f32 {
+    const SPLITTER: Self = 4097.0;
+    #[inline(always)]
+    fn ln(self) -> Self {
+        libm::logf(self)
+    }
+    #[inline(always)]
+    fn rint(self) -> Self {
+        libm::rintf(self)
+    }
     #[inline(always)]
     fn to_f64(self) -> f64 {
         f64::from(self)

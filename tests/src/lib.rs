@@ -1,6 +1,8 @@
 //! What the tests of the whole rig share: rigs on the bench, excitation, recordings.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+pub mod circle;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;

@@ -4,14 +4,26 @@
 //! up, to its top counting down (RM0440, TIM2, "Encoder index"); between two index pulses lie whole turns, so that the
 //! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
 //! moved is counts that were lost or made up on the way.
+//!
+//! TIM5 times the edges: TIM2 sends the clock of its counter out as a trigger (TIM2_CR2.MMS = 8, "encoder clock
+//! output"), which is TIM5's ITR1 (RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"); there it captures a
+//! count that runs freely at 170 MHz (CC1S = 3: channel 1 captures on TRC, the internal trigger). Edge and count pass
+//! the same filter, so that they belong together; the filter's own delay, 1.1 µs, is left in both.
 
 use core::num::NonZeroU32;
 
-use embassy_stm32::pac::timer::vals::{CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Sms};
-use embassy_stm32::pac::{RCC, TIM2};
+use embassy_stm32::pac::timer::vals::{
+    CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Mms, Sms, Ts,
+};
+use embassy_stm32::pac::{RCC, TIM2, TIM5};
+use rig_firmware::sample::EDGE_CLOCK_HZ;
 use rig_shared::units::EncoderCount;
 
+use super::clock::CORE_HZ;
 use super::pins::EncoderPins;
+
+// TIM5 counts the core's clock: its bus is not divided.
+const _: () = assert!(EDGE_CLOCK_HZ == CORE_HZ);
 
 /// How far the step of a tick may be from that of the tick before, besides half of that step, counts: four times
 /// the hardest acceleration that the limits allow (60 rad/s² at the joint are 0.04 counts in a tick squared).
@@ -20,6 +32,8 @@ const SLACK: u32 = 4;
 /// What the counter says in one tick.
 pub(crate) struct Reading {
     pub(crate) count: EncoderCount,
+    /// Age of the last edge, periods of [`EDGE_CLOCK_HZ`].
+    pub(crate) edge_age: u32,
     /// The index disagrees by so many counts, or the channels changed both at once (0).
     pub(crate) wrong: Option<i32>,
 }
@@ -76,6 +90,9 @@ impl EncoderTimer {
             w.set_idir(Idir::BOTH);
         });
         timer.sr().write_value(Default::default());
+        timer.cr2().write(|w| w.set_mms(Mms::ENCODER_CLOCK_OUTPUT));
+        // The slave listens before the master begins.
+        time_edges();
         timer.cr1().modify(|w| w.set_cen(true));
         Self {
             counts_per_turn: NonZeroU32::new(counts_per_turn).unwrap_or(NonZeroU32::MIN),
@@ -90,6 +107,9 @@ impl EncoderTimer {
     #[inline(always)]
     pub(crate) fn read(&mut self) -> Reading {
         let timer = TIM2;
+        // Before the count: of an edge that comes in between, the time is known to a few periods. After it would be
+        // an edge that the count does not have yet.
+        let now = TIM5.cnt().read();
         let mut raw = timer.cnt().read();
         let flags = timer.sr().read();
         let mut wrong = None;
@@ -117,12 +137,28 @@ impl EncoderTimer {
                 }
             }
         }
+        let age = now.wrapping_sub(TIM5.ccr(0).read());
         self.last = raw;
         self.step = step;
         self.count = self.count.wrapping_add(step as u16);
         Reading {
             count: EncoderCount(self.count),
+            // An edge since `now` is a negative age.
+            edge_age: if age > u32::MAX / 2 { 0 } else { age },
             wrong,
         }
     }
+}
+
+/// Sets TIM5 up and starts it.
+fn time_edges() {
+    RCC.apb1enr1().modify(|w| w.set_tim5en(true));
+    let timer = TIM5;
+    timer.arr().write_value(u32::MAX);
+    timer.smcr().write(|w| w.set_ts(Ts::ITR1));
+    timer
+        .ccmr_input(0)
+        .write(|w| w.set_ccs(0, CcmrInputCcs::TRC));
+    timer.ccer().write(|w| w.set_cce(0, true));
+    timer.cr1().write(|w| w.set_cen(true));
 }

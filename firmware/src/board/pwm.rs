@@ -12,7 +12,7 @@ use embassy_stm32::gpio::Output;
 use embassy_stm32::pac::timer::vals::{
     Bkinp, Bkp, CcmrOutputCcs, Cms, FilterValue, Mms2, Ocm, Ossi, Ossr, Urs,
 };
-use embassy_stm32::pac::{RCC, SYSCFG, TIM1};
+use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1};
 use rig_firmware::sample::Command;
 
 use super::clock::CORE_HZ;
@@ -22,6 +22,9 @@ use super::pins::BridgePins;
 pub(crate) const PWM_HZ: u32 = 20_000;
 /// Top of the ramp: up and down are one pulse.
 const TOP: u16 = (CORE_HZ / PWM_HZ / 2) as u16;
+
+/// PWR_CR2.PLS: a chip's supply below 2.8 V counts as broken down (RM0440, PVD level 5). Its own lowest is 1.71 V.
+const SUPPLY_LEVEL: u8 = 5;
 
 /// The bridge.
 pub(crate) struct Bridge {
@@ -34,6 +37,11 @@ impl Bridge {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);
             w.set_syscfgen(true);
+        });
+        // The chip's own supply is watched (RM0440, PWR_CR2). Before PVDL, which locks these bits as they are.
+        PWR.cr2().modify(|w| {
+            w.set_pls(SUPPLY_LEVEL);
+            w.set_pvde(true);
         });
         // A processor that has locked up, a flash word beyond repair or a supply that breaks down act on the
         // break input too (RM0440, SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).

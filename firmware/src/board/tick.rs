@@ -66,6 +66,7 @@ impl Tick {
         self.entered = entered;
         let sample = Sample {
             encoder: motion.count,
+            edge_age: Some(motion.edge_age),
             current: codes.current,
             supply: codes.supply,
             temperature: codes.temperature,

@@ -7,10 +7,10 @@ use clap::{ArgGroup, Args as ClapArgs, Subcommand};
 use rig_shared::wire::message::{Greeting, Health, Report, RequestBody, SettingsOrigin};
 
 use super::error::CommandError;
-use super::record::{effects_of, emulated, open_probe, upload};
+use super::record::{emulated, open_probe};
 use super::ui::Ui;
 use crate::data::{Column, CsvWriter};
-use crate::emulated::Nameplate;
+use crate::emulated::upload::requests;
 use crate::link::experiment::when_calibrated;
 use crate::link::serial::DEFAULT_BAUD;
 use crate::link::{EmulatedPort, Port, SerialLine, Session, SessionSettings};
@@ -80,7 +80,7 @@ enum Action {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     // What can be wrong with the arguments is said before the rig is disturbed.
     let sent = match &args.action {
-        Action::Upload { model, .. } => requests(model)?,
+        Action::Upload { model, .. } => requests(&Robot::load(model)?)?,
         Action::Capture { out, force, .. } if out.exists() && !force => {
             return Err(CommandError::Exists { path: out.clone() });
         }
@@ -98,14 +98,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ui,
         )
     }
-}
-
-/// What a description asks the rig to be told, friction and effects compensated.
-fn requests(model: &Path) -> Result<Vec<RequestBody>, CommandError> {
-    let robot = Robot::load(model)?;
-    let mut all = upload(&Nameplate::from_robot(&robot)?, true);
-    all.push(effects_of(&robot)?);
-    Ok(all)
 }
 
 fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result<(), CommandError> {

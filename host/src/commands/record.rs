@@ -5,8 +5,6 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args as ClapArgs};
-use rig_shared::compensation::EFFECTS;
-use rig_shared::effects::Effect;
 use rig_shared::safety::{Limit, Mode};
 use rig_shared::trajectory::Trajectory;
 use rig_shared::wire::message::RequestBody;
@@ -14,7 +12,7 @@ use rig_shared::wire::message::RequestBody;
 use super::error::CommandError;
 use super::ui::Ui;
 use crate::data::{Column, RecordingWriter};
-use crate::emulated::{EmulatedRig, Nameplate};
+use crate::emulated::{EmulatedRig, Nameplate, upload};
 use crate::excite::TrajectoryFile;
 use crate::link::experiment::{Experiment, run as run_experiment};
 use crate::link::serial::DEFAULT_BAUD;
@@ -90,7 +88,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .into_iter()
         .collect();
     if let Some(robot) = &robot {
-        settings.extend(upload(&Nameplate::from_robot(robot)?, args.precompensation));
+        settings.extend(upload::settings(
+            &Nameplate::from_robot(robot)?,
+            args.precompensation,
+        ));
     }
     let trajectory = match &args.trajectory {
         Some(path) => {
@@ -179,40 +180,6 @@ fn single(
 /// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
 /// limits from where the link really stands.
 const START_TOLERANCE: f64 = 0.02;
-
-/// What a description asks the rig to be told.
-pub(crate) fn upload(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {
-    let settings = &nameplate.settings;
-    let mut compensation = settings.precompensation;
-    compensation.enabled = precompensation;
-    vec![
-        RequestBody::SetLimits(settings.limits),
-        RequestBody::SetModel(settings.model),
-        RequestBody::SetFriction(settings.friction),
-        RequestBody::SetPrecompensation(compensation),
-        RequestBody::SetGains(settings.gains),
-        RequestBody::SetEstimator(settings.estimator),
-    ]
-}
-
-/// The effects of a one-link description as a request.
-pub(crate) fn effects_of(robot: &Robot) -> Result<RequestBody, CommandError> {
-    let placed = robot.placed_effects();
-    if placed.len() > EFFECTS {
-        return Err(CommandError::Sentence(format!(
-            "{} has {} effects, but the rig compensates at most {EFFECTS}; leave the smallest out.",
-            robot.name,
-            placed.len()
-        )));
-    }
-    let single = |effect: Effect<f64>| Effect {
-        kind: effect.kind,
-        gains: effect.gains.map(|value| value as f32),
-        shapes: effect.shapes.map(|value| value as f32),
-    };
-    let effects = placed.iter().map(|one| single(one.effect)).collect();
-    Ok(RequestBody::SetEffects(effects))
-}
 
 fn record<P: Port>(
     port: P,

@@ -1,6 +1,7 @@
 //! The rig without hardware: the firmware's own control application closed around the emulated rig.
 
 mod nameplate;
+pub mod upload;
 
 use rig_firmware::config::Config;
 use rig_firmware::sample::Command;

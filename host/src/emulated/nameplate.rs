@@ -4,7 +4,7 @@ use core::f64::consts::FRAC_PI_2;
 
 use rig_firmware::config::{Config, Encoder, Rates, Settings};
 use rig_firmware::sample::Scaling;
-use rig_shared::compensation::Effects;
+use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
 use rig_shared::estimation::EstimatorSettings;
@@ -45,6 +45,16 @@ pub enum NameplateError {
         robot: String,
         /// Joints it has.
         joints: usize,
+    },
+    /// More effects than a rig compensates.
+    #[error(
+        "{robot} has {effects} effects, but the rig compensates at most {EFFECTS}; leave the smallest out."
+    )]
+    TooManyEffects {
+        /// Name of the robot.
+        robot: String,
+        /// Effects it has.
+        effects: usize,
     },
     /// Not a revolute joint.
     #[error("joint \"{0}\" is prismatic: the rig's link turns, so its kind must be \"revolute\".")]

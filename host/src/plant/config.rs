@@ -17,6 +17,7 @@ use super::effect::tilt::Tilt;
 use super::effect::torque_ripple::TorqueRipple;
 use super::effect::torque_saturation::TorqueSaturation;
 use super::effect::transmission::{Backlash, Elasticity};
+use super::effect::unequal_lines::UnequalLines;
 use super::effect::winding_temperature::WindingTemperature;
 use super::friction::{Friction, Presliding, VelocityWeakening};
 
@@ -113,6 +114,10 @@ pub struct Encoder {
     pub zero: f64,
     /// Once-per-turn reading error.
     pub eccentricity: Option<EncoderEccentricity>,
+    /// Edges that are not evenly spaced.
+    pub unequal_lines: Option<UnequalLines>,
+    /// A timer captures when the last edge came.
+    pub timed: bool,
 }
 
 /// What the controller gets to see.
@@ -336,6 +341,8 @@ impl Default for PlantConfig {
                     counts_per_turn: 8192.0,
                     zero: -FRAC_PI_2,
                     eccentricity: None,
+                    unequal_lines: None,
+                    timed: true,
                 },
                 current: Channel {
                     noise: Some(0.02),

@@ -16,7 +16,7 @@
 //! winding temperature coefficients, dead time, supply resistance, joint elasticity with hardening
 //! (Spong 1987), backlash (Nordin & Gutman 2002), gear eccentricity, asymmetric, load- and
 //! position-dependent friction, quadratic drag, friction warm-up (Bittencourt & Gunnarsson 2012), cable
-//! spring, base tilt, torque offset, coloured disturbance, encoder eccentricity, sensor lag and delay.
+//! spring, base tilt, torque offset, coloured disturbance, encoder eccentricity and unequal lines, sensor lag and delay.
 //! [`Faults`] go wrong while it runs.
 //!
 //! Integration: leapfrog. Positions and asperity deflections live at the middle of a substep, speeds and
@@ -53,12 +53,12 @@ use std::collections::VecDeque;
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use rig_firmware::sample::{Command, Sample};
+use rig_firmware::sample::{Command, EDGE_CLOCK_HZ, Sample};
 use rig_shared::units::AdcCode;
 
 use body::Load;
 use integrate::{Dynamics, Held};
-use sensors::Converter;
+use sensors::{Converter, EdgeClock};
 
 /// The emulated rig.
 #[derive(Clone, Debug)]
@@ -76,6 +76,7 @@ pub struct Plant {
     winding_rise: f64,
     gear_rise: f64,
     held_count: i64,
+    edges: EdgeClock,
     late_current: VecDeque<f64>,
     current: Converter,
     supply: Converter,
@@ -119,6 +120,12 @@ impl Plant {
                 .sensors
                 .encoder
                 .count(dynamics.motor_angle(), config.mechanism.ratio),
+            edges: EdgeClock::new(
+                config
+                    .sensors
+                    .encoder
+                    .reading(dynamics.motor_angle(), config.mechanism.ratio),
+            ),
             load: config.load(),
             gravity: config.gravity(),
             dynamics,
@@ -224,10 +231,14 @@ impl Plant {
 
     fn sample(&mut self) -> Sample {
         let encoder = self.config.sensors.encoder;
-        if !self.faults.encoder_cut {
-            self.held_count =
-                encoder.count(self.dynamics.motor_angle(), self.config.mechanism.ratio);
-        }
+        let age = if self.faults.encoder_cut {
+            None
+        } else {
+            let reading = encoder.reading(self.dynamics.motor_angle(), self.config.mechanism.ratio);
+            self.held_count = reading.floor() as i64;
+            let age = self.edges.tick(reading);
+            encoder.timed.then_some(age)
+        };
         let mut current = self.dynamics.current();
         if !self.late_current.is_empty() {
             self.late_current.push_back(current);
@@ -242,6 +253,8 @@ impl Plant {
         let faults = &self.faults;
         Sample {
             encoder: sensors::register(self.held_count + i64::from(faults.encoder_jump)),
+            // The cast saturates, and says so after 25 s.
+            edge_age: age.map(|ticks| (ticks * self.config.tick * f64::from(EDGE_CLOCK_HZ)) as u32),
             current: faults.current_stuck.map_or(current, AdcCode),
             supply: faults.supply_stuck.map_or(supply, AdcCode),
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),

@@ -77,7 +77,39 @@ impl Encoder {
             + self
                 .eccentricity
                 .map_or(0.0, |e| e.error(shaft) - e.error(0.0));
-        read / TAU * self.counts_per_turn
+        let even = read / TAU * self.counts_per_turn;
+        self.unequal_lines.map_or(even, |lines| lines.reading(even))
+    }
+}
+
+/// When the encoder's last edge came, as a timer that captures it would say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EdgeClock {
+    reading: f64,
+    /// Ticks from the last edge to the last sampling instant.
+    age: f64,
+}
+
+impl EdgeClock {
+    /// Begins at a reading.
+    pub(crate) fn new(reading: f64) -> Self {
+        Self { reading, age: 0.0 }
+    }
+
+    /// One tick later the encoder reads so much: ticks since its last edge. Within a tick the reading goes straight: at
+    /// 60 rad/s² of the template's joint that is wrong by 0.5 % of a count.
+    pub(crate) fn tick(&mut self, reading: f64) -> f64 {
+        let before = core::mem::replace(&mut self.reading, reading);
+        self.age += 1.0;
+        if reading.floor() != before.floor() {
+            let edge = if reading > before {
+                reading.floor()
+            } else {
+                reading.floor() + 1.0
+            };
+            self.age = (reading - edge) / (reading - before);
+        }
+        self.age
     }
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fourier::envelope;
 use super::{Elapsed, Reference};
+use crate::pair::Pair;
 use crate::scalar::Scalar;
 
 /// How the frequency runs from start to end.
@@ -19,8 +20,7 @@ pub enum Sweep {
 /// q(t) = E(t)·A(f)·sin φ(t) with φ' = 2πf and A(f) = A₀/√(1 + (ω/ωv)² + (ω/ωa)⁴), ωv = v/A₀, ωa² = a/A₀: then A ≤ A₀,
 /// A·ω ≤ v and A·ω² ≤ a. What envelope and sweep add to that is small for slow sweeps and counted by the check.
 ///
-/// The phase is computed in `f64` whatever the scalar, because hundreds of turns leave an `f32` no digits for the
-/// angle; a chip without double-precision hardware does that in software.
+/// The phase is computed with twice the scalar's digits, because hundreds of turns leave an `f32` none for the angle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Chirp<T> {
     /// Frequency at the start, Hz.
@@ -57,30 +57,34 @@ impl<T: Scalar> Chirp<T> {
 
     /// Phase within a turn (rad), angular frequency and its first two derivatives.
     fn phase(&self, time: Elapsed<T>) -> (T, [T; 3]) {
-        let seconds = (time.micros as f64 + time.fraction.to_f64()) * 1.0e-6;
-        let length = f64::from(self.duration_us.max(1)) * 1.0e-6;
-        let (low, high) = (self.start_hz.to_f64(), self.end_hz.to_f64());
+        let million = Pair::from_u32(1_000_000);
+        let length = Pair::from_u32(self.duration_us.max(1)) / million;
+        let micros = u32::try_from(time.micros).unwrap_or(u32::MAX);
+        let seconds = (Pair::from_u32(micros) + Pair::new(time.fraction)) / million;
+        let (low, high) = (Pair::new(self.start_hz), Pair::new(self.end_hz));
         let (turns, hz) = match self.sweep {
             Sweep::Linear => {
                 let slope = (high - low) / length;
-                let turns = seconds * (low + 0.5 * slope * seconds);
-                (turns, [low + slope * seconds, slope, 0.0])
+                let gained = slope * seconds;
+                let turns = seconds * (low + gained * Pair::new(T::from_f64(0.5)));
+                (turns, [(low + gained).value(), slope.value(), T::ZERO])
             }
             Sweep::Logarithmic => {
-                let rate = libm::log(high / low) / length;
-                let hz = low * libm::exp(rate * seconds);
+                let change = (high / low).ln();
+                let rate = change / length;
+                let hz = low * (rate * seconds).exp();
                 // A sweep without change has no rate to divide by.
-                let turns = if rate.abs() * length < 1e-9 {
+                let turns = if change.value().abs().lt(T::from_f64(1e-9)) {
                     low * seconds
                 } else {
                     (hz - low) / rate
                 };
-                (turns, [hz, rate * hz, rate * rate * hz])
+                let (hz, rate) = (hz.value(), rate.value());
+                (turns, [hz, rate * hz, rate.squared() * hz])
             }
         };
-        let tau = core::f64::consts::TAU;
-        let angle = T::from_f64(tau * (turns - libm::rint(turns)));
-        (angle, hz.map(|x| T::from_f64(tau * x)))
+        let tau = T::from_f64(core::f64::consts::TAU);
+        (tau * turns.beside_whole(), hz.map(|x| tau * x))
     }
 
     /// Amplitude and its first two time derivatives, from the angular frequency and its.

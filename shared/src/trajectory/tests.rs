@@ -328,6 +328,17 @@ fn hostile_values_neither_panic_nor_run_for_ever() {
             acceleration: 0.0,
         }),
     ];
+    // Frequencies whose ratio no scalar holds.
+    let boundless = Trajectory::Chirp(Chirp {
+        start_hz: 1e-30,
+        end_hz: 1e30,
+        sweep: Sweep::Logarithmic,
+        duration_us: 1_000_000,
+        ramp_us: 1000,
+        amplitude: 0.1,
+        velocity: 1.0,
+        acceleration: 1.0,
+    });
     let limits = Limits {
         position_low: -3.0_f32,
         position_high: 3.0,
@@ -335,6 +346,7 @@ fn hostile_values_neither_panic_nor_run_for_ever() {
         acceleration: 60.0,
         ..Limits::default()
     };
+    assert!(boundless.check(&limits, 0.0).is_err());
     for trajectory in hostile {
         assert!(
             matches!(

@@ -34,6 +34,8 @@ pub struct BoardFaults {
     pub driver: bool,
     /// The fault line is pulled low, but the driver does not switch off by itself.
     pub fault_line: bool,
+    /// The chip's own supply, V, where it is not its 3.3. Too low for the processor is nothing that is modelled.
+    pub logic_supply: Option<f64>,
 }
 
 /// The encoder's index has passed.
@@ -43,6 +45,17 @@ pub struct Index {
     pub upwards: bool,
     /// Counts since then.
     pub since: u32,
+}
+
+/// What came on the encoder's wires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edges {
+    /// Edges counted up less edges counted down.
+    pub counts: i64,
+    /// When the last one came, where any did.
+    pub last: Option<Instant>,
+    /// The index, where it passed.
+    pub index: Option<Index>,
 }
 
 /// The board.
@@ -68,6 +81,8 @@ pub struct Board {
     register: u16,
     true_count: i64,
     seen_count: i64,
+    /// When the encoder was last looked at.
+    looked: Instant,
     /// Times of every change of the driver's enable input.
     pub enable_edges: Vec<(Instant, bool)>,
 }
@@ -101,6 +116,7 @@ impl Board {
             register: sample.encoder.0,
             true_count: i64::from(sample.encoder.0),
             seen_count: 0,
+            looked: 0,
             enable_edges: Vec::new(),
         }
     }
@@ -194,24 +210,43 @@ impl Board {
         stuck.unwrap_or_else(|| self.codes.get(input).copied().unwrap_or(0))
     }
 
-    /// The encoder's true count at `now`, not wrapped.
-    fn count(&self, now: Instant) -> i64 {
+    /// What an encoder without steps would read at `now`, counts, not wrapped.
+    fn reading(&self, now: Instant) -> f64 {
         let ahead = self.truth.motor_velocity * to_seconds(now - self.last);
         let config = self.plant.config();
         let encoder = config.sensors.encoder;
         // How far into the count that was sampled: by the encoder's own zero, or edges would come twice.
         let reading = encoder.reading(self.truth.motor_position, config.mechanism.ratio);
         let phase = reading.rem_euclid(1.0);
-        self.sampled + (phase + ahead * self.counts_per_radian).floor() as i64
+        self.sampled as f64 + phase + ahead * self.counts_per_radian
     }
 
-    /// Counts that the timer sees up to `now` since the last call, and the index if it passed. It stands where the
-    /// true count is a multiple of a turn.
+    /// When the edge before `now` came, the count having changed since the last look: by the last speed, and not before
+    /// that look.
+    fn edge(&self, now: Instant, reading: f64, upwards: bool) -> Instant {
+        let within = reading.rem_euclid(1.0);
+        let since = if upwards { within } else { 1.0 - within };
+        let speed = (self.truth.motor_velocity * self.counts_per_radian).abs();
+        let longest = to_seconds(now - self.looked);
+        // No speed: it has only just come to rest.
+        let age = if speed * longest > since {
+            since / speed
+        } else {
+            longest
+        };
+        now - from_seconds(age)
+    }
+
+    /// Counts that the timer sees up to `now` since the last call. The index stands where the true count is a multiple of
+    /// a turn.
     ///
     /// With one channel cut, the other's edges count to and fro: the timer sees a step and takes it back.
-    pub fn edges(&mut self, now: Instant) -> (i64, Option<Index>) {
-        let count = self.count(now);
+    pub fn edges(&mut self, now: Instant) -> Edges {
+        let reading = self.reading(now);
+        let count = reading.floor() as i64;
         let before = self.true_count;
+        let last = (count != before).then(|| self.edge(now, reading, count > before));
+        self.looked = now;
         self.true_count = count;
         let passed = count.div_euclid(self.turn) != before.div_euclid(self.turn);
         let upwards = count > before;
@@ -229,13 +264,29 @@ impl Board {
         });
         // Quadrature: A is high in phases 1 and 2, B in phases 2 and 3.
         let seen = match (self.faults.channel_a_cut, self.faults.channel_b_cut) {
-            (false, false) => return (count - before, index),
-            (true, true) => return (0, index),
+            (false, false) => {
+                return Edges {
+                    counts: count - before,
+                    last,
+                    index,
+                };
+            }
+            (true, true) => {
+                return Edges {
+                    counts: 0,
+                    last: None,
+                    index,
+                };
+            }
             (true, false) => i64::from(matches!(count.rem_euclid(4), 2 | 3)),
             (false, true) => i64::from(matches!(count.rem_euclid(4), 1 | 2)),
         };
         let step = seen - self.seen_count;
         self.seen_count = seen;
-        (step, index)
+        Edges {
+            counts: step,
+            last: last.filter(|_| step != 0),
+            index,
+        }
     }
 }

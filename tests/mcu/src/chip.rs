@@ -113,7 +113,8 @@ pub struct Chip {
     pub triggers: u64,
     /// What surrounds the chip.
     pub board: Board,
-    /// Loads from the encoder's counter and the converter's results in the control interrupt, where wanted.
+    /// Loads from the encoder's counter, the timing of its edges and the converter's results in the control interrupt,
+    /// where wanted.
     pub readings: Option<Vec<Reading>>,
 }
 
@@ -379,6 +380,12 @@ impl Chip {
         if self.gpio[1].function(12) == Function::Alternate(6) {
             self.tim[0].set_break_pin(high);
         }
+        if let Some(supply) = self.board.faults.logic_supply
+            && self.pwr.detects_low(supply)
+            && self.syscfg.breaks_on_low_supply()
+        {
+            self.tim[0].trip();
+        }
     }
 
     /// What PWM and enable pin make of the bridge. PA8 and PA9 by alternate function 6 (DS12288 table 13).
@@ -455,15 +462,20 @@ impl Chip {
         self.nvic.set_lines(lines);
     }
 
-    /// The encoder's edges up to now, into the timer that counts them: PA0 and PA1 by alternate function 1.
+    /// The encoder's edges up to now, into the timers that count and time them: PA0 and PA1 by alternate function 1.
     fn count_edges(&mut self) {
-        let (counts, index) = self.board.edges(self.work.now);
+        let edges = self.board.edges(self.work.now);
         let wired = (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
         if wired {
-            let tim = &mut self.tim[1];
-            tim.quadrature(counts);
-            if let Some(index) = index {
+            let tim = self.timer(2);
+            tim.quadrature(edges.counts);
+            if let Some(index) = edges.index {
                 tim.index(index.upwards, index.since);
+            }
+            if let Some(last) = edges.last
+                && tim.sends_encoder_clock()
+            {
+                self.timer(5).internal_trigger_1(last);
             }
         }
     }
@@ -509,7 +521,7 @@ impl Chip {
             Peripheral::Tim(number) => {
                 let tim = &mut self.tim[timer_index(number)];
                 tim.advance(now);
-                if number == 2 {
+                if matches!(number, 2 | 5) {
                     self.count_edges();
                 }
                 self.tim[timer_index(number)].read(now, offset)?
@@ -585,7 +597,7 @@ impl Chip {
             Peripheral::Tim(number) => {
                 let tim = &mut self.tim[timer_index(number)];
                 tim.advance(now);
-                if number == 2 {
+                if matches!(number, 2 | 5) {
                     self.count_edges();
                 }
                 self.tim[timer_index(number)].write(now, offset, value)?;
@@ -780,7 +792,10 @@ impl Bus for Chip {
             Ok(value) => {
                 if let Some(readings) = &mut self.readings
                     && self.nvic.running() == Some(CONTROL_EXCEPTION)
-                    && matches!(address, 0x4000_0024 | 0x5000_0080..=0x5000_008C)
+                    && matches!(
+                        address,
+                        0x4000_0024 | 0x4000_0C24 | 0x4000_0C34 | 0x5000_0080..=0x5000_008C
+                    )
                 {
                     readings.push(Reading {
                         address,

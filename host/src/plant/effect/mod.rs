@@ -15,4 +15,5 @@ pub mod tilt;
 pub mod torque_ripple;
 pub mod torque_saturation;
 pub mod transmission;
+pub mod unequal_lines;
 pub mod winding_temperature;

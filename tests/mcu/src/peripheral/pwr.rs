@@ -1,4 +1,4 @@
-//! Power control (RM0440 section 6.4): storage; regulators settle at once.
+//! Power control (RM0440 section 6.4): storage, and the detector of a low supply; regulators settle at once.
 
 use super::{Bank, Refusal, Register};
 
@@ -13,6 +13,9 @@ const REGISTERS: &[Register] = &[
     Register(0x18, "PWR_SCR", 0, 0x0000_011F),
     Register(0x80, "PWR_CR5", 0x0000_0100, 0x0000_0100),
 ];
+
+/// Levels of the voltage detector by CR2.PLS, V; the eighth compares an outside pin.
+const LEVELS: [f64; 7] = [2.0, 2.2, 2.4, 2.5, 2.6, 2.8, 2.9];
 
 /// The power controller.
 #[derive(Clone, Debug)]
@@ -39,6 +42,13 @@ impl Pwr {
     /// An access that is not modelled.
     pub fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
         self.0.write(offset, value).map(|_| ())
+    }
+
+    /// The voltage detector is on (CR2.PVDE) and finds `supply`, V, below its level (CR2.PLS, section 6.4.2).
+    pub fn detects_low(&self, supply: f64) -> bool {
+        let control = self.0.get(0x04);
+        let level = LEVELS.get((control >> 1 & 7) as usize);
+        control & 1 != 0 && level.is_some_and(|level| supply < *level)
     }
 
     /// Highest system clock that the core's voltage allows, Hz (section 6.1.5): range 1 boost 170 MHz, range 1

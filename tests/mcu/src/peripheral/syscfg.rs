@@ -45,6 +45,11 @@ impl Syscfg {
         self.0.get(0x1C) & 1 != 0
     }
 
+    /// CFGR2.PVDL: the voltage detector acts on the timers' break inputs.
+    pub fn breaks_on_low_supply(&self) -> bool {
+        self.0.get(0x1C) & 4 != 0
+    }
+
     /// Port (0 for A) that feeds external interrupt `line`.
     pub fn port_of(&self, line: u32) -> u8 {
         let register = 0x08 + 4 * (line / 4);

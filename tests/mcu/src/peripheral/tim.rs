@@ -1,8 +1,9 @@
 //! Timers (RM0440 sections 28 to 31): up-counting and centre-aligned time base with repetition counter and
-//! preload, compare flags, PWM outputs, encoder mode with index, break input, update trigger.
+//! preload, compare flags, PWM outputs, encoder mode with index, break input, update trigger, encoder clock as trigger,
+//! capture on an internal trigger.
 //!
-//! Left out: slave modes other than encoder, input capture, dead time, DMA requests, dithering, complementary
-//! outputs. Asking for one of them is refused.
+//! Left out: slave modes other than encoder, capture from a pin, the resynchronisation of a trigger by some clock periods,
+//! dead time, DMA requests, dithering, complementary outputs. Asking for one of them is refused.
 
 use super::{Bank, Refusal, Register, told};
 use crate::time::{Instant, NEVER};
@@ -32,6 +33,16 @@ const ARPE: u32 = 1 << 7;
 const UIF: u32 = 1;
 const BIF: u32 = 1 << 7;
 const IDXF: u32 = 1 << 20;
+/// First over-capture flag.
+const CC1OF: u32 = 1 << 9;
+/// TIMx_CR2.MMS, whose fourth bit lies apart, at "encoder clock output" (RM0440 section 30.5.2).
+const MMS: u32 = 0x0200_0070;
+const MMS_ENCODER_CLOCK: u32 = 0x0200_0000;
+/// TIMx_SMCR.TS, likewise in two parts.
+const TS: u32 = 0x0030_0070;
+/// TS of the one connection that is modelled: ITR1, which is TIM2's TRGO at TIM5 (RM0440 section 30.4.2, table of the
+/// internal trigger connections).
+const TS_ITR1: u32 = 0x10;
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
 const AOE: u32 = 1 << 14;
@@ -312,6 +323,44 @@ impl Tim {
         }
     }
 
+    /// Whether the clock of the encoder's counter goes out as TRGO.
+    pub fn sends_encoder_clock(&self) -> bool {
+        let on = self.is_encoder() && self.bank.get(CR1) & CEN != 0;
+        on && self.bank.get(CR2) & MMS == MMS_ENCODER_CLOCK
+    }
+
+    /// How channel `k` is selected (CCxS), if it is enabled.
+    fn selection(&self, k: usize) -> Option<u32> {
+        let modes = self.bank.get(if k < 2 { CCMR1 } else { CCMR2 }) >> (8 * (k % 2));
+        (self.bank.get(CCER) >> (4 * k) & 1 != 0).then_some(modes & 3)
+    }
+
+    /// Internal trigger 1 had an edge at `at`: channels on TRC capture the count (RM0440 section 30.4.7, "Input capture
+    /// mode").
+    pub fn internal_trigger_1(&mut self, at: Instant) {
+        if self.bank.get(SMCR) & TS != TS_ITR1 {
+            return;
+        }
+        for k in 0..4 {
+            if self.selection(k) == Some(3) {
+                let count = self.count_before(at);
+                self.bank.put(CCR1 + 4 * k as u32, count);
+                let captured = 2 << k;
+                let missed = self.bank.get(SR) & captured != 0;
+                self.flag(captured | (u32::from(missed) * (CC1OF << k)));
+            }
+        }
+    }
+
+    /// The count at an instant that may lie before the run under way.
+    fn count_before(&self, at: Instant) -> u32 {
+        if self.counts_by_clock() && at < self.base && !self.is_centred() {
+            let ticks = (self.base - at).div_ceil(self.tick());
+            return (u64::from(self.active.reload) + 1).saturating_sub(ticks) as u32;
+        }
+        self.count(at)
+    }
+
     /// The encoder's index has passed `since` counts ago: it set the counter to 0 counting up, to its top counting
     /// down.
     pub fn index(&mut self, upwards: bool, since: u32) {
@@ -411,8 +460,17 @@ impl Tim {
     ///
     /// # Errors
     /// An access that is not modelled.
-    pub fn read(&self, now: Instant, offset: u32) -> Result<u32, Refusal> {
+    pub fn read(&mut self, now: Instant, offset: u32) -> Result<u32, Refusal> {
         match offset {
+            0x34..=0x40 => {
+                let k = (offset - CCR1) / 4;
+                if self.selection(k as usize).is_some_and(|s| s != 0) {
+                    // Reading what was captured clears its flag (RM0440 section 30.5.5, CC1IF).
+                    let status = self.bank.get(SR) & !(2 << k);
+                    self.bank.put(SR, status);
+                }
+                self.bank.read(offset)
+            }
             CNT => Ok(self.count(now)),
             CR1 => {
                 let direction = u32::from(self.down && self.is_centred()) << 4;
@@ -462,6 +520,9 @@ impl Tim {
                     self.checked = now.saturating_sub(1);
                 }
             }
+            CCMR1 | CCMR2 | CCER | SMCR if let Some(refusal) = self.unmodelled_capture() => {
+                return told(refusal);
+            }
             SMCR if value & 7 != 0 && !self.is_encoder() => {
                 return told(format!(
                     "TIM{} slave mode {:#x} is not modelled",
@@ -492,6 +553,25 @@ impl Tim {
             _ => {}
         }
         Ok(())
+    }
+
+    /// What is asked of the captures and not there.
+    fn unmodelled_capture(&self) -> Option<String> {
+        (0..4).find_map(|k| {
+            let name = format!("TIM{} channel {}", self.number, k + 1);
+            match self.selection(k)? {
+                0 => None,
+                3 if self.number == 5 && self.bank.get(SMCR) & TS == TS_ITR1 => {
+                    let modes = self.bank.get(if k < 2 { CCMR1 } else { CCMR2 }) >> (8 * (k % 2));
+                    (modes & 0xFC != 0)
+                        .then(|| format!("{name} captures with filter or prescaler, which is not modelled"))
+                }
+                3 => Some(format!(
+                    "{name} captures on an internal trigger other than TIM2's at TIM5, which is not modelled"
+                )),
+                _ => Some(format!("{name} captures a pin, which is not modelled")),
+            }
+        })
     }
 
     fn is_preloaded(&self, channel: usize) -> bool {
@@ -624,5 +704,50 @@ mod test {
         tim.index(false, 3);
         assert_eq!(tim.read(0, CNT).unwrap(), u32::MAX - 3);
         assert!(tim.write(0, SMCR, 4).is_err());
+    }
+    #[test]
+    fn encoder_clock_captures_the_count_of_another_timer() {
+        let mut encoder = Tim::new(2, CLOCK);
+        encoder.write(0, SMCR, 3).unwrap();
+        encoder.write(0, CR1, CEN).unwrap();
+        assert!(!encoder.sends_encoder_clock());
+        encoder.write(0, CR2, MMS_ENCODER_CLOCK).unwrap();
+        assert!(encoder.sends_encoder_clock());
+
+        let mut tim = Tim::new(5, CLOCK);
+        for (offset, value) in [(ARR, u32::MAX), (SMCR, TS_ITR1), (CCMR1, 3), (CCER, 1)] {
+            tim.write(0, offset, value).unwrap();
+        }
+        tim.write(1000, CR1, CEN).unwrap();
+        tim.internal_trigger_1(1000 + 77 * CLOCK);
+        assert_eq!(tim.read(0, SR).unwrap(), 2);
+        assert_eq!(tim.read(1000 + 90 * CLOCK, CCR1).unwrap(), 77);
+        assert_eq!(tim.read(0, SR).unwrap(), 0, "cleared by the load");
+        tim.internal_trigger_1(1000 + 100 * CLOCK);
+        tim.internal_trigger_1(1000 + 101 * CLOCK);
+        assert_eq!(tim.read(0, SR).unwrap(), 2 | CC1OF);
+        assert_eq!(tim.read(0, CCR1).unwrap(), 101);
+        // An edge shortly before the counter wrapped, told afterwards.
+        let wrap = 1000 + (1_u64 << 32) * CLOCK;
+        tim.advance(wrap + 5 * CLOCK);
+        tim.internal_trigger_1(wrap - 3 * CLOCK);
+        assert_eq!(tim.read(0, CCR1).unwrap(), u32::MAX - 2);
+        tim.write(0, SMCR, 0).unwrap_err();
+        assert!(Tim::new(3, CLOCK).write(0, SMCR, TS_ITR1).is_ok());
+    }
+
+    #[test]
+    fn captures_that_are_not_modelled_are_refused() {
+        let refused = |number, smcr, ccmr| {
+            let mut tim = Tim::new(number, CLOCK);
+            tim.write(0, SMCR, smcr).unwrap();
+            tim.write(0, CCMR1, ccmr).unwrap();
+            tim.write(0, CCER, 1).is_err()
+        };
+        assert!(!refused(5, TS_ITR1, 3));
+        assert!(refused(5, TS_ITR1, 3 | 0x10), "filter");
+        assert!(refused(5, 0, 3), "another trigger");
+        assert!(refused(3, TS_ITR1, 3), "another timer");
+        assert!(refused(5, TS_ITR1, 1), "a pin");
     }
 }

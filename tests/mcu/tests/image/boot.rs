@@ -1,5 +1,6 @@
 //! Power on, determinism, standstill.
 
+use core::f64::consts::TAU;
 use std::time::Duration;
 
 use rig_host::link::{EmulatedPort, Session, SessionSettings};
@@ -7,9 +8,9 @@ use rig_mcu::cpu::Memory;
 use rig_mcu::map;
 use rig_mcu::rig::{EmulatedBoard, Line};
 use rig_shared::wire::message::{Report, RequestBody, ResetCause, SettingsOrigin};
-use rig_tests::{calibrated, wait};
+use rig_tests::{calibrated, excitation, wait};
 
-use crate::{bench, board, greeted, health, powered};
+use crate::{BoardSession, awaited, bench, board, greeted, health, place, powered};
 
 #[test]
 fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
@@ -142,6 +143,58 @@ fn two_to_the_thirty_first_ticks_pass_unnoticed() {
     assert!(board(&mut line).with_board(|b| b.bridge().enabled));
     assert_eq!(board(&mut line).resets, []);
     assert_eq!(health(&mut line).dropped, 0);
+}
+
+/// The motor's encoder counts by the telemetry and by the rig's truth, at rest.
+fn counts(line: &mut BoardSession) -> [f64; 2] {
+    let told = awaited(line, |report| match report {
+        Report::Batch(batch) => batch.samples.last().map(|sample| sample.position_sum),
+        _ => None,
+    });
+    let shaft = board(line).with_board(|b| b.plant().truth().motor_position);
+    let config = board(line).with_board(|b| b.plant().config().clone());
+    let per_turn = config.sensors.encoder.counts_per_turn;
+    // A window is ten ticks.
+    [told as f64 / 10.0, shaft / TAU * per_turn]
+}
+
+/// TIM2 wraps where it starts, and with it the 16 bits that the control tick takes of it: there and back many times.
+#[test]
+fn a_wrapping_encoder_counter_loses_no_count() {
+    let mut emulated = powered(8);
+    emulated.with_chip(|chip| {
+        chip.readings = Some(Vec::new());
+        // Without index nothing puts a lost count right.
+        chip.board.faults.index_cut = true;
+    });
+    let mut line = greeted(emulated);
+    calibrated(&mut line);
+    place(&mut line);
+    line.request(RequestBody::StartStream).unwrap();
+    let motion = excitation(8, 5, 1);
+    let seconds = motion.duration_micros() as f64 * 1e-6;
+    line.request(RequestBody::SetTrajectory(motion)).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.2);
+    let before = counts(&mut line);
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, seconds + 0.5);
+    let after = counts(&mut line);
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+
+    let readings = board(&mut line).with_chip(|chip| chip.readings.take());
+    let raw: Vec<u32> = readings
+        .unwrap()
+        .iter()
+        .filter(|reading| reading.address == 0x4000_0024)
+        .map(|reading| reading.value)
+        .collect();
+    let wrapped = |pair: &&[u32]| pair[0].abs_diff(pair[1]) > 1 << 31;
+    let wraps = raw.windows(2).filter(wrapped).count();
+    let [told, truth] = [0, 1].map(|k| after[k] - before[k]);
+    println!("{wraps} wraps; {told:.1} counts told, {truth:.1} turned");
+    assert!(wraps >= 5, "{wraps}");
+    assert!((told - truth).abs() < 3.0, "{told} {truth}");
 }
 
 /// Single control ticks around an instant that the host names, over the wire.

@@ -7,10 +7,11 @@ use rig_mcu::cpu::{Cpu, Memory, Register};
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{NEVER, from_seconds, to_seconds};
 use rig_shared::safety::Fault;
-use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
+use rig_shared::wire::encode;
+use rig_shared::wire::message::{Refusal, Request, RequestBody, ResetCause};
 use rig_tests::wait;
 
-use crate::{BoardSession, bench, board, health, moving, snapshot};
+use crate::{BoardSession, board, health, moving, snapshot};
 
 /// Seconds from now until the bridge is off for good; none if it is still on after `within`.
 fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
@@ -47,7 +48,7 @@ fn cut(faults: &mut BoardFaults) {
 fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
     type Injury = fn(&mut Chip);
     // What is done, what must be latched, seconds until the bridge must be off.
-    let cases: [(&str, Injury, &[Fault], f64); 10] = [
+    let cases: [(&str, Injury, &[Fault], f64); 11] = [
         (
             "encoder's cable cut",
             |c| cut(&mut c.board.faults),
@@ -87,6 +88,12 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
         (
             "driver fault",
             |c| c.board.faults.driver = true,
+            &[Fault::Driver],
+            0.0003,
+        ),
+        (
+            "chip's own supply sags",
+            |c| c.board.faults.logic_supply = Some(2.7),
             &[Fault::Driver],
             0.0003,
         ),
@@ -176,19 +183,40 @@ fn a_silent_host_is_waited_for_then_stopped_then_latched() {
     let after = off_after(&mut line, 2.0).unwrap();
     assert!((1.4..=1.6).contains(&after), "{after} s of silence");
     assert_eq!(snapshot(&mut line).0.fault, Fault::HostSilent);
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
 }
 
+/// A command to switch off, once for each of its bits wrong, while the rig moves: none is carried out.
 #[test]
 fn a_corrupted_command_is_counted_and_changes_nothing() {
-    let mut line = bench(32);
+    let mut line = moving(32);
     let before = health(&mut line).bad_requests;
-    // A frame of the right form whose check sum is wrong, and bytes that are no frame at all.
-    board(&mut line).with_chip(|chip| chip.send(&[0, 5, 1, 2, 3, 4, 0, 0xFF, 0x37, 0]));
+    let mut frame = [0; 64];
+    let disarm = Request {
+        id: 0x8000,
+        body: RequestBody::Disarm,
+    };
+    let length = encode(&disarm, &mut frame).unwrap();
+    // The last byte ends the frame.
+    let bits = 8 * (length - 1);
+    for bit in 0..bits {
+        let mut wrong = frame;
+        wrong[bit / 8] ^= 1 << (bit % 8);
+        board(&mut line).with_chip(|chip| chip.send(&wrong[..length]));
+        wait(&mut line, 2e-3);
+    }
     wait(&mut line, 0.1);
-    line.request(RequestBody::KeepAlive).unwrap();
-    let after = health(&mut line).bad_requests;
-    assert!(after > before, "{before} then {after}");
-    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+    let report = health(&mut line);
+    let counted = report.bad_requests - before;
+    // A bit may make a zero, which cuts the frame in two.
+    assert!(
+        (bits..=2 * bits).contains(&(counted as usize)),
+        "{counted} counted of {bits}"
+    );
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+    // As it should have come.
+    board(&mut line).with_chip(|chip| chip.send(&frame[..length]));
+    assert!(off_after(&mut line, 0.01).is_some());
 }
 
 #[test]
@@ -199,6 +227,7 @@ fn a_stack_near_its_end_is_a_fault() {
     assert!(board(&mut line).cpu().store(end + 1024, &[0x11; 16]));
     assert!(off_after(&mut line, 0.001).is_some());
     assert_eq!(snapshot(&mut line).0.fault, Fault::Stack);
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
 }
 
 #[test]

@@ -97,14 +97,18 @@ fn samples(line: &mut BoardSession) -> Vec<(u64, Sample)> {
     let readings = board(line).with_chip(|chip| chip.readings.take()).unwrap();
     let mut samples: Vec<(u64, Sample)> = Vec::new();
     let mut sample = Sample::default();
+    let mut now = 0;
     for reading in readings {
         match reading.address {
             0x5000_0080 => sample.current = AdcCode(reading.value as u16),
             0x5000_0084 => sample.supply = AdcCode(reading.value as u16),
             0x5000_0088 => sample.temperature = AdcCode(reading.value as u16),
+            0x4000_0C24 => now = reading.value,
+            0x4000_0024 => sample.encoder = EncoderCount(reading.value as u16),
             _ => {
-                // The counter is read last.
-                sample.encoder = EncoderCount(reading.value as u16);
+                // What was captured is read last.
+                let age = now.wrapping_sub(reading.value).cast_signed();
+                sample.edge_age = Some(age.max(0).cast_unsigned());
                 samples.push((reading.trigger, sample));
             }
         }

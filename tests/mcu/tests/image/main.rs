@@ -5,6 +5,7 @@
 
 mod boot;
 mod budget;
+mod circle;
 mod faults;
 mod identification;
 mod storage;
