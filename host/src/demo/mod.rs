@@ -165,6 +165,8 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     progress(0.5);
     let sweep = sweep()?;
     record(&mut session, "sweep.csv", vec![], &sweep, 0.5)?;
+    let reversals = reversals()?;
+    let without = record(&mut session, "slow-without.csv", vec![], &reversals, REST)?;
     progress(0.6);
 
     let open = |name: &str| Source::open(&out.join(name), &robot);
@@ -195,10 +197,10 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
         &out.join("identified.toml"),
         identified.to_toml()?.as_bytes(),
     )?;
-    let again = open("train-again.csv")?;
+    let (again, slow) = (open("train-again.csv")?, open("slow-without.csv")?);
     let (diagnosis, model) = diagnose(
         &identified,
-        &[&train, &again, &sweep],
+        &[&train, &again, &slow],
         &[&hold],
         &diagnose::Options {
             seed,
@@ -209,8 +211,6 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     write_whole(&out.join("model.toml"), model.to_toml()?.as_bytes())?;
     progress(0.9);
 
-    let reversals = reversals()?;
-    let without = record(&mut session, "slow-without.csv", vec![], &reversals, REST)?;
     let uploaded = compensation(&identified, &friction_map)?;
     let with = record(&mut session, "slow-with.csv", uploaded, &reversals, REST)?;
     progress(1.0);

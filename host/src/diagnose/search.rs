@@ -155,9 +155,10 @@ impl<'a> Search<'a> {
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
             let profiles = self.sweep(&fit, &present)?;
             told(chosen.len(), &profiles);
-            let Some(best) = first_to_take(profiles, trials) else {
+            let Some(best) = first_to_take(&profiles, trials) else {
                 break;
             };
+            let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
             let before = chosen.clone();
             chosen.push(best);
             self.settle(base, &mut chosen, trials)?;
@@ -173,6 +174,42 @@ impl<'a> Search<'a> {
         }
         self.other_laws(base, &mut chosen)?;
         Ok(chosen)
+    }
+
+    /// A gear whose link sticks bends to friction that has memory and falls with speed at once: where two plain effects leave
+    /// no more than the gear does, the better of them is taken instead.
+    fn plain_before_gear(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        best: Profile,
+        profiles: &[Profile],
+        trials: usize,
+    ) -> Result<Profile, DiagnoseError> {
+        let joint = best.candidate.joint;
+        let plain = (profiles.iter())
+            .filter(|p| !is_gear(p.candidate.kind) && p.candidate.joint == joint)
+            .find(|p| p.refused(trials).is_none());
+        let Some(plain) = plain.filter(|_| is_gear(best.candidate.kind)) else {
+            return Ok(best);
+        };
+        let of =
+            |more: &Profile| -> Vec<Profile> { chosen.iter().chain([more]).cloned().collect() };
+        let mut pair = of(plain);
+        let taken = pair.iter().map(|p| p.candidate);
+        let gears = self.library.iter().filter(|c| is_gear(c.kind));
+        let without: Vec<Candidate> = taken.chain(gears.copied()).collect();
+        let second = self.sweep(&with(base, &pair, None), &without)?;
+        pair.extend((second.into_iter()).find(|p| p.refused(trials).is_none()));
+        for _ in 0..2 {
+            self.refine_all(base, &mut pair)?;
+        }
+        let left = |list: &[Profile]| with(base, list, None).rms(joint);
+        let instead = left(&pair) <= left(&of(&best));
+        Ok(match pair.into_iter().nth(chosen.len()) {
+            Some(plain) if instead => plain,
+            _ => best,
+        })
     }
 
     /// What would stand in the place of the `i`-th effect beside all others, best first; gears only where a gear or what is
@@ -191,16 +228,12 @@ impl<'a> Search<'a> {
             .filter(|(k, _)| *k != i)
             .map(|(_, p)| p.candidate)
             .collect();
-        let own = chosen[i].candidate.kind.about();
+        let own = chosen[i].candidate.kind;
         others.push(chosen[i].candidate);
-        if own.channel != Channel::Transmission {
-            let like = |name: &str| own.confused.iter().any(|c| c.with == name);
-            for candidate in &self.library {
-                let about = candidate.kind.about();
-                if about.channel == Channel::Transmission && !like(about.name) {
-                    others.push(*candidate);
-                }
-            }
+        if !is_gear(own) {
+            let like = |name: &str| own.about().confused.iter().any(|c| c.with == name);
+            let unlike = |c: &&Candidate| is_gear(c.kind) && !like(c.kind.about().name);
+            others.extend(self.library.iter().filter(unlike));
         }
         self.sweep(&fit, &others)
     }
@@ -293,8 +326,8 @@ impl<'a> Search<'a> {
 }
 
 /// The best that passes; of two transmissions the one without play unless play takes away clearly more.
-fn first_to_take(profiles: Vec<Profile>, trials: usize) -> Option<Profile> {
-    let mut passing = profiles.into_iter().filter(|p| p.refused(trials).is_none());
+fn first_to_take(profiles: &[Profile], trials: usize) -> Option<Profile> {
+    let mut passing = (profiles.iter().cloned()).filter(|p| p.refused(trials).is_none());
     let best = passing.next()?;
     if best.candidate.kind == Kind::Backlash {
         let simpler = passing.find(|p| {
@@ -345,11 +378,14 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
     fit
 }
 
+/// Whether it acts between motor and link.
+fn is_gear(kind: Kind) -> bool {
+    kind.about().channel == Channel::Transmission
+}
+
 /// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
 pub(super) fn rivals(a: &Candidate, b: &Candidate) -> bool {
-    let (x, y) = (a.kind.about(), b.kind.about());
-    let one = x.name == y.name
-        || x.channel == Channel::Transmission && y.channel == Channel::Transmission;
+    let one = a.kind.about().name == b.kind.about().name || is_gear(a.kind) && is_gear(b.kind);
     one && a.joint == b.joint && a.other == b.other
 }
 
