@@ -176,8 +176,8 @@ impl<'a> Search<'a> {
         Ok(chosen)
     }
 
-    /// A gear whose link sticks bends to friction that has memory and falls with speed at once: where two plain effects leave
-    /// no more than the gear does, the better of them is taken instead.
+    /// A gear whose link sticks bends to friction that has memory and falls with speed at once: where two plain effects, by
+    /// whichever law, leave no more than the gear does, the better of them is taken instead.
     fn plain_before_gear(
         &self,
         base: &Fit,
@@ -204,6 +204,7 @@ impl<'a> Search<'a> {
         for _ in 0..2 {
             self.refine_all(base, &mut pair)?;
         }
+        self.other_laws(base, &mut pair)?;
         let left = |list: &[Profile]| with(base, list, None).rms(joint);
         let instead = left(&pair) <= left(&of(&best));
         Ok(match pair.into_iter().nth(chosen.len()) {
