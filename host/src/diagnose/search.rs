@@ -328,7 +328,7 @@ impl<'a> Search<'a> {
 
 /// The best that passes; of two transmissions the one without play unless play takes away clearly more.
 fn first_to_take(profiles: &[Profile], trials: usize) -> Option<Profile> {
-    let mut passing = (profiles.iter().cloned()).filter(|p| p.refused(trials).is_none());
+    let mut passing = profiles.iter().filter(|p| p.refused(trials).is_none());
     let best = passing.next()?;
     if best.candidate.kind == Kind::Backlash {
         let simpler = passing.find(|p| {
@@ -337,10 +337,10 @@ fn first_to_take(profiles: &[Profile], trials: usize) -> Option<Profile> {
         if let Some(simpler) = simpler
             && simpler.evidence.joint_gain + LEAST_GAIN > best.evidence.joint_gain
         {
-            return Some(simpler);
+            return Some(simpler.clone());
         }
     }
-    Some(best)
+    Some(best.clone())
 }
 
 /// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
