@@ -3,7 +3,7 @@
 //! An injected sequence of three; each conversion is the mean of four (RM0440, ADC, "Oversampler"), taken within 3.5 µs:
 //! with 12-bit codes as before, white noise is halved. The current, converted first, is held at 0.62, 1.49, 2.37 and
 //! 3.24 µs after the trigger, 1.93 µs ([`LEAD`]) in the mean. So much before the middle of a braking interval the trigger
-//! comes: behind that middle the current would read low by (R·i + Kₑ·ω)/L times the delay, as if friction were larger.
+//! comes: behind that middle the current would read low by (R·i + Kₑ·ω)/L times the delay, as if friction were smaller.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};

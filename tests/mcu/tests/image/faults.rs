@@ -9,9 +9,9 @@ use rig_mcu::time::{NEVER, from_seconds, to_seconds};
 use rig_shared::safety::Fault;
 use rig_shared::wire::encode;
 use rig_shared::wire::message::{Refusal, Request, RequestBody, ResetCause};
-use rig_tests::wait;
+use rig_tests::{calibrated, excitation, wait};
 
-use crate::{BoardSession, bench, board, health, moving, snapshot};
+use crate::{BoardSession, bench, board, greeted, health, moving, powered, snapshot};
 
 /// Seconds from now until the bridge is off for good; none if it is still on after `within`.
 fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
@@ -341,4 +341,59 @@ fn a_processor_that_hangs_is_reset_by_the_watchdog() {
     board(&mut line).run_for(0.1).unwrap();
     assert_eq!(health(&mut line).reset, ResetCause::Watchdog);
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+}
+
+/// The winding's thermal mean above its rating: off, and not to be cleared before it has cooled.
+#[test]
+fn a_motor_loaded_beyond_its_rating_is_switched_off_and_must_cool() {
+    let mut line = bench(40);
+    let (_, settings) = rig_firmware::nameplate::one_link();
+    let mut limits = settings.limits;
+    limits.continuous_current = 0.1;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::SetTrajectory(excitation(40, 5, 2)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 3.0);
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Overload);
+    assert_eq!(
+        refused(&mut line, RequestBody::ClearFault),
+        Refusal::CauseActing
+    );
+}
+
+/// 0.8 A read with the bridge off: nothing is armed until it has been measured anew.
+#[test]
+fn an_implausible_current_offset_is_a_fault_until_it_is_measured_anew() {
+    let mut emulated = powered(41);
+    emulated.with_board(|b| b.faults.stuck[0] = Some(2048 + 100));
+    let mut line = greeted(emulated);
+    wait(&mut line, 0.7);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::CurrentOffset);
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
+    board(&mut line).with_board(|b| b.faults.stuck[0] = None);
+    line.request(RequestBody::ClearFault).unwrap();
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::WrongMode);
+    calibrated(&mut line);
+    line.request(RequestBody::Arm).unwrap();
+}
+
+/// A panic, met by the program at any place: the bridge goes off at once and stays so, and the next start says why.
+#[test]
+fn a_panic_switches_off_and_starts_anew() {
+    let mut line = moving(42);
+    let emulated = board(&mut line);
+    let handler = emulated
+        .image()
+        .function_ending("rust_begin_unwind")
+        .unwrap();
+    emulated.cpu().set(Register::Pc, handler);
+    assert!(off_after(&mut line, 1e-4).is_some());
+    board(&mut line).run_for(0.1).unwrap();
+    let emulated = board(&mut line);
+    assert!(matches!(emulated.resets[..], [(_, Cause::Software)]));
+    assert!(emulated.with_board(|b| b.enable_edges.len() == 2 && !b.bridge().enabled));
+    assert_eq!(health(&mut line).reset, ResetCause::Software);
 }
