@@ -561,7 +561,7 @@ impl Tim {
             SR => {
                 // Cleared by zeros, save the bits that cannot be set, and breaks that still act.
                 let acting =
-                    u32::from(self.break_active) * BIF | u32::from(self.system_break) * SBIF;
+                    (u32::from(self.break_active) * BIF) | (u32::from(self.system_break) * SBIF);
                 let status = self.bank.get(SR) & (value | acting);
                 self.bank.put(SR, status);
                 return Ok(());
