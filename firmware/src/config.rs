@@ -72,6 +72,8 @@ pub struct Config {
     pub encoder: Encoder,
     /// Thresholds of the checks.
     pub monitor: MonitorConfig,
+    /// What the rig's parts stand: no limits may lie beyond ([`ratings`]).
+    pub ratings: Limits<f32>,
     /// Ticks over which the current offset is measured at start.
     pub calibration_ticks: u32,
     /// Largest plausible current offset, A.
@@ -80,6 +82,23 @@ pub struct Config {
     pub host_silent_ticks: u32,
     /// Further silence after which the bridge goes off and the fault latches, ticks.
     pub host_lost_ticks: u32,
+}
+
+/// What parts stand that were chosen for these limits: currents and torque by a quarter more, as over-current is found at
+/// one and a half times the peak current and the bridge of the parts list bears 6 A; twice the speed and four times the
+/// acceleration, which the checks of the encoder still follow; and positions whose counts an `f32` names one by one.
+pub fn ratings(limits: &Limits<f32>, radians_per_count: f32) -> Limits<f32> {
+    const FARTHEST: f32 = 16_777_216.0;
+    let farthest = FARTHEST * radians_per_count.abs();
+    Limits {
+        position_low: -farthest,
+        position_high: farthest,
+        velocity: 2.0 * limits.velocity,
+        acceleration: 4.0 * limits.acceleration,
+        torque: 1.25 * limits.torque,
+        continuous_current: 1.25 * limits.continuous_current,
+        peak_current: 1.25 * limits.peak_current,
+    }
 }
 
 /// What the host may replace while the rig stands.

@@ -1,7 +1,7 @@
 //! The control application of the rig, free of hardware.
 //!
 //! One pure function, [`step`](step::step), is the whole control tick: it takes the raw [`Sample`](sample::Sample)
-//! of one instant and gives the [`Command`](sample::Command) that acts from the next one on. A board calls
+//! of one trigger and gives the [`Command`](sample::Command) that acts from the next one on. A board calls
 //! it from its converter interrupt; the emulated rig and the tests call it in a loop. Beside it,
 //! [`speaker::Speaker`] turns bytes from the host into changes of [`State`](state::State) and what a
 //! tick gave into bytes for the host.

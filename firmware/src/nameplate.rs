@@ -13,7 +13,7 @@ use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::safety::monitor::MonitorConfig;
 
-use crate::config::{Config, Encoder, Rates, Settings};
+use crate::config::{Config, Encoder, Rates, Settings, ratings};
 use crate::sample::Scaling;
 
 /// The one-link rig of the template: what is fixed, and what holds until the host says otherwise.
@@ -58,6 +58,7 @@ pub fn one_link() -> (Config, Settings) {
             stuck_duty: 0.02,
             thermal_time: 10.0,
         },
+        ratings: ratings(&limits, (core::f64::consts::TAU / (8192.0 * 50.0)) as f32),
         calibration_ticks: rate / 2,
         largest_offset: 0.5,
         host_silent_ticks: rate / 2,

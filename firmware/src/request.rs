@@ -72,8 +72,12 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         }
         _ => {
             refuse_in_motion(state)?;
+            // Checks that act may not be moved.
+            if matches!(body, RequestBody::SetLimits(_)) && state.mode.drives() {
+                return Err(Refusal::WrongMode);
+            }
             let settings = with(&state.settings, body);
-            usable(&settings)?;
+            usable(config, &settings)?;
             state
                 .apply(config, settings)
                 .map_err(|_| Refusal::BadValue)?;
@@ -210,9 +214,10 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Whether values are physical; everything written so that NaN is refused.
-pub(crate) fn usable(settings: &Settings) -> Result<(), Refusal> {
+/// Whether values are physical and within what the rig's parts stand; everything written so that NaN is refused.
+pub(crate) fn usable(config: &Config, settings: &Settings) -> Result<(), Refusal> {
     let good = settings.limits.is_valid()
+        && settings.limits.is_within(&config.ratings)
         && settings.gains.usable()
         && settings.friction.check().is_ok()
         && model_is_usable(&settings.model)

@@ -5,7 +5,8 @@ use rig_shared::units::{AdcCode, Duty, EncoderCount};
 /// Clock of the timer that captures the encoder's edges, Hz.
 pub const EDGE_CLOCK_HZ: u32 = 170_000_000;
 
-/// What one control tick sees, all taken at the same instant by one hardware trigger.
+/// What one control tick sees, begun by one hardware trigger. A converter takes its inputs one after the other, and the
+/// encoder is read when it has done: on the board some 9 µs after the middle of the current's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Encoder timer, motor side.

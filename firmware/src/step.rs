@@ -32,7 +32,7 @@ pub struct Output {
     pub fault: Option<FaultRecord>,
 }
 
-/// One control tick. Takes the samples of one instant, gives the command that acts from the next one on.
+/// One control tick. Takes the samples of one trigger, gives the command that acts from the next one on.
 pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     state.follow(config);
     let readings = read(config, state, sample);

@@ -127,7 +127,7 @@ pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     let damaged = copies.contains(&Copy::Damaged);
     let (settings, origin) = match &copies[newer] {
         Copy::Whole { settings, .. } => {
-            let good = usable(settings).is_ok()
+            let good = usable(config, settings).is_ok()
                 && Compensation::new(&settings.effects).is_ok()
                 && settings
                     .estimator

@@ -2,8 +2,8 @@
 
 use rig_shared::safety::LimitSet;
 
-/// Sums over the ticks of one window. Position and current are taken at the same instants, so their means
-/// belong to the same instant too.
+/// Sums over the ticks of one window. Position and current are taken in the same ticks, so their means
+/// belong to the same time but for the delay between the two readings ([`Sample`](crate::sample::Sample)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
     /// Ticks so far.

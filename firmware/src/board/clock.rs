@@ -45,6 +45,14 @@ pub(crate) fn boost() {
     PWR.cr5().modify(|w| w.0 &= !(1 << 8));
 }
 
+/// Watches a crystal that started: should it stop, the chip goes on by its own oscillator, a break switches the outputs
+/// off, and the non-maskable interrupt starts the program anew (RM0440, RCC, "Clock security system").
+pub(crate) fn watch(crystal: bool) {
+    if crystal {
+        RCC.cr().modify(|w| w.set_csson(true));
+    }
+}
+
 /// The tasks that may not wait for the others.
 pub(crate) const TASK_PRIORITY: Priority = Priority::P10;
 

@@ -13,9 +13,7 @@ use super::pwm;
 /// A program error. The rig starts again disarmed, and tells in its health report why.
 #[panic_handler]
 fn panic(_info: &PanicInfo) -> ! {
-    pwm::off();
-    cortex_m::interrupt::disable();
-    cortex_m::peripheral::SCB::sys_reset()
+    fault()
 }
 
 /// `defmt`'s own assertions end here too.
@@ -58,6 +56,8 @@ unsafe fn DefaultHandler(_number: i16) {
 }
 
 extern "C" fn fault() -> ! {
+    // One instruction, before the bridge: a control tick in between would switch it on again.
+    cortex_m::interrupt::disable();
     pwm::off();
     cortex_m::peripheral::SCB::sys_reset()
 }

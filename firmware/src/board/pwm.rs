@@ -1,20 +1,23 @@
-//! TIM1: the bridge's two inputs, the break input, and the trigger of every sample.
+//! TIM1: the bridge's two inputs and the break input; TIM4, started by it: the trigger of every sample.
 //!
 //! Centre-aligned at 20 kHz. With d > 0 input 1 is high and input 2 low for the share d of a period, both high
 //! for the rest (drive and brake, so-called slow decay): the motor's current flows on through the bridge, the
 //! ripple is the smallest, and the mean voltage is d times the supply. With d < 0 the inputs change places.
 //!
 //! The repetition counter lets every fourth overflow or underflow through as an update, 10 000 a second, always
-//! at the same end of the ramp: there the new duty takes effect, and there the converter is triggered. It is the
-//! middle of a driving or of a braking interval, where the current equals its mean over the period.
+//! at the underflow: there the new duty takes effect. It is the middle of a braking interval, where the current equals
+//! its mean over the period. The samples are to lie about that instant, so their trigger comes [`LEAD`] before it: TIM4
+//! counts the same clock with the period of the updates, starts with TIM1's counter (trigger mode, TIM1's enable as TRGO,
+//! ITR0; RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection") so much ahead, and never again loses or gains a count.
 
 use embassy_stm32::gpio::Output;
 use embassy_stm32::pac::timer::vals::{
-    Bkinp, Bkp, CcmrOutputCcs, Cms, FilterValue, Mms2, Ocm, Ossi, Ossr, Urs,
+    Bkinp, Bkp, CcmrOutputCcs, Cms, FilterValue, Mms, Ocm, Ossi, Ossr, Sms, Ts, Urs,
 };
-use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1};
+use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
 use rig_firmware::sample::Command;
 
+use super::adc::LEAD;
 use super::clock::CORE_HZ;
 use super::pins::BridgePins;
 
@@ -22,6 +25,8 @@ use super::pins::BridgePins;
 pub(crate) const PWM_HZ: u32 = 20_000;
 /// Top of the ramp: up and down are one pulse.
 const TOP: u16 = (CORE_HZ / PWM_HZ / 2) as u16;
+/// Above the top: never low.
+const HIGH: u16 = TOP + 1;
 
 /// PWR_CR2.PLS: a chip's supply below 2.8 V counts as broken down (RM0440, PVD level 5). Its own lowest is 1.71 V.
 const SUPPLY_LEVEL: u8 = 5;
@@ -70,9 +75,7 @@ impl Bridge {
             }
         });
         // Idle outputs are low: both inputs low leave the motor open-circuit.
-        timer.cr2().write(|w| w.set_mms2(Mms2::UPDATE));
-        timer.ccr(0).write(|w| w.set_ccr(0));
-        timer.ccr(1).write(|w| w.set_ccr(0));
+        brake();
         timer.ccer().write(|w| {
             w.set_cce(0, true);
             w.set_cce(1, true);
@@ -85,8 +88,9 @@ impl Bridge {
         timer.bdtr().write(|w| {
             w.set_bke(0, true);
             w.set_bkp(0, Bkp::ACTIVE_LOW);
-            // Eight samples at the timer's clock: 47 ns, against spikes that the bridge itself couples in.
-            w.set_bkf(0, FilterValue::FCK_INT_N8);
+            // No filter: a filtered input needs the timer's clock, which may be what has failed. A capacitor at the pin
+            // keeps off the spikes that the bridge itself couples in.
+            w.set_bkf(0, FilterValue::NO_FILTER);
             w.set_aoe(false);
             w.set_ossi(Ossi::IDLE_LEVEL);
             w.set_ossr(Ossr::IDLE_LEVEL);
@@ -94,20 +98,24 @@ impl Bridge {
         // Loads the preloaded registers.
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write_value(Default::default());
+        follow(control_hz);
         Self {
             enable: pins.connect(),
         }
     }
 
-    /// Starts the ramp, and with it the sampling. The outputs stay idle.
+    /// Starts the ramp, and with it the sampling: after the converter is set up, whom every trigger must find ready. The
+    /// outputs stay idle.
     pub(crate) fn run(&mut self) {
         TIM1.cr1().modify(|w| w.set_cen(true));
     }
 
-    /// Whether the break input has acted since the bridge was last switched on, or acts now.
+    /// Whether the break input or a system break has acted since the bridge was last switched on, or acts now.
     #[inline(always)]
     pub(crate) fn broken(&self) -> bool {
-        TIM1.sr().read().bif(0)
+        let flags = TIM1.sr().read();
+        // What goes wrong inside the chip has a flag of its own, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
+        flags.bif(0) || flags.sbif()
     }
 
     /// Puts a command on the outputs, effective from the next update on; switching off is at once.
@@ -116,29 +124,59 @@ impl Bridge {
         let timer = TIM1;
         if !command.bridge {
             off();
-            // A driver fault that has gone may be cleared: the flag rises again at once if it has not.
+            // The update before the next command takes this over: the bridge starts from standstill, not with its last duty.
+            brake();
+            // A fault that has gone may be cleared: its flag rises again at once if it has not.
             timer.sr().write(|w| {
                 // Written with zero a flag is cleared, with one it is left (rc_w0).
                 *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
                 w.set_bif(0, false);
+                w.set_sbif(false);
             });
             return;
         }
         let high = f32::from(TOP);
         let braking = (high * (1.0 - command.duty.0.abs())) as u16;
-        // Above the top: never low.
         let (one, two) = if command.duty.0 >= 0.0 {
-            (TOP + 1, braking)
+            (HIGH, braking)
         } else {
-            (braking, TOP + 1)
+            (braking, HIGH)
         };
-        timer.ccr(0).write(|w| w.set_ccr(one));
-        timer.ccr(1).write(|w| w.set_ccr(two));
+        compare(one, two);
         if !self.enable.is_set_high() {
             timer.bdtr().modify(|w| w.set_moe(true));
             self.enable.set_high();
         }
     }
+}
+
+/// What the outputs compare with from the next update on.
+#[inline(always)]
+fn compare(one: u16, two: u16) {
+    TIM1.ccr(0).write(|w| w.set_ccr(one));
+    TIM1.ccr(1).write(|w| w.set_ccr(two));
+}
+
+/// Duty 0: both inputs high.
+#[inline(always)]
+fn brake() {
+    compare(HIGH, HIGH);
+}
+
+/// Sets TIM4 up to start with TIM1 and to trigger the converter [`LEAD`] before each of its updates.
+fn follow(control_hz: u32) {
+    RCC.apb1enr1().modify(|w| w.set_tim4en(true));
+    let timer = TIM4;
+    timer
+        .arr()
+        .write(|w| w.set_arr((CORE_HZ / control_hz - 1) as u16));
+    timer.cnt().write(|w| w.set_cnt(LEAD));
+    timer.smcr().write(|w| {
+        w.set_ts(Ts::ITR0);
+        w.set_sms(Sms::TRIGGER_MODE);
+    });
+    timer.cr2().write(|w| w.set_mms(Mms::UPDATE));
+    TIM1.cr2().write(|w| w.set_mms(Mms::ENABLE));
 }
 
 /// Switches the bridge off from anywhere, with nothing but two stores.

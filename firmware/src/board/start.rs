@@ -47,6 +47,7 @@ pub(crate) fn run() -> ! {
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| unreachable!());
     clock::boost();
     let peripherals = embassy_stm32::init(clock::config(crystal));
+    clock::watch(crystal);
     cycles::start(&mut core.DCB, &mut core.DWT);
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);

@@ -2,7 +2,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use rig_firmware::config::{Config, Encoder, Rates, Settings};
+use rig_firmware::config::{Config, Encoder, Rates, Settings, ratings};
 use rig_firmware::sample::Scaling;
 use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
@@ -152,6 +152,10 @@ impl Nameplate {
                 observer_bandwidth: OBSERVER_BANDWIDTH,
             },
             monitor: monitor(&rates, &limits, counts, drive.gear_ratio),
+            ratings: ratings(
+                &limits,
+                (core::f64::consts::TAU / (counts * drive.gear_ratio)) as f32,
+            ),
             calibration_ticks: rates.control_hz / 2,
             largest_offset: 0.5,
             host_silent_ticks: rates.control_hz / 2,

@@ -41,6 +41,17 @@ impl<T: Real<Mask = bool>> Limits<T> {
             && self.position_low.lt(self.position_high)
             && positive(self.position_high - self.position_low)
     }
+
+    /// Whether no limit allows more than `ratings` do. NaN fails each comparison.
+    pub fn is_within(&self, ratings: &Self) -> bool {
+        self.velocity.le(ratings.velocity)
+            && self.acceleration.le(ratings.acceleration)
+            && self.torque.le(ratings.torque)
+            && self.continuous_current.le(ratings.continuous_current)
+            && self.peak_current.le(ratings.peak_current)
+            && ratings.position_low.le(self.position_low)
+            && self.position_high.le(ratings.position_high)
+    }
 }
 
 /// A limit that can act.

@@ -69,9 +69,11 @@ impl<const N: usize> Snapshot<N> {
         self.remaining == Some(0)
     }
 
-    /// Starts turning again; what was kept is overwritten by and by.
+    /// Starts turning again, empty; in the same time however long the ring is, as it is called within a control tick.
     pub fn release(&mut self) {
-        *self = Self::default();
+        self.next = 0;
+        self.filled = 0;
+        self.remaining = None;
     }
 
     /// Ticks kept.
@@ -126,6 +128,20 @@ mod tests {
             .collect();
         assert_eq!(ticks, (86..102).collect::<std::vec::Vec<_>>());
         assert!(snapshot.get(16).is_none());
+    }
+
+    #[test]
+    fn a_released_ring_is_as_a_new_one() {
+        let mut snapshot = Snapshot::<16>::default();
+        for tick in 0..30 {
+            snapshot.push(at(tick));
+            snapshot.freeze();
+        }
+        snapshot.release();
+        assert!(snapshot.is_empty() && !snapshot.is_frozen());
+        assert!(snapshot.get(0).is_none());
+        snapshot.push(at(50));
+        assert_eq!((snapshot.len(), snapshot.get(0).unwrap().tick), (1, 50));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rig_firmware::sample::Command;
 use rig_host::plant::{Plant, PlantConfig, Truth};
 use rig_shared::units::Duty;
 
+use crate::ripple::Ripple;
 use crate::time::{Instant, from_seconds, to_seconds};
 
 /// What the two half bridges do.
@@ -36,6 +37,8 @@ pub struct BoardFaults {
     pub fault_line: bool,
     /// The chip's own supply, V, where it is not its 3.3. Too low for the processor is nothing that is modelled.
     pub logic_supply: Option<f64>,
+    /// The crystal does not swing.
+    pub crystal_dead: bool,
 }
 
 /// The encoder's index has passed.
@@ -85,6 +88,8 @@ pub struct Board {
     looked: Instant,
     /// Times of every change of the driver's enable input.
     pub enable_edges: Vec<(Instant, bool)>,
+    /// What the half bridges did when they were last enabled.
+    pub first_duty: f64,
 }
 
 impl Board {
@@ -118,6 +123,7 @@ impl Board {
             seen_count: 0,
             looked: 0,
             enable_edges: Vec::new(),
+            first_duty: 0.0,
         }
     }
 
@@ -154,6 +160,9 @@ impl Board {
         self.integrate(now);
         if bridge.enabled != self.bridge.enabled {
             self.enable_edges.push((now, bridge.enabled));
+            if bridge.enabled {
+                self.first_duty = bridge.duty;
+            }
         }
         self.bridge = bridge;
     }
@@ -208,6 +217,22 @@ impl Board {
     pub fn code(&self, input: usize) -> u16 {
         let stuck = self.faults.stuck.get(input).copied().flatten();
         stuck.unwrap_or_else(|| self.codes.get(input).copied().unwrap_or(0))
+    }
+
+    /// What the current varies by within a pulse now.
+    pub fn ripple(&self) -> Ripple {
+        if !self.bridge.enabled {
+            return Ripple::default();
+        }
+        let config = self.plant.config();
+        let motor = &config.motor;
+        let drop = motor.resistance * self.truth.current
+            + motor.torque_constant * self.truth.motor_velocity;
+        Ripple {
+            braking: -drop / motor.inductance,
+            duty: self.bridge.duty.abs().min(1.0),
+            codes_per_ampere: 1.0 / f64::from(config.sensors.scaling.current_per_code),
+        }
     }
 
     /// What an encoder without steps would read at `now`, counts, not wrapped.

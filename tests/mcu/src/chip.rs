@@ -17,11 +17,12 @@ use crate::peripheral::gpio::{Function, Gpio};
 use crate::peripheral::iwdg::Iwdg;
 use crate::peripheral::lpuart::Lpuart;
 use crate::peripheral::pwr::Pwr;
-use crate::peripheral::rcc::{Cause, Rcc};
+use crate::peripheral::rcc::{Cause, Crystal, Rcc};
 use crate::peripheral::syscfg::Syscfg;
 use crate::peripheral::tim::Tim;
 use crate::peripheral::{Refusal, told};
-use crate::time::{Instant, UNITS_PER_SECOND};
+use crate::ripple::Ripple;
+use crate::time::{Instant, UNITS_PER_SECOND, to_seconds};
 
 /// What an access to a peripheral costs beside the load or store itself, cycles: the bridge from AHB to APB.
 const BRIDGE: u64 = 3;
@@ -34,7 +35,10 @@ pub const CONTROL_EXCEPTION: u16 = 16 + ADC1_2 as u16;
 /// DMAMUX requests (RM0440 table 91).
 const REQUEST_RX: u32 = 34;
 const REQUEST_TX: u32 = 35;
-/// External trigger of the injected group (RM0440 table 167).
+/// Exception number of the non-maskable interrupt.
+const NON_MASKABLE: u16 = 2;
+/// External triggers of the injected group (RM0440 table 167).
+const TIM4_TRGO: u32 = 5;
 const TIM1_TRGO2: u32 = 8;
 
 /// What went wrong in the emulated chip.
@@ -183,6 +187,7 @@ impl Chip {
         self.bitten = false;
         self.nvic = Nvic::default();
         self.rcc = Rcc::new(cause);
+        self.rcc.set_crystal(!self.board.faults.crystal_dead);
         self.pwr = Pwr::default();
         self.flash = Flash::default();
         self.syscfg = Syscfg::default();
@@ -210,7 +215,7 @@ impl Chip {
     /// The processor has locked up: an input of the break where it is let through (SYSCFG_CFGR2.CLL).
     pub fn lock_up(&mut self) {
         if self.syscfg.breaks_on_lockup() {
-            self.tim[0].trip();
+            self.tim[0].set_system_break(true);
             if let Err(refusal) = self.update_bridge(self.work.now) {
                 self.fail(ChipError::Hardware(refusal));
             }
@@ -303,16 +308,19 @@ impl Chip {
         for tim in &mut self.tim {
             tim.advance(at);
         }
-        if let Some(trigger) = self.tim[0].take_trgo2() {
-            self.board.align(trigger);
-            if self.board.due() <= at {
-                self.board.advance(at);
+        let pulses = [
+            (TIM1_TRGO2, self.timer(1).take_trgo2()),
+            (TIM4_TRGO, self.timer(4).take_trgo()),
+        ];
+        for (source, pulse) in pulses {
+            if let Some(trigger) = pulse {
+                self.trigger_adc(source, trigger, at)?;
             }
-            self.triggers += 1;
-            self.trigger_adc(trigger)?;
-        } else if self.board.due() <= at {
+        }
+        if self.board.due() <= at {
             self.board.advance(at);
         }
+        self.watch_crystal()?;
         self.update_pins();
         self.update_bridge(at)?;
         self.adc.advance(at);
@@ -330,21 +338,40 @@ impl Chip {
         Ok(())
     }
 
-    fn trigger_adc(&mut self, at: Instant) -> Result<(), Refusal> {
-        if !self.adc.listens_to(TIM1_TRGO2) {
+    /// A timer's pulse to the converter, whose clock must be on by then: a pulse that nobody can take is a mistake in the
+    /// order of the start.
+    fn trigger_adc(&mut self, source: u32, at: Instant, now: Instant) -> Result<(), Refusal> {
+        if !self.rcc.is_clocked(Peripheral::Adc12) {
+            return told("a timer's trigger reaches the converter while its clock is off");
+        }
+        if !self.adc.listens_to(source) {
             return Ok(());
         }
+        self.board.align(at);
+        if self.board.due() <= now {
+            self.board.advance(now);
+        }
+        self.triggers += 1;
         let (system, kernel) = (self.period, self.rcc.adc_period());
         let codes = self.codes();
         self.adc
-            .start_injected(at, system, kernel, &|channel| code_of(&codes, channel))
+            .start_injected(at, system, kernel, &|channel, held| {
+                code_of(&codes, channel, held)
+            })
     }
 
     /// Codes on PC0, PC1, PC2 as far as the pins are analogue.
-    fn codes(&self) -> [Option<u16>; 3] {
-        core::array::from_fn(|k| {
+    fn codes(&self) -> Codes {
+        let [current, supply, temperature] = core::array::from_fn(|k| {
             (self.gpio[2].function(k as u32) == Function::Analogue).then(|| self.board.code(k))
-        })
+        });
+        Codes {
+            current,
+            supply,
+            temperature,
+            ripple: self.board.ripple(),
+            middle: self.tim[0].underflow(self.work.now),
+        }
     }
 
     /// Requests of the serial port to the DMA.
@@ -371,6 +398,21 @@ impl Chip {
         Ok(())
     }
 
+    /// The crystal may stop. Watched, it is replaced by the chip's own oscillator, which tells by the non-maskable interrupt;
+    /// not watched, the clock that comes from it stands.
+    fn watch_crystal(&mut self) -> Result<(), Refusal> {
+        match self.rcc.set_crystal(!self.board.faults.crystal_dead) {
+            Crystal::Unchanged => Ok(()),
+            Crystal::Replaced => {
+                self.nvic.pend(NON_MASKABLE);
+                self.clocks_changed()
+            }
+            Crystal::Lost => {
+                told("the clock stands: its crystal has stopped, and nobody watches it")
+            }
+        }
+    }
+
     /// The pins that the board drives.
     fn update_pins(&mut self) {
         let high = self.board.fault_pin();
@@ -380,12 +422,11 @@ impl Chip {
         if self.gpio[1].function(12) == Function::Alternate(6) {
             self.tim[0].set_break_pin(high);
         }
-        if let Some(supply) = self.board.faults.logic_supply
-            && self.pwr.detects_low(supply)
-            && self.syscfg.breaks_on_low_supply()
-        {
-            self.tim[0].trip();
-        }
+        let low = self.board.faults.logic_supply;
+        let low = low.is_some_and(|supply| self.pwr.detects_low(supply));
+        let break_down = low && self.syscfg.breaks_on_low_supply();
+        // The clock's failure acts whatever SYSCFG says.
+        self.tim[0].set_system_break(break_down || self.rcc.clock_failed());
     }
 
     /// What PWM and enable pin make of the bridge. PA8 and PA9 by alternate function 6 (DS12288 table 13).
@@ -600,7 +641,11 @@ impl Chip {
                 if matches!(number, 2 | 5) {
                     self.count_edges();
                 }
-                self.tim[timer_index(number)].write(now, offset, value)?;
+                let ran = self.timer(1).sends_enable();
+                self.timer(number).write(now, offset, value)?;
+                if !ran && self.timer(1).sends_enable() {
+                    self.timer(4).internal_trigger_0(now);
+                }
             }
             Peripheral::Iwdg => self.iwdg.write(now, offset, value)?,
             Peripheral::Pwr => self.pwr.write(offset, value)?,
@@ -624,8 +669,8 @@ impl Chip {
                 let (system, kernel) = (self.period, self.rcc.adc_period());
                 let codes = self.codes();
                 self.adc
-                    .write(now, offset, value, system, kernel, &|channel| {
-                        code_of(&codes, channel)
+                    .write(now, offset, value, system, kernel, &|channel, held| {
+                        code_of(&codes, channel, held)
                     })?;
             }
             Peripheral::Dwt => match offset {
@@ -726,9 +771,24 @@ impl Chip {
     }
 }
 
-fn code_of(codes: &[Option<u16>; 3], channel: u32) -> Option<u16> {
+/// What is on the converter's pins: codes, and what the current's varies by within a pulse.
+struct Codes {
+    current: Option<u16>,
+    supply: Option<u16>,
+    temperature: Option<u16>,
+    ripple: Ripple,
+    /// Middle of a braking interval, while the pulses come.
+    middle: Option<Instant>,
+}
+
+fn code_of(codes: &Codes, channel: u32, held: Instant) -> Option<u16> {
     match channel {
-        6..=8 => codes.get(channel as usize - 6).copied().flatten(),
+        6 => codes.current.map(|code| match codes.middle {
+            Some(middle) => codes.ripple.on(code, to_seconds(held) - to_seconds(middle)),
+            None => code,
+        }),
+        7 => codes.supply,
+        8 => codes.temperature,
         // VREFINT of 1.212 V (DS12288 table 21) at 3.3 V.
         18 => Some(1504),
         _ => None,

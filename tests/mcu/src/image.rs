@@ -139,6 +139,12 @@ impl Image {
         })
     }
 
+    /// First instruction of the function whose symbol ends so: compilers put their own marks before it.
+    pub fn function_ending(&self, name: &str) -> Option<u32> {
+        let found = self.functions.iter().find(|f| f.name.ends_with(name));
+        found.map(|function| function.address)
+    }
+
     /// The function that an address lies in.
     pub fn function_at(&self, address: u32) -> Option<&Function> {
         let after = self.functions.partition_point(|f| f.address <= address);

@@ -21,6 +21,7 @@ pub mod nvic;
 pub mod peripheral;
 #[cfg(feature = "unicorn")]
 pub mod rig;
+pub mod ripple;
 pub mod time;
 #[cfg(feature = "unicorn")]
 pub mod unicorn;

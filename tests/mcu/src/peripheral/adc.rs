@@ -36,6 +36,9 @@ const JEOS: u32 = 1 << 6;
 const REGULATOR: u64 = 20 * UNITS_PER_MICROSECOND;
 /// Calibration, cycles of the converter's clock (table 66).
 const CALIBRATION: u64 = 116;
+/// Half cycles of the converter's clock from a trigger to the first sampling, asynchronous clock, typical (table 66,
+/// t_LATRINJ).
+const LATENCY: u64 = 4;
 /// Fastest clock with one converter in use, Hz (table 66).
 const FASTEST: u64 = 60_000_000;
 
@@ -107,8 +110,8 @@ impl Default for Adc {
     }
 }
 
-/// What the board has on a channel's pin, as a 12-bit code; none where nothing is connected.
-pub type Codes<'a> = &'a dyn Fn(u32) -> Option<u16>;
+/// What the board has on a channel's pin when a sample is held, as a 12-bit code; none where nothing is connected.
+pub type Codes<'a> = &'a dyn Fn(u32, Instant) -> Option<u16>;
 
 impl Adc {
     /// Period of the converter's clock, from the AHB's and the asynchronous one.
@@ -141,23 +144,38 @@ impl Adc {
             .unwrap_or(5)
     }
 
-    /// Duration of a conversion in half cycles, and its result from one code.
-    fn conversion(&self, channel: u32, code: u16, injected: bool) -> Result<(u64, u32), Refusal> {
+    /// End of a conversion that begins at `start`, and its result. A sample is held at the end of its sampling time.
+    fn conversion(
+        &self,
+        channel: u32,
+        start: Instant,
+        clock: u64,
+        injected: bool,
+        codes: Codes<'_>,
+    ) -> Result<(Instant, u32), Refusal> {
         let config = self.bank.get(CFGR);
         if config & 0x18 != 0 || config & 0x8000 != 0 {
             return told("resolutions below 12 bits and left alignment are not modelled");
         }
-        let single = self.sampling(channel) + 25;
+        let sampling = self.sampling(channel);
+        let single = sampling + 25;
         let over = self.bank.get(CFGR2);
-        if over & (if injected { 2 } else { 1 }) == 0 {
-            return Ok((single, code.into()));
+        let (ratio, shift) = if over & (if injected { 2 } else { 1 }) == 0 {
+            (1, 0)
+        } else {
+            (2_u64 << (over >> 2 & 7), over >> 5 & 0xF)
+        };
+        let mut sum = 0;
+        for k in 0..ratio {
+            let held = start + (k * single + sampling) * clock / 2;
+            let Some(code) = codes(channel, held) else {
+                return told(format!("nothing is connected to ADC1 channel {channel}"));
+            };
+            sum += u32::from(code);
         }
-        let ratio = 2_u32 << (over >> 2 & 7);
-        let sum = u32::from(code) * ratio;
-        let shift = over >> 5 & 0xF;
         // Rounded (section 21.4.31).
         let result = (sum + ((1 << shift) >> 1)) >> shift;
-        Ok((single * u64::from(ratio), result & 0xFFFF))
+        Ok((start + ratio * single * clock / 2, result & 0xFFFF))
     }
 
     /// Whether the hardware trigger `source` starts the injected sequence.
@@ -184,16 +202,13 @@ impl Adc {
         let clock = self.clock(system, kernel)?;
         let jsqr = self.bank.get(JSQR);
         let length = (jsqr & 3) + 1;
-        let mut at = now;
+        let mut at = now + LATENCY * clock / 2;
         for rank in 0..length {
             let channel = jsqr >> (9 + 6 * rank) & 0x1F;
-            let Some(code) = codes(channel) else {
-                return told(format!("nothing is connected to ADC1 channel {channel}"));
-            };
-            let (half_cycles, value) = self.conversion(channel, code, true)?;
-            at += half_cycles * clock / 2;
+            let (ends, value) = self.conversion(channel, at, clock, true, codes)?;
+            at = ends;
             self.under_way.push(Conversion {
-                ends: at,
+                ends,
                 rank: Some(rank),
                 value,
                 last: rank + 1 == length,
@@ -214,13 +229,10 @@ impl Adc {
             return told("only single regular conversions by software are modelled");
         }
         let channel = sequence >> 6 & 0x1F;
-        let Some(code) = codes(channel) else {
-            return told(format!("nothing is connected to ADC1 channel {channel}"));
-        };
         let clock = self.clock(system, kernel)?;
-        let (half_cycles, value) = self.conversion(channel, code, false)?;
+        let (ends, value) = self.conversion(channel, now, clock, false, codes)?;
         self.under_way.push(Conversion {
-            ends: now + half_cycles * clock / 2,
+            ends,
             rank: None,
             value,
             last: true,
@@ -409,7 +421,7 @@ impl Adc {
 mod test {
     use super::*;
 
-    fn code(channel: u32) -> Option<u16> {
+    fn code(channel: u32, _: Instant) -> Option<u16> {
         (channel < 10).then_some(100 * channel as u16)
     }
 
@@ -442,6 +454,7 @@ mod test {
         assert!(adc.listens_to(8) && !adc.listens_to(0));
         adc.start_injected(t, 24, Ok(24), &code).unwrap();
         let one = 25 * 96;
+        let t = t + LATENCY / 2 * 96;
         assert_eq!(adc.due(), t + one);
         adc.advance(t + 3 * one - 1);
         assert_eq!(adc.read(t, ISR).unwrap() & (JEOC | JEOS), JEOC);
@@ -452,6 +465,21 @@ mod test {
         let results: Vec<u32> = (0..3).map(|k| adc.read(t, JDR1 + 4 * k).unwrap()).collect();
         assert_eq!(results, [600, 700, 800]);
         assert!(adc.listens_to(8), "armed for the next trigger");
+    }
+
+    /// 24.5 cycles of sampling, four samples: held at 24.5, 61.5, 98.5, 135.5 cycles after the latency of 2.
+    #[test]
+    fn oversampling_holds_each_sample_at_the_end_of_its_sampling_time() {
+        let mut adc = Adc::default();
+        write(&mut adc, 0, COMMON, 3 << 16).unwrap();
+        for (offset, value) in [(SMPR1, 3 << 18), (CFGR2, 2 | 1 << 2), (JSQR, 6 << 9)] {
+            write(&mut adc, 0, offset, value).unwrap();
+        }
+        // The sum of the half cycles at which they are held.
+        let held = |_, at: Instant| Some((at / 48) as u16);
+        adc.start_injected(0, 24, Ok(24), &held).unwrap();
+        adc.advance(10_000_000);
+        assert_eq!(adc.read(0, JDR1).unwrap(), 53 + 127 + 201 + 275);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Reset and clock control (RM0440 section 7.4).
 //!
-//! Oscillators are ready as soon as they are on. Left out: HSE failure detection, MCO, clocks of peripherals
+//! Oscillators are ready as soon as they are on, save a crystal that is dead. Left out: MCO, clocks of peripherals
 //! without a model.
 
 use super::{Bank, Refusal, Register, told};
@@ -24,8 +24,8 @@ const CRRCR: u32 = 0x98;
 
 #[rustfmt::skip]
 const REGISTERS: &[Register] = &[
-    // HSION, HSIKERON, HSEON, HSEBYP, CSSON off, PLLON.
-    Register(0x00, "RCC_CR", 0x0000_0500, 0x0105_0300),
+    // HSION, HSIKERON, HSEON, HSEBYP, CSSON, PLLON.
+    Register(0x00, "RCC_CR", 0x0000_0500, 0x010D_0300),
     Register(0x04, "RCC_ICSCR", 0x4000_0000, 0x7F00_0000),
     Register(0x08, "RCC_CFGR", 0x0000_0005, 0x0000_3FF3),
     Register(0x0C, "RCC_PLLCFGR", 0x0000_1000, 0xFF73_7FF3),
@@ -72,10 +72,28 @@ pub enum Cause {
     Pin,
 }
 
+/// What a crystal's stopping comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crystal {
+    /// Nothing new.
+    Unchanged,
+    /// The clock security system has put the chip's own oscillator in its place.
+    Replaced,
+    /// The clock has gone with it.
+    Lost,
+}
+
+const HSEON: u32 = 1 << 16;
+const CSSON: u32 = 1 << 19;
+const PLLON: u32 = 1 << 24;
+const CIFR: u32 = 0x1C;
+const CSSF: u32 = 1 << 8;
+
 /// The clock tree.
 #[derive(Clone, Debug)]
 pub struct Rcc {
     bank: Bank,
+    crystal: bool,
 }
 
 impl Rcc {
@@ -90,7 +108,42 @@ impl Rcc {
             Cause::Watchdog => 0x2400_0000,
         };
         bank.put(CSR, flags);
-        Self { bank }
+        Self {
+            bank,
+            crystal: true,
+        }
+    }
+
+    /// Whether the crystal swings. Where the system clock comes from one that stops, directly or by the PLL, the clock
+    /// security system (CR.CSSON) goes over to HSI, switches HSE and PLL off and flags it (RM0440 section 7.2.10).
+    pub fn set_crystal(&mut self, swings: bool) -> Crystal {
+        self.crystal = swings;
+        let (control, config) = (self.bank.get(CR), self.bank.get(CFGR));
+        if swings || control & HSEON == 0 {
+            return Crystal::Unchanged;
+        }
+        let source = config & 3;
+        let used = source == 2 || source == 3 && self.bank.get(PLLCFGR) & 3 == 3;
+        if control & CSSON == 0 {
+            return if used {
+                Crystal::Lost
+            } else {
+                Crystal::Unchanged
+            };
+        }
+        let off = HSEON | CSSON | if used { PLLON } else { 0 };
+        self.bank.put(CR, control & !off | 0x100);
+        if used {
+            self.bank.put(CFGR, config & !3 | 1);
+        }
+        let flags = self.bank.get(CIFR) | CSSF;
+        self.bank.put(CIFR, flags);
+        Crystal::Replaced
+    }
+
+    /// CIFR.CSSF: the security system has acted, and nobody has taken note.
+    pub fn clock_failed(&self) -> bool {
+        self.bank.get(CIFR) & CSSF != 0
     }
 
     /// A load.
@@ -101,7 +154,10 @@ impl Rcc {
         let value = self.bank.read(offset)?;
         Ok(match offset {
             // HSIRDY, HSERDY, PLLRDY follow their switches.
-            CR => (value & !0x0202_0400) | (value & 0x100) << 2 | (value & 0x0101_0000) << 1,
+            CR => {
+                let swinging = value & (if self.crystal { 0x0101_0000 } else { PLLON });
+                (value & !0x0202_0400) | (value & 0x100) << 2 | swinging << 1
+            }
             CFGR => (value & !0xC) | (value & 3) << 2,
             // LSERDY, LSIRDY, HSI48RDY.
             BDCR | CSR | CRRCR => (value & !2) | (value & 1) << 1,
@@ -128,6 +184,8 @@ impl Rcc {
             self.bank.put(CSR, kept);
         }
         if offset == 0x20 {
+            let flags = self.bank.get(CIFR) & !value;
+            self.bank.put(CIFR, flags);
             self.bank.put(0x20, 0);
         }
         Ok(matches!(offset, CR | CFGR | PLLCFGR | CCIPR))

@@ -1,8 +1,8 @@
 //! Timers (RM0440 sections 28 to 31): up-counting and centre-aligned time base with repetition counter and
-//! preload, compare flags, PWM outputs, encoder mode with index, break input, update trigger, encoder clock as trigger,
-//! capture on an internal trigger.
+//! preload, compare flags, PWM outputs, encoder mode with index, break input and system break, enable, update and encoder
+//! clock as triggers, start and capture on an internal trigger.
 //!
-//! Left out: slave modes other than encoder, capture from a pin, the resynchronisation of a trigger by some clock periods,
+//! Left out: slave modes other than encoder and trigger mode, capture from a pin, the resynchronisation of a trigger by some clock periods,
 //! dead time, DMA requests, dithering, complementary outputs. Asking for one of them is refused.
 
 use super::{Bank, Refusal, Register, told};
@@ -32,16 +32,24 @@ const OPM: u32 = 1 << 3;
 const ARPE: u32 = 1 << 7;
 const UIF: u32 = 1;
 const BIF: u32 = 1 << 7;
+/// System break: lock-up, supply, ECC or clock (RM0440 section 28.6.5).
+const SBIF: u32 = 1 << 13;
 const IDXF: u32 = 1 << 20;
 /// First over-capture flag.
 const CC1OF: u32 = 1 << 9;
 /// TIMx_CR2.MMS, whose fourth bit lies apart, at "encoder clock output" (RM0440 section 30.5.2).
 const MMS: u32 = 0x0200_0070;
 const MMS_ENCODER_CLOCK: u32 = 0x0200_0000;
+const MMS_ENABLE: u32 = 1 << 4;
+const MMS_UPDATE: u32 = 2 << 4;
+/// TIMx_SMCR.SMS, whose fourth bit lies apart, at "trigger mode": a trigger starts the counter.
+const SMS: u32 = 0x0001_0007;
+const SMS_TRIGGER: u32 = 6;
 /// TIMx_SMCR.TS, likewise in two parts.
 const TS: u32 = 0x0030_0070;
-/// TS of the one connection that is modelled: ITR1, which is TIM2's TRGO at TIM5 (RM0440 section 30.4.2, table of the
-/// internal trigger connections).
+/// TS of the connections that are modelled: ITR0, which is TIM1's TRGO at TIM4, and ITR1, which is TIM2's at TIM5 (RM0440
+/// section 30.4.2, table of the internal trigger connections).
+const TS_ITR0: u32 = 0;
 const TS_ITR1: u32 = 0x10;
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
@@ -103,9 +111,11 @@ pub struct Tim {
     repetitions: u32,
     /// Counter while it does not run by the clock.
     held: u32,
-    update: Option<Instant>,
+    /// Updates that went out as TRGO2 or TRGO and have not been taken.
+    pulses: [Option<Instant>; 2],
     indexed: bool,
     break_active: bool,
+    system_break: bool,
     /// Update events so far.
     pub updates: u64,
 }
@@ -134,9 +144,10 @@ impl Tim {
             down: false,
             repetitions: 0,
             held: 0,
-            update: None,
+            pulses: [None; 2],
             indexed: false,
             break_active: false,
+            system_break: false,
             updates: 0,
         }
     }
@@ -291,13 +302,24 @@ impl Tim {
             return;
         }
         self.load();
-        if self.bank.get(BDTR) & AOE != 0 && !self.break_active {
+        if self.bank.get(BDTR) & AOE != 0 && !self.is_broken() {
             let bdtr = self.bank.get(BDTR) | MOE;
             self.bank.put(BDTR, bdtr);
         }
         self.flag(UIF);
         self.updates += 1;
-        self.update = Some(at);
+        self.send_update(at);
+    }
+
+    /// An update goes out where it is selected as TRGO2 (CR2.MMS2 = 2) or TRGO (CR2.MMS = 2) when it comes.
+    fn send_update(&mut self, at: Instant) {
+        let control = self.bank.get(CR2);
+        if control >> 20 & 0xF == 2 {
+            self.pulses[0] = Some(at);
+        }
+        if control & MMS == MMS_UPDATE {
+            self.pulses[1] = Some(at);
+        }
     }
 
     /// Takes the preloaded values over.
@@ -309,10 +331,40 @@ impl Tim {
         }
     }
 
-    /// The update event since the last call, where it goes out as TRGO2 (CR2.MMS2 = 2).
+    /// The update since the last call that went out as TRGO2.
     pub fn take_trgo2(&mut self) -> Option<Instant> {
-        let at = self.update.take()?;
-        (self.bank.get(CR2) >> 20 & 0xF == 2).then_some(at)
+        self.pulses[0].take()
+    }
+
+    /// The update since the last call that went out as TRGO.
+    pub fn take_trgo(&mut self) -> Option<Instant> {
+        self.pulses[1].take()
+    }
+
+    /// Whether the counter's enable is on and goes out as TRGO.
+    pub fn sends_enable(&self) -> bool {
+        self.bank.get(CR2) & MMS == MMS_ENABLE && self.bank.get(CR1) & CEN != 0
+    }
+
+    /// Internal trigger 0 rose: a counter in trigger mode starts (RM0440 section 30.4.19).
+    pub fn internal_trigger_0(&mut self, at: Instant) {
+        let slave = self.bank.get(SMCR) & (SMS | TS) == SMS_TRIGGER | TS_ITR0;
+        if slave && self.bank.get(CR1) & CEN == 0 {
+            let control = self.bank.get(CR1) | CEN;
+            self.bank.put(CR1, control);
+            self.rebase(at, self.held);
+        }
+    }
+
+    /// When the counter of a centre-aligned timer is at 0 next, from `now`; none while it stands.
+    pub fn underflow(&self, now: Instant) -> Option<Instant> {
+        if !self.counts_by_clock() || !self.is_centred() {
+            return None;
+        }
+        let run = self.run() * self.tick();
+        let first = self.base + if self.down { run } else { 2 * run };
+        let begun = now.saturating_sub(first).div_ceil(2 * run);
+        Some(first + begun * 2 * run)
     }
 
     /// Counts by the encoder's edges.
@@ -388,11 +440,30 @@ impl Tim {
         }
     }
 
-    /// A break from inside the chip.
-    pub fn trip(&mut self) {
+    fn trip(&mut self) {
+        self.cut();
+        self.flag(BIF);
+    }
+
+    fn cut(&mut self) {
         let bdtr = self.bank.get(BDTR) & !MOE;
         self.bank.put(BDTR, bdtr);
-        self.flag(BIF);
+    }
+
+    /// Level of the system break: what goes wrong inside the chip (RM0440 section 28.3.17). It passes no filter, and flags
+    /// itself apart from the break input.
+    pub fn set_system_break(&mut self, active: bool) {
+        self.system_break = active && self.bank.get(BDTR) & BKE != 0;
+        if self.system_break {
+            self.cut();
+            self.flag(SBIF);
+        }
+    }
+
+    /// Whether the main output can't be switched on: a break acts, or the system break's flag has not been cleared ("this
+    /// flag must be reset to re-start PWM operation", section 28.6.5).
+    fn is_broken(&self) -> bool {
+        self.break_active || self.system_break || self.bank.get(SR) & SBIF != 0
     }
 
     /// Share of the time for which output `channel` (0 for CH1) is high; none while it is not driven.
@@ -444,7 +515,8 @@ impl Tim {
     pub fn requests(&self) -> [bool; 4] {
         let pending = self.bank.get(SR) & self.bank.get(DIER);
         [
-            pending & BIF != 0,
+            // SBIF shares the break's interrupt.
+            pending & BIF != 0 || self.bank.get(SR) & SBIF != 0 && self.bank.get(DIER) & BIF != 0,
             pending & UIF != 0,
             pending & 0x0010_0060 != 0,
             pending & 0x1E != 0,
@@ -487,8 +559,10 @@ impl Tim {
     pub fn write(&mut self, now: Instant, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
             SR => {
-                // Cleared by zeros, save the bits that cannot be set.
-                let status = self.bank.get(SR) & value;
+                // Cleared by zeros, save the bits that cannot be set, and breaks that still act.
+                let acting =
+                    (u32::from(self.break_active) * BIF) | (u32::from(self.system_break) * SBIF);
+                let status = self.bank.get(SR) & (value | acting);
                 self.bank.put(SR, status);
                 return Ok(());
             }
@@ -523,7 +597,10 @@ impl Tim {
             CCMR1 | CCMR2 | CCER | SMCR if let Some(refusal) = self.unmodelled_capture() => {
                 return told(refusal);
             }
-            SMCR if value & 7 != 0 && !self.is_encoder() => {
+            SMCR if value & SMS != 0
+                && !self.is_encoder()
+                && !(self.number == 4 && value & (SMS | TS) == SMS_TRIGGER | TS_ITR0) =>
+            {
                 return told(format!(
                     "TIM{} slave mode {:#x} is not modelled",
                     self.number,
@@ -542,9 +619,8 @@ impl Tim {
                 }
             }
             BDTR => {
-                if self.break_active && value & MOE != 0 {
-                    let bdtr = self.bank.get(BDTR) & !MOE;
-                    self.bank.put(BDTR, bdtr);
+                if self.is_broken() {
+                    self.cut();
                 }
                 if value & 0x0100_0000 != 0 {
                     return told("the second break input is not modelled");
@@ -593,7 +669,7 @@ impl Tim {
                 self.flag(UIF);
             }
             if self.bank.get(CR1) & UDIS == 0 {
-                self.update = Some(now);
+                self.send_update(now);
             }
         }
         self.flag(value & 0x1E);
@@ -681,6 +757,47 @@ mod test {
         tim.write(0, BDTR, BKE | MOE).unwrap();
         assert!(tim.main_output());
         assert!(tim.read(0, SR).unwrap() & BIF != 0);
+    }
+
+    #[test]
+    fn a_system_break_flags_itself_and_holds_the_outputs_until_that_is_cleared() {
+        let mut tim = Tim::new(1, CLOCK);
+        tim.write(0, BDTR, MOE).unwrap();
+        tim.set_system_break(true);
+        assert!(tim.main_output(), "the break is not enabled");
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        tim.set_system_break(true);
+        assert!(!tim.main_output());
+        assert_eq!(tim.read(0, SR).unwrap(), SBIF, "not the pin's flag");
+        tim.write(0, SR, 0).unwrap();
+        assert_eq!(tim.read(0, SR).unwrap(), SBIF, "it still acts");
+        tim.set_system_break(false);
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        assert!(!tim.main_output(), "the flag is up");
+        tim.write(0, SR, !SBIF).unwrap();
+        tim.write(0, BDTR, BKE | MOE).unwrap();
+        assert!(tim.main_output());
+    }
+
+    #[test]
+    fn a_timer_in_trigger_mode_starts_with_its_master_and_sends_its_updates() {
+        let mut tim = Tim::new(4, CLOCK);
+        for (offset, value) in [
+            (ARR, 999),
+            (CNT, 100),
+            (CR2, MMS_UPDATE),
+            (SMCR, SMS_TRIGGER),
+        ] {
+            tim.write(0, offset, value).unwrap();
+        }
+        tim.advance(5000 * CLOCK);
+        assert_eq!(tim.take_trgo(), None, "it stands");
+        tim.internal_trigger_0(5000 * CLOCK);
+        assert_eq!(tim.read(5010 * CLOCK, CNT).unwrap(), 110);
+        tim.advance(5900 * CLOCK);
+        assert_eq!(tim.take_trgo(), Some(5900 * CLOCK));
+        assert_eq!(tim.take_trgo(), None);
+        assert!(Tim::new(3, CLOCK).write(0, SMCR, SMS_TRIGGER).is_err());
     }
 
     #[test]

@@ -2,16 +2,16 @@
 
 use rig_host::link::LinkError;
 use rig_mcu::board::BoardFaults;
-use rig_mcu::chip::Chip;
+use rig_mcu::chip::{CONTROL_EXCEPTION, Chip};
 use rig_mcu::cpu::{Cpu, Memory, Register};
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::time::{NEVER, from_seconds, to_seconds};
 use rig_shared::safety::Fault;
 use rig_shared::wire::encode;
 use rig_shared::wire::message::{Refusal, Request, RequestBody, ResetCause};
-use rig_tests::wait;
+use rig_tests::{calibrated, excitation, wait};
 
-use crate::{BoardSession, board, health, moving, snapshot};
+use crate::{BoardSession, bench, board, greeted, health, moving, powered, snapshot};
 
 /// Seconds from now until the bridge is off for good; none if it is still on after `within`.
 fn off_after(line: &mut BoardSession, within: f64) -> Option<f64> {
@@ -156,6 +156,81 @@ fn each_fault_takes_the_bridge_off_in_time_latches_and_keeps_its_snapshot() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
+/// A break that is not the pin's has a flag of its own, which must be cleared before the outputs come on again. And they
+/// come on without the duty that they went off with.
+#[test]
+fn after_a_sag_of_its_own_supply_the_board_drives_again_from_standstill() {
+    let mut line = moving(36);
+    board(&mut line).with_board(|b| b.faults.logic_supply = Some(2.7));
+    assert!(off_after(&mut line, 3e-4).is_some());
+    assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Driver);
+    assert_eq!(
+        refused(&mut line, RequestBody::ClearFault),
+        Refusal::CauseActing
+    );
+    board(&mut line).with_board(|b| b.faults.logic_supply = None);
+    wait(&mut line, 0.5);
+    line.request(RequestBody::ClearFault).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.01);
+    let (output, bridge, first) = board(&mut line).with_chip(|chip| {
+        let output = chip.timer(1).main_output();
+        (output, chip.board.bridge(), chip.board.first_duty)
+    });
+    assert!(output && bridge.enabled && bridge.duty != 0.0, "{bridge:?}");
+    assert_eq!(first, 0.0, "the duty that the bridge began with");
+}
+
+/// The rings of snapshot and capture are let go of within a tick that costs no more than another.
+#[test]
+fn clearing_a_fault_takes_no_longer_than_another_tick() {
+    let mut line = moving(37);
+    board(&mut line).with_board(|b| b.faults.driver = true);
+    assert!(off_after(&mut line, 3e-4).is_some());
+    board(&mut line).with_board(|b| b.faults.driver = false);
+    wait(&mut line, 0.1);
+    board(&mut line).clear_costs();
+    line.request(RequestBody::ClearFault).unwrap();
+    let cost = board(&mut line).cost(CONTROL_EXCEPTION);
+    println!("{} cycles in the worst tick", cost.worst_cycles);
+    assert!(cost.count > 3 && cost.worst_cycles < 8500, "{cost:?}");
+    line.request(RequestBody::Arm).unwrap();
+}
+
+#[test]
+fn a_crystal_that_stops_switches_off_and_starts_anew_without_it() {
+    let mut line = moving(38);
+    board(&mut line).with_board(|b| b.faults.crystal_dead = true);
+    assert!(off_after(&mut line, 1e-4).is_some());
+    board(&mut line).run_for(0.1).unwrap();
+    assert!(matches!(
+        board(&mut line).resets[..],
+        [(_, Cause::Software)]
+    ));
+    let report = health(&mut line);
+    assert!(!report.crystal && report.reset == ResetCause::Software);
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+}
+
+/// Limits by which no check would act are refused, and so is any while the bridge is on.
+#[test]
+fn limits_beyond_what_the_parts_stand_are_refused() {
+    let mut line = bench(39);
+    let (config, settings) = rig_firmware::nameplate::one_link();
+    let mut limits = settings.limits;
+    limits.peak_current = 1e8;
+    let beyond = RequestBody::SetLimits(limits);
+    assert_eq!(refused(&mut line, beyond), Refusal::BadValue);
+    line.request(RequestBody::SetLimits(config.ratings))
+        .unwrap();
+    limits = settings.limits;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    let driving = RequestBody::SetLimits(limits);
+    assert_eq!(refused(&mut line, driving), Refusal::WrongMode);
+}
+
 #[test]
 fn the_break_input_acts_without_the_processor() {
     let mut line = moving(30);
@@ -266,4 +341,59 @@ fn a_processor_that_hangs_is_reset_by_the_watchdog() {
     board(&mut line).run_for(0.1).unwrap();
     assert_eq!(health(&mut line).reset, ResetCause::Watchdog);
     assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+}
+
+/// The winding's thermal mean above its rating: off, and not to be cleared before it has cooled.
+#[test]
+fn a_motor_loaded_beyond_its_rating_is_switched_off_and_must_cool() {
+    let mut line = bench(40);
+    let (_, settings) = rig_firmware::nameplate::one_link();
+    let mut limits = settings.limits;
+    limits.continuous_current = 0.1;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::SetTrajectory(excitation(40, 5, 2)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 3.0);
+    assert!(!board(&mut line).with_board(|b| b.bridge().enabled));
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Overload);
+    assert_eq!(
+        refused(&mut line, RequestBody::ClearFault),
+        Refusal::CauseActing
+    );
+}
+
+/// 0.8 A read with the bridge off: nothing is armed until it has been measured anew.
+#[test]
+fn an_implausible_current_offset_is_a_fault_until_it_is_measured_anew() {
+    let mut emulated = powered(41);
+    emulated.with_board(|b| b.faults.stuck[0] = Some(2048 + 100));
+    let mut line = greeted(emulated);
+    wait(&mut line, 0.7);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::CurrentOffset);
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::FaultLatched);
+    board(&mut line).with_board(|b| b.faults.stuck[0] = None);
+    line.request(RequestBody::ClearFault).unwrap();
+    assert_eq!(refused(&mut line, RequestBody::Arm), Refusal::WrongMode);
+    calibrated(&mut line);
+    line.request(RequestBody::Arm).unwrap();
+}
+
+/// A panic, met by the program at any place: the bridge goes off at once and stays so, and the next start says why.
+#[test]
+fn a_panic_switches_off_and_starts_anew() {
+    let mut line = moving(42);
+    let emulated = board(&mut line);
+    let handler = emulated
+        .image()
+        .function_ending("rust_begin_unwind")
+        .unwrap();
+    emulated.cpu().set(Register::Pc, handler);
+    assert!(off_after(&mut line, 1e-4).is_some());
+    board(&mut line).run_for(0.1).unwrap();
+    let emulated = board(&mut line);
+    assert!(matches!(emulated.resets[..], [(_, Cause::Software)]));
+    assert!(emulated.with_board(|b| b.enable_edges.len() == 2 && !b.bridge().enabled));
+    assert_eq!(health(&mut line).reset, ResetCause::Software);
 }

@@ -20,9 +20,11 @@ use rig_shared::safety::Mode;
 use rig_shared::trajectory::{SlowReversals, Trajectory};
 use rig_shared::units::{AdcCode, EncoderCount};
 use rig_shared::wire::message::{Estimate, Request, RequestBody};
-use rig_tests::{Recording, driven, excitation, recorded, robot, wait};
+use rig_tests::{Recording, calibrated, driven, excitation, recorded, robot, wait};
 
-use crate::{BoardSession, bench, board, greeted, powered};
+use rig_mcu::rig::power_on;
+
+use crate::{BoardSession, bench, board, greeted, image, plant, powered};
 
 /// Gravity acceleration of description and plant, m/s².
 const GRAVITY: f64 = 9.81;
@@ -245,4 +247,51 @@ fn what_was_learnt_and_uploaded_makes_slow_reversals_follow_better() {
         1e3 * after
     );
     assert!(after < before / 2.0, "{before} to {after} rad");
+}
+
+/// The current's samples lie about the middle of the braking interval, where it equals its mean: what is read differs from
+/// the truth by noise, and not by (R·i + Kₑ·ω)/L times a delay.
+#[test]
+fn the_ripple_of_the_current_leaves_its_mean_alone() {
+    let mut rig = plant(53);
+    rig.sensors.current.gain_error = 0.0;
+    rig.sensors.current.lag = None;
+    let motor = rig.motor;
+    let mut line = greeted(power_on(image(), rig, 53).unwrap());
+    calibrated(&mut line);
+    line.request(RequestBody::SetTrajectory(excitation(53, 5, 1)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    let per_code = f64::from(nameplate::one_link().0.scaling.current_per_code);
+    // Slope of braking, A/s, and error of the reading, A, of one tick each.
+    let mut pairs = Vec::new();
+    while pairs.len() < 4000 {
+        board(&mut line).with_chip(|chip| chip.readings = Some(Vec::new()));
+        wait(&mut line, 7.3e-4);
+        board(&mut line).with_chip(|chip| {
+            let readings = chip.readings.take().unwrap_or_default();
+            let last = readings.iter().rev().find(|r| r.address == 0x5000_0080);
+            // The rig moves on with each trigger: a reading belongs to the truth until the next.
+            let Some(last) = last.filter(|r| r.trigger == chip.triggers) else {
+                return;
+            };
+            let truth = chip.board.plant().truth();
+            let drop =
+                motor.resistance * truth.current + motor.torque_constant * truth.motor_velocity;
+            let read = per_code * (f64::from(last.value) - 2048.0);
+            pairs.push((drop / motor.inductance, read - truth.current));
+        });
+    }
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / 4000.0;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let spread = mean(&|p| (p.0 - x).powi(2));
+    let delay = -mean(&|p| (p.0 - x) * (p.1 - y)) / spread;
+    println!(
+        "slope {:.1} A/ms RMS, as if read {:.3} µs after the middle",
+        1e-3 * spread.sqrt(),
+        1e6 * delay
+    );
+    // Noise alone makes some 0.1 µs of it.
+    assert!(spread.sqrt() > 4e3 && delay.abs() < 0.4e-6, "{delay} s");
 }

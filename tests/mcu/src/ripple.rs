@@ -1,0 +1,65 @@
+//! The motor current within a pulse, which the emulated rig does not resolve: it moves by mean voltages.
+//!
+//! Between driving and braking the current is a sawtooth about its mean. Braking, both motor wires at one potential, it
+//! changes by −(R·i + Kₑ·ω)/L, and equals the mean in the middle; driving takes it back. Left out: its curvature, which is
+//! that of exp(−t·R/L) over a pulse of 50 µs against L/R of some 0.8 ms, and the change from pulse to pulse.
+
+/// Pulses a second.
+const PULSES: f64 = 20_000.0;
+/// Largest code of the converter.
+const LARGEST: f64 = 4095.0;
+
+/// The sawtooth. The default is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ripple {
+    /// Slope while braking, A/s.
+    pub braking: f64,
+    /// Share of a pulse that drives.
+    pub duty: f64,
+    /// Scale of the current sense.
+    pub codes_per_ampere: f64,
+}
+
+impl Ripple {
+    /// Current beside its mean, A, so many seconds after the middle of a braking interval.
+    pub fn at(&self, after: f64) -> f64 {
+        let half = 0.5 / PULSES;
+        let within = after - (after * PULSES).round() / PULSES;
+        let edge = half * (1.0 - self.duty);
+        let distance = within.abs();
+        let beside = if distance <= edge {
+            distance
+        } else {
+            edge * (half - distance) / (half - edge)
+        };
+        (self.braking * beside).copysign(self.braking * within)
+    }
+
+    /// The code that the converter gives, from that of the mean.
+    pub fn on(&self, code: u16, after: f64) -> u16 {
+        let moved = f64::from(code) + self.codes_per_ampere * self.at(after);
+        moved.round().clamp(0.0, LARGEST) as u16
+    }
+}
+
+#[cfg(test)]
+mod test {
+    use super::*;
+
+    #[test]
+    fn a_sawtooth_about_its_mean_with_both_its_slopes() {
+        let ripple = Ripple {
+            braking: -20_000.0,
+            duty: 0.4,
+            codes_per_ampere: 100.0,
+        };
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(close(ripple.at(0.0), 0.0) && close(ripple.at(25e-6), 0.0));
+        assert!(close(ripple.at(2e-6), -0.04) && close(ripple.at(-2e-6), 0.04));
+        // The edge at 15 µs, and half way back to the middle of driving.
+        assert!(close(ripple.at(15e-6), -0.3) && close(ripple.at(20e-6), -0.15));
+        assert!(close(ripple.at(52e-6), -0.04) && close(ripple.at(-52e-6), 0.04));
+        assert_eq!(ripple.on(2048, 2e-6), 2044);
+        assert_eq!(ripple.on(2, 10e-6), 0);
+    }
+}
