@@ -301,10 +301,11 @@ fn errors(offset: [f64; 4], seconds: f64, motion: impl Fn(f64) -> (f64, f64)) ->
 }
 
 /// At constant speed, wandering by a hundredth. Times take away what comes of not knowing when in a sample an edge came;
-/// unequal lines stay, and below some 1000 counts/s they are all that is left.
+/// unequal lines stay, and below some 1000 counts/s they are all that is left. At 100 counts/s, an edge in two of the observer's
+/// time constants, what even equal lines leave is the wandering between the edges: 0.04 %.
 #[test]
 fn times_of_edges_make_the_velocity_smooth() {
-    for (scale, most) in [(0.0, [0.15, 0.02]), (0.25, [1.02, 0.2]), (1.0, [1.02, 0.5])] {
+    for (scale, most) in [(0.0, [0.25, 0.02]), (0.25, [1.02, 0.2]), (1.0, [1.02, 0.5])] {
         let offset = UNEQUAL.map(|x| scale * x);
         for speed in [100.0, 300.0, 1e3, 2e3, 5e3, 1e4, 2e4, 1e5, 4e5_f64] {
             let seconds = (200.0 / speed).clamp(2.0, 20.0);
