@@ -158,9 +158,9 @@ fn over_speed_position_and_overload_from_outside() {
         Fault::Position
     );
 
-    let (mut line, _) = bench(3);
-    line.request(RequestBody::Arm).unwrap();
-    inject(&mut line, |f| f.external_torque = 6.0);
+    // In motion: at rest so much current without a count is taken for a lost encoder.
+    let mut line = moving(3);
+    inject(&mut line, |f| f.external_torque = 5.0);
     wait(&mut line, 12.0);
     assert_eq!(
         line.port().device().state().latch.first().unwrap().fault,
