@@ -29,9 +29,6 @@ pub use run::Run;
 
 /// Speed of the slow reversals that the precompensation is judged by, rad/s.
 const SLOW: f64 = 0.05;
-/// Pause before every motion, s: the thermal time of the winding that the firmware reckons with. Without it two motions in a
-/// row can be more than the motor stands for good.
-const COOLING: f64 = 10.0;
 /// Rest after the slow reversals, in which a limit cycle would show, s.
 const REST: f64 = 5.0;
 /// Speeds of the friction sweep, rad/s: below, at and well above the Stribeck velocity of a servo gear
@@ -124,13 +121,15 @@ pub fn run(out: &Path, seed: u64, mut progress: impl FnMut(f64)) -> Result<Demo,
     })?;
     let mut session = Session::open(EmulatedPort::new(rig), SessionSettings::default())?;
     let at_home = vec![RequestBody::SetPosition(home as f32)];
+    // Two motions in a row can be more than the motor stands for good.
+    let cooling = f64::from(nameplate.config.monitor.thermal_time);
     let mut losses = Vec::new();
     let mut record = |session: &mut Session<_>,
                       name: &str,
                       settings: Vec<RequestBody>,
                       motion: &Trajectory<f64>,
                       rest| {
-        run::pause(session, COOLING)?;
+        run::pause(session, cooling)?;
         let run = Run::record(session, settings, motion, rest, &out.join(name))?;
         losses.push(run.losses);
         Ok::<_, DemoError>(run)

@@ -11,6 +11,7 @@ use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
+use super::search::is_gear;
 use super::transmission::{ABREAST, Driven, Load};
 use crate::prepare::{central_difference, second_difference};
 use crate::robot::{Robot, unit_of};
@@ -118,7 +119,7 @@ impl Source<'_> {
 
     /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
     pub(super) fn gains(&self, kind: Kind) -> Vec<Parameter> {
-        if kind.about().channel == Channel::Transmission {
+        if is_gear(kind) {
             // 1 where mass and load are right; the fit may move it a little until they are.
             return vec![Parameter {
                 name: "share",
@@ -171,7 +172,7 @@ impl Source<'_> {
             column[candidate.joint] = Some(signal);
             column
         };
-        if candidate.kind.about().channel == Channel::Transmission {
+        if is_gear(candidate.kind) {
             let signals = self.twisted(candidate, shapes, r)?;
             return Ok(signals.into_iter().map(|s| vec![own(s)]).collect());
         }

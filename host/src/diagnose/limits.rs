@@ -3,7 +3,7 @@
 //! Leaves out: sizes of what acts between motor and link, which are shapes and not gains.
 
 use nalgebra::DMatrix;
-use rig_shared::effects::{Channel, Effect, Kind, Need};
+use rig_shared::effects::{Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::columns::Candidate;
@@ -12,7 +12,7 @@ use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
-use super::search::{is_first_law, rivals, with};
+use super::search::{is_first_law, is_gear, rivals, with};
 use super::{DiagnoseError, testable};
 use crate::robot::Robot;
 use crate::simulate::Model;
@@ -59,7 +59,7 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
             let mut tried = false;
             let mut distinct = false;
             for (c, candidate) in own {
-                if candidate.kind.about().channel == Channel::Transmission {
+                if is_gear(candidate.kind) {
                     distinct = true;
                 }
                 tried = true;
@@ -119,11 +119,7 @@ pub(super) fn detectable(
             .any(|t| t.effect == about.name && t.joint == joint.name);
         let taken = (found.chosen.iter()).any(|p| rivals(&p.candidate, candidate));
         let gains = found.search.source.gains(candidate.kind);
-        if hidden
-            || taken
-            || !is_first_law(candidate.kind)
-            || about.channel == Channel::Transmission
-        {
+        if hidden || taken || !is_first_law(candidate.kind) || is_gear(candidate.kind) {
             continue;
         }
         let mut sizes: Vec<(f64, usize)> = Vec::new();

@@ -3,12 +3,13 @@
 //! Leaves out: second order in the angle of a tilted base where there is more than one joint.
 
 use nalgebra::{DVector, Rotation3, Vector3};
-use rig_shared::effects::{Channel, Effect, Kind, SHAPES};
+use rig_shared::effects::{Effect, Kind, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::anchor::Anchor;
 use super::columns::Candidate;
 use super::rows::Nominal;
+use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
 use crate::robot::{Robot, RobotEffect};
 
@@ -58,7 +59,7 @@ pub(super) fn described(
         if kind == Kind::GravityTilt {
             continue;
         }
-        let transmission = kind.about().channel == Channel::Transmission;
+        let transmission = is_gear(kind);
         if let ([share], true) = (fitted.gains, transmission)
             && (share - 1.0).abs() > UNEVEN
         {

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use rig_shared::effects::{Channel, Kind, Parameter, SHAPES, Scale};
+use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
 use super::columns::Candidate;
 use super::fit::{Evidence, Fit};
 use super::lead::slack;
 use super::rows::Column;
-use super::search::Search;
+use super::search::{Search, is_gear};
 use super::simplex::Simplex;
 use super::transmission::ABREAST;
 
@@ -88,7 +88,7 @@ impl Profile {
     }
 
     fn least_gain(&self) -> f64 {
-        if self.candidate.kind.about().channel == Channel::Transmission {
+        if is_gear(self.candidate.kind) {
             LEAST_GAIN_OF_GEARS
         } else {
             LEAST_GAIN
@@ -124,7 +124,7 @@ fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
 
 /// Grid of shapes of an effect.
 pub(super) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
-    if kind.about().channel == Channel::Transmission {
+    if is_gear(kind) {
         return starts(kind);
     }
     let shapes = kind.about().shapes;
@@ -242,7 +242,7 @@ impl Search<'_> {
         let kind = self.library[c].kind;
         let points = grid(kind);
         let mut best: Option<Best> = None;
-        let gear = kind.about().channel == Channel::Transmission;
+        let gear = is_gear(kind);
         let mut followed: Vec<Best> = Vec::new();
         if let Some(shapes) = start {
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);

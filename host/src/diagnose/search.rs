@@ -349,9 +349,10 @@ fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
         |p: &Profile| -> f64 { p.evidence.block_errors.iter().map(|e| e[0] - e[1]).sum() };
     let own = squares(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
-        let shadow = match other.candidate.kind.about().channel {
-            Channel::Transmission => SHADOW_OF_A_GEAR,
-            _ => SHADOW,
+        let shadow = if is_gear(other.candidate.kind) {
+            SHADOW_OF_A_GEAR
+        } else {
+            SHADOW
         };
         k != i
             && other.candidate.joint == chosen[i].candidate.joint
@@ -380,7 +381,7 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
 }
 
 /// Whether it acts between motor and link.
-fn is_gear(kind: Kind) -> bool {
+pub(super) fn is_gear(kind: Kind) -> bool {
     kind.about().channel == Channel::Transmission
 }
 
