@@ -61,6 +61,7 @@ fn six_joints() -> Robot {
         gravity: [0.0, 0.0, -9.81],
         joints: joints.collect(),
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     }
 }

@@ -129,7 +129,7 @@ pub(crate) struct Args {
     /// Which equations are fitted
     #[arg(long, value_enum, default_value = "differential")]
     model: Model,
-    /// How they are fitted [default: weighted; for several joints whose description states all inertial values, ridge]
+    /// How they are fitted [default: weighted; for several joints consistent]
     #[arg(long, value_enum)]
     estimator: Option<Fit>,
     /// Compare estimators on stretches of time left out of the fit, and say which to trust
@@ -139,7 +139,7 @@ pub(crate) struct Args {
     #[arg(long)]
     weight: Vec<f64>,
     /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for ridge and consistent
-    /// [default: ridge: what makes the data most likely; consistent: 1]
+    /// [default: ridge: what makes the data most likely; consistent: 2]
     #[arg(long)]
     prior_uncertainty: Option<f64>,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
@@ -266,8 +266,8 @@ fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), 
                 .columns
                 .iter()
                 .position(|column| *column == j * COLUMNS + place);
-            row.and_then(|row| found.base_parameters.get(row))
-                .is_some_and(|parameter| parameter.interval[1] < 0.0)
+            row.and_then(|row| found.details.free.get(row))
+                .is_some_and(|[_, _, high]| *high < 0.0)
         };
         if below_zero(column::VISCOUS) && below_zero(column::COULOMB) {
             return Err(CommandError::Implausible(format!(
@@ -307,6 +307,24 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
             joint.name,
             joint.train_residual_rms,
             100.0 * joint.train_relative_error,
+        ));
+    }
+    if result.estimator != Estimator::Consistent
+        && let Some(set) = &result.standard_parameters
+    {
+        let percent = |errors: &[f64]| {
+            let list: Vec<String> = errors.iter().map(|e| format!("{:.1}", 100.0 * e)).collect();
+            list.join(", ")
+        };
+        let held = set
+            .holdout_relative_error
+            .as_ref()
+            .map_or(String::new(), |errors| {
+                format!(", on the hold-out {} %", percent(errors))
+            });
+        ui.say(&format!(
+            "identified.toml and identified.urdf hold the nearest set that bodies can have (--estimator consistent fits it): it leaves {} % of the torque{held}.",
+            percent(&set.train_relative_error)
         ));
     }
     for missing in &result.not_excited {

@@ -1,20 +1,24 @@
 //! What an identification adds to the description beyond values of its parameters.
 
+use nalgebra::DMatrix;
 use rig_shared::effects::Kind;
 use rig_shared::transmission::DriveKind;
 
+use super::IdentifyError;
+use super::consistent::consistent;
 use super::evidence::Belief;
 use super::factor::TriangularFactor;
 use super::position::{PositionTorque, effect};
 use super::prior::Prior;
-use super::problem::Problem;
+use super::problem::{Problem, singular};
 use super::terms::{Evidence, PERIODS, Term};
 use super::tilt::{Axes, BaseTilt};
-use super::{Estimator, IdentifyError};
 use crate::robot::{JointKind, Robot};
 
 /// Gain in the logarithm of the evidence from which on a term is taken: 2·ln B = 10, "very strong" (Kass & Raftery 1995).
 const VERY_STRONG: f64 = 5.0;
+/// A term that moves by less than this share of its standard deviation stays where it is.
+const SETTLED: f64 = 0.25;
 /// Candidates of the description's relative uncertainty in the search.
 const STEPS: usize = 9;
 
@@ -30,6 +34,28 @@ pub(super) struct Beyond {
 impl Beyond {
     pub(super) fn is_empty(&self) -> bool {
         self.torques.is_empty() && self.tilt.is_none()
+    }
+
+    /// As terms with their gains in evidence, and their values in the same order.
+    fn terms(&self, robot: &Robot) -> (Vec<(Term, f64)>, Vec<f64>) {
+        let mut values = Vec::new();
+        let mut terms = Vec::new();
+        for torque in &self.torques {
+            let Some(joint) = robot.joints.iter().position(|j| j.name == torque.joint) else {
+                continue;
+            };
+            let term = Term::Position {
+                joint,
+                periods: torque.periods,
+            };
+            terms.push((term, torque.log_evidence));
+            values.extend(&torque.values);
+        }
+        if let Some(tilt) = &self.tilt {
+            terms.push((Term::Tilt, tilt.log_evidence));
+            values.extend(tilt.angles);
+        }
+        (terms, values)
     }
 
     /// Sentences.
@@ -94,10 +120,10 @@ pub(super) fn beyond(
     prior: &Prior,
 ) -> Result<Beyond, IdentifyError> {
     // Blocks that stand in for links say nothing of inertia.
-    if Estimator::for_robot(problem.robot) != Estimator::Ridge {
+    if !prior.stated {
         return Ok(Beyond::default());
     }
-    let data = Evidence::collect(problem, factors, prior)?;
+    let data = Evidence::collect(problem, factors, prior, problem.robot.gravity)?;
     let all: Vec<(Term, Vec<f64>)> = candidates(problem)
         .into_iter()
         .filter_map(|term| Some((term, data.sizes(term)?)))
@@ -114,7 +140,7 @@ pub(super) fn beyond(
         for (term, sizes) in all.iter().filter(|(term, _)| !taken.contains(term)) {
             let tried = belief.with(sizes);
             let seen = data.joined(&[taken.as_slice(), &[*term]].concat());
-            let found = tried.posterior(&seen, &tried.widened(&likely.deviation))?;
+            let found = tried.judged(&seen, &tried.widened(&likely.deviation))?;
             let pulls = !term.is_spring() || found.standard[tried.centre.len() - 1] > 0.0;
             if pulls && best.as_ref().is_none_or(|b| found.evidence > b.0) {
                 best = Some((found.evidence, *term, tried));
@@ -135,6 +161,22 @@ pub(super) fn beyond(
         return Ok(Beyond::default());
     }
     let found = belief.posterior(&data.joined(&taken), &likely.deviation)?;
+    let values = &found.standard.as_slice()[standard..];
+    let p = problem.base.len();
+    let covariance = found.base().view_range(p.., p..).into_owned();
+    let list: Vec<(Term, f64)> = taken.into_iter().zip(gains).collect();
+    with_values(problem, &list, values, &covariance, problem.robot.gravity)
+}
+
+/// Terms, each with its gain in evidence, as what a description states; `values` and their covariance stand in the terms'
+/// order, gravity as the description had it.
+fn with_values(
+    problem: &Problem,
+    terms: &[(Term, f64)],
+    values: &[f64],
+    covariance: &DMatrix<f64>,
+    gravity: [f64; 3],
+) -> Result<Beyond, IdentifyError> {
     let zeros = vec![0.0; problem.robot.joints.len()];
     let mut zero = zeros.clone();
     let failed =
@@ -146,22 +188,24 @@ pub(super) fn beyond(
     drives
         .motor_velocity(&zeros, &ones, &mut ratios)
         .map_err(failed)?;
-    let mut at = standard;
+    let mut at = 0;
     let mut result = Beyond::default();
-    for (term, log_evidence) in taken.into_iter().zip(gains) {
+    for &(term, log_evidence) in terms {
         let own = at..at + term.columns().len();
         at = own.end;
-        let values: Vec<f64> = own.clone().map(|c| found.standard[c]).collect();
-        let std: Vec<f64> = own.map(|c| found.variance[c].sqrt()).collect();
-        let (joint, periods) = match (term, Axes::of(problem.robot.gravity)) {
+        let (joint, periods) = match (term, Axes::of(gravity)) {
             (Term::Position { joint, periods }, _) => (joint, periods),
             (Term::Tilt, Some(axes)) => {
-                let [angles, std] = [values, std].map(|v| [v[0], v[1]]);
-                result.tilt = Some(BaseTilt::of(&axes, angles, std, log_evidence));
+                let angles = [values[own.start], values[own.start + 1]];
+                let spread = covariance
+                    .fixed_view::<2, 2>(own.start, own.start)
+                    .into_owned();
+                result.tilt = Some(BaseTilt::of(&axes, angles, &spread, log_evidence));
                 continue;
             }
             (Term::Tilt, None) => continue,
         };
+        let values = values[own.clone()].to_vec();
         // A later term may have left a spring nothing.
         if periods.is_none() && values[0] <= 0.0 {
             continue;
@@ -170,11 +214,77 @@ pub(super) fn beyond(
         result.torques.push(PositionTorque {
             joint: problem.robot.joints[joint].name.clone(),
             periods,
-            std,
+            std: own.map(|c| covariance[(c, c)].max(0.0).sqrt()).collect(),
             log_evidence,
             effect: effect(problem.robot, joint, periods, &values, motor),
             values,
         });
     }
     Ok(result)
+}
+
+/// Terms and parameters fitted together.
+pub(super) struct Together {
+    /// The terms that were known: their values moved, or as they were where that is within their own uncertainty, with its
+    /// standard deviations.
+    pub terms: Beyond,
+    /// Whether none moved by more than [`SETTLED`].
+    pub settled: bool,
+    /// What the terms' uncertainty adds to the covariance of all base columns.
+    pub beside: DMatrix<f64>,
+}
+
+/// Fits `known`, whose torques were taken off the rows, together with all parameters. The base parameters of a robot that
+/// is not level are others than those of a level one, and what a tilt acts on is known better once it has been allowed for:
+/// hence the second look. `described` is gravity as the description states it.
+pub(super) fn together(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+    prior: &Prior,
+    known: &Beyond,
+    described: [f64; 3],
+) -> Result<Together, IdentifyError> {
+    let data = Evidence::collect(problem, factors, prior, described)?;
+    let (terms, before) = known.terms(problem.robot);
+    let list: Vec<Term> = terms.iter().map(|(term, _)| *term).collect();
+    let mut sizes = Vec::new();
+    for term in &list {
+        let own = &before[sizes.len()..sizes.len() + term.columns().len()];
+        sizes.extend(
+            data.sizes(*term)
+                .unwrap_or_else(|| own.iter().map(|v| v.abs()).collect()),
+        );
+    }
+    let base = &problem.base.combination;
+    let (p, standard) = base.shape();
+    let more = sizes.len();
+    let mut combination = base.clone().resize(p + more, standard + more, 0.0);
+    combination
+        .view_range_mut(p.., standard..)
+        .fill_with_identity();
+    let prior = prior.with_free(&sizes);
+    let found = consistent(&data.joined(&list).quadratic(&combination), &prior)?;
+    let along = prior.own(&combination) * found.spread;
+    let covariance = &along * along.transpose();
+    let own = covariance.view_range(p.., p..).into_owned();
+    let across = covariance.view_range(..p, p..).into_owned();
+    let Some(inverse) = own.clone().cholesky() else {
+        return Err(singular("of what the description does not state"));
+    };
+    let beside = &across * inverse.solve(&across.transpose());
+    let steps = &found.parameters[standard..];
+    let settled = steps
+        .iter()
+        .enumerate()
+        .all(|(k, step)| step.abs() <= SETTLED * own[(k, k)].sqrt());
+    let after: Vec<f64> = if settled {
+        before
+    } else {
+        before.iter().zip(steps).map(|(v, step)| v + step).collect()
+    };
+    Ok(Together {
+        terms: with_values(problem, &terms, &after, &own, described)?,
+        settled,
+        beside,
+    })
 }

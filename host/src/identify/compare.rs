@@ -104,7 +104,25 @@ pub(super) fn fit(
     }
 }
 
-/// Hold-out data as one factor a joint, torque against motion.
+/// Per joint, RMS of what `full` leaves of the rows behind `factors` over that of the torque: of `whole`, where the rows do
+/// not hold all of it.
+pub(super) fn relative_errors(
+    factors: &[TriangularFactor],
+    full: &[f64],
+    whole: Option<&[f64]>,
+) -> Vec<f64> {
+    let one = |(j, factor): (usize, &TriangularFactor)| {
+        let rows = factor.rows().max(1) as f64;
+        let torque = whole.map_or_else(
+            || (factor.right_side_squares() / rows).sqrt(),
+            |torque| torque[j],
+        );
+        (factor.residual_squares(full) / rows).sqrt() / torque.max(f64::MIN_POSITIVE)
+    };
+    factors.iter().enumerate().map(one).collect()
+}
+
+/// Recordings as one factor a joint, torque against motion; none of none.
 pub(super) fn judge(
     problem: &Problem,
     holdout: &[&dyn Recording],
@@ -200,19 +218,8 @@ pub(super) fn compare(
                             .collect(),
                     ),
                     holdout_relative_error: held.as_ref().map(|factors| {
-                        factors
-                            .iter()
-                            .enumerate()
-                            .map(|(j, f)| {
-                                let rows = f.rows().max(1) as f64;
-                                let left = (f.residual_squares(&fitted.full.whole) / rows).sqrt();
-                                let all = measured.map_or_else(
-                                    || (f.right_side_squares() / rows).sqrt(),
-                                    |[_, holdout]| holdout[j],
-                                );
-                                left / all.max(f64::MIN_POSITIVE)
-                            })
-                            .collect()
+                        let whole = measured.map(|[_, holdout]| holdout.as_slice());
+                        relative_errors(factors, &fitted.full.whole, whole)
                     }),
                     distance_to_consistent: far,
                     physically_consistent: far
@@ -244,7 +251,15 @@ pub(super) fn compare(
         .as_ref()
         .and_then(|iv| endogeneity(&weighted, iv, names));
     let weak = instrumental.as_ref().is_some_and(|iv| iv.doubtful);
-    let (recommended, recommendation) = recommend(&rows, endogeneity.as_ref(), weak);
+    let (recommended, mut recommendation) = recommend(&rows, endogeneity.as_ref(), weak);
+    let written = problem.options.estimator;
+    if recommended != written {
+        recommendation += &format!(
+            " The values given and written are those of {}; --estimator {} gives its own.",
+            written.name(),
+            recommended.name()
+        );
+    }
     Ok(Comparison {
         folds: parts.count,
         estimators: rows,

@@ -46,6 +46,9 @@ pub(super) struct Consistent {
     pub parameters: Vec<f64>,
     /// ‖R·K·π − z‖².
     pub squares: f64,
+    /// W with W·Wᵀ the inverse of the Hessian at the minimum over the prior's values, pulls and data: their covariance as far
+    /// as the pulls are a prior (Laplace's approximation).
+    pub spread: DMatrix<f64>,
     /// Newton steps.
     pub steps: usize,
 }
@@ -151,7 +154,9 @@ fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64
 }
 
 /// Cholesky factor after scaling the diagonal to one, and the scales.
-fn scaled_cholesky(mut h: DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
+pub(super) fn scaled_cholesky(
+    mut h: DMatrix<f64>,
+) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
     let m = h.nrows();
     let scale = DVector::from_fn(m, |k, _| 1.0 / h[(k, k)].sqrt());
     for c in 0..m {
@@ -232,8 +237,14 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         let nothing = decrement * strength <= NOTHING_TO_GAIN * (1.0 + before.abs());
         if decrement <= SETTLED[usize::from(last)] || nothing || !moved {
             if last {
+                // L·Lᵀ = S·H·S: H⁻¹ = S·L⁻ᵀ·L⁻¹·S.
+                let mut whiten = DMatrix::from_diagonal(&scale);
+                if !cholesky.l_dirty().solve_lower_triangular_mut(&mut whiten) {
+                    return Err(not_settled());
+                }
                 return Ok(Consistent {
                     squares: space.misfit(&c).norm_squared(),
+                    spread: &space.lift * whiten.transpose(),
                     parameters: prior.standard(&pi),
                     steps: steps + 1,
                 });

@@ -7,7 +7,7 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 use super::Identification;
 use super::beyond::with_beyond;
 use super::prior::described;
-use crate::robot::{JointKind, Robot};
+use crate::robot::{IdentifiedBand, JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
 ///
@@ -18,11 +18,13 @@ use crate::robot::{JointKind, Robot};
 /// had to be said.
 pub fn identified_robot(robot: &Robot, identification: &Identification) -> (Robot, Vec<String>) {
     let details = &identification.details;
-    let robot = &with_beyond(
+    let mut robot = with_beyond(
         robot,
         &identification.position_torques,
         identification.base_tilt.as_ref(),
     );
+    robot.identified = Some(IdentifiedBand::of(&details.treatment));
+    let robot = &robot;
     if let Some(set) = &identification.standard_parameters {
         let mut pi = described(robot, details.combination.ncols());
         for (entry, value) in pi.iter_mut().zip(set.values()) {

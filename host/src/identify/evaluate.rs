@@ -85,13 +85,15 @@ pub(super) fn covariance(
 
 /// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
 /// can be compared. `by_position` is the torque (of a joint at a position) that was taken off
-/// before the fit without being stated: measured and predicted torque are shown with it.
+/// before the fit without being stated: measured and predicted torque are shown with it. Where effects were taken off
+/// the recordings, `measured` are these as they were: errors are relative to the whole torque.
 pub(crate) fn torque_residuals(
     recordings: &[&dyn Recording],
     surveys: &[Survey],
     plan: &Plan,
     full: &[f64],
     by_position: &dyn Fn(usize, f64) -> f64,
+    measured: Option<&[&dyn Recording]>,
 ) -> Result<Vec<ResidualReport>, IdentifyError> {
     let total: u64 = surveys
         .iter()
@@ -151,5 +153,33 @@ pub(crate) fn torque_residuals(
             Ok(())
         })?;
     }
-    Ok(streams.into_iter().map(ResidualStream::report).collect())
+    let mut reports: Vec<ResidualReport> =
+        streams.into_iter().map(ResidualStream::report).collect();
+    if let Some(measured) = measured {
+        for (report, rms) in reports.iter_mut().zip(torque_rms(measured, plan)?) {
+            report.torque_rms = rms;
+            report.relative_error = report.rms / rms.max(f64::MIN_POSITIVE);
+        }
+    }
+    Ok(reports)
+}
+
+/// Per joint, RMS of the torque over the rows that count.
+fn torque_rms(recordings: &[&dyn Recording], plan: &Plan) -> Result<Vec<f64>, IdentifyError> {
+    let mut sums = vec![(0u64, 0.0); plan.chain.joint_count()];
+    for recording in recordings {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for ((count, squares), equation) in sums.iter_mut().zip(&rows.equations) {
+                for (y, _) in equation.y.iter().zip(&equation.keep).filter(|(_, k)| **k) {
+                    *count += 1;
+                    *squares += y * y;
+                }
+            }
+            Ok(())
+        })?;
+    }
+    Ok(sums
+        .into_iter()
+        .map(|(count, squares)| (squares / count.max(1) as f64).sqrt())
+        .collect())
 }

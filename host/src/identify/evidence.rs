@@ -11,6 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::IdentifyError;
+use super::consistent::{Quadratic, scaled_cholesky};
 use super::factor::TriangularFactor;
 use super::prior::{Prior, Rule};
 use super::problem::singular;
@@ -38,6 +39,14 @@ impl Seen {
         let (r, z) = factor.system();
         let left = (factor.right_side_squares() - z.norm_squared()).max(0.0);
         Self { r, z, left }
+    }
+
+    /// Over what `combination` combines.
+    pub(super) fn quadratic(&self, combination: &DMatrix<f64>) -> Quadratic {
+        Quadratic {
+            matrix: &self.r * combination,
+            right: self.z.clone(),
+        }
     }
 }
 
@@ -122,14 +131,14 @@ impl Belief {
     fn tailed(&self, data: &Seen, s: f64) -> Result<Likely, IdentifyError> {
         let mut deviation = self.even(s);
         for _ in 0..ROUNDS {
-            let found = self.posterior(data, &deviation)?;
+            let found = self.judged(data, &deviation)?;
             for c in (0..deviation.len()).filter(|&c| self.stated[c]) {
                 let even = (s * self.scale[c]).powi(2);
                 let square = (found.standard[c] - self.centre[c]).powi(2) + found.variance[c];
                 deviation[c] = ((TAIL * even + square) / (TAIL + 1.0)).sqrt();
             }
         }
-        let found = self.posterior(data, &deviation)?;
+        let found = self.judged(data, &deviation)?;
         let tail: f64 = (0..deviation.len())
             .filter(|&c| self.stated[c])
             .map(|c| {
@@ -144,13 +153,55 @@ impl Belief {
         })
     }
 
-    /// Logarithm of the evidence but for a constant, and the posterior.
+    /// Logarithm of the evidence but for a constant, mean and variances. A·Aᵀ + 1 is formed: with its diagonal scaled to
+    /// one that costs the square of what base parameters are told apart by, not of their sizes.
+    pub(super) fn judged(
+        &self,
+        data: &Seen,
+        deviation: &DVector<f64>,
+    ) -> Result<Judged, IdentifyError> {
+        let Seen { r, z, left } = data;
+        let mut spread = self.combination.clone();
+        for (c, mut column) in spread.column_iter_mut().enumerate() {
+            column *= deviation[c];
+        }
+        let mut seen = r * spread;
+        let mut sum = &seen * seen.transpose();
+        for k in 0..sum.nrows() {
+            sum[(k, k)] += 1.0;
+        }
+        let failed = || singular("of the description's evidence");
+        let (cholesky, scale) = scaled_cholesky(sum).ok_or_else(failed)?;
+        let lower = cholesky.l_dirty();
+        let logarithm: f64 = (0..scale.len())
+            .map(|k| 2.0 * (lower[(k, k)] / scale[k]).ln())
+            .sum();
+        let surprise = z - r * (&self.combination * &self.centre);
+        let pulls = cholesky.solve(&surprise.component_mul(&scale));
+        let along = pulls.dot(&surprise.component_mul(&scale));
+        let step = seen.tr_mul(&pulls.component_mul(&scale));
+        for mut column in seen.column_iter_mut() {
+            column.component_mul_assign(&scale);
+        }
+        if !lower.solve_lower_triangular_mut(&mut seen) {
+            return Err(failed());
+        }
+        Ok(Judged {
+            evidence: -0.5 * (left + logarithm + along),
+            standard: &self.centre + step.component_mul(deviation),
+            variance: DVector::from_fn(deviation.len(), |c, _| {
+                deviation[c].powi(2) * (1.0 - seen.column(c).norm_squared()).max(0.0)
+            }),
+        })
+    }
+
+    /// What is believed after the data, its covariance too.
     pub(super) fn posterior(
         &self,
         data: &Seen,
         deviation: &DVector<f64>,
     ) -> Result<Posterior, IdentifyError> {
-        let Seen { r, z, left } = data;
+        let Seen { r, z, .. } = data;
         let mut spread = self.combination.clone();
         for (c, mut column) in spread.column_iter_mut().enumerate() {
             column *= deviation[c];
@@ -163,26 +214,12 @@ impl Belief {
         };
         let surprise = u.transpose() * (z - r * (&self.combination * &self.centre));
         let gains = &svd.singular_values;
-        let along: f64 = gains
-            .iter()
-            .zip(surprise.iter())
-            .map(|(d, e)| (1.0 + d * d).ln() + e * e / (1.0 + d * d))
-            .sum();
-        let evidence = -0.5 * (left + along);
         let step = DVector::from_fn(gains.len(), |k, _| {
             gains[k] / (1.0 + gains[k] * gains[k]) * surprise[k]
         });
         let standard = &self.centre + (v_t.transpose() * step).component_mul(deviation);
-        let variance = DVector::from_fn(deviation.len(), |c, _| {
-            let known: f64 = (0..gains.len())
-                .map(|k| v_t[(k, c)].powi(2) * gains[k].powi(2) / (1.0 + gains[k].powi(2)))
-                .sum();
-            deviation[c].powi(2) * (1.0 - known).max(0.0)
-        });
         Ok(Posterior {
-            evidence,
             standard,
-            variance,
             spread,
             gains: gains.clone(),
             v_t,
@@ -197,20 +234,26 @@ pub(super) struct Likely {
     pub deviation: DVector<f64>,
 }
 
-/// What is believed after the data.
-pub(super) struct Posterior {
+/// How likely deviations make the data, and what is believed then.
+pub(super) struct Judged {
     pub evidence: f64,
     /// Mean.
     pub standard: DVector<f64>,
     /// Variance of each value.
-    pub variance: DVector<f64>,
+    variance: DVector<f64>,
+}
+
+/// What is believed after the data.
+pub(super) struct Posterior {
+    /// Mean.
+    pub standard: DVector<f64>,
     spread: DMatrix<f64>,
     gains: DVector<f64>,
     v_t: DMatrix<f64>,
 }
 
 impl Posterior {
-    /// Covariance of the base columns' values.
+    /// Covariance of the base columns' values, those of terms behind them.
     pub(super) fn base(&self) -> DMatrix<f64> {
         // What the data see of K·P·Kᵀ shrinks by 1/(1 + d²), the rest stays; no difference of large numbers is taken.
         let along = &self.spread * self.v_t.transpose();

@@ -1,20 +1,25 @@
 //! What an identification holds beyond least squares: the other estimators, the essential and the physically
 //! consistent parameters, the comparison.
 
-use super::beyond::{Beyond, beyond};
-use super::compare::{Comparison, compare, fit};
+use nalgebra::DMatrix;
+
+use super::beyond::{Beyond, Together, beyond, together};
+use super::compare::{Comparison, compare, fit, judge};
 use super::consistent::consistent;
 use super::covariance::Estimate;
 use super::essential::{EssentialSet, essential};
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
+use super::linear::classical;
 use super::parts::Parts;
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
-use super::standard::{StandardSet, prior_of, quadratic, quadratic_about, standard_set};
-use super::{BaseParameter, Estimator, IdentifyError, NotExcited, Options};
+use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
+use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
 use crate::prepare::Recording;
 
+/// Standard deviations to either side that hold 95 % of a normal distribution.
+const NORMAL_95: f64 = 1.96;
 /// A residual that is so many times that of the weighted fit calls for a warning.
 const MUCH_MORE: f64 = 1.2;
 
@@ -43,7 +48,11 @@ pub(super) struct Own {
 }
 
 /// Fits with the estimator asked for; `None` where that is one of the three least squares.
-pub(super) fn own(problem: &Problem) -> Result<Option<Own>, IdentifyError> {
+/// `beside` is the covariance that terms beyond the description add.
+pub(super) fn own(
+    problem: &Problem,
+    beside: Option<&DMatrix<f64>>,
+) -> Result<Option<Own>, IdentifyError> {
     let estimator = problem.options.estimator;
     if matches!(
         estimator,
@@ -54,7 +63,7 @@ pub(super) fn own(problem: &Problem) -> Result<Option<Own>, IdentifyError> {
     let parts = Parts::collect(problem)?;
     let fitted = fit(estimator, problem, &parts, &prior(problem))?;
     Ok(Some(Own {
-        estimate: fitted.estimate(&parts),
+        estimate: fitted.estimate(&parts, problem, beside),
         fitted,
         parts,
     }))
@@ -74,6 +83,16 @@ pub(super) fn beyond_description(
     }
 }
 
+/// The terms that were found with all parameters at once; `described` is gravity as the description states it.
+pub(super) fn together_with(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+    known: &Beyond,
+    described: [f64; 3],
+) -> Result<Together, IdentifyError> {
+    together(problem, factors, &prior(problem), known, described)
+}
+
 fn prior(problem: &Problem) -> Prior {
     prior_of(
         problem.robot,
@@ -91,6 +110,8 @@ pub(super) struct Further {
     pub standard: Option<StandardSet>,
     pub comparison: Option<Comparison>,
     pub hardly_excited: Vec<NotExcited>,
+    /// [`super::Details::free`].
+    pub free: Vec<[f64; 3]>,
     pub procedure: Vec<String>,
     pub warnings: Vec<String>,
 }
@@ -104,7 +125,7 @@ pub(super) struct Outcome<'a> {
     /// By equation, rows that the residual remembers.
     pub memory: Vec<f64>,
     pub parameters: &'a [BaseParameter],
-    /// RMS torques of training data and hold-out by joint, where torques with position were taken off the rows.
+    /// RMS torques of training data and hold-out by joint, where effects were taken off the rows.
     pub measured: Option<[Vec<f64>; 2]>,
 }
 
@@ -136,6 +157,10 @@ pub(super) fn further(
     let wanted = problem.robot.joints.len() > 1
         || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
     let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
+    let (std, _) = classical(&tempered, data, problem.start)?;
+    further.free = (problem.start.iter().zip(&std))
+        .map(|(value, std)| [*value, value - NORMAL_95 * std, value + NORMAL_95 * std])
+        .collect();
     if problem.robot.joints.len() > 1 {
         further.hardly_excited = hardly_excited(base, data, &prior, &tempered, &names);
     }
@@ -153,14 +178,21 @@ pub(super) fn further(
         };
         match found {
             Ok(found) => {
+                let of_momentum = match problem.options.model {
+                    ModelKind::Differential => None,
+                    ModelKind::Integral => judge(problem, problem.training)?,
+                };
+                let held = judge(problem, holdout)?;
                 further.standard = Some(standard_set(
-                    problem.robot,
-                    base,
-                    data,
+                    problem,
                     &prior,
                     &found,
-                    result.factors,
-                    &problem.start_full(),
+                    &Judges {
+                        fitted: result.factors,
+                        training: of_momentum.as_deref().unwrap_or(result.factors),
+                        holdout: held.as_deref(),
+                        measured: result.measured.as_ref(),
+                    },
                 ));
             }
             Err(e) => further.warnings.push(format!(

@@ -34,6 +34,7 @@ fn robot(gravity: [f64; 3], joints: Vec<Joint>) -> Robot {
         gravity,
         joints,
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     }
 }

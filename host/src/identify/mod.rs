@@ -141,18 +141,13 @@ impl Estimator {
         Self::Consistent,
     ];
 
-    /// The estimator that is used for `robot` where none is asked for: weighted least squares, which needs no prior. Several
-    /// joints are seldom all excited; where the description states the inertial values of every link, `ridge` takes from
-    /// it what the data do not say, as far as the data themselves speak for the description.
+    /// The estimator that is used for `robot` where none is asked for. One joint: weighted least squares, which need no
+    /// prior. Several joints are seldom all excited, and what is fitted to one motion must hold for the next: `consistent`
+    /// takes from the description what the data do not say and gives links that can exist, so that the values reported
+    /// are those of the files that are written.
     pub fn for_robot(robot: &Robot) -> Self {
-        let stated = robot.joints.iter().all(|joint| {
-            joint
-                .inertial
-                .as_ref()
-                .is_some_and(|inertial| inertial.mass > 0.0)
-        });
-        if robot.joints.len() > 1 && stated {
-            Self::Ridge
+        if robot.joints.len() > 1 {
+            Self::Consistent
         } else {
             Self::Weighted
         }
@@ -231,7 +226,7 @@ pub struct Options {
     /// How many times each training recording counts; those beyond the list count once.
     pub recording_weights: Vec<f64>,
     /// Relative uncertainty of the description's inertial values, for `ridge` and `consistent`; where absent, `ridge`
-    /// takes what makes the data most likely and `consistent` takes 1.
+    /// takes what makes the data most likely and `consistent` takes 2.
     pub prior_uncertainty: Option<f64>,
     /// Which estimators are compared besides; none for no comparison.
     pub compare: Vec<Estimator>,
@@ -467,6 +462,9 @@ pub struct Details {
     pub holdout: Vec<Survey>,
     /// Values, covariance, condition numbers.
     pub estimate: Estimate,
+    /// What weighted least squares give for each base parameter, free of any prior, with its 95 % interval: what the data say
+    /// where the estimator bends it.
+    pub free: Vec<[f64; 3]>,
     /// K with identified values = K·π, π the 14 standard parameters of each joint; rows as `base_parameters`.
     pub combination: nalgebra::DMatrix<f64>,
     /// Standard column that stands for each base parameter.

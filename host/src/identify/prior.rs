@@ -67,7 +67,7 @@ pub(super) struct Hints {
 }
 
 impl Prior {
-    /// From the description; `given` is the relative uncertainty stated for its values (1 where none is).
+    /// From the description; `given` is the relative uncertainty of its values.
     pub(super) fn of(robot: &Robot, columns: usize, hints: &Hints, given: f64) -> Self {
         let n = robot.joints.len();
         let shares = shares(robot, columns);
@@ -144,6 +144,24 @@ impl Prior {
         prior.size = (prior.scale.iter().zip(&sizes))
             .map(|(scale, size)| scale.max(*size))
             .collect();
+        prior
+    }
+
+    /// The same with values behind its own of which nothing is known but their size.
+    pub(super) fn with_free(&self, sizes: &[f64]) -> Self {
+        let mut prior = self.clone();
+        let all = prior.centre.len() + sizes.len();
+        prior.centre.resize(all, 0.0);
+        prior.scale.extend(sizes);
+        prior.size.extend(sizes);
+        prior.uncertainty.resize(all, f64::INFINITY);
+        prior.rules.resize(all, Rule::Free);
+        prior.shares = prior.shares.map(|shares| {
+            let own = shares.nrows();
+            let mut shares = shares.resize(all, all, 0.0);
+            shares.view_range_mut(own.., own..).fill_with_identity();
+            shares
+        });
         prior
     }
 

@@ -50,6 +50,12 @@ impl Problem<'_> {
             .collect()
     }
 
+    /// Covariance of the identified combinations, from that of all base columns.
+    pub(super) fn identified_covariance(&self, full: &DMatrix<f64>) -> DMatrix<f64> {
+        let k = &self.data.combination;
+        k * full * k.transpose()
+    }
+
     /// The identified combinations of values of all base columns.
     pub(super) fn identified(&self, full: &[f64]) -> Vec<f64> {
         (&self.data.combination * DVector::from_column_slice(full))
@@ -69,7 +75,7 @@ pub(super) struct Fitted {
     pub standard: Option<Vec<f64>>,
     /// Standard deviations that the estimator's own theory gives for white residuals.
     pub classical_std: Vec<f64>,
-    /// Covariance by the estimator's own theory, where the jackknife does not say what is meant.
+    /// Covariance of all base columns by the estimator's own theory, where the jackknife does not say what is meant.
     pub covariance: Option<DMatrix<f64>>,
     /// Upper triangle of the regressor as fitted, for condition numbers.
     pub regressor: DMatrix<f64>,
@@ -82,17 +88,29 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// The estimate with its covariance.
-    pub(super) fn estimate(&self, parts: &Parts) -> Estimate {
+    /// The estimate with its covariance; `beside` is what the uncertainty of terms beyond the description adds to that of
+    /// all base columns.
+    pub(super) fn estimate(
+        &self,
+        parts: &Parts,
+        problem: &Problem,
+        beside: Option<&DMatrix<f64>>,
+    ) -> Estimate {
         let size = self.kept.whole.len();
         let memory = parts.memory.iter().copied().fold(1.0, f64::max);
-        let (covariance, freedom) = match &self.covariance {
+        let (mut covariance, freedom) = match &self.covariance {
             Some(own) => {
                 let rows = parts.rows as f64 / memory;
-                (own.clone(), (rows as usize).saturating_sub(size).max(1))
+                (
+                    problem.identified_covariance(own),
+                    (rows as usize).saturating_sub(size).max(1),
+                )
             }
             None => (self.kept.covariance(), self.kept.without.len() - 1),
         };
+        if let Some(beside) = beside {
+            covariance += problem.identified_covariance(beside);
+        }
         Estimate::of(
             &self.kept.whole,
             &covariance,

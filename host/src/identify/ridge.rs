@@ -53,15 +53,15 @@ pub(super) fn ridge(
             .to_vec()
     });
     let kept = full.map(&|values| problem.identified(values));
-    let k = &problem.data.combination;
-    let covariance = k * found.base() * k.transpose();
+    let covariance = found.base();
+    let identified = problem.identified_covariance(&covariance);
     let mut warnings = Vec::new();
     if !prior.stated {
         warnings.push("The prior rests on stand-ins for what the description does not state; values that the data do not determine are guesses.".to_owned());
     }
     Ok(Fitted {
         classical_std: (0..kept.whole.len())
-            .map(|c| covariance[(c, c)].max(0.0).sqrt())
+            .map(|c| identified[(c, c)].max(0.0).sqrt())
             .collect(),
         standard: Some(prior.standard(&DVector::from_column_slice(&standard.whole))),
         full,

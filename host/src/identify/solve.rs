@@ -28,6 +28,8 @@ use crate::robot::Robot;
 const ROWS_A_PARAMETER: usize = 10;
 /// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
 const HALF_POWER: f64 = 0.443;
+/// Looks at what the description does not state: one finds it, each further one fits it together with all parameters.
+const MOST_LOOKS: usize = 8;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -44,16 +46,17 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     further::check(options)?;
-    match solve(robot, training, holdout, options, None)? {
-        Solved::Whole(found) => Ok(*found),
-        Solved::Anew(more) => match solve(robot, training, holdout, options, Some(&more))? {
-            Solved::Whole(found) => Ok(*found),
-            Solved::Anew(_) => Err(IdentifyError::Unsettled {
-                what: "The search for what the description does not state",
-                passes: 1,
-            }),
-        },
+    let mut known = None;
+    for _ in 0..=MOST_LOOKS {
+        match solve(robot, training, holdout, options, known.as_ref())? {
+            Solved::Whole(found) => return Ok(*found),
+            Solved::Anew(more) => known = Some(more),
+        }
     }
+    Err(IdentifyError::Unsettled {
+        what: "The search for what the description does not state",
+        passes: MOST_LOOKS,
+    })
 }
 
 /// An identification, or what it has to begin anew with.
@@ -115,6 +118,7 @@ fn solve(
     let [known_training, known_holdout, known_sources] = rid.each_ref().map(|l| plain(l));
     let spooled = [Spooled::all(&known_training), Spooled::all(&known_holdout)];
     let [spooled_training, spooled_holdout] = spooled.each_ref().map(|l| plain(l));
+    let whole = (!effects.is_empty()).then_some([training, holdout]);
     let (training, holdout, sources) = if effects.is_empty() {
         (training, holdout, sources)
     } else {
@@ -293,13 +297,23 @@ fn solve(
         start: &weighted_beta,
         instants,
     };
-    if added.is_none() {
-        let found = further::beyond_description(&problem, &factors)?;
-        if !found.is_empty() {
-            return Ok(Solved::Anew(found));
+    let (known, beside) = match added {
+        None => {
+            let found = further::beyond_description(&problem, &factors)?;
+            if !found.is_empty() {
+                return Ok(Solved::Anew(found));
+            }
+            (found, None)
         }
-    }
-    let own = further::own(&problem)?;
+        Some(known) => {
+            let found = further::together_with(&problem, &factors, known, described.gravity)?;
+            if !found.settled {
+                return Ok(Solved::Anew(found.terms));
+            }
+            (found.terms, Some(found.beside))
+        }
+    };
+    let own = further::own(&problem, beside.as_ref())?;
     let (estimate, full) = match &own {
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
         // Second look: residuals of the fitted equations, for the covariance.
@@ -318,14 +332,15 @@ fn solve(
             .filter(|t| t.joint == robot.joints[j].name);
         own.map(|t| t.torque(q)).sum()
     };
-    let residuals = |recordings: &[&dyn Recording], surveys: &[Survey]| {
-        torque_residuals(recordings, surveys, &plan, &full, &by_position)
+    let residuals = |recordings: &[&dyn Recording], surveys: &[Survey], whole| {
+        torque_residuals(recordings, surveys, &plan, &full, &by_position, whole)
     };
-    let train = residuals(training, &surveys)?;
+    let train = residuals(training, &surveys, whole.map(|[training, _]| training))?;
     let holdout_residuals = if holdout.is_empty() {
         None
     } else {
-        Some(residuals(holdout, &holdout_surveys)?)
+        let whole = whole.map(|[_, holdout]| holdout);
+        Some(residuals(holdout, &holdout_surveys, whole)?)
     };
 
     let combination = &data.combination * &base.combination;
@@ -358,7 +373,7 @@ fn solve(
                 ModelKind::Integral => vec![estimate.memory_rows],
             },
             parameters: &base_parameters,
-            measured: (!known.torques.is_empty()).then(|| {
+            measured: whole.map(|_| {
                 let rms = |of: &[ResidualReport]| of.iter().map(|r| r.torque_rms).collect();
                 [
                     rms(&train),
@@ -460,6 +475,7 @@ fn solve(
             training: surveys.clone(),
             holdout: holdout_surveys,
             estimate,
+            free: beyond.free,
             combination,
             columns,
             train,

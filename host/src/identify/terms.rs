@@ -84,16 +84,18 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// `factors` are those of the fitted equations; they and the prior say what masses a tilt acts on.
+    /// `factors` are those of the fitted equations; they and the prior say what masses a tilt acts on, about axes that are
+    /// level where gravity is `described`.
     pub(super) fn collect(
         problem: &Problem,
         factors: &[TriangularFactor],
         prior: &Prior,
+        described: [f64; 3],
     ) -> Result<Self, IdentifyError> {
         let joints = problem.robot.joints.len();
         let p = problem.base.len();
         let weights = weights(problem)?;
-        let mut tilt = match Axes::of(problem.robot.gravity) {
+        let mut tilt = match Axes::of(described) {
             Some(axes) => {
                 let mut all = TriangularFactor::new(p);
                 for (factor, weight) in factors.iter().zip(&weights) {

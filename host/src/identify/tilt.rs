@@ -8,7 +8,7 @@
 //! Leaves out: angles so large that their cosine differs from one; where the first joint's axis is level, an error of
 //! its zero, which does the same as a turn of gravity about it.
 
-use nalgebra::{Unit, Vector3};
+use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};
 use serde::Serialize;
 
@@ -25,20 +25,30 @@ pub struct BaseTilt {
     pub std: f64,
     /// Logarithm of how many times more likely the data are with it.
     pub log_evidence: f64,
+    /// About the two level axes, rad.
+    #[serde(skip)]
+    pub(super) angles: [f64; 2],
 }
 
 impl BaseTilt {
-    /// From the two angles and their standard deviations.
-    pub(super) fn of(axes: &Axes, angles: [f64; 2], std: [f64; 2], log_evidence: f64) -> Self {
-        let angle = angles[0].hypot(angles[1]);
+    /// From the two angles and their covariance.
+    pub(super) fn of(
+        axes: &Axes,
+        angles: [f64; 2],
+        covariance: &Matrix2<f64>,
+        log_evidence: f64,
+    ) -> Self {
+        let along = Vector2::from(angles);
+        let angle = along.norm();
         let level = axes.level[0] * angles[0] + axes.level[1] * angles[1];
         let turned = (axes.gravity / axes.size + level).normalize() * axes.size;
-        let along = |k: usize| angles[k] * std[k] / angle.max(f64::MIN_POSITIVE);
+        let unit = along / angle.max(f64::MIN_POSITIVE);
         Self {
             gravity: turned.into(),
             angle,
-            std: along(0).hypot(along(1)),
+            std: (unit.transpose() * covariance * unit)[0].max(0.0).sqrt(),
             log_evidence,
+            angles,
         }
     }
 

@@ -102,6 +102,9 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     }
     check_transmission(robot)?;
     check_workspace(robot)?;
+    if let Some(band) = &robot.identified {
+        band.check(robot.joints.len())?;
+    }
     check_effects(robot)
 }
 

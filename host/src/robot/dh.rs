@@ -160,6 +160,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         gravity: [0.0, 0.0, -GRAVITY],
         joints,
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     };
     Converted { robot, base }

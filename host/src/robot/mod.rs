@@ -6,6 +6,7 @@
 //! eq. 3.6; Khalil & Dombre 2002, sec. 3.2): frame i−1 → i is
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
+mod band;
 mod check;
 mod check_drives;
 mod dh;
@@ -25,6 +26,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+pub use band::IdentifiedBand;
 pub use check::EFFECT_NAMES;
 pub use drives::Screw;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
@@ -70,6 +72,9 @@ pub struct Robot {
     /// Effects beyond the standard model, as `diagnose` adds them.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<RobotEffect>,
+    /// Where the values come from an identification: the band that they were found in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<IdentifiedBand>,
 }
 
 /// Revolute or prismatic.

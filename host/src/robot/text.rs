@@ -179,6 +179,9 @@ pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
     for effect in &robot.effects {
         write_effect(&mut out, robot, effect);
     }
+    if let Some(band) = &robot.identified {
+        band.write(&mut out);
+    }
     Ok(out)
 }
 

@@ -87,6 +87,7 @@ fn random(rng: &mut Pcg64) -> Robot {
         gravity: direction.map(|v| v / size * 9.81),
         joints,
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     }
 }

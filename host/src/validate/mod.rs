@@ -28,7 +28,7 @@ use serde::Serialize;
 
 use crate::effects::Compensated;
 use crate::identify::{IdentifyError, Plan, ResidualReport, chain_of, torque_residuals};
-use crate::prepare::{PrepareError, PrepareOptions, Recording, Survey, Treatment};
+use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
 
@@ -254,7 +254,7 @@ pub fn validate(
         .iter()
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
-    let treatment = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let treatment = treatment(robot, &surveys, options, &limits)?;
     let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
@@ -284,6 +284,7 @@ pub fn validate(
             &plan,
             &values,
             &|_, _| 0.0,
+            (!model.effects.is_empty()).then_some(&[*recording]),
         )?
         .into_iter()
         .zip(&robot.joints)
@@ -335,6 +336,49 @@ pub fn validate(
         taken_off: taken,
         treatment,
     })
+}
+
+/// What is not given is as it was when the description was identified, where it says so: a model is judged in the band that
+/// it was fitted in, and its error is that of `identify` on the same recording. Else it is chosen from the recordings.
+fn treatment(
+    robot: &Robot,
+    surveys: &[Survey],
+    options: &Options,
+    limits: &[Option<f64>],
+) -> Result<Treatment, PrepareError> {
+    let (Some(band), Some(first)) = (&robot.identified, surveys.first()) else {
+        return Treatment::decide(surveys, &options.prepare, limits);
+    };
+    let mut prepare = options.prepare.clone();
+    let stated = "as the description was identified.";
+    let [mut own_cutoff, mut own_decimation] = [false; 2];
+    if prepare.cutoff == Choice::Auto && band.cutoff < 0.5 * first.sample_rate {
+        prepare.cutoff = Choice::Fixed(band.cutoff);
+        own_cutoff = true;
+    }
+    if prepare.decimation == Choice::Auto {
+        let rows = (first.sample_rate / band.rate).round().max(1.0);
+        prepare.decimation = Choice::Fixed(rows as usize);
+        own_decimation = true;
+    }
+    if prepare.torque_lead == 0.0 {
+        prepare.torque_lead = band.torque_lead;
+    }
+    let Ok(mut treatment) = Treatment::decide(surveys, &prepare, limits) else {
+        // Too short for that band.
+        return Treatment::decide(surveys, &options.prepare, limits);
+    };
+    if own_cutoff {
+        treatment.cutoff_reason = format!("{} Hz, {stated}", band.cutoff);
+    }
+    if own_decimation {
+        treatment.decimation_reason = format!("One row in {}, {stated}", treatment.decimation);
+    }
+    if prepare.speed_threshold == Choice::Auto {
+        treatment.speed_threshold.clone_from(&band.min_speed);
+        treatment.speed_reason = format!("By joint, {stated}");
+    }
+    Ok(treatment)
 }
 
 /// What the description itself gives reason to say.

@@ -90,6 +90,7 @@ fn arm() -> Robot {
         gravity: [0.0, 0.0, -9.81],
         joints,
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     }
 }

@@ -36,6 +36,7 @@ fn robot(name: &str, joints: Vec<Joint>) -> Robot {
         gravity: [0.0, 0.0, -9.81],
         joints,
         workspace: Vec::new(),
+        identified: None,
         effects: Vec::new(),
     }
 }
