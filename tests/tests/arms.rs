@@ -140,7 +140,6 @@ fn lwr_repeats_its_motion() {
 #[test]
 fn lwr_stood_on_a_base_that_is_not_level() {
     let Some((robot, data)) = lwr() else { return };
-    assert_eq!(Estimator::for_robot(&robot), Estimator::Ridge);
     for run in 1..=3 {
         let training = [data.join(format!("run{run}.csv"))];
         let found = fit(
@@ -148,14 +147,15 @@ fn lwr_stood_on_a_base_that_is_not_level() {
             &training,
             &[],
             ModelKind::Differential,
-            Estimator::Ridge,
+            Estimator::for_robot(&robot),
         );
         let tilt = found.base_tilt.unwrap();
         println!("LWR4+ run {run}: {tilt:?}");
         let [x, y, _] = tilt.gravity;
-        let off = (x - 0.064).hypot(y + 0.245) / 9.81;
+        // Two components, each with such a standard deviation.
+        let off = (x - 0.064).hypot(y + 0.203) / 9.81;
         assert!(
-            off < 3.0 * tilt.std && tilt.std < 0.25 * tilt.angle,
+            off < 3.0 * tilt.std * 2f64.sqrt() && tilt.std < 0.1 * tilt.angle,
             "{off}"
         );
     }
@@ -239,15 +239,12 @@ fn tx40_has_the_published_expressions_and_values() {
     };
     let robot = described("tx40.toml");
     let published = fs::read_to_string(data.join("published_base_parameters.csv")).unwrap();
-    for model in BOTH {
-        let found = fit(
-            &robot,
-            &[data.join("motor_1kHz.csv")],
-            &[],
-            model,
-            // As the published values were found.
-            Estimator::Weighted,
-        );
+    // By default, and as the published values were found.
+    let ways =
+        BOTH.map(|model| [Estimator::for_robot(&robot), Estimator::Weighted].map(|e| (model, e)));
+    for (model, estimator) in ways.into_iter().flatten() {
+        let recording = [data.join("motor_1kHz.csv")];
+        let found = fit(&robot, &recording, &[], model, estimator);
         let (mut same, mut near, mut all) = (0, 0, 0);
         for line in published.lines() {
             let cells: Vec<&str> = line.rsplitn(5, ',').collect();
@@ -275,7 +272,7 @@ fn tx40_has_the_published_expressions_and_values() {
             }
         }
         println!(
-            "TX40, {model:?}: {same} of {all} expressions as published, {near} values within two standard deviations"
+            "TX40, {model:?}, {estimator:?}: {same} of {all} expressions as published, {near} values within two standard deviations"
         );
         assert_eq!(same, all);
         assert_eq!(found.base_parameters.len(), all);
@@ -294,7 +291,7 @@ fn tx40_predicts_the_rest_of_its_motion() {
     // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file: what is left of joint 5 there is no
     // larger than in training, only its torque is (docs/arms.md).
     let moving: &[(usize, f64)] = &[];
-    for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 48.1)])] {
+    for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 49.3)])] {
         let train = tx40_part(&data, place.path(), &format!("train{until}.csv"), 0..until);
         let rest = tx40_part(&data, place.path(), &format!("rest{until}.csv"), until..end);
         for model in BOTH {
