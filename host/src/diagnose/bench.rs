@@ -119,7 +119,8 @@ impl<'a> Bench<'a> {
         chosen: &[Profile],
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let (nominal, gains) = coefficients.split_at(self.anchor.free.len());
-        let source = self.source(loaded, &self.anchor.values(nominal))?;
+        let source =
+            (self.source(loaded, &self.anchor.values(nominal))?).loaded_by(chosen, gains)?;
         let rows = &loaded.rows;
         let mut columns = self.anchor.columns(rows);
         for profile in chosen {

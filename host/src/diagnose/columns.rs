@@ -9,6 +9,7 @@ use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 
 use super::DiagnoseError;
 use super::predicted::Predicted;
+use super::profile::Profile;
 use super::rows::{Column, Nominal, Thinning, motion_of};
 use super::runs::Run;
 use super::search::is_gear;
@@ -50,7 +51,42 @@ const DELAY: f64 = 0.002;
 /// Error of the reading at which its column is taken, of the gains' unit: small against every wave of the motion.
 const NUDGE: f64 = 1e-5;
 
+/// Effects whose torque acts on the link: a gear between motor and link transmits it.
+const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
+
 impl Source<'_> {
+    /// The same with the gears' load as effects make it that are in the model; `gains` are those of their columns, one
+    /// effect after the other.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn loaded_by(
+        mut self,
+        chosen: &[Profile],
+        gains: &[f64],
+    ) -> Result<Self, DiagnoseError> {
+        let mut at = 0;
+        for profile in chosen {
+            let own = &gains[at..at + profile.columns.len()];
+            at += own.len();
+            if !ON_THE_LINK.contains(&profile.candidate.kind) {
+                continue;
+            }
+            for r in 0..self.runs.len() {
+                let shapes = std::slice::from_ref(&profile.shapes);
+                let columns = self.at_full_rate(&profile.candidate, shapes, r)?;
+                for (column, gain) in columns.into_iter().flatten().zip(own) {
+                    for (load, signal) in self.predicted[r].load.iter_mut().zip(column) {
+                        for (to, x) in load.iter_mut().zip(signal.iter().flatten()) {
+                            *to += gain * x;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(self)
+    }
+
     /// One column a gain.
     ///
     /// # Errors

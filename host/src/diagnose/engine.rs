@@ -200,7 +200,11 @@ fn searched<'a>(
         let solution = refit.solution(chosen);
         let coefficients = solution.as_ref().unwrap_or(&refit.before);
         let nominal = &coefficients.values[..refit.free.len()];
-        bench.source(loaded, &bench.anchor.values(nominal))
+        let source = bench.source(loaded, &bench.anchor.values(nominal))?;
+        match &solution {
+            Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
+            Err(_) => Ok(source),
+        }
     };
     let mut tried = Vec::new();
     let mut sweeps = 0;
