@@ -49,6 +49,8 @@ fn fit(
     let options = Options {
         model,
         estimator,
+        // The plain fit takes the description as it is.
+        look_beyond: estimator != Estimator::Weighted,
         ..Default::default()
     };
     identify(robot, &training, &holdout, &options).unwrap()

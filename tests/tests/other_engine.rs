@@ -11,7 +11,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use rig_host::data::Source;
-use rig_host::identify::{ModelKind, Options, identify};
+use rig_host::identify::{Estimator, ModelKind, Options, identify};
 use rig_host::prepare::Recording;
 use rig_host::robot::Robot;
 
@@ -93,6 +93,8 @@ fn at_the_noise(arm: &str, engine: &str, seed: u64) {
     for model in [ModelKind::Differential, ModelKind::Integral] {
         let options = Options {
             model,
+            estimator: Estimator::for_robot(&robot),
+            look_beyond: true,
             ..Default::default()
         };
         let found = identify(

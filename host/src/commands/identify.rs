@@ -7,7 +7,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared};
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{
@@ -142,6 +142,9 @@ pub(crate) struct Args {
     /// [default: ridge: what makes the data most likely; consistent: 2]
     #[arg(long)]
     prior_uncertainty: Option<f64>,
+    /// Take the description as it is: do not look for springs, ripple or a base that is not level
+    #[arg(long)]
+    as_described: bool,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
     #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
     cutoff: Choice<f64>,
@@ -185,6 +188,7 @@ impl Args {
             recording_weights: self.weight.clone(),
             prior_uncertainty: self.prior_uncertainty,
             compare: self.compare.list(bytes),
+            look_beyond: !self.as_described,
         }
     }
 }
@@ -201,6 +205,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     refuse_shared(&args.data, &args.holdout)?;
+    refuse_twice(&args.data)?;
     if args.weight.len() > args.data.len() {
         return Err(CommandError::Sentence(format!(
             "--weight is given {} times and --data {} times; each weight belongs to the recording of its place.",
@@ -299,9 +304,15 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
         ));
     }
     for joint in &result.joints {
-        let holdout = joint.holdout_relative_error.map_or(String::new(), |error| {
-            format!(", {:.2} % on the hold-out", 100.0 * error)
-        });
+        let holdout = match joint.holdout_relative_error {
+            None => String::new(),
+            Some(error) if error.is_nan() => ", no row of the hold-out left to judge by".to_owned(),
+            Some(error) => format!(", {:.2} % on the hold-out", 100.0 * error),
+        };
+        if joint.train_relative_error.is_nan() {
+            ui.say(&format!("{}: no row left to judge by{holdout}", joint.name));
+            continue;
+        }
         ui.say(&format!(
             "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
             joint.name,

@@ -167,6 +167,20 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
     }
 }
 
+/// A recording that is learnt from twice makes every interval too narrow.
+pub(crate) fn refuse_twice(data: &[PathBuf]) -> Result<(), CommandError> {
+    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    for (k, path) in data.iter().enumerate() {
+        if data[..k].iter().any(|before| real(before) == real(path)) {
+            return Err(CommandError::Sentence(format!(
+                "{} is given twice as --data, which would count its noise as two recordings'; give it once, with --weight where it is to count more.",
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// The command line as typed, for the report's "how to repeat this".
 pub(crate) fn command_line() -> String {
     let mut words = vec!["rig".to_string()];

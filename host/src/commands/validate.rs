@@ -64,6 +64,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for line in summary(&validation) {
         ui.say(&line);
     }
+    for warning in &validation.warnings {
+        ui.remark(warning);
+    }
     ui.say(&format!(
         "report: {}",
         args.out.join("report.html").display()
@@ -76,6 +79,10 @@ fn summary(validation: &Validation) -> Vec<String> {
     let mut lines = Vec::new();
     for checked in &validation.recordings {
         for torque in &checked.torque {
+            if torque.residual.rows == 0 {
+                // A remark says why.
+                continue;
+            }
             lines.push(format!(
                 "{}, {}: torque off by {} {} rms, {:.2} % of the torque",
                 checked.recording,
@@ -86,7 +93,8 @@ fn summary(validation: &Validation) -> Vec<String> {
             ));
         }
         match &checked.motion {
-            Motion::NotSimulated { why } => lines.push(format!("{}: motion not simulated: {why}", checked.recording)),
+            // A remark says why.
+            Motion::NotSimulated { .. } => {}
             Motion::Simulated { joints, .. } => lines.extend(joints.iter().map(|joint| {
                 format!(
                     "{}, {}: simulated position off by {} {} rms, {:.2} % of the tracking error; torque by {} {} rms",

@@ -112,7 +112,10 @@ pub(super) fn relative_errors(
     whole: Option<&[f64]>,
 ) -> Vec<f64> {
     let one = |(j, factor): (usize, &TriangularFactor)| {
-        let rows = factor.rows().max(1) as f64;
+        if factor.rows() == 0 {
+            return f64::NAN;
+        }
+        let rows = factor.rows() as f64;
         let torque = whole.map_or_else(
             || (factor.right_side_squares() / rows).sqrt(),
             |torque| torque[j],

@@ -27,6 +27,8 @@ const MOST_STEPS: usize = 500;
 const SETTLED: [f64; 2] = [1e-2, 1e-13];
 /// The last stage also ends when a step would gain less than this of the squares: below it lies rounding.
 const NOTHING_TO_GAIN: f64 = 1e-11;
+/// … or after so many steps in turn that have gained no more than that: rounding moves the point about.
+const MOST_STANDING: usize = 4;
 /// Pull of an offset towards its prior: only decides where the data say nothing.
 const OFFSET_PULL: f64 = 1e-6;
 
@@ -46,8 +48,7 @@ pub(super) struct Consistent {
     pub parameters: Vec<f64>,
     /// ‖R·K·π − z‖².
     pub squares: f64,
-    /// W with W·Wᵀ the inverse of the Hessian at the minimum over the prior's values, pulls and data: their covariance as far
-    /// as the pulls are a prior (Laplace's approximation).
+    /// W with W·Wᵀ the covariance of the prior's values: the inverse of what the data bend and of [`believed`].
     pub spread: DMatrix<f64>,
     /// Newton steps.
     pub steps: usize,
@@ -153,6 +154,33 @@ fn slopes(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<(DVector<f64
     Some((gradient, bent))
 }
 
+/// Hessian, times `lift`, of what is believed before the data, as far as that is a spread: at the edge of the cone the pulls
+/// bend without bound, which says where the minimum is and not how far the truth may lie from it. Bodies bend as at the sum of
+/// prior and solution, friction and drive inertia as at the prior, and not at all where nothing is known of them.
+fn believed(prior: &Prior, pi: &[f64], lift: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut bent = DMatrix::zeros(pi.len(), pi.len());
+    for (c, rule) in prior.rules.iter().enumerate() {
+        let pull = prior.pull(c);
+        let bend = match rule {
+            Rule::Inertial(0) => {
+                let body = prior.bodies.get(c / rig_shared::multibody::COLUMNS)?;
+                let both: Vec<f64> = (c..c + INERTIAL).map(|k| pi[k] + prior.centre[k]).collect();
+                let (_, h) = body.derivatives(&both)?;
+                // Twice as large bends a quarter.
+                let h = DMatrix::from_fn(INERTIAL, INERTIAL, |r, s| 4.0 * pull * h[(r, s)]);
+                bent.rows_mut(c, INERTIAL)
+                    .copy_from(&(h * lift.rows(c, INERTIAL)));
+                continue;
+            }
+            Rule::Inertial(_) => continue,
+            Rule::NotNegative if prior.uncertainty[c].is_finite() => pull / prior.centre[c].powi(2),
+            Rule::NotNegative | Rule::Free => OFFSET_PULL / prior.size[c].powi(2),
+        };
+        bent.row_mut(c).copy_from(&(lift.row(c) * bend));
+    }
+    Some(bent)
+}
+
 /// Cholesky factor after scaling the diagonal to one, and the scales.
 pub(super) fn scaled_cholesky(
     mut h: DMatrix<f64>,
@@ -204,6 +232,7 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         2.0 * gradient.dot(&cholesky.solve(&gradient)).max(0.0).sqrt()
     };
     let mut strength = first.max(prior.strength);
+    let mut standing = 0;
     for steps in 0..MOST_STEPS {
         let (slope, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
         let gradient = space.singular.component_mul(&space.misfit(&c))
@@ -235,9 +264,20 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         }
         let last = strength <= prior.strength;
         let nothing = decrement * strength <= NOTHING_TO_GAIN * (1.0 + before.abs());
-        if decrement <= SETTLED[usize::from(last)] || nothing || !moved {
+        let after = value(&c, &pi, strength).ok_or_else(not_settled)?;
+        let gained = before - after > NOTHING_TO_GAIN * (1.0 + before.abs());
+        standing = if gained { 0 } else { standing + 1 };
+        let stands = standing >= MOST_STANDING;
+        if decrement <= SETTLED[usize::from(last)] || nothing || !moved || stands {
+            standing = 0;
             if last {
+                let bent = believed(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
+                let mut hessian = space.lift.transpose() * bent * prior.strength;
+                for k in 0..m {
+                    hessian[(k, k)] += space.singular[k].powi(2);
+                }
                 // L·Lᵀ = S·H·S: H⁻¹ = S·L⁻ᵀ·L⁻¹·S.
+                let (cholesky, scale) = scaled_cholesky(hessian).ok_or_else(not_settled)?;
                 let mut whiten = DMatrix::from_diagonal(&scale);
                 if !cholesky.l_dirty().solve_lower_triangular_mut(&mut whiten) {
                     return Err(not_settled());

@@ -1,6 +1,6 @@
 //! Passes over recordings with fitted parameters: covariance and residuals.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::base::Independent;
 use super::covariance::{Estimate, Groups, Memory};
@@ -11,7 +11,8 @@ use super::residual::{Ranges, ResidualReport, ResidualStream};
 use super::{IdentifyError, ModelKind, Options};
 use crate::prepare::{Recording, Survey};
 
-/// The estimate with its covariance, from one pass over the rows that were fitted.
+/// The estimate with its covariance, from one pass over the rows that were fitted; `beside` is what the identified
+/// combinations' covariance has besides.
 pub(super) fn covariance(
     training: &[&dyn Recording],
     plan: &Plan,
@@ -22,6 +23,7 @@ pub(super) fn covariance(
     weights: &[f64],
     loss: Option<(super::Loss, &[f64])>,
     instants: u64,
+    beside: Option<&DMatrix<f64>>,
 ) -> Result<Estimate, IdentifyError> {
     let (classical_std, inverse) = classical(factor, data, beta)?;
     let full = spread(beta, &data.kept, factor.columns());
@@ -70,7 +72,10 @@ pub(super) fn covariance(
             needed: (2.0 * seconds).ceil() as u64,
         }
     })?;
-    let covariance = &inverse * white * inverse.transpose();
+    let mut covariance = &inverse * white * inverse.transpose();
+    if let Some(beside) = beside {
+        covariance += beside;
+    }
     let (regressor, _) = kept_columns(factor, data);
     Ok(Estimate::of(
         beta,

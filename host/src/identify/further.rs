@@ -18,6 +18,8 @@ use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about,
 use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
 use crate::prepare::Recording;
 
+/// Weights of recordings: beyond it the other recordings are lost in rounding.
+const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 /// Standard deviations to either side that hold 95 % of a normal distribution.
 const NORMAL_95: f64 = 1.96;
 /// A residual that is so many times that of the weighted fit calls for a warning.
@@ -28,7 +30,7 @@ pub(super) fn check(options: &Options) -> Result<(), IdentifyError> {
     if let Some(&weight) = options
         .recording_weights
         .iter()
-        .find(|w| !(w.is_finite() && **w > 0.0))
+        .find(|w| !WEIGHTS.contains(w))
     {
         return Err(IdentifyError::Weight(weight));
     }
@@ -69,17 +71,16 @@ pub(super) fn own(
     }))
 }
 
-/// What the data show beyond the description, where the estimator has it as its prior: without that, torques with position
-/// cannot be told from inertia. `factors` are those of the fitted equations.
+/// What the data show beyond the description. That is asked with the description as the prior, whichever the estimator:
+/// without one, torques with position cannot be told from inertia. `factors` are those of the fitted equations.
 pub(super) fn beyond_description(
     problem: &Problem,
     factors: &[TriangularFactor],
 ) -> Result<Beyond, IdentifyError> {
-    match problem.options.estimator {
-        Estimator::Ridge | Estimator::Consistent if problem.robot.joints.len() > 1 => {
-            beyond(problem, factors, &prior(problem))
-        }
-        _ => Ok(Beyond::default()),
+    if problem.options.look_beyond && problem.robot.joints.len() > 1 {
+        beyond(problem, factors, &prior(problem))
+    } else {
+        Ok(Beyond::default())
     }
 }
 
@@ -232,8 +233,8 @@ pub(super) fn further(
         for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
             if *own > MUCH_MORE * plain {
                 further.warnings.push(format!(
-                    "Equation {}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
-                    k + 1,
+                    "Joint {}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
+                    problem.robot.joints[k].name,
                     own / plain
                 ));
             }

@@ -230,6 +230,9 @@ pub struct Options {
     pub prior_uncertainty: Option<f64>,
     /// Which estimators are compared besides; none for no comparison.
     pub compare: Vec<Estimator>,
+    /// Look for springs, ripple and a base that is not level where several joints are described with all their links; else
+    /// the description is taken as it is.
+    pub look_beyond: bool,
 }
 
 impl Options {
@@ -251,6 +254,7 @@ impl Default for Options {
             recording_weights: Vec::new(),
             prior_uncertainty: None,
             compare: Vec::new(),
+            look_beyond: false,
         }
     }
 }
@@ -351,7 +355,7 @@ pub enum IdentifyError {
     Simulation(String),
     /// A weight that is none.
     #[error(
-        "A recording's weight is {0}; it must be above zero (1 counts the recording once, 2 twice)."
+        "A recording's weight is {0}; it must lie between 1e-12 and 1e12 (1 counts the recording once, 2 twice)."
     )]
     Weight(f64),
     /// A prior uncertainty that is none.
@@ -428,9 +432,9 @@ pub struct Identification {
     pub base_parameters: Vec<BaseParameter>,
     /// Residuals by joint.
     pub joints: Vec<JointFigures>,
-    /// Torques with position that the description does not state and the data show; `ridge` and `consistent` look for them.
+    /// Torques with position that the description does not state and the data show.
     pub position_torques: Vec<PositionTorque>,
-    /// Gravity off the direction that the description states, where the data show it; the same estimators look for it.
+    /// Gravity off the direction that the description states, where the data show it.
     pub base_tilt: Option<BaseTilt>,
     /// What the data say nothing about.
     pub not_excited: Vec<NotExcited>,

@@ -56,7 +56,7 @@ impl PositionTorque {
             ),
         };
         format!(
-            "Joint {}: a part of the torque goes with its position, {what}; data and description are e^{:.0} times as likely with it. It was taken off the torque before the fit, and identified.toml states it. Errors are relative to the torque as measured.",
+            "Joint {}: a part of the torque goes with its position, {what}; data and description are e^{:.0} times as likely with it; a torque reading that saturates or is off by a factor can look alike. It was taken off the torque before the fit, and identified.toml states it. Errors are relative to the torque as measured.",
             self.joint, self.log_evidence
         )
     }

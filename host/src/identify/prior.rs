@@ -133,10 +133,11 @@ impl Prior {
             }
             let value = hints.values[c];
             prior.uncertainty[c] = f64::INFINITY;
-            prior.centre[c] = if value > SMALL_SHARE * size {
-                value
-            } else {
+            // Where the motion tells it badly, least squares may give what no torque was there for.
+            prior.centre[c] = if value.is_nan() {
                 SMALL_SHARE * size
+            } else {
+                value.clamp(SMALL_SHARE * size, size)
             };
             prior.scale[c] = prior.centre[c];
             sizes[c] = size;

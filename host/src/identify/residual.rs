@@ -304,11 +304,16 @@ impl ResidualStream {
                 )
             },
             dependence: self.binned.iter().map(|b| b.report(rms)).collect(),
-            relative_error: rms / torque_rms.max(f64::MIN_POSITIVE),
+            // Of no rows nothing is known.
+            relative_error: if self.moments[0] > 0.0 {
+                rms / torque_rms.max(f64::MIN_POSITIVE)
+            } else {
+                f64::NAN
+            },
             rows: self.moments[0] as u64,
             autocorrelation: correlation,
             series: self.series,
-            rms,
+            rms: if self.moments[0] > 0.0 { rms } else { f64::NAN },
             torque_rms,
             whiteness_p,
             skewness,

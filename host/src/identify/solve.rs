@@ -1,5 +1,8 @@
 //! The way from recordings to an [`Identification`].
 
+use nalgebra::DMatrix;
+use rig_shared::multibody::{COLUMNS, column};
+
 use super::band::explained_band;
 use super::base::{Base, chain_of, expression, transmission_of};
 use super::beyond::{Beyond, with_beyond};
@@ -320,7 +323,18 @@ fn solve(
         None => {
             let loss = scales.as_ref().map(|s| (options.loss, s.as_slice()));
             let estimate = covariance(
-                training, &plan, options, &factor, &data, &beta, &weights, loss, instants,
+                training,
+                &plan,
+                options,
+                &factor,
+                &data,
+                &beta,
+                &weights,
+                loss,
+                instants,
+                beside
+                    .map(|full| problem.identified_covariance(&full))
+                    .as_ref(),
             )?;
             (estimate, spread(&beta, &data.kept, p))
         }
@@ -352,7 +366,13 @@ fn solve(
             std: estimate.std[k],
             relative_std_percent: 100.0 * estimate.std[k] / estimate.values[k].abs(),
             unit: base.column_unit(columns[k]).to_owned(),
-            interval: estimate.interval[k],
+            interval: if options.estimator == Estimator::Consistent
+                && not_below_zero(&combination, k, columns[k])
+            {
+                estimate.interval[k].map(|end| end.max(0.0))
+            } else {
+                estimate.interval[k]
+            },
             classical_relative_std_percent: 100.0 * estimate.classical_std[k]
                 / estimate.values[k].abs(),
         })
@@ -416,6 +436,21 @@ fn solve(
     }
     for (j, report) in train.iter().enumerate() {
         let name = &robot.joints[j].name;
+        let unjudged = |which: &str| {
+            format!(
+                "Joint {name}: every row of the {which} was left out (slower than {:.4}, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed.",
+                treatment.speed_threshold[j]
+            )
+        };
+        if report.rows == 0 {
+            warnings.push(unjudged("training data"));
+        }
+        if holdout_residuals
+            .as_ref()
+            .is_some_and(|held| held[j].rows == 0)
+        {
+            warnings.push(unjudged("hold-out"));
+        }
         if report.relative_error > 0.3 {
             warnings.push(format!(
                 "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to.",
@@ -485,6 +520,21 @@ fn solve(
             treatment,
         },
     })))
+}
+
+/// Whether an identified combination is friction or drive inertia alone, which cannot lie below zero.
+fn not_below_zero(combination: &DMatrix<f64>, row: usize, column: usize) -> bool {
+    let alone = combination
+        .row(row)
+        .iter()
+        .filter(|x| x.abs() > 1e-9)
+        .count()
+        == 1;
+    alone
+        && matches!(
+            column % COLUMNS,
+            column::DRIVE_INERTIA | column::VISCOUS | column::COULOMB
+        )
 }
 
 fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {

@@ -6,6 +6,9 @@ use super::check::{Fault, Step};
 use super::text::{float, line};
 use crate::prepare::Treatment;
 
+/// Longest lead, s: a torque that acts so much later is of another motion.
+const MOST_LEAD: f64 = 1.0;
+
 /// Band and rows in which the values of a description were found: what they are judged in unless asked otherwise, as an
 /// error relative to the torque depends on both.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,11 +59,11 @@ impl IdentifiedBand {
                 "it must be above 0, in rows per second",
             );
         }
-        if !self.torque_lead.is_finite() {
+        if self.torque_lead.is_nan() || self.torque_lead.abs() > MOST_LEAD {
             return fault(
                 "torque_lead",
                 self.torque_lead.to_string(),
-                "it must be a number, in s",
+                "it must lie between -1 and 1 s",
             );
         }
         if self.min_speed.len() != joints {

@@ -254,7 +254,7 @@ pub fn validate(
         .iter()
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
-    let treatment = treatment(robot, &surveys, options, &limits)?;
+    let (treatment, note) = treatment(robot, &surveys, options, &limits)?;
     let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
@@ -267,6 +267,7 @@ pub fn validate(
         cache: crate::identify::RowCache::default(),
     };
     let mut warnings = prior_warnings(robot, &columns);
+    warnings.extend(note);
     let [taken, left] = model.effects.uncompensated();
     warnings.extend(left);
     let mut checked = Vec::with_capacity(recordings.len());
@@ -345,9 +346,9 @@ fn treatment(
     surveys: &[Survey],
     options: &Options,
     limits: &[Option<f64>],
-) -> Result<Treatment, PrepareError> {
+) -> Result<(Treatment, Option<String>), PrepareError> {
     let (Some(band), Some(first)) = (&robot.identified, surveys.first()) else {
-        return Treatment::decide(surveys, &options.prepare, limits);
+        return Ok((Treatment::decide(surveys, &options.prepare, limits)?, None));
     };
     let mut prepare = options.prepare.clone();
     let stated = "as the description was identified.";
@@ -365,8 +366,12 @@ fn treatment(
         prepare.torque_lead = band.torque_lead;
     }
     let Ok(mut treatment) = Treatment::decide(surveys, &prepare, limits) else {
-        // Too short for that band.
-        return Treatment::decide(surveys, &options.prepare, limits);
+        let note = format!(
+            "These recordings cannot be judged in the band that the description was identified in (cut-off {} Hz, {} rows per second), so one was chosen from them: the errors are not those of the identification's hold-out.",
+            band.cutoff, band.rate
+        );
+        let own = Treatment::decide(surveys, &options.prepare, limits)?;
+        return Ok((own, Some(note)));
     };
     if own_cutoff {
         treatment.cutoff_reason = format!("{} Hz, {stated}", band.cutoff);
@@ -378,7 +383,7 @@ fn treatment(
         treatment.speed_threshold.clone_from(&band.min_speed);
         treatment.speed_reason = format!("By joint, {stated}");
     }
-    Ok(treatment)
+    Ok((treatment, None))
 }
 
 /// What the description itself gives reason to say.

@@ -298,3 +298,82 @@ fn arms_of_two_to_seven_joints_by_every_estimator() {
 pub(super) fn bodies(chance: &mut Chance, n: usize) -> Vec<[f64; 10]> {
     (0..n).map(|_| body(chance, 2.0, 0.2)).collect()
 }
+
+/// Friction and drive inertia that the data hardly touch come out at zero; how far from it they may lie is for the data to
+/// say, not for the barrier that keeps them above it.
+#[test]
+fn intervals_at_zero_are_those_of_the_data() {
+    let (mut inside, mut all, mut at_zero) = (0, 0, 0);
+    for seed in 0..10 {
+        let mut robot = arm(3, 80 + seed);
+        for joint in &mut robot.joints {
+            let friction = joint.friction.as_mut().unwrap();
+            (friction.viscous, friction.coulomb) = (0.01, 0.01);
+            joint.drive.as_mut().unwrap().rotor_inertia = 1e-7;
+        }
+        let noise = Noise {
+            position: 2e-6,
+            torque: 1.0,
+            ..Default::default()
+        };
+        let recording = record(&robot, 15.0, 200.0, noise, seed);
+        let options = Options {
+            estimator: Estimator::Consistent,
+            ..Default::default()
+        };
+        let mut described = robot.clone();
+        for joint in &mut described.joints {
+            (joint.friction, joint.drive) = (None, None);
+        }
+        let found = identify(&described, &[&recording], &[], &options).unwrap();
+        let truth = truth(&robot, &found);
+        for ((b, t), c) in (found.base_parameters.iter())
+            .zip(&truth)
+            .zip(&found.details.columns)
+        {
+            if !(10..13).contains(&(c % COLUMNS)) {
+                continue;
+            }
+            all += 1;
+            at_zero += usize::from(b.value < 0.2 * b.std);
+            inside += usize::from(b.interval[0] <= *t && *t <= b.interval[1]);
+            assert!(b.interval[0] >= 0.0 || b.expression.contains(' '), "{b:?}");
+        }
+    }
+    println!("{inside} of {all} inside, {at_zero} near zero");
+    assert!(at_zero >= 5, "{at_zero} of {all}: nothing was at its bound");
+    assert!(inside as f64 >= 0.9 * all as f64, "{inside} of {all}");
+}
+
+/// A joint that moves too slowly for any of its rows to count: that is said and not called a fit.
+#[test]
+fn a_joint_without_rows_is_not_called_explained() {
+    let robot = arm(3, 90);
+    let noise = Noise {
+        position: 2e-6,
+        torque: 0.05,
+        ..Default::default()
+    };
+    let recording = record(&robot, 20.0, 200.0, noise, 1);
+    let still = {
+        let mut still = recording.clone();
+        // A thousandth of the motion: slower than the rows that count.
+        let q = &mut still.blocks[0].joints[1].q;
+        let first = q[0];
+        q.iter_mut().for_each(|x| *x = first + 1e-3 * (*x - first));
+        still
+    };
+    let options = Options {
+        estimator: Estimator::Consistent,
+        ..Default::default()
+    };
+    let found = identify(&robot, &[&recording], &[&still], &options).unwrap();
+    assert!(found.joints[1].holdout_relative_error.unwrap().is_nan());
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.contains("j2") && w.contains("hold-out"))
+    );
+    assert!(found.joints[0].holdout_relative_error.unwrap() > 0.0);
+}

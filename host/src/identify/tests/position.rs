@@ -43,11 +43,12 @@ fn made(seed: u64, pulled: bool) -> (Robot, InMemory) {
 #[test]
 fn cables_and_ripple_are_found_where_they_are_and_only_there() {
     for seed in 0..4 {
-        for estimator in [Estimator::Ridge, Estimator::Consistent] {
+        for estimator in [Estimator::Weighted, Estimator::Ridge, Estimator::Consistent] {
             let left = [false, true].map(|pulled| {
                 let (robot, recording) = made(seed, pulled);
                 let options = Options {
                     estimator,
+                    look_beyond: true,
                     ..Default::default()
                 };
                 let found = identify(&robot, &[&recording], &[&recording], &options).unwrap();
@@ -91,9 +92,8 @@ fn cables_and_ripple_are_found_where_they_are_and_only_there() {
     }
 }
 
-/// The plain fits have no prior that could tell a cable from an inertia, and do not look for one.
 #[test]
-fn plain_fits_look_for_nothing() {
+fn nothing_is_looked_for_unasked() {
     let (robot, recording) = made(0, true);
     let found = identify(&robot, &[&recording], &[], &Options::default()).unwrap();
     assert!(found.position_torques.is_empty());
@@ -128,7 +128,8 @@ fn a_tilted_base_is_found_and_a_level_one_is_not() {
             link.inertia = link.inertia.map(|x| 1.2 * x);
         }
         let options = Options {
-            estimator: Estimator::Ridge,
+            estimator: Estimator::Consistent,
+            look_beyond: true,
             ..Default::default()
         };
         let found = identify(&robot, &[&recording], &[], &options).unwrap();
