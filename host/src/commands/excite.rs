@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::error::CommandError;
+use super::input::described;
 use super::ui::Ui;
 use crate::excite::{Criterion, Design, Options, Parameters, Scaling, StagedKind, design, staged};
 use crate::robot::Robot;
@@ -123,7 +124,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             path: args.out.clone(),
         });
     }
-    let robot = Robot::load(&args.robot)?;
+    let robot = described(&args.robot, ui)?.robot;
     let kind = match args.kind {
         KindArg::Fourier => return optimal(args, &robot, ui),
         KindArg::Chirp => StagedKind::Chirp,

@@ -115,7 +115,8 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
 /// Identifies the parameters of a robot from recordings.
 ///
 /// Writes identified.toml (the description with the identified values), identification.json and report.html
-/// into the folder given with --out.
+/// into the folder given with --out, and identified.urdf where a full set of parameters was found: of a URDF the same file
+/// with other values, of a TOML description a new one.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -194,7 +195,8 @@ impl Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let description = args.robot.describe(ui)?;
+    let robot = description.robot;
     let training = Inputs::open(&robot, &args.data)?;
     let holdout = Inputs::open(&robot, &args.holdout)?;
     for warning in training.warnings().chain(holdout.warnings()) {
@@ -223,16 +225,24 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
     // A full set of parameters is a body each; combinations alone would not be.
-    let mut urdf = None;
+    let (mut urdf, mut said) = (None, Vec::new());
     if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
-        match identified.to_urdf() {
+        let found = match &description.urdf {
+            Some(original) => original.with_values(&identified),
+            None => identified.to_urdf(),
+        };
+        match found {
             Ok(found) => {
-                remarks.extend(found.remarks);
+                said = found.remarks;
                 urdf = Some(found.text);
             }
             Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
         }
     }
+    remarks.extend(
+        said.iter()
+            .map(|sentence| format!("identified.urdf: {sentence}")),
+    );
     let context = Context {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
@@ -253,7 +263,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         (json + "\n").as_bytes(),
     )?;
     report::write(&args.out.join("report.html"), &page)?;
-    print(ui, &identification, &args.out);
+    print(ui, &identification);
+    for sentence in &said {
+        ui.say(&format!("identified.urdf: {sentence}"));
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
     Ok(())
 }
 
@@ -281,7 +298,7 @@ fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), 
 }
 
 /// The result at a glance.
-fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
+fn print(ui: &Ui, result: &Identification) {
     let width = result
         .base_parameters
         .iter()
@@ -324,5 +341,4 @@ fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
     for warning in &result.warnings {
         ui.remark(warning);
     }
-    ui.say(&format!("report: {}", out.join("report.html").display()));
 }

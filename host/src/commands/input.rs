@@ -1,15 +1,15 @@
 //! What several commands take: a robot description and recordings, checked before any work begins.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::ui::Progress;
+use super::ui::{Progress, Ui};
 use crate::data::{Block, Source, plausibility};
 use crate::prepare::{PrepareError, Recording};
-use crate::robot::Robot;
+use crate::robot::{Description, Robot};
 
 /// Rows that are looked at for units; a recording in the wrong unit shows it at once.
 const UNIT_CHECK_ROWS: usize = 100_000;
@@ -27,9 +27,29 @@ impl RobotArg {
     ///
     /// # Errors
     /// What is wrong with the file, by line.
-    pub(crate) fn load(&self) -> Result<Robot, CommandError> {
-        Ok(Robot::load(&self.path)?)
+    pub(crate) fn load(&self, ui: &Ui) -> Result<Robot, CommandError> {
+        Ok(self.describe(ui)?.robot)
     }
+
+    /// Loads it with the file that it was read from.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub(crate) fn describe(&self, ui: &Ui) -> Result<Description, CommandError> {
+        described(&self.path, ui)
+    }
+}
+
+/// Loads a description and says what is strange about it.
+///
+/// # Errors
+/// What is wrong with the file, by line.
+pub(crate) fn described(path: &Path, ui: &Ui) -> Result<Description, CommandError> {
+    let description = Description::load(path)?;
+    for remark in &description.remarks {
+        ui.remark(remark);
+    }
+    Ok(description)
 }
 
 /// Recordings that fit the robot.

@@ -32,7 +32,7 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let robot = args.robot.load(ui)?;
     let inputs = Inputs::open(&robot, &args.data)?;
     for warning in inputs.warnings() {
         ui.remark(&warning);

@@ -6,6 +6,7 @@
 //! eq. 3.6; Khalil & Dombre 2002, sec. 3.2): frame i−1 → i is
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
+mod bodies;
 mod check;
 mod check_drives;
 mod dh;
@@ -15,7 +16,6 @@ mod error;
 mod numbers;
 mod text;
 mod urdf;
-mod urdf_out;
 mod workspace;
 
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ pub use check::EFFECT_NAMES;
 pub use drives::Screw;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
-pub use urdf_out::Urdf;
+pub use urdf::{Original, Urdf};
 pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
@@ -257,17 +257,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
 impl Robot {
     /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
-        let text = read_text(path)?;
-        let extension = path
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase);
-        match extension.as_deref() {
-            Some("toml") => Self::from_toml(&text, path),
-            Some("urdf") => Self::from_urdf(&text, path),
-            _ if text.trim_start().starts_with('<') => Self::from_urdf(&text, path),
-            _ => Self::from_toml(&text, path),
-        }
+        Ok(Description::load(path)?.robot)
     }
 
     /// Reads TOML text; `path` only names the source in messages.
@@ -292,6 +282,53 @@ impl Robot {
     /// Index (from 0) of the joint called `name`.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)
+    }
+}
+
+/// A file that describes a robot.
+#[derive(Debug)]
+pub struct Description {
+    /// The robot.
+    pub robot: Robot,
+    /// The file itself, where it is URDF.
+    pub urdf: Option<Original>,
+    /// What the user should know, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+impl Description {
+    /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
+    ///
+    /// # Errors
+    /// [`RobotError`]: what is wrong with the file, by line.
+    pub fn load(path: &Path) -> Result<Self, RobotError> {
+        let text = read_text(path)?;
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        let urdf = match extension.as_deref() {
+            Some("toml") => false,
+            Some("urdf") => true,
+            _ => text.trim_start().starts_with('<'),
+        };
+        if !urdf {
+            let robot = Robot::from_toml(&text, path)?;
+            return Ok(Self {
+                remarks: robot.implausible_bodies(None),
+                robot,
+                urdf: None,
+            });
+        }
+        let original = Original::read(text, path)?;
+        let robot = original.robot().clone();
+        let mut remarks = original.remarks().to_vec();
+        remarks.extend(robot.implausible_bodies(Some(&original)));
+        Ok(Self {
+            robot,
+            urdf: Some(original),
+            remarks,
+        })
     }
 }
 
