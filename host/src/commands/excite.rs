@@ -138,7 +138,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&note);
     }
     ui.say(&format!(
-        "{}: {} of {:.1} s.",
+        "{}: the motion, {} of {:.1} s.",
         args.out.display(),
         kind.name(),
         file.duration()
@@ -182,9 +182,11 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         ui.say(&line);
     }
     ui.say(&format!(
-        "{}: {:.1} s.",
+        "{}: the motion, {:.1} s from rest to rest. Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
         args.out.display(),
-        found.file.duration()
+        found.file.duration(),
+        args.robot.display(),
+        args.out.display()
     ));
     Ok(())
 }

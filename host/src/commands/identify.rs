@@ -1,5 +1,7 @@
 //! `rig identify`: recordings and a description in, parameters with their uncertainty out.
 
+mod printed;
+
 use std::cell::RefCell;
 use std::path::PathBuf;
 
@@ -16,7 +18,6 @@ use crate::identify::{
 use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
-use crate::report::format_value;
 use crate::robot::Robot;
 
 /// Which equations are fitted.
@@ -161,6 +162,9 @@ pub(crate) struct Args {
     /// Seed of the random states from which the base parameters are found
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    #[arg(long)]
+    even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -197,8 +201,8 @@ impl Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
-    let training = Inputs::open(&robot, &args.data)?;
-    let holdout = Inputs::open(&robot, &args.holdout)?;
+    let training = Inputs::read(&robot, &args.data)?;
+    let holdout = Inputs::read(&robot, &args.holdout)?;
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }
@@ -208,6 +212,29 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             "--weight is given {} times and --data {} times; each weight belongs to the recording of its place.",
             args.weight.len(),
             args.data.len()
+        )));
+    }
+    let (found, held) = (training.faults(&robot)?, holdout.faults(&robot)?);
+    for sentence in found.doubtful.iter().chain(&held.doubtful) {
+        ui.remark(&format!("{sentence} Or the description is that far off."));
+    }
+    let mut wrong = [found.wrong, held.wrong].concat();
+    let strange = training.strange_references(&robot)?;
+    if matches!(args.estimator, Some(Fit::OutputError)) {
+        wrong.extend(strange);
+    } else {
+        for sentence in strange {
+            ui.remark(&format!(
+                "{sentence}. Only --estimator output-error uses references."
+            ));
+        }
+    }
+    if args.even_if_wrong {
+        wrong.iter().for_each(|sentence| ui.remark(sentence));
+    } else if !wrong.is_empty() {
+        return Err(CommandError::Implausible(format!(
+            "{} Nothing was fitted; --even-if-wrong fits all the same.",
+            wrong.join(" ")
         )));
     }
     // Three passes over the training data, two over the hold-out: see `identify`.
@@ -220,7 +247,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &args.options(&robot, training.bytes()),
     )?;
     drop(progress);
-    refuse_driving_friction(&robot, &identification)?;
+    if !args.even_if_wrong {
+        refuse_driving_friction(&robot, &identification)?;
+    }
     folder(&args.out)?;
     let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
@@ -263,7 +292,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         (json + "\n").as_bytes(),
     )?;
     report::write(&args.out.join("report.html"), &page)?;
-    print(ui, &identification);
+    printed::print(ui, &identification);
     for sentence in &said {
         ui.say(&format!("identified.urdf: {sentence}"));
     }
@@ -295,50 +324,4 @@ fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), 
         }
     }
     Ok(())
-}
-
-/// The result at a glance.
-fn print(ui: &Ui, result: &Identification) {
-    let width = result
-        .base_parameters
-        .iter()
-        .map(|p| p.expression.chars().count())
-        .max()
-        .unwrap_or(0);
-    for parameter in &result.base_parameters {
-        ui.say(&format!(
-            "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
-            parameter.expression,
-            format_value(parameter.value, parameter.std),
-            parameter.unit,
-            parameter.interval[0],
-            parameter.interval[1],
-        ));
-    }
-    for joint in &result.joints {
-        let holdout = joint.holdout_relative_error.map_or(String::new(), |error| {
-            format!(", {:.2} % on the hold-out", 100.0 * error)
-        });
-        ui.say(&format!(
-            "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
-            joint.name,
-            joint.train_residual_rms,
-            100.0 * joint.train_relative_error,
-        ));
-    }
-    for missing in &result.not_excited {
-        ui.say(&format!(
-            "not excited: {} ({}); {}",
-            missing.combination, missing.why, missing.motion
-        ));
-    }
-    for sentence in &result.procedure {
-        ui.say(sentence);
-    }
-    if let Some(comparison) = &result.comparison {
-        ui.say(&comparison.recommendation);
-    }
-    for warning in &result.warnings {
-        ui.remark(warning);
-    }
 }

@@ -37,6 +37,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in inputs.warnings() {
         ui.remark(&warning);
     }
+    for sentence in inputs.strange_references(&robot)? {
+        ui.remark(&format!(
+            "{sentence}. A simulated motion follows them as they are."
+        ));
+    }
     let mut progress = ui.progress("validating", 1000);
     let validation = validate(
         &robot,

@@ -36,7 +36,7 @@ impl Robot {
                     None => format!("The link of joint `{joint}`"),
                 };
                 Some(format!(
-                    "{link} {why}. No body is like that: `ridge` and `consistent` take a uniform block in its place as what is known beforehand, and a simulation takes it as it stands, which may be impossible."
+                    "{link} {why}. No body is like that: `rig identify` takes a uniform block for what is known of it, a simulation takes it as it stands."
                 ))
             })
             .collect()

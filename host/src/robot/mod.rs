@@ -14,9 +14,11 @@ mod drives;
 mod effects;
 mod error;
 mod numbers;
+mod screw;
 mod text;
 mod urdf;
 mod workspace;
+mod written;
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -26,9 +28,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 pub use check::EFFECT_NAMES;
-pub use drives::Screw;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
+pub use screw::Screw;
+pub(crate) use urdf::is_placeholder;
 pub use urdf::{Original, Urdf};
 pub use workspace::Region;
 
@@ -49,6 +52,9 @@ pub const EDDA_TEMPLATE: &str = include_str!("../../robots/edda.toml");
 
 /// The Stäubli TX40 with its coupled wrist, as its published recording needs it.
 pub const TX40: &str = include_str!("../../robots/tx40.toml");
+
+/// The double pendulum of the DFKI whose public recordings the project reproduces.
+pub const DOUBLE_PENDULUM: &str = include_str!("../../robots/double-pendulum.toml");
 
 /// The pendulum on a Dynamixel XL330 whose public recordings have a voltage and no current.
 pub const XL330: &str = include_str!("../../robots/xl330.toml");
@@ -249,6 +255,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
         "irp6" => Some(IRP6_TEMPLATE),
         "emps" => Some(EMPS),
         "tx40" => Some(TX40),
+        "double-pendulum" => Some(DOUBLE_PENDULUM),
         "xl330" => Some(XL330),
         _ => None,
     }
@@ -276,7 +283,7 @@ impl Robot {
 
     /// The description as TOML with units in comments; [`Robot::from_toml`] reads it back equal.
     pub fn to_toml(&self) -> Result<String, RobotError> {
-        text::write(self)
+        written::write(self)
     }
 
     /// Index (from 0) of the joint called `name`.

@@ -3,6 +3,7 @@
 //! Leaves out: visuals, collision shapes, safety controllers and calibration, none of which enters the
 //! dynamics.
 
+mod edits;
 mod original;
 mod reader;
 mod remarks;
@@ -22,6 +23,7 @@ use reader::{Reader, parsed};
 
 pub use original::Original;
 pub(super) use spatial::SpatialInertia;
+pub(crate) use values::is_placeholder;
 pub use write::Urdf;
 
 /// A joint and the body that it moves.
