@@ -29,7 +29,7 @@ pub(crate) struct Args {
 /// # Errors
 /// The description, or a model whose base parameters cannot be decided.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let robot = args.robot.load(ui)?;
     let base = Base::structural(&robot, args.model.into(), args.seed)?;
     let rules = grouped(&robot)?;
     let same = agree(&rules, &base);

@@ -49,7 +49,7 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let robot = args.robot.load(ui)?;
     refuse_shared(&args.data, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
     let training = Inputs::read(&robot, &args.data)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::error::CommandError;
+use super::input::described;
 use super::ui::Ui;
 use crate::excite::{Criterion, Design, Options, Parameters, Scaling, StagedKind, design, staged};
 use crate::robot::Robot;
@@ -123,7 +124,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             path: args.out.clone(),
         });
     }
-    let robot = Robot::load(&args.robot)?;
+    let robot = described(&args.robot, ui)?.robot;
     let kind = match args.kind {
         KindArg::Fourier => return optimal(args, &robot, ui),
         KindArg::Chirp => StagedKind::Chirp,
@@ -137,7 +138,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&note);
     }
     ui.say(&format!(
-        "{}: {} of {:.1} s.",
+        "{}: the motion, {} of {:.1} s.",
         args.out.display(),
         kind.name(),
         file.duration()
@@ -181,9 +182,11 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         ui.say(&line);
     }
     ui.say(&format!(
-        "{}: {:.1} s.",
+        "{}: the motion, {:.1} s from rest to rest. Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
         args.out.display(),
-        found.file.duration()
+        found.file.duration(),
+        args.robot.display(),
+        args.out.display()
     ));
     Ok(())
 }

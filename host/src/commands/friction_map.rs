@@ -39,7 +39,7 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let robot = args.robot.load(ui)?;
     let training = Inputs::open(&robot, &args.data)?;
     let sweep = Inputs::open(&robot, std::slice::from_ref(&args.sweep))?;
     for warning in training.warnings().chain(sweep.warnings()) {

@@ -1,5 +1,7 @@
 //! `rig identify`: recordings and a description in, parameters with their uncertainty out.
 
+mod printed;
+
 use std::cell::RefCell;
 use std::path::PathBuf;
 
@@ -16,7 +18,6 @@ use crate::identify::{
 use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
-use crate::report::format_value;
 use crate::robot::Robot;
 
 /// Which equations are fitted.
@@ -115,7 +116,8 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
 /// Identifies the parameters of a robot from recordings.
 ///
 /// Writes identified.toml (the description with the identified values), identification.json and report.html
-/// into the folder given with --out.
+/// into the folder given with --out, and identified.urdf where a full set of parameters was found: of a URDF the same file
+/// with other values, of a TOML description a new one.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -163,6 +165,9 @@ pub(crate) struct Args {
     /// Seed of the random states from which the base parameters are found
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Fit although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    #[arg(long)]
+    even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -198,9 +203,10 @@ impl Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
-    let training = Inputs::open(&robot, &args.data)?;
-    let holdout = Inputs::open(&robot, &args.holdout)?;
+    let description = args.robot.describe(ui)?;
+    let robot = description.robot;
+    let training = Inputs::read(&robot, &args.data)?;
+    let holdout = Inputs::read(&robot, &args.holdout)?;
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }
@@ -213,6 +219,29 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             args.data.len()
         )));
     }
+    let (found, held) = (training.faults(&robot)?, holdout.faults(&robot)?);
+    for sentence in found.doubtful.iter().chain(&held.doubtful) {
+        ui.remark(&format!("{sentence} Or the description is that far off."));
+    }
+    let mut wrong = [found.wrong, held.wrong].concat();
+    let strange = training.strange_references(&robot)?;
+    if matches!(args.estimator, Some(Fit::OutputError)) {
+        wrong.extend(strange);
+    } else {
+        for sentence in strange {
+            ui.remark(&format!(
+                "{sentence}. Only --estimator output-error uses references."
+            ));
+        }
+    }
+    if args.even_if_wrong {
+        wrong.iter().for_each(|sentence| ui.remark(sentence));
+    } else if !wrong.is_empty() {
+        return Err(CommandError::Implausible(format!(
+            "{} Nothing was fitted; --even-if-wrong fits all the same.",
+            wrong.join(" ")
+        )));
+    }
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
@@ -223,21 +252,31 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &args.options(&robot, training.bytes()),
     )?;
     drop(progress);
-    refuse_driving_friction(&robot, &identification)?;
+    if !args.even_if_wrong {
+        refuse_driving_friction(&robot, &identification)?;
+    }
     folder(&args.out)?;
     let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
     // A full set of parameters is a body each; combinations alone would not be.
-    let mut urdf = None;
+    let (mut urdf, mut said) = (None, Vec::new());
     if identification.standard_parameters.is_some() || robot.joints.len() == 1 {
-        match identified.to_urdf() {
+        let found = match &description.urdf {
+            Some(original) => original.with_values(&identified),
+            None => identified.to_urdf(),
+        };
+        match found {
             Ok(found) => {
-                remarks.extend(found.remarks);
+                said = found.remarks;
                 urdf = Some(found.text);
             }
             Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
         }
     }
+    remarks.extend(
+        said.iter()
+            .map(|sentence| format!("identified.urdf: {sentence}")),
+    );
     let context = Context {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
@@ -258,7 +297,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         (json + "\n").as_bytes(),
     )?;
     report::write(&args.out.join("report.html"), &page)?;
-    print(ui, &identification, &args.out);
+    printed::print(ui, &identification);
+    for sentence in &said {
+        ui.say(&format!("identified.urdf: {sentence}"));
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
     Ok(())
 }
 
@@ -283,75 +329,4 @@ fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), 
         }
     }
     Ok(())
-}
-
-/// The result at a glance.
-fn print(ui: &Ui, result: &Identification, out: &std::path::Path) {
-    let width = result
-        .base_parameters
-        .iter()
-        .map(|p| p.expression.chars().count())
-        .max()
-        .unwrap_or(0);
-    for parameter in &result.base_parameters {
-        ui.say(&format!(
-            "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
-            parameter.expression,
-            format_value(parameter.value, parameter.std),
-            parameter.unit,
-            parameter.interval[0],
-            parameter.interval[1],
-        ));
-    }
-    for joint in &result.joints {
-        let holdout = match joint.holdout_relative_error {
-            None => String::new(),
-            Some(error) if error.is_nan() => ", no row of the hold-out left to judge by".to_owned(),
-            Some(error) => format!(", {:.2} % on the hold-out", 100.0 * error),
-        };
-        if joint.train_relative_error.is_nan() {
-            ui.say(&format!("{}: no row left to judge by{holdout}", joint.name));
-            continue;
-        }
-        ui.say(&format!(
-            "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
-            joint.name,
-            joint.train_residual_rms,
-            100.0 * joint.train_relative_error,
-        ));
-    }
-    if result.estimator != Estimator::Consistent
-        && let Some(set) = &result.standard_parameters
-    {
-        let percent = |errors: &[f64]| {
-            let list: Vec<String> = errors.iter().map(|e| format!("{:.1}", 100.0 * e)).collect();
-            list.join(", ")
-        };
-        let held = set
-            .holdout_relative_error
-            .as_ref()
-            .map_or(String::new(), |errors| {
-                format!(", on the hold-out {} %", percent(errors))
-            });
-        ui.say(&format!(
-            "identified.toml and identified.urdf hold the nearest set that bodies can have (--estimator consistent fits it): it leaves {} % of the torque{held}.",
-            percent(&set.train_relative_error)
-        ));
-    }
-    for missing in &result.not_excited {
-        ui.say(&format!(
-            "not excited: {} ({}); {}",
-            missing.combination, missing.why, missing.motion
-        ));
-    }
-    for sentence in &result.procedure {
-        ui.say(sentence);
-    }
-    if let Some(comparison) = &result.comparison {
-        ui.say(&comparison.recommendation);
-    }
-    for warning in &result.warnings {
-        ui.remark(warning);
-    }
-    ui.say(&format!("report: {}", out.join("report.html").display()));
 }

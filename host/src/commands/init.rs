@@ -22,6 +22,8 @@ pub(crate) enum Kind {
     Emps,
     /// The Stäubli TX40 whose public recording, made on the motor side, the project reproduces.
     Tx40,
+    /// The double pendulum of the DFKI whose public recordings the project reproduces.
+    DoublePendulum,
     /// The pendulum on a Dynamixel XL330 servo whose public recordings have a voltage and no current.
     Xl330,
 }
@@ -51,6 +53,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Kind::Irp6 => ("irp6.toml", robot::IRP6_TEMPLATE),
         Kind::Emps => ("emps.toml", robot::EMPS),
         Kind::Tx40 => ("tx40.toml", robot::TX40),
+        Kind::DoublePendulum => ("double-pendulum.toml", robot::DOUBLE_PENDULUM),
         Kind::Xl330 => ("xl330.toml", robot::XL330),
     };
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(name));

@@ -1,15 +1,16 @@
 //! What several commands take: a robot description and recordings, checked before any work begins.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::ui::Progress;
-use crate::data::{Block, Source, plausibility};
+use super::ui::{Progress, Ui};
+use crate::data::{Block, Implausible, Source, plausibility, strange_references};
+use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
-use crate::robot::Robot;
+use crate::robot::{Description, Robot};
 
 /// Rows that are looked at for units; a recording in the wrong unit shows it at once.
 const UNIT_CHECK_ROWS: usize = 100_000;
@@ -27,9 +28,37 @@ impl RobotArg {
     ///
     /// # Errors
     /// What is wrong with the file, by line.
-    pub(crate) fn load(&self) -> Result<Robot, CommandError> {
-        Ok(Robot::load(&self.path)?)
+    pub(crate) fn load(&self, ui: &Ui) -> Result<Robot, CommandError> {
+        Ok(self.describe(ui)?.robot)
     }
+
+    /// Loads it with the file that it was read from.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub(crate) fn describe(&self, ui: &Ui) -> Result<Description, CommandError> {
+        described(&self.path, ui)
+    }
+}
+
+/// Loads a description and says what is strange about it.
+///
+/// # Errors
+/// What is wrong with the file, by line.
+pub(crate) fn described(path: &Path, ui: &Ui) -> Result<Description, CommandError> {
+    let description = Description::load(path)?;
+    for remark in &description.remarks {
+        ui.remark(remark);
+    }
+    Ok(description)
+}
+
+/// What columns of recordings look like, one sentence each.
+pub(crate) struct Faults {
+    /// What they cannot be.
+    pub(crate) wrong: Vec<String>,
+    /// What they can only be where the description is far off.
+    pub(crate) doubtful: Vec<String>,
 }
 
 /// Recordings that fit the robot.
@@ -56,22 +85,81 @@ impl Inputs {
     /// What is wrong, by file and line; all units that look wrong in one sentence.
     pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
         let inputs = Self::read(robot, paths)?;
-        for source in &inputs.sources {
+        match inputs.wrong_units(robot)?.into_iter().next() {
+            Some(sentence) => Err(CommandError::Implausible(sentence)),
+            None => Ok(inputs),
+        }
+    }
+
+    /// One sentence for each recording whose units look wrong.
+    ///
+    /// # Errors
+    /// What is wrong with a file, by line.
+    fn wrong_units(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
+        let mut wrong = Vec::new();
+        for source in &self.sources {
             if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
                 let found: Vec<String> = plausibility(&block?, robot)
                     .iter()
                     .map(ToString::to_string)
                     .collect();
                 if !found.is_empty() {
-                    return Err(CommandError::Implausible(format!(
-                        "{}: {}",
-                        source.path().display(),
-                        found.join("; ")
-                    )));
+                    wrong.push(format!("{}: {}", source.path().display(), found.join("; ")));
                 }
             }
         }
-        Ok(inputs)
+        Ok(wrong)
+    }
+
+    /// One sentence for each recording whose columns cannot be what they say: units, and where those are right signs, ratios,
+    /// clocks and columns in each other's place, of which the motion tells.
+    ///
+    /// # Errors
+    /// What is wrong with a file, by line.
+    pub(crate) fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
+        let mut faults = Faults {
+            wrong: self.wrong_units(robot)?,
+            doubtful: Vec::new(),
+        };
+        if !faults.wrong.is_empty() {
+            return Ok(faults);
+        }
+        for source in &self.sources {
+            for fault in faults_at_start(robot, source, UNIT_CHECK_ROWS)? {
+                // How large a torque should be is known from the description alone, whose masses may be stand-ins.
+                let size = fault.text.starts_with("tau")
+                    && matches!(fault.kind.as_str(), "unit" | "ratio");
+                let list = if size {
+                    &mut faults.doubtful
+                } else {
+                    &mut faults.wrong
+                };
+                list.push(format!("{}: {}", source.path().display(), fault.text));
+            }
+        }
+        Ok(faults)
+    }
+
+    /// One sentence for each recording whose references are in another unit or sense than its positions.
+    ///
+    /// # Errors
+    /// What is wrong with a file, by line.
+    pub(crate) fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
+        let mut strange = Vec::new();
+        for source in &self.sources {
+            if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
+                let found = strange_references(&block?, robot);
+                let mut found = found.iter();
+                let Some(first) = found.next() else { continue };
+                let rest: Vec<String> = found.map(Implausible::column).collect();
+                let rest = match rest.as_slice() {
+                    [] => String::new(),
+                    _ => format!("; so do {}", rest.join(", ")),
+                };
+                strange.push(format!("{}: {first}{rest}", source.path().display()));
+            }
+        }
+        Ok(strange)
     }
 
     /// What the reader should know of them.

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::error::CommandError;
+use super::input::described;
 use super::ui::Ui;
 use crate::excite::{Noise, load_reference, replay};
-use crate::robot::Robot;
 
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
 ///
@@ -44,7 +44,7 @@ pub(crate) struct Args {
 /// # Errors
 /// Files that cannot be read or written, a model that cannot be simulated.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = Robot::load(&args.robot)?;
+    let robot = described(&args.robot, ui)?.robot;
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {
         position: args.noise_position,

@@ -32,10 +32,15 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load()?;
+    let robot = args.robot.load(ui)?;
     let inputs = Inputs::open(&robot, &args.data)?;
     for warning in inputs.warnings() {
         ui.remark(&warning);
+    }
+    for sentence in inputs.strange_references(&robot)? {
+        ui.remark(&format!(
+            "{sentence}. A simulated motion follows them as they are."
+        ));
     }
     let mut progress = ui.progress("validating", 1000);
     let validation = validate(

@@ -15,7 +15,7 @@ mod writer;
 pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
 pub(crate) use plausibility::velocity_scale;
-pub use plausibility::{Implausible, plausibility};
+pub use plausibility::{Implausible, plausibility, strange_references};
 pub use source::{Blocks, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 

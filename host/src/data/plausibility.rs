@@ -5,7 +5,7 @@
 //! only what the columns say about each other is checked.
 
 use super::{Block, JointColumns};
-use crate::robot::{Joint, JointKind, Robot};
+use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 
 /// A column that cannot be in the unit of the contract.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -68,6 +68,20 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// Reference and position do not belong together.
+    #[error(
+        "ref{joint} does not belong to q{joint}: it moves {ratio:.4} times as far{hint}, while both should be in {unit} and counted in the same sense"
+    )]
+    ReferenceScale {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Change of the reference over that of the position; 1 would be right.
+        ratio: f64,
+        /// What a factor like that is called, with a comma before it; empty where it has no name.
+        hint: &'static str,
+        /// rad or m.
+        unit: &'static str,
+    },
     /// Effort far above the limit.
     #[error(
         "tau{joint} looks too large by a factor of about 1000 (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
@@ -84,7 +98,7 @@ pub enum Implausible {
     },
     /// Effort far below what moves the joint.
     #[error(
-        "tau{joint} looks too small by a factor of about 1000 (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint"
+        "tau{joint} looks too small by a factor of about 1000 (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
     )]
     EffortTooSmall {
         /// Joint, 1-based.
@@ -104,6 +118,23 @@ pub enum Implausible {
         /// Median step.
         step: f64,
     },
+}
+
+impl Implausible {
+    /// The column at fault, with its factor where it has one.
+    pub fn column(&self) -> String {
+        match self {
+            Self::Degrees { joint, .. }
+            | Self::Position { joint, .. }
+            | Self::Velocity { joint, .. } => format!("q{joint}"),
+            Self::VelocityScale { joint, .. } => format!("qd{joint}"),
+            Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
+            Self::EffortTooLarge { joint, .. } | Self::EffortTooSmall { joint, .. } => {
+                format!("tau{joint}")
+            }
+            Self::Milliseconds { .. } => "t".into(),
+        }
+    }
 }
 
 /// Everything in `block` that cannot be in SI units for `robot`; empty where all is well.
@@ -232,6 +263,53 @@ pub(crate) fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
 }
 
+/// References that are not in the unit or sense of their positions; what uses no references is right without them.
+pub fn strange_references(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let joints = (1..).zip(block.joints.iter().zip(&robot.joints));
+    joints
+        .filter_map(|(k, (columns, joint))| {
+            let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
+            let (unit, _) = joint.kind.units();
+            // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
+            let hint = match (ratio, unit) {
+                (0.1..10.0, _) => return None,
+                (50.0..65.0, "rad") => ", as degrees would",
+                (0.0154..0.02, "rad") => ", as if turned from degrees to rad twice",
+                (900.0..1100.0, "m") => ", as millimetres would",
+                (r, _) if r < 0.0 => ", the other way",
+                _ => "",
+            };
+            Some(Implausible::ReferenceScale {
+                joint: k,
+                ratio,
+                hint,
+                unit,
+            })
+        })
+        .collect()
+}
+
+/// Spread of the reference over that of the position, below zero where they run against each other; none where they are
+/// not the same motion.
+fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
+    let count = q.len().max(1) as f64;
+    let (mean_q, mean_ref) = (
+        q.iter().sum::<f64>() / count,
+        reference.iter().sum::<f64>() / count,
+    );
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in q.iter().zip(reference) {
+        let (x, y) = (x - mean_q, y - mean_ref);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    let alike = xy / (xx * yy).sqrt();
+    // A position that lags far behind its reference is still like it (KUKA LWR4+: 0.77); one that runs against it has to be
+    // its very mirror image.
+    (alike.is_finite() && !(-0.9..=0.6).contains(&alike)).then(|| (yy / xx).sqrt() * alike.signum())
+}
+
 fn check_effort(
     k: usize,
     columns: &JointColumns,
@@ -265,7 +343,8 @@ fn check_effort(
         .filter(|c| *c > 0.0);
     let too_small = match (coulomb, limit) {
         (Some(c), _) if highest < 0.01 * c => Some(("Coulomb friction", c)),
-        (None, Some(l)) if highest < 5e-4 * l => Some(("limit", l)),
+        // A limit that stands for "none" says nothing of what moves the joint.
+        (None, Some(l)) if highest < 5e-4 * l && !is_placeholder(l, 1e3) => Some(("limit", l)),
         _ => None,
     };
     if let Some((of, expected)) = too_small {

@@ -498,6 +498,31 @@ fn wrong_units_are_named_and_right_ones_are_not() {
     );
     assert!(scaled(&|b| all(&mut b.joints[0].tau, 1000.0)).contains("tau1 looks too large"));
     assert!(scaled(&|b| all(&mut b.joints[0].tau, 1e-3)).contains("tau1 looks too small"));
+    let referred = |factor: f64| {
+        let mut b = block.clone();
+        let reference = b.joints[0].q.iter().map(|q| factor * q).collect();
+        b.joints[0].reference = Some(reference);
+        assert_eq!(plausibility(&b, &rig()), []);
+        let found = strange_references(&b, &rig());
+        found.first().map_or(String::new(), ToString::to_string)
+    };
+    assert_eq!(referred(1.1), "");
+    assert!(
+        referred(57.296).contains(
+            "ref1 does not belong to q1: it moves 57.2960 times as far, as degrees would"
+        )
+    );
+    assert!(referred(-1.0).contains("it moves -1.0000 times as far, the other way"));
+    // A limit that stands for none is no measure of the torque.
+    let mut open = rig();
+    open.joints[0].friction = None;
+    for (limit, found) in [(900.0, 1), (1e3, 0), (1e4, 0), (99999.0, 0), (3e6, 0)] {
+        open.joints[0].limits.as_mut().unwrap().torque = Some(limit);
+        let mut b = block.clone();
+        let peak = b.joints[0].tau.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        all(&mut b.joints[0].tau, 0.1 / peak);
+        assert_eq!(plausibility(&b, &open).len(), found, "{limit}");
+    }
     assert!(scaled(&|b| all(&mut b.t, 1000.0)).contains("milliseconds"));
     assert!(scaled(&|b| all(&mut b.t, 1e-3)).contains("more than ten times its limit"));
 }

@@ -77,30 +77,74 @@ pub fn runs_of(
     rate: f64,
     position: &LowPass,
 ) -> Result<Vec<Run>, DiagnoseError> {
-    let mut runs: Vec<Run> = Vec::new();
+    let mut gathered = Gathered::new(&recording.label(), number, rate);
     recording.each_block(65_536, &mut |block| {
-        if !block.continues || runs.is_empty() {
-            runs.push(Run {
-                label: recording.label(),
-                recording: number,
-                rate,
-                joints: vec![JointRun::default(); block.joints.len()],
-                ..Run::default()
-            });
-        }
-        if let Some(run) = runs.last_mut() {
-            append(run, block);
-        }
+        gathered.push(block);
         Ok(())
     })?;
-    for run in &mut runs {
-        for joint in &mut run.joints {
-            joint.q = position.zero_phase(&joint.q_raw);
-            joint.qd = central_difference(&joint.q, 1.0 / rate);
-            joint.qdd = second_difference(&joint.q, 1.0 / rate);
+    Ok(gathered.differentiated(position))
+}
+
+/// [`runs_of`] over blocks that are there.
+///
+/// # Errors
+/// Those of the blocks.
+pub(super) fn runs_of_blocks(
+    blocks: impl Iterator<Item = Result<Block, DiagnoseError>>,
+    label: &str,
+    number: usize,
+    rate: f64,
+    position: &LowPass,
+) -> Result<Vec<Run>, DiagnoseError> {
+    let mut gathered = Gathered::new(label, number, rate);
+    for block in blocks {
+        gathered.push(block?);
+    }
+    Ok(gathered.differentiated(position))
+}
+
+/// Stretches as they are read.
+struct Gathered {
+    empty: Run,
+    runs: Vec<Run>,
+}
+
+impl Gathered {
+    fn new(label: &str, recording: usize, rate: f64) -> Self {
+        Self {
+            empty: Run {
+                label: label.to_owned(),
+                recording,
+                rate,
+                ..Run::default()
+            },
+            runs: Vec::new(),
         }
     }
-    Ok(runs)
+
+    fn push(&mut self, block: Block) {
+        if !block.continues || self.runs.is_empty() {
+            self.runs.push(Run {
+                joints: vec![JointRun::default(); block.joints.len()],
+                ..self.empty.clone()
+            });
+        }
+        if let Some(run) = self.runs.last_mut() {
+            append(run, block);
+        }
+    }
+
+    fn differentiated(self, position: &LowPass) -> Vec<Run> {
+        let mut runs = self.runs;
+        for run in &mut runs {
+            for joint in &mut run.joints {
+                joint.q = position.zero_phase(&joint.q_raw);
+                joint.qd = central_difference(&joint.q, 1.0 / run.rate);
+                joint.qdd = second_difference(&joint.q, 1.0 / run.rate);
+            }
+        }
+        runs
+    }
 }
 
 fn append(run: &mut Run, block: Block) {

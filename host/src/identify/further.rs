@@ -232,9 +232,9 @@ pub(super) fn further(
         };
         for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
             if *own > MUCH_MORE * plain {
+                let joint = problem.robot.joints.get(k).map_or("", |j| j.name.as_str());
                 further.warnings.push(format!(
-                    "Joint {}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
-                    problem.robot.joints[k].name,
+                    "Joint {joint}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
                     own / plain
                 ));
             }

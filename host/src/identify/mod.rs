@@ -392,7 +392,7 @@ pub struct BaseParameter {
 pub struct JointFigures {
     /// Name of the joint.
     pub name: String,
-    /// N·m or N
+    /// N·m or N; not a number (null) where none of the joint's rows could be used, as of one that stands still.
     pub train_residual_rms: f64,
     /// N·m or N; null without a hold-out.
     pub holdout_residual_rms: Option<f64>,

@@ -436,6 +436,13 @@ fn solve(
     }
     for (j, report) in train.iter().enumerate() {
         let name = &robot.joints[j].name;
+        if surveys.iter().all(|s| s.joints[j].still()) {
+            warnings.push(format!(
+                "Joint {name} stands still at {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more.",
+                surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0])
+            ));
+            continue;
+        }
         let unjudged = |which: &str| {
             format!(
                 "Joint {name}: every row of the {which} was left out (slower than {:.4}, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed.",
@@ -489,12 +496,22 @@ fn solve(
             .joints
             .iter()
             .enumerate()
-            .map(|(j, joint)| JointFigures {
-                name: joint.name.clone(),
-                train_residual_rms: train[j].rms,
-                holdout_residual_rms: holdout_residuals.as_ref().map(|h| h[j].rms),
-                train_relative_error: train[j].relative_error,
-                holdout_relative_error: holdout_residuals.as_ref().map(|h| h[j].relative_error),
+            .map(|(j, joint)| {
+                // Without a row there is no error, not one of zero.
+                let judged = |report: &ResidualReport, value: f64| {
+                    if report.rows > 0 { value } else { f64::NAN }
+                };
+                let held = holdout_residuals
+                    .as_ref()
+                    .map(|h| &h[j])
+                    .filter(|h| h.rows > 0);
+                JointFigures {
+                    name: joint.name.clone(),
+                    train_residual_rms: judged(&train[j], train[j].rms),
+                    holdout_residual_rms: held.map(|h| h.rms),
+                    train_relative_error: judged(&train[j], train[j].relative_error),
+                    holdout_relative_error: held.map(|h| h.relative_error),
+                }
             })
             .collect(),
         position_torques: known.torques.clone(),

@@ -60,6 +60,9 @@ impl StandardSet {
     }
 }
 
+/// A joint that is slower than this share of the fastest (in rad/s and m/s alike) hardly moves.
+const HARDLY: f64 = 1e-4;
+
 /// Prior of `robot`, with hints from a fit of all base columns.
 pub(super) fn prior_of(
     robot: &Robot,
@@ -81,15 +84,23 @@ pub(super) fn prior_of(
             .collect::<Vec<f64>>()
     };
     let speed = over(&|s, j| s.joints[j].spectrum.velocity_rms());
+    // An order of magnitude is all that is wanted: a motion of that speed at its highest frequency.
+    let acceleration = over(&|s, j| {
+        let spectrum = &s.joints[j].spectrum;
+        std::f64::consts::TAU * spectrum.motion * spectrum.velocity_rms()
+    });
+    // What hardly moves says nothing of sizes: it could move like the others.
+    let like_others = |list: Vec<f64>| -> Vec<f64> {
+        let most = list.iter().copied().fold(0.0, f64::max);
+        list.into_iter()
+            .map(|own| if own < HARDLY * most { most } else { own })
+            .collect()
+    };
     let hints = Hints {
         torque: over(&|s, j| s.joints[j].torque_rms),
-        // An order of magnitude is all that is wanted: a motion of that speed at its highest frequency.
-        acceleration: over(&|s, j| {
-            let spectrum = &s.joints[j].spectrum;
-            std::f64::consts::TAU * spectrum.motion * spectrum.velocity_rms()
-        }),
+        acceleration: like_others(acceleration),
         values,
-        speed,
+        speed: like_others(speed),
     };
     Prior::of(
         robot,

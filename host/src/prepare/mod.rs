@@ -65,14 +65,14 @@ pub enum PrepareError {
         /// Longest step, s.
         longest: f64,
     },
-    /// A joint stands still throughout.
+    /// Every joint stands still throughout.
     #[error(
-        "Joint {joint} does not move in {label}: its position stays at {position}; record a motion in which it does."
+        "Joint {joint} does not move in {label}: its position stays at {position}, and no other joint moves; record a motion."
     )]
     NotMoving {
         /// The recording.
         label: String,
-        /// Number of the joint, from 1.
+        /// Number of the first joint, from 1.
         joint: usize,
         /// Where it stands.
         position: f64,

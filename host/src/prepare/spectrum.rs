@@ -179,6 +179,20 @@ impl PositionSpectrum {
         }
     }
 
+    /// Of a position that never changes: nothing, which limits no cut-off.
+    pub fn still(frequency: Vec<f64>) -> Self {
+        let [first, last] =
+            [frequency.first(), frequency.last()].map(|f| f.copied().unwrap_or(0.0));
+        Self {
+            density: vec![0.0; frequency.len()],
+            floor: 0.0,
+            crossing: last,
+            motion: first,
+            clean: last,
+            frequency,
+        }
+    }
+
     /// RMS of the velocity, rad/s or m/s, noise beyond the crossing left out.
     pub fn velocity_rms(&self) -> f64 {
         let step = self.frequency[0];

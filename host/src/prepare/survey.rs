@@ -141,11 +141,18 @@ impl Delayed {
     }
 }
 
+impl JointSurvey {
+    /// Whether the joint stands still throughout.
+    pub fn still(&self) -> bool {
+        self.position[0] == self.position[1]
+    }
+}
+
 impl Survey {
     /// Reads `recording` once. `joints` is the number of joints of the robot.
     ///
     /// # Errors
-    /// [`PrepareError`]: too short, unevenly sampled, not moving, wrong number of joints.
+    /// [`PrepareError`]: too short, unevenly sampled, no joint moving, wrong number of joints.
     pub fn take(recording: &dyn Recording, joints: usize) -> Result<Self, PrepareError> {
         let mut running: Vec<Running> = (0..joints)
             .map(|_| Running {
@@ -238,17 +245,17 @@ impl Survey {
             }
         }
         let sample_rate = 1.0 / mean;
+        let still = |r: &Running| r.position[0] == r.position[1];
+        if let (Some(first), true) = (running.first(), running.iter().all(still)) {
+            return Err(PrepareError::NotMoving {
+                label: recording.label(),
+                joint: 1,
+                position: first.position[0],
+            });
+        }
         let joints = running
             .into_iter()
-            .enumerate()
-            .map(|(j, r)| {
-                if r.position[0] == r.position[1] {
-                    return Err(PrepareError::NotMoving {
-                        label: recording.label(),
-                        joint: j + 1,
-                        position: r.position[0],
-                    });
-                }
+            .map(|r| {
                 let (frequency, density) =
                     r.welch.finish().density(sample_rate).ok_or_else(|| {
                         PrepareError::TooShort {
@@ -263,7 +270,11 @@ impl Survey {
                     torque_rms: (r.square / rows as f64).sqrt(),
                     torque: [-r.low.value, r.high.value],
                     clipped: [r.low.clipped().map(|v| -v), r.high.clipped()],
-                    spectrum: PositionSpectrum::judge(frequency, density),
+                    spectrum: if r.position[0] == r.position[1] {
+                        PositionSpectrum::still(frequency)
+                    } else {
+                        PositionSpectrum::judge(frequency, density)
+                    },
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;

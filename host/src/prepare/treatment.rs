@@ -120,6 +120,9 @@ const LEAST_HEADROOM: f64 = 5.0;
 /// friction have harmonics well above the motion itself, and the residual is to show them.
 const PARALLEL_HEADROOM: f64 = 10.0;
 
+/// Above what rounding leaves of the velocity of a joint that stands still, below what any encoder shows, rad/s or m/s.
+const STILL: f64 = 1e-6;
+
 impl Treatment {
     /// Decides from the surveys of all training recordings and the robot's torque limits.
     ///
@@ -137,10 +140,15 @@ impl Treatment {
         for survey in surveys {
             same_rate(survey, rate)?;
         }
-        // The longest recording speaks for the spectrum.
+        // The longest recording speaks for the spectrum, for that of a joint the longest in which it moves.
         let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
-        let spectra: Vec<PositionSpectrum> =
-            speaker.joints.iter().map(|j| j.spectrum.clone()).collect();
+        let spectra: Vec<PositionSpectrum> = (0..speaker.joints.len())
+            .map(|j| {
+                let moving = surveys.iter().filter(|s| !s.joints[j].still());
+                let own = moving.max_by_key(|s| s.rows).unwrap_or(speaker);
+                own.joints[j].spectrum.clone()
+            })
+            .collect();
         let motion = spectra.iter().map(|s| s.motion).fold(0.0, f64::max);
         let nyquist = rate / 2.0;
         let (cutoff, cutoff_reason) = match options.cutoff {
@@ -198,6 +206,15 @@ impl Treatment {
                 )
             }
         };
+        // At rest friction, or a brake, carries any part of the torque: no row of such a joint tells anything.
+        let speed_threshold = speed_threshold
+            .into_iter()
+            .enumerate()
+            .map(|(j, speed): (usize, f64)| {
+                let still = surveys.iter().all(|s| s.joints[j].still());
+                if still { speed.max(STILL) } else { speed }
+            })
+            .collect();
         let (parallel_edge, parallel_filter) = if decimation > 1 {
             let edge = decimator_edge(decimation, rate);
             (

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::check::{Fault, Step};
-use super::text::{float, line};
+use super::written::{float, line};
 use crate::prepare::Treatment;
 
 /// Longest lead, s: a torque that acts so much later is of another motion.

@@ -5,10 +5,10 @@
 
 use std::collections::HashSet;
 
-use super::check_drives::check_transmission;
+use super::check_drives::{check_drive, check_transmission};
 use super::effects::check_effects;
 use super::workspace::check_workspace;
-use super::{Drive, Joint, JointKind, Robot};
+use super::{Joint, JointKind, Robot};
 
 /// Names of effects beyond the standard model.
 pub const EFFECT_NAMES: [&str; 22] = [
@@ -119,14 +119,14 @@ fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
 
 /// What a number must be.
 #[derive(Clone, Copy)]
-enum Must {
+pub(super) enum Must {
     Finite,
     Positive,
     NotNegative,
     NotZero,
 }
 
-fn number(
+pub(super) fn number(
     joint: &Joint,
     way: &[Step],
     what: &str,
@@ -271,132 +271,6 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             NotZero,
             controller.torque_gain,
         )?;
-    }
-    Ok(())
-}
-
-/// What a drive must satisfy on its own; [`check_transmission`] sees to what it does with the others.
-fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, NotZero, Positive};
-    use Step::{At, Key};
-    let way = |k| [Key("drive"), Key(k)];
-    if drive.screw.is_none() {
-        number(
-            joint,
-            &way("gear_ratio"),
-            "gear ratio",
-            "motor turns per joint turn",
-            NotZero,
-            drive.gear_ratio,
-        )?;
-    } else if drive.gear_ratio != 0.0 {
-        return Err(Fault {
-            way: way("gear_ratio").to_vec(),
-            what: format!("the gear ratio of joint `{}`", joint.name),
-            found: drive.gear_ratio.to_string(),
-            right: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
-        });
-    }
-    let numbers = [
-        ("zero", "motor zero", "rad", Finite, drive.zero),
-        (
-            "rotor_inertia",
-            "rotor inertia",
-            "kg·m²",
-            NotNegative,
-            drive.rotor_inertia,
-        ),
-        (
-            "joint_inertia",
-            "drive inertia seen at the joint",
-            "kg·m² (kg where prismatic)",
-            Finite,
-            drive.joint_inertia,
-        ),
-        (
-            "coulomb",
-            "Coulomb friction of the motor",
-            "N·m, on the motor side",
-            NotNegative,
-            drive.coulomb,
-        ),
-        (
-            "viscous",
-            "viscous friction of the motor",
-            "N·m·s/rad, on the motor side",
-            NotNegative,
-            drive.viscous,
-        ),
-        (
-            "torque_constant",
-            "torque constant",
-            "N·m/A",
-            NotNegative,
-            drive.torque_constant,
-        ),
-    ];
-    for (key, what, unit, must, value) in numbers {
-        number(joint, &way(key), what, unit, must, value)?;
-    }
-    let optional = [
-        ("resistance", "Ω", drive.resistance),
-        ("inductance", "H", drive.inductance),
-        (
-            "encoder_counts_per_rev",
-            "counts per motor turn",
-            drive.encoder_counts_per_rev,
-        ),
-        (
-            "duty_full_scale",
-            "units of the duty column",
-            drive.duty_full_scale,
-        ),
-    ];
-    for (key, unit, value) in optional {
-        if let Some(v) = value {
-            number(joint, &way(key), key, unit, Positive, v)?;
-        }
-    }
-    if let Some(screw) = &drive.screw {
-        let way = |k| [Key("drive"), Key("screw"), Key(k)];
-        number(
-            joint,
-            &way("lead"),
-            "lead of the screw",
-            "m per motor turn",
-            NotZero,
-            screw.lead,
-        )?;
-        number(
-            joint,
-            &way("crank"),
-            "crank of the screw",
-            "m",
-            Positive,
-            screw.crank,
-        )?;
-        for (i, v) in screw.anchor.iter().enumerate() {
-            let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
-            number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
-        }
-        number(
-            joint,
-            &way("offset"),
-            "crank's offset",
-            "rad",
-            Finite,
-            screw.offset,
-        )?;
-        if let Some([low, high]) = screw.range
-            && !(low.is_finite() && high.is_finite() && low < high)
-        {
-            return Err(Fault {
-                way: way("range").to_vec(),
-                what: format!("the range of the crank of joint `{}`", joint.name),
-                found: format!("[{low}, {high}]"),
-                right: "it must be [lowest, highest], two finite angles in rad".into(),
-            });
-        }
     }
     Ok(())
 }

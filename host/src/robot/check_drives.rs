@@ -1,10 +1,9 @@
-//! What the drives of a description must satisfy together: that the motors move all joints, everywhere they may be.
+//! What the drives of a description must satisfy, alone and together: that the motors move all joints, everywhere they may be.
 
 use rig_shared::transmission::TransmissionError;
 
-use super::Robot;
-use super::check::{Fault, Step};
-use super::drives::Screw;
+use super::check::{Fault, Must, Step, number};
+use super::{Drive, Joint, Robot, Screw};
 
 /// A dead centre this close to the crank's range is within it, rad: the ratio there is hardly a hundredth of the best.
 const MARGIN: f64 = 0.01;
@@ -217,4 +216,130 @@ fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
         q[k] += (now.clamp(low, high) - now) / own;
     }
     q
+}
+
+/// What a drive must satisfy on its own; [`check_transmission`] sees to what it does with the others.
+pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
+    use Must::{Finite, NotNegative, NotZero, Positive};
+    use Step::{At, Key};
+    let way = |k| [Key("drive"), Key(k)];
+    if drive.screw.is_none() {
+        number(
+            joint,
+            &way("gear_ratio"),
+            "gear ratio",
+            "motor turns per joint turn",
+            NotZero,
+            drive.gear_ratio,
+        )?;
+    } else if drive.gear_ratio != 0.0 {
+        return Err(Fault {
+            way: way("gear_ratio").to_vec(),
+            what: format!("the gear ratio of joint `{}`", joint.name),
+            found: drive.gear_ratio.to_string(),
+            right: "a screw moves this joint ([joint.drive.screw]); leave gear_ratio out".into(),
+        });
+    }
+    let numbers = [
+        ("zero", "motor zero", "rad", Finite, drive.zero),
+        (
+            "rotor_inertia",
+            "rotor inertia",
+            "kg·m²",
+            NotNegative,
+            drive.rotor_inertia,
+        ),
+        (
+            "joint_inertia",
+            "drive inertia seen at the joint",
+            "kg·m² (kg where prismatic)",
+            Finite,
+            drive.joint_inertia,
+        ),
+        (
+            "coulomb",
+            "Coulomb friction of the motor",
+            "N·m, on the motor side",
+            NotNegative,
+            drive.coulomb,
+        ),
+        (
+            "viscous",
+            "viscous friction of the motor",
+            "N·m·s/rad, on the motor side",
+            NotNegative,
+            drive.viscous,
+        ),
+        (
+            "torque_constant",
+            "torque constant",
+            "N·m/A",
+            NotNegative,
+            drive.torque_constant,
+        ),
+    ];
+    for (key, what, unit, must, value) in numbers {
+        number(joint, &way(key), what, unit, must, value)?;
+    }
+    let optional = [
+        ("resistance", "Ω", drive.resistance),
+        ("inductance", "H", drive.inductance),
+        (
+            "encoder_counts_per_rev",
+            "counts per motor turn",
+            drive.encoder_counts_per_rev,
+        ),
+        (
+            "duty_full_scale",
+            "units of the duty column",
+            drive.duty_full_scale,
+        ),
+    ];
+    for (key, unit, value) in optional {
+        if let Some(v) = value {
+            number(joint, &way(key), key, unit, Positive, v)?;
+        }
+    }
+    if let Some(screw) = &drive.screw {
+        let way = |k| [Key("drive"), Key("screw"), Key(k)];
+        number(
+            joint,
+            &way("lead"),
+            "lead of the screw",
+            "m per motor turn",
+            NotZero,
+            screw.lead,
+        )?;
+        number(
+            joint,
+            &way("crank"),
+            "crank of the screw",
+            "m",
+            Positive,
+            screw.crank,
+        )?;
+        for (i, v) in screw.anchor.iter().enumerate() {
+            let way = [Key("drive"), Key("screw"), Key("anchor"), At(i)];
+            number(joint, &way, "anchor of the screw", "m", Finite, *v)?;
+        }
+        number(
+            joint,
+            &way("offset"),
+            "crank's offset",
+            "rad",
+            Finite,
+            screw.offset,
+        )?;
+        if let Some([low, high]) = screw.range
+            && !(low.is_finite() && high.is_finite() && low < high)
+        {
+            return Err(Fault {
+                way: way("range").to_vec(),
+                what: format!("the range of the crank of joint `{}`", joint.name),
+                found: format!("[{low}, {high}]"),
+                right: "it must be [lowest, highest], two finite angles in rad".into(),
+            });
+        }
+    }
+    Ok(())
 }

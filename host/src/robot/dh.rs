@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 #[cfg(test)]
 use super::JointKind;
 use super::urdf::{Body, Chain};
-use super::{Drive, Inertial, Joint, Robot};
+use super::{Drive, Joint, Robot};
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
 /// base link, the customary rounded value that robot descriptions and simulators are used with.
@@ -26,8 +26,9 @@ const ROUNDING: f64 = 1e-10;
 pub(super) struct Converted {
     pub robot: Robot,
     /// Frame 0 in the base link's frame.
-    #[cfg_attr(not(test), allow(dead_code))]
     pub base: Isometry3<f64>,
+    /// Each body's own frame (that of the link its joint moves) in frame i.
+    pub links: Vec<Isometry3<f64>>,
 }
 
 /// Modified DH step without the joint's own motion.
@@ -123,6 +124,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     // neither the snapping above nor the file's rounding adds up along the chain.
     let mut frame = base;
     let mut joints = Vec::new();
+    let mut links = Vec::new();
     for (i, body) in chain.bodies.iter().enumerate() {
         let line = axis_of(i);
         let x_before = frame.rotation * Vector3::x();
@@ -149,11 +151,9 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         let theta = snap_angle(angle_about(x_before, x, z));
         let d = snap_length((origin - foot).dot(&z));
         frame = bent * step(0.0, 0.0, theta, d);
-        joints.push(joint(
-            body,
-            [alpha, a, theta, d],
-            &(frame.inverse() * poses[i]),
-        ));
+        let link = frame.inverse() * poses[i];
+        joints.push(joint(body, [alpha, a, theta, d], &link));
+        links.push(link);
     }
     let robot = Robot {
         name: chain.name.clone(),
@@ -163,12 +163,10 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         identified: None,
         effects: Vec::new(),
     };
-    Converted { robot, base }
+    Converted { robot, base, links }
 }
 
 fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {
-    let seen = body.inertia.seen_from(link_in_frame);
-    let (h, i) = (seen.first_moment, seen.inertia);
     Joint {
         name: body.joint.clone(),
         kind: body.kind,
@@ -176,11 +174,7 @@ fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<
         a,
         theta,
         d,
-        inertial: Some(Inertial {
-            mass: seen.mass,
-            first_moment: [h.x, h.y, h.z],
-            inertia: [i.m11, i.m12, i.m13, i.m22, i.m23, i.m33],
-        }),
+        inertial: Some(body.inertia.seen_from(link_in_frame).inertial()),
         limits: body.limits.clone(),
         friction: body.friction.clone(),
         drive: body.reduction.map(|gear_ratio| Drive {
@@ -202,4 +196,4 @@ pub(super) fn joint_pose(joint: &Joint, q: f64) -> Isometry3<f64> {
 
 #[cfg(test)]
 #[path = "dh_test.rs"]
-mod tests;
+pub(in crate::robot) mod tests;

@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use roxmltree::Document;
@@ -175,14 +175,7 @@ fn worst(text: &str, seed: u64, draws: usize) -> (Robot, f64) {
         let mut pose: Isometry3<f64> = converted.base;
         for joint in &robot.joints {
             pose *= joint_pose(joint, q[&joint.name]);
-            let own = joint.inertial.as_ref().unwrap();
-            let [xx, xy, xz, yy, yz, zz] = own.inertia;
-            let body = urdf::SpatialInertia {
-                mass: own.mass,
-                first_moment: Vector3::from(own.first_moment),
-                inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
-            }
-            .seen_from(&pose);
+            let body = urdf::SpatialInertia::of(joint.inertial.as_ref().unwrap()).seen_from(&pose);
             let want = expected[&joint.name];
             worst = worst.max((body.mass - want.mass).abs());
             for r in 0..3 {
@@ -200,7 +193,7 @@ fn worst(text: &str, seed: u64, draws: usize) -> (Robot, f64) {
 }
 
 /// A chain with random axes: skew, parallel, meeting and coinciding ones; fixed links in between.
-fn random_urdf(rng: &mut Pcg64) -> String {
+pub(in crate::robot) fn random_urdf(rng: &mut Pcg64) -> String {
     let mut text = String::from("<robot name='r'><link name='l0'/>");
     let right = std::f64::consts::FRAC_PI_2;
     for i in 0..rng.random_range(1..7) {

@@ -7,7 +7,7 @@ use rig_shared::effects::{Channel, Effect, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
 use super::check::{EFFECT_NAMES, Fault, Step};
-use super::text::{float, line, quoted};
+use super::written::{float, line, quoted};
 use super::{JointKind, Robot};
 
 /// An effect beyond the standard model, as a description states it.

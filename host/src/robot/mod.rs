@@ -7,6 +7,7 @@
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
 mod band;
+mod bodies;
 mod check;
 mod check_drives;
 mod dh;
@@ -14,10 +15,11 @@ mod drives;
 mod effects;
 mod error;
 mod numbers;
+mod screw;
 mod text;
 mod urdf;
-mod urdf_out;
 mod workspace;
+mod written;
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -28,10 +30,11 @@ use serde::{Deserialize, Serialize};
 
 pub use band::IdentifiedBand;
 pub use check::EFFECT_NAMES;
-pub use drives::Screw;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
-pub use urdf_out::Urdf;
+pub use screw::Screw;
+pub(crate) use urdf::is_placeholder;
+pub use urdf::{Original, Urdf};
 pub use workspace::Region;
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
@@ -51,6 +54,9 @@ pub const EDDA_TEMPLATE: &str = include_str!("../../robots/edda.toml");
 
 /// The Stäubli TX40 with its coupled wrist, as its published recording needs it.
 pub const TX40: &str = include_str!("../../robots/tx40.toml");
+
+/// The double pendulum of the DFKI whose public recordings the project reproduces.
+pub const DOUBLE_PENDULUM: &str = include_str!("../../robots/double-pendulum.toml");
 
 /// The pendulum on a Dynamixel XL330 whose public recordings have a voltage and no current.
 pub const XL330: &str = include_str!("../../robots/xl330.toml");
@@ -254,6 +260,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
         "irp6" => Some(IRP6_TEMPLATE),
         "emps" => Some(EMPS),
         "tx40" => Some(TX40),
+        "double-pendulum" => Some(DOUBLE_PENDULUM),
         "xl330" => Some(XL330),
         _ => None,
     }
@@ -262,17 +269,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
 impl Robot {
     /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
-        let text = read_text(path)?;
-        let extension = path
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase);
-        match extension.as_deref() {
-            Some("toml") => Self::from_toml(&text, path),
-            Some("urdf") => Self::from_urdf(&text, path),
-            _ if text.trim_start().starts_with('<') => Self::from_urdf(&text, path),
-            _ => Self::from_toml(&text, path),
-        }
+        Ok(Description::load(path)?.robot)
     }
 
     /// Reads TOML text; `path` only names the source in messages.
@@ -291,12 +288,59 @@ impl Robot {
 
     /// The description as TOML with units in comments; [`Robot::from_toml`] reads it back equal.
     pub fn to_toml(&self) -> Result<String, RobotError> {
-        text::write(self)
+        written::write(self)
     }
 
     /// Index (from 0) of the joint called `name`.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)
+    }
+}
+
+/// A file that describes a robot.
+#[derive(Debug)]
+pub struct Description {
+    /// The robot.
+    pub robot: Robot,
+    /// The file itself, where it is URDF.
+    pub urdf: Option<Original>,
+    /// What the user should know, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+impl Description {
+    /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
+    ///
+    /// # Errors
+    /// [`RobotError`]: what is wrong with the file, by line.
+    pub fn load(path: &Path) -> Result<Self, RobotError> {
+        let text = read_text(path)?;
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        let urdf = match extension.as_deref() {
+            Some("toml") => false,
+            Some("urdf") => true,
+            _ => text.trim_start().starts_with('<'),
+        };
+        if !urdf {
+            let robot = Robot::from_toml(&text, path)?;
+            return Ok(Self {
+                remarks: robot.implausible_bodies(None),
+                robot,
+                urdf: None,
+            });
+        }
+        let original = Original::read(text, path)?;
+        let robot = original.robot().clone();
+        let mut remarks = original.remarks().to_vec();
+        remarks.extend(robot.implausible_bodies(Some(&original)));
+        Ok(Self {
+            robot,
+            urdf: Some(original),
+            remarks,
+        })
     }
 }
 

@@ -21,6 +21,9 @@ pub use step::Stepper;
 /// Bandwidth of the controller that stands in where the description has none, Hz.
 pub const STAND_IN_BANDWIDTH: f64 = 5.0;
 
+/// Share of the largest inertia below which one is rounding.
+const NO_INERTIA: f64 = 1e-12;
+
 /// Why a motion could not be simulated.
 #[derive(Debug, Error)]
 pub enum SimulateError {
@@ -42,9 +45,9 @@ pub enum SimulateError {
         /// From 1 at the base.
         joint: usize,
     },
-    /// A joint's inertial parameters are unknown.
+    /// A joint has nothing to move.
     #[error(
-        "joint \"{joint}\" has no [joint.inertial] and no drive inertia, so it cannot be simulated; `rig identify` writes a description that can."
+        "joint \"{joint}\" has no inertia to move, so it cannot be simulated: neither its link nor what follows has any about its axis, nor has its drive. Give the link mass and inertia, or the drive a rotor_inertia; `rig identify` writes a description that can."
     )]
     NoInertia {
         /// The joint's name.
@@ -230,6 +233,11 @@ pub fn controllers(
     let n = robot.joints.len();
     let mut mass = vec![0.0; n * n];
     model.inertia_matrix(q, &mut mass)?;
+    if let Some(light) = massless(&mass, n) {
+        return Err(SimulateError::NoInertia {
+            joint: robot.joints[light].name.clone(),
+        });
+    }
     let mut stand_ins = Vec::new();
     let mut list = Vec::with_capacity(n);
     for (i, joint) in robot.joints.iter().enumerate() {
@@ -238,11 +246,6 @@ pub fn controllers(
             continue;
         }
         let inertia = mass[i * n + i];
-        if inertia.is_nan() || inertia <= 0.0 {
-            return Err(SimulateError::NoInertia {
-                joint: joint.name.clone(),
-            });
-        }
         let omega = core::f64::consts::TAU * STAND_IN_BANDWIDTH;
         stand_ins.push(joint.name.clone());
         list.push(Controller {
@@ -252,6 +255,26 @@ pub fn controllers(
         });
     }
     Ok((list, stand_ins))
+}
+
+/// The joint, from the tip, that has next to nothing to move while the joints behind it are free: its pivot of the inertia
+/// matrix (n × n, row-major), which the elimination from the tip leaves (Featherstone 2008, sec. 7.3), is rounding.
+fn massless(mass: &[f64], n: usize) -> Option<usize> {
+    let largest = (0..n).map(|i| mass[i * n + i]).fold(0.0, f64::max);
+    let mut left = mass.to_vec();
+    for k in (0..n).rev() {
+        let pivot = left[k * n + k];
+        if pivot.is_nan() || pivot <= NO_INERTIA * mass[k * n + k].max(largest) {
+            return Some(k);
+        }
+        for i in 0..k {
+            let share = left[i * n + k] / pivot;
+            for j in 0..k {
+                left[i * n + j] -= share * left[k * n + j];
+            }
+        }
+    }
+    None
 }
 
 /// What drives a simulation, sample by sample.

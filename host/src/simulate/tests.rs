@@ -378,3 +378,42 @@ fn the_side_of_the_friction_changes_the_twist_but_not_the_steady_speed() {
         assert!((spring - share * 1.2).abs() < 1e-6, "{share}: {spring}");
     }
 }
+
+#[test]
+fn a_link_without_inertia_is_named_whatever_the_controllers() {
+    let named = |robot: &Robot, q: &[f64]| {
+        let model = Model::from_robot(robot).unwrap();
+        controllers(robot, &model, q)
+            .map(|_| ())
+            .map_err(|e| e.to_string())
+    };
+    let mut robot = double_pendulum(0.1);
+    assert_eq!(named(&robot, &[0.3, 0.2]), Ok(()));
+    // A point on its own axis.
+    let tip = robot.joints[1].inertial.as_mut().unwrap();
+    (tip.first_moment, tip.inertia) = ([0.0; 3], [0.0; 6]);
+    let controller = Controller {
+        position_gain: 10.0,
+        velocity_gain: 20.0,
+        torque_gain: 0.1,
+    };
+    let said = named(&robot, &[0.3, 0.2]).unwrap_err();
+    assert!(
+        said.contains("joint \"second\" has no inertia to move"),
+        "{said}"
+    );
+    for joint in &mut robot.joints {
+        joint.controller = Some(controller.clone());
+    }
+    assert!(
+        named(&robot, &[0.3, 0.2])
+            .unwrap_err()
+            .contains("\"second\"")
+    );
+    robot.joints[1].drive = Some(crate::robot::Drive {
+        gear_ratio: 50.0,
+        rotor_inertia: 1e-6,
+        ..Default::default()
+    });
+    assert_eq!(named(&robot, &[0.3, 0.2]), Ok(()));
+}

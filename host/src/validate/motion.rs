@@ -59,7 +59,7 @@ pub(super) fn check(
             Some(controller) => controllers.push(controller.clone()),
             None => {
                 return not(format!(
-                    "The description has no controller for joint {}; add its [joint.controller] table.",
+                    "The description has no controller for joint {}; with [joint.controller] tables, and references ref<k> in the recording, the closed loop is simulated.",
                     joint.name
                 ));
             }

@@ -125,7 +125,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 | Implausible::VelocityScale { joint, .. }
                 | Implausible::EffortTooLarge { joint, .. }
                 | Implausible::EffortTooSmall { joint, .. } => *joint,
-                Implausible::Milliseconds { .. } => continue,
+                Implausible::Milliseconds { .. } | Implausible::ReferenceScale { .. } => continue,
             };
             let joint = joint.saturating_sub(1);
             if found.iter().any(|(j, _)| *j == joint) {

@@ -16,13 +16,20 @@ mod model;
 mod names;
 mod rows;
 mod senses;
+mod swaps;
 
 #[cfg(test)]
 mod tests;
 
 use super::outcome::DataFault;
+use super::runs::runs_of_blocks;
 use super::{DiagnoseError, Run};
+use crate::data::Source;
+use crate::prepare::{LowPass, PrepareError};
 use crate::robot::Robot;
+
+/// Cut-off of the positions that are judged, Hz.
+const BAND: f64 = 20.0;
 
 /// What is wrong with each recording; empty where all is well.
 ///
@@ -60,6 +67,45 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
         }
         found.extend(of_one(robot, &own)?);
     }
+    Ok(found)
+}
+
+/// What is wrong with the beginning of a recording, its first `rows` rows, before it is fitted: signs, units, ratios, clocks
+/// and columns in each other's place. Saturation and rest are for the fit itself, which leaves such rows out.
+///
+/// # Errors
+/// What reading gives, and [`DiagnoseError::Model`].
+pub fn faults_at_start(
+    robot: &Robot,
+    source: &Source,
+    rows: usize,
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let sampling = source.sampling();
+    let rate = 1.0 / sampling.period;
+    // Irregular rows have no derivative before they are resampled.
+    let Some(low_pass) =
+        LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate).filter(|_| !sampling.irregular)
+    else {
+        return Ok(Vec::new());
+    };
+    let mut left = rows;
+    let blocks = source.blocks(rows).map_while(|block| {
+        if left == 0 {
+            return None;
+        }
+        if let Ok(block) = &block {
+            left = left.saturating_sub(block.len());
+        }
+        Some(block.map_err(|error| PrepareError::Read(error.to_string()).into()))
+    });
+    let label = source.path().display().to_string();
+    let runs = runs_of_blocks(blocks, &label, 0, rate, &low_pass)?;
+    let own: Vec<&Run> = runs.iter().collect();
+    if own.is_empty() || columns::too_short(&own).is_some() {
+        return Ok(Vec::new());
+    }
+    let mut found = faults(robot, &runs)?;
+    found.retain(|fault| !["saturation", "not-moving", "too-short"].contains(&fault.kind.as_str()));
     Ok(found)
 }
 

@@ -13,18 +13,18 @@ use crate::identify::{chain_of, preference};
 use crate::robot::{JointKind, Robot};
 
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
-const POOR: f64 = 0.1;
+pub(super) const POOR: f64 = 0.1;
 /// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
 const BETTER: f64 = 0.35;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
 const MUCH_BETTER: f64 = 0.2;
-const GOOD: f64 = 0.2;
+pub(super) const GOOD: f64 = 0.2;
 /// Shifts up to this belong to filters and buses, not to clocks, s.
 const SHIFT: f64 = 0.1;
 /// Farthest shift that is tried, s; no more than a quarter of the recording.
 const FARTHEST: f64 = 5.0;
 /// Rows of one trial of several joints.
-const TRIAL: usize = 500;
+pub(super) const TRIAL: usize = 500;
 
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
@@ -32,7 +32,7 @@ pub(super) struct Judge<'a> {
     runs: &'a [&'a Run],
     pub(super) chain: ChainBatch,
     pub(super) rows: Rows,
-    order: Vec<usize>,
+    pub(super) order: Vec<usize>,
     matrices: Vec<DMatrix<f64>>,
     pub(super) fits: Vec<Option<Fit>>,
 }
@@ -72,6 +72,10 @@ impl<'a> Judge<'a> {
         if !clipped.is_empty() {
             return Ok(clipped);
         }
+        let mixed = self.mixed()?;
+        if let Some(swap) = mixed.as_ref().filter(|m| m.is_swap()) {
+            return Ok(vec![self.said(swap)]);
+        }
         let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();
         if !shifted.is_empty() {
             return Ok(shifted);
@@ -88,6 +92,9 @@ impl<'a> Judge<'a> {
             {
                 found.push(fault);
             }
+        }
+        if let (true, Some(turned)) = (found.is_empty(), mixed) {
+            found.push(self.said(&turned));
         }
         Ok(found)
     }

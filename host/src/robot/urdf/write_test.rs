@@ -7,10 +7,10 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
 
-use super::super::{IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind, Robot, TX40};
+use crate::robot::{IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind, Robot, TX40};
 
 /// A body of eight mass points.
-fn body(rng: &mut Pcg64) -> Inertial {
+pub(in crate::robot) fn body(rng: &mut Pcg64) -> Inertial {
     let mut inertial = Inertial {
         mass: 0.0,
         first_moment: [0.0; 3],

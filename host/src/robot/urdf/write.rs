@@ -7,12 +7,14 @@
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
-use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 use rig_shared::multibody::column;
 use rig_shared::transmission::DriveKind;
 
-use super::dh::{GRAVITY, step};
-use super::{Joint, JointKind, Robot, RobotError};
+use super::SpatialInertia;
+use crate::robot::dh::{GRAVITY, step};
+use crate::robot::error::RobotError;
+use crate::robot::{Joint, JointKind, Robot};
 
 /// Written where the description has no limit: URDF demands one.
 const NO_LIMIT: f64 = 1e6;
@@ -43,10 +45,11 @@ impl Robot {
         };
         let mut body = String::new();
         let base = name("base_link".into());
-        let tilt = self.base_tilt(&mut remarks);
+        let tilt = levelled(Vector3::from(self.gravity), &mut remarks);
         // Writing to a String cannot fail.
         let _ = writeln!(body, "  <link name=\"{base}\"/>");
         if let Some(rotation) = tilt {
+            remarks.push(format!("Gravity is not along -z of {base}: link world is level, and the joint {} holds how {base} stands in it.", self.fixed_name()));
             let world = name("world".into());
             let _ = writeln!(body, "  <link name=\"{world}\"/>");
             let _ = writeln!(
@@ -82,37 +85,15 @@ impl Robot {
             parent = link;
         }
         self.write_transmissions(&mut body);
-        self.leave_out(&parameters, &mut remarks);
+        self.left_out(&parameters, &mut remarks);
         let mut text = String::from("<?xml version=\"1.0\"?>\n");
         for remark in &remarks {
-            // Two dashes would end the comment.
-            let _ = writeln!(text, "<!-- {} -->", remark.replace("--", "- -"));
+            let _ = writeln!(text, "{}", comment(remark));
         }
         let _ = writeln!(text, "<robot name=\"{}\">", escaped(&self.name));
         text.push_str(&body);
         text.push_str("</robot>\n");
         Ok(Urdf { text, remarks })
-    }
-
-    /// The base in a world whose gravity points along −z; none where it does already.
-    fn base_tilt(&self, remarks: &mut Vec<String>) -> Option<Rotation3<f64>> {
-        let gravity = Vector3::from(self.gravity);
-        let size = gravity.norm();
-        if (size - GRAVITY).abs() > 1e-9 {
-            remarks.push(format!(
-                "URDF states no gravity, and its readers assume {GRAVITY} m/s^2 along -z; this description has {size} m/s^2: set it in the program that loads the file."
-            ));
-        }
-        let down = Unit::try_new(gravity, 1e-12)?;
-        if down.x == 0.0 && down.y == 0.0 && down.z < 0.0 {
-            return None;
-        }
-        let turn = UnitQuaternion::rotation_between(&down, &-Vector3::z_axis())
-            // Upside down: any half turn about a level axis.
-            .unwrap_or_else(|| {
-                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-            });
-        Some(turn.to_rotation_matrix())
     }
 
     /// A name for the joint between world and base that no joint of the robot has.
@@ -138,89 +119,59 @@ impl Robot {
             );
         }
     }
-
-    /// Says what the file does not hold.
-    fn leave_out(
-        &self,
-        parameters: &[[f64; rig_shared::multibody::COLUMNS]],
-        remarks: &mut Vec<String>,
-    ) {
-        let list = |place: usize, unit: fn(JointKind) -> &'static str| {
-            let entries: Vec<String> = self
-                .joints
-                .iter()
-                .zip(parameters)
-                .filter(|(_, row)| row[place] != 0.0)
-                .map(|(joint, row)| format!("{} {:?} {}", joint.name, row[place], unit(joint.kind)))
-                .collect();
-            (!entries.is_empty()).then(|| entries.join(", "))
-        };
-        let inertia = |kind| match kind {
-            JointKind::Revolute => "kg*m^2",
-            JointKind::Prismatic => "kg",
-        };
-        let torque = |kind: JointKind| kind.units().1;
-        if let Some(entries) = list(column::DRIVE_INERTIA, inertia) {
-            remarks.push(format!("URDF has no place for the inertia of the drives, seen at the joints: {entries}; give it to the simulator as armature or rotor inertia."));
-        }
-        if let Some(entries) = list(column::OFFSET, torque) {
-            remarks.push(format!(
-                "URDF has no place for constant torques at the joints: {entries}."
-            ));
-        }
-        let coupled: Vec<&str> = self
-            .joints
-            .iter()
-            .zip(self.drive_kinds())
-            .filter(|(_, kind)| *kind != DriveKind::Simple)
-            .map(|(joint, _)| joint.name.as_str())
-            .collect();
-        if !coupled.is_empty() {
-            remarks.push(format!("URDF has no place for drives that move several joints or do so at a changing ratio: {}; inertia and friction of their motors beyond the joints' own are left out.", coupled.join(", ")));
-        }
-        if !self.effects.is_empty() {
-            remarks.push("URDF has no place for the effects beyond the standard model.".into());
-        }
-    }
 }
 
-fn write_link(out: &mut String, joint: &Joint, link: &str) -> Result<(), RobotError> {
-    let refused = |why: &str| RobotError::NotUrdf {
-        joint: joint.name.clone(),
-        why: why.into(),
-    };
-    let Some(inertial) = &joint.inertial else {
-        return Err(refused(
-            "has no [joint.inertial], which URDF needs of every link that moves",
-        ));
-    };
-    let h = Vector3::from(inertial.first_moment);
-    if inertial.mass <= 0.0 && h != Vector3::zeros() {
-        return Err(refused(
-            "has a first moment but no mass, so it has no centre of mass, which URDF is written about",
+/// The frame of this gravity in a world where gravity points along −z; none where it does already.
+pub(super) fn levelled(gravity: Vector3<f64>, remarks: &mut Vec<String>) -> Option<Rotation3<f64>> {
+    let size = gravity.norm();
+    if (size - GRAVITY).abs() > 1e-9 {
+        remarks.push(format!(
+            "URDF states no gravity, and its readers assume {GRAVITY} m/s^2 along -z; this description has {size} m/s^2: set it in the program that loads the file."
         ));
     }
-    let centre = if inertial.mass > 0.0 {
-        h / inertial.mass
-    } else {
-        Vector3::zeros()
-    };
-    let [xx, xy, xz, yy, yz, zz] = inertial.inertia;
-    let about_origin = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let steiner = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
-    let i = about_origin - steiner * inertial.mass;
-    let _ = writeln!(
-        out,
-        "  <link name=\"{link}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{:?}\"/>\n      <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n    </inertial>\n  </link>",
+    let down = Unit::try_new(gravity, 1e-12)?;
+    if down.x == 0.0 && down.y == 0.0 && down.z < 0.0 {
+        return None;
+    }
+    let turn = UnitQuaternion::rotation_between(&down, &-Vector3::z_axis())
+        // Upside down: any half turn about a level axis.
+        .unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        });
+    Some(turn.to_rotation_matrix())
+}
+
+/// `<inertial>` of a body about its centre of mass, in lines that begin with `indent`.
+///
+/// # Errors
+/// What stands in the way, as the rest of a sentence about the joint.
+pub(super) fn inertial_element(body: &SpatialInertia, indent: &str) -> Result<String, String> {
+    let (centre, i) = body.about_centre().ok_or(
+        "has a first moment but no mass, so it has no centre of mass, which URDF is written about",
+    )?;
+    Ok(format!(
+        "<inertial>\n{indent}  <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n{indent}  <mass value=\"{:?}\"/>\n{indent}  <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n{indent}</inertial>",
         three(&centre),
-        inertial.mass,
+        body.mass,
         i.m11,
         i.m12,
         i.m13,
         i.m22,
         i.m23,
         i.m33
-    );
+    ))
+}
+
+fn write_link(out: &mut String, joint: &Joint, link: &str) -> Result<(), RobotError> {
+    let refused = |why: String| RobotError::NotUrdf {
+        joint: joint.name.clone(),
+        why,
+    };
+    let inertial = joint.inertial.as_ref().ok_or_else(|| {
+        refused("has no [joint.inertial], which URDF needs of every link that moves".into())
+    })?;
+    let element = inertial_element(&SpatialInertia::of(inertial), "    ").map_err(refused)?;
+    let _ = writeln!(out, "  <link name=\"{link}\">\n    {element}\n  </link>");
     Ok(())
 }
 
@@ -290,7 +241,7 @@ fn write_joint(
 }
 
 /// Fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
-fn rpy(rotation: &Rotation3<f64>) -> String {
+pub(super) fn rpy(rotation: &Rotation3<f64>) -> String {
     let r = rotation.matrix();
     let level = r.m32.hypot(r.m33);
     let pitch = (-r.m31).atan2(level);
@@ -308,8 +259,17 @@ fn three(v: &Vector3<f64>) -> String {
     format!("{:?} {:?} {:?}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
 }
 
+/// An XML comment; two dashes would end it.
+pub(super) fn comment(text: &str) -> String {
+    let mut text = text.to_owned();
+    while text.contains("--") {
+        text = text.replace("--", "- -");
+    }
+    format!("<!-- {text} -->")
+}
+
 /// Text for an XML attribute.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -327,5 +287,5 @@ fn escaped(text: &str) -> String {
 }
 
 #[cfg(test)]
-#[path = "urdf_out_test.rs"]
-mod tests;
+#[path = "write_test.rs"]
+pub(in crate::robot) mod tests;

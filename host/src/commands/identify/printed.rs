@@ -1,0 +1,107 @@
+//! What `rig identify` says on the terminal.
+
+use super::super::ui::Ui;
+use crate::identify::{Estimator, Identification, NotExcited, StandardSet};
+use crate::report::format_value;
+
+/// The result at a glance.
+pub(super) fn print(ui: &Ui, result: &Identification) {
+    let width = result
+        .base_parameters
+        .iter()
+        .map(|p| p.expression.chars().count())
+        .max()
+        .unwrap_or(0);
+    for parameter in &result.base_parameters {
+        ui.say(&format!(
+            "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
+            parameter.expression,
+            format_value(parameter.value, parameter.std),
+            parameter.unit,
+            parameter.interval[0],
+            parameter.interval[1],
+        ));
+    }
+    for joint in &result.joints {
+        let holdout = match joint.holdout_relative_error {
+            None => String::new(),
+            Some(error) if error.is_nan() => ", no row of the hold-out left to judge by".to_owned(),
+            Some(error) => format!(", {:.2} % on the hold-out", 100.0 * error),
+        };
+        if joint.train_residual_rms.is_nan() {
+            ui.say(&format!(
+                "{}: none of its torque was used{holdout}",
+                joint.name
+            ));
+            continue;
+        }
+        ui.say(&format!(
+            "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
+            joint.name,
+            joint.train_residual_rms,
+            100.0 * joint.train_relative_error,
+        ));
+    }
+    if result.estimator != Estimator::Consistent
+        && let Some(set) = &result.standard_parameters
+    {
+        ui.say(&of_the_files(set));
+    }
+    for line in not_excited(&result.not_excited) {
+        ui.say(&line);
+    }
+    for sentence in &result.procedure {
+        ui.say(sentence);
+    }
+    if let Some(comparison) = &result.comparison {
+        ui.say(&comparison.recommendation);
+    }
+    for warning in &result.warnings {
+        ui.remark(warning);
+    }
+}
+
+/// What the set that is written leaves, where that is not what was fitted.
+fn of_the_files(set: &StandardSet) -> String {
+    let percent = |errors: &[f64]| {
+        let list: Vec<String> = errors.iter().map(|e| format!("{:.1}", 100.0 * e)).collect();
+        list.join(", ")
+    };
+    let held = set.holdout_relative_error.as_ref();
+    let held = held.map_or(String::new(), |errors| {
+        format!(", on the hold-out {} %", percent(errors))
+    });
+    format!(
+        "identified.toml and identified.urdf hold the nearest set that bodies can have (--estimator consistent fits it): it leaves {} % of the torque{held}.",
+        percent(&set.train_relative_error)
+    )
+}
+
+/// One line for each motion that would show more, with all that it would show.
+fn not_excited(list: &[NotExcited]) -> Vec<String> {
+    let mut by_motion: Vec<(&str, Vec<&NotExcited>)> = Vec::new();
+    for missing in list {
+        match by_motion
+            .iter_mut()
+            .find(|(motion, _)| *motion == missing.motion)
+        {
+            Some((_, own)) => own.push(missing),
+            None => by_motion.push((&missing.motion, vec![missing])),
+        }
+    }
+    let lines = by_motion.iter().map(|(motion, own)| match own.as_slice() {
+        [missing] => format!(
+            "not excited: {} ({}); {motion}",
+            missing.combination, missing.why
+        ),
+        several => {
+            let names: Vec<&str> = several.iter().map(|m| m.combination.as_str()).collect();
+            format!("not excited: {}; {motion}", names.join("; "))
+        }
+    });
+    let mut lines: Vec<String> = lines.collect();
+    if by_motion.iter().any(|(_, own)| own.len() > 1) {
+        lines.push("How well these data alone know each of them stands in the report.".into());
+    }
+    lines
+}

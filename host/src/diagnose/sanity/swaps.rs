@@ -1,0 +1,289 @@
+//! Columns of two joints that stand in each other's place, and columns counted the other way round.
+//!
+//! Each such fault is undone in turn and the torques of all joints are explained anew; what makes the data by far the most
+//! likely is named.
+
+use nalgebra::DMatrix;
+use rig_shared::multibody::column;
+
+use super::super::DiagnoseError;
+use super::super::outcome::DataFault;
+use super::fit::{Fit, about_mean};
+use super::model::{GOOD, Judge, POOR, TRIAL, model_error};
+use super::rows::Rows;
+use crate::batch::ModelBatch;
+use crate::identify::chain_of;
+use crate::robot::Joint;
+
+/// Rise of the logarithm of the residuals' variances, summed over the joints, from which on an undone fault is believed: as
+/// if one joint's variance fell to a tenth. A description may be far off, and a fault undone may by chance bring it nearer.
+const CONVINCING_TO_DESCRIPTION: f64 = 2.3;
+/// The same where all parameters are fitted, so that only the model's form speaks: a fall to less than a quarter.
+const CONVINCING_TO_FIT: f64 = 1.5;
+/// Joints that move less than this share of the widest do not count, rad or m.
+const STILL: f64 = 1e-4;
+
+/// What may have been done to the columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Mixed {
+    /// Torques of two joints swapped.
+    Torques([usize; 2]),
+    /// Positions of two joints swapped.
+    Positions([usize; 2]),
+    /// A torque counted the other way round.
+    Torque(usize),
+    /// A position counted the other way round.
+    Position(usize),
+}
+
+/// A fault, and shares of the torques' variance that are left of the joints it concerns, as recorded and without it.
+pub(super) struct Found {
+    pub(super) mixed: Mixed,
+    gain: f64,
+    left: [f64; 2],
+    /// Whether the other columns of the same joints would explain it, too.
+    twin: bool,
+}
+
+impl Judge<'_> {
+    /// The one that explains the recording, where there is one.
+    pub(super) fn mixed(&self) -> Result<Option<Found>, DiagnoseError> {
+        let rows = self.rows.thinned(TRIAL);
+        let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();
+        let widest = ranges.iter().copied().fold(0.0, f64::max);
+        let moving: Vec<usize> = (0..ranges.len())
+            .filter(|j| ranges[*j] > STILL * widest)
+            .collect();
+        if self.robot.joints.len() < 2 {
+            return Ok(None);
+        }
+        let before = self.left(&rows)?;
+        if moving.iter().all(|j| before[*j] <= POOR) {
+            return Ok(None);
+        }
+        let mut all: Vec<Found> = Vec::new();
+        for mixed in candidates(&moving) {
+            let after = self.left(&self.undone(&rows, mixed))?;
+            let concerned: Vec<usize> = match mixed {
+                Mixed::Torques(pair) | Mixed::Positions(pair) => pair.to_vec(),
+                Mixed::Torque(j) | Mixed::Position(j) => vec![j],
+            };
+            let mean = |left: &[f64]| {
+                concerned.iter().map(|j| left[*j]).sum::<f64>() / concerned.len() as f64
+            };
+            let gain = moving
+                .iter()
+                .map(|j| (before[*j].max(EXACT) / after[*j].max(EXACT)).ln())
+                .sum();
+            all.push(Found {
+                mixed,
+                gain,
+                left: [mean(&before), mean(&after)],
+                twin: false,
+            });
+        }
+        let enough = if self.stated() {
+            CONVINCING_TO_DESCRIPTION
+        } else {
+            CONVINCING_TO_FIT
+        };
+        all.retain(|found| found.convinces(enough));
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut all = all.into_iter();
+        Ok(all.next().map(|best| Found {
+            twin: all.any(|other| other.is_twin(&best)),
+            ..best
+        }))
+    }
+
+    /// As a fault of the recording.
+    pub(super) fn said(&self, found: &Found) -> DataFault {
+        let [recorded, without] = found.left.map(|share| 100.0 * share);
+        let model = format!(
+            "the model leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %"
+        );
+        let swapped = |column: &str, other: &str, [i, j]: [usize; 2]| {
+            let (a, b) = (i + 1, j + 1);
+            let or = match found.twin {
+                true => format!(" (or {other}{a} and {other}{b})"),
+                false => String::new(),
+            };
+            self.say(
+                "swap",
+                i,
+                format!("{column}{a} and {column}{b}{or} stand in each other's columns: swapped, {model}; give each its own."),
+            )
+        };
+        let turned = |column: &str, other: &str, j: usize| {
+            let n = j + 1;
+            let or = match found.twin {
+                true => format!(" (or {other}{n})"),
+                false => String::new(),
+            };
+            self.say(
+                "sign",
+                j,
+                format!(
+                    "{column}{n}{or} is counted the other way round: reversed, {model}; reverse it."
+                ),
+            )
+        };
+        match found.mixed {
+            Mixed::Torques(pair) => swapped("tau", "q", pair),
+            Mixed::Positions(pair) => swapped("q", "tau", pair),
+            Mixed::Torque(j) => turned("tau", "q", j),
+            Mixed::Position(j) => turned("q", "tau", j),
+        }
+    }
+
+    /// Rows without the fault.
+    fn undone(&self, rows: &Rows, mixed: Mixed) -> Rows {
+        let mut rows = rows.clone();
+        let scale =
+            |column: &mut Vec<f64>, factor: f64| column.iter_mut().for_each(|v| *v *= factor);
+        match mixed {
+            Mixed::Torque(j) => scale(&mut rows.tau[j], -1.0),
+            Mixed::Position(j) => rows = rows.rescaled(Some(j), -1.0),
+            Mixed::Torques([i, j]) => {
+                // What was measured at the motors went through the ratio of the other joint.
+                let share = self.ratio(i) / self.ratio(j);
+                rows.tau.swap(i, j);
+                scale(&mut rows.tau[i], share);
+                scale(&mut rows.tau[j], 1.0 / share);
+            }
+            Mixed::Positions([i, j]) => {
+                let share = self.ratio(i) / self.ratio(j);
+                for columns in [&mut rows.q, &mut rows.qd, &mut rows.qdd] {
+                    columns.swap(i, j);
+                    scale(&mut columns[i], 1.0 / share);
+                    scale(&mut columns[j], share);
+                }
+            }
+        }
+        rows
+    }
+
+    fn ratio(&self, joint: usize) -> f64 {
+        self.robot.joints[joint].gear_ratio()
+    }
+
+    /// Whether the description states every link.
+    fn stated(&self) -> bool {
+        let stated = |j: &Joint| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0);
+        self.robot.joints.iter().all(stated)
+    }
+
+    /// Share of each torque's variance that is left: by the description as it stands where it states every link, which has few
+    /// numbers to fit, else by one set of parameters for all joints.
+    fn left(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+        if self.stated() {
+            self.left_of_description(rows)
+        } else {
+            self.left_of_parameters(rows)
+        }
+    }
+
+    fn left_of_parameters(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+        let (n, count) = (rows.tau.len(), rows.len());
+        let matrices = rows.regressors(&self.chain)?;
+        // A still torque has no variance to explain.
+        let size: Vec<f64> = (rows.tau.iter())
+            .map(|tau| {
+                about_mean(tau.iter().copied())
+                    .sqrt()
+                    .max(f64::MIN_POSITIVE)
+            })
+            .collect();
+        let width = matrices.first().map_or(0, DMatrix::ncols);
+        let whole = DMatrix::from_fn(n * count, width, |k, c| {
+            matrices[k / count][(k % count, c)] / size[k / count]
+        });
+        let torque: Vec<f64> = (rows.tau.iter().zip(&size))
+            .flat_map(|(tau, size)| tau.iter().map(move |v| v / size))
+            .collect();
+        let Some(fit) = Fit::of(&whole, &torque, &self.order) else {
+            return Ok(vec![1.0; n]);
+        };
+        let own = |j: usize| fit.residual.rows(j * count, count).norm_squared();
+        Ok((0..n).map(own).collect())
+    }
+
+    fn left_of_description(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+        let (n, count) = (self.robot.joints.len(), rows.len());
+        let mut parameters = self.robot.standard_parameters();
+        for row in &mut parameters {
+            row[column::VISCOUS..].fill(0.0);
+        }
+        let chain = chain_of(self.robot).map_err(model_error)?;
+        let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
+        let mut all = vec![0.0; n * count];
+        model
+            .inverse_dynamics(&rows.q, &rows.qd, &rows.qdd, &mut all)
+            .map_err(model_error)?;
+        let share = |j: usize| {
+            let qd = &rows.qd[j];
+            let friction = DMatrix::from_fn(count, 3, |k, c| match c {
+                0 => qd[k],
+                1 if qd[k] == 0.0 => 0.0,
+                1 => qd[k].signum(),
+                _ => 1.0,
+            });
+            let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j * count..]))
+                .map(|(tau, own)| tau - own)
+                .collect();
+            let total = about_mean(rows.tau[j].iter().copied()).max(f64::MIN_POSITIVE);
+            let squares = Fit::of(&friction, &rest, &[2, 1, 0]).map_or_else(
+                || about_mean(rest.iter().copied()),
+                |fit| fit.residual.norm_squared(),
+            );
+            squares / total
+        };
+        Ok((0..n).map(share).collect())
+    }
+}
+
+/// Shares below this count as this: data without noise have no scale.
+const EXACT: f64 = 1e-6;
+
+impl Found {
+    /// Whether the recording is poor as it stands, good without the fault, and by far the better.
+    fn convinces(&self, enough: f64) -> bool {
+        let [recorded, without] = self.left;
+        recorded > POOR && without < GOOD.max(0.2 * recorded).min(0.5) && self.gain > enough
+    }
+
+    /// Whether both say the same of torque and position of the same joints.
+    fn is_twin(&self, other: &Self) -> bool {
+        match (self.mixed, other.mixed) {
+            (Mixed::Torques(a), Mixed::Positions(b)) | (Mixed::Positions(a), Mixed::Torques(b)) => {
+                a == b
+            }
+            (Mixed::Torque(a), Mixed::Position(b)) | (Mixed::Position(a), Mixed::Torque(b)) => {
+                a == b
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether two joints' columns are swapped.
+    pub(super) fn is_swap(&self) -> bool {
+        matches!(self.mixed, Mixed::Torques(_) | Mixed::Positions(_))
+    }
+}
+
+fn range(values: &[f64]) -> f64 {
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most - values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// All faults of these joints.
+fn candidates(moving: &[usize]) -> Vec<Mixed> {
+    let mut all = Vec::new();
+    for (k, &i) in moving.iter().enumerate() {
+        all.extend([Mixed::Torque(i), Mixed::Position(i)]);
+        for &j in &moving[k + 1..] {
+            all.extend([Mixed::Torques([i, j]), Mixed::Positions([i, j])]);
+        }
+    }
+    all
+}

@@ -1,0 +1,153 @@
+//! An arm with one joint locked.
+
+use super::arms::{Chance, arm};
+use super::*;
+use rig_shared::multibody::inverse_dynamics;
+
+/// Sums of sines; joint `locked` stands, and its brake carries what nobody knows.
+fn record(robot: &Robot, locked: usize, seed: u64) -> InMemory {
+    let mut chance = Chance::new(seed);
+    let n = robot.joints.len();
+    let chain = chain_of(robot).unwrap();
+    let terms: Vec<Vec<[f64; 3]>> = (0..n)
+        .map(|_| {
+            (0..4)
+                .map(|k| {
+                    [
+                        0.5 / (1.0 + k as f64),
+                        1.1 * (k as f64 + 1.0) + 0.3 * chance.even(),
+                        3.0 * chance.even(),
+                    ]
+                })
+                .collect()
+        })
+        .collect();
+    let mut block = Block {
+        joints: vec![JointColumns::default(); n],
+        first_line: 2,
+        ..Default::default()
+    };
+    let mut tau = vec![0.0; n];
+    for k in 0..20_000 {
+        let t = k as f64 * 2e-3;
+        let mut state = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for (j, own) in terms.iter().enumerate() {
+            for [a, w, p] in own {
+                let (s, c) = (w * t + p).sin_cos();
+                state[0][j] += a * s;
+                state[1][j] += a * w * c;
+                state[2][j] -= a * w * w * s;
+            }
+        }
+        (state[0][locked], state[1][locked], state[2][locked]) = (0.4, 0.0, 0.0);
+        inverse_dynamics(
+            &chain,
+            &robot.standard_parameters(),
+            &state[0],
+            &state[1],
+            &state[2],
+            &mut tau,
+        )
+        .unwrap();
+        tau[locked] = 7.0 * (0.3 * t).sin();
+        block.t.push(t);
+        for j in 0..n {
+            let noise = if j == locked {
+                0.0
+            } else {
+                1e-6 * chance.normal()
+            };
+            block.joints[j].q.push(state[0][j] + noise);
+            block.joints[j].tau.push(tau[j] + 0.02 * chance.normal());
+        }
+    }
+    InMemory {
+        label: "locked".into(),
+        blocks: vec![block],
+    }
+}
+
+#[test]
+fn an_arm_is_identified_beside_a_joint_that_stands_still() {
+    let robot = arm(4, 3);
+    let mut truth = robot.standard_parameters().concat();
+    truth.extend(robot.motor_parameters().concat());
+    for locked in [0, 1, 3] {
+        let [training, holdout] = [1, 2].map(|seed| record(&robot, locked, seed));
+        for estimator in [Estimator::Weighted, Estimator::Ridge, Estimator::Consistent] {
+            for model in [ModelKind::Differential, ModelKind::Integral] {
+                let options = Options {
+                    estimator,
+                    model,
+                    ..Default::default()
+                };
+                let found = identify(&robot, &[&training], &[&holdout], &options).unwrap();
+                let name = &robot.joints[locked].name;
+                assert!(
+                    found
+                        .warnings
+                        .iter()
+                        .any(|w| w.starts_with(&format!("Joint {name} stands still at 0.4"))),
+                    "{:?}",
+                    found.warnings
+                );
+                for (j, figures) in found.joints.iter().enumerate() {
+                    if j == locked {
+                        assert!(
+                            figures.train_residual_rms.is_nan()
+                                && figures.holdout_residual_rms.is_none()
+                        );
+                        continue;
+                    }
+                    // At the noise, whose white 0.02 the low-pass makes smaller.
+                    assert!(
+                        figures.holdout_residual_rms.unwrap() < 0.02,
+                        "{locked} {estimator:?} {model:?}: {figures:?}"
+                    );
+                }
+                let combination = &found.details.combination;
+                let far = (0..combination.nrows()).filter(|&k| {
+                    let meant: f64 = combination
+                        .row(k)
+                        .iter()
+                        .zip(&truth)
+                        .map(|(k, p)| k * p)
+                        .sum();
+                    let parameter = &found.base_parameters[k];
+                    (parameter.value - meant).abs() > 4.0 * parameter.std
+                });
+                assert_eq!(far.count(), 0, "{locked} {estimator:?} {model:?}");
+                let own = format!("{}", locked + 1);
+                for friction in ["fv", "fc", "off", "Ia"] {
+                    assert!(
+                        found
+                            .base_parameters
+                            .iter()
+                            .all(|p| p.expression != format!("{friction}{own}")),
+                        "{friction}{own}"
+                    );
+                }
+                let (described, _) = identified_robot(&robot, &found);
+                for (row, joint) in described.standard_parameters().iter().zip(&robot.joints) {
+                    assert!(
+                        row[10] < 10.0,
+                        "drive inertia {} of {}",
+                        row[10],
+                        joint.name
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_in_which_nothing_moves_is_refused() {
+    let robot = arm(2, 3);
+    let mut still = record(&robot, 0, 1);
+    still.blocks[0].joints[1].q.fill(0.2);
+    let said = identify(&robot, &[&still], &[], &Options::default())
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("no other joint moves"), "{said}");
+}

@@ -1,0 +1,141 @@
+//! Bodies that cannot be, and those that can.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use crate::robot::{
+    Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot, TX40, XL330,
+};
+
+fn said(inertial: &str) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    let link = |name: &str, inertial: &str| {
+        format!("<link name='{name}'><inertial>{inertial}</inertial></link>")
+    };
+    let good = "<mass value='1'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/>";
+    let joint = |name: &str, parent: &str, child: &str, axis: &str| {
+        format!(
+            "<joint name='{name}' type='continuous'><parent link='{parent}'/><child link='{child}'/><axis xyz='{axis}'/></joint>"
+        )
+    };
+    let text = format!(
+        "<robot name='r'><link name='base'/>{}{}{}{}</robot>",
+        link("upper", good),
+        link("fore", inertial),
+        joint("shoulder", "base", "upper", "0 0 1"),
+        joint("elbow", "upper", "fore", "0 1 0"),
+    );
+    std::fs::write(&path, text).unwrap();
+    Description::load(&path).unwrap().remarks
+}
+
+#[test]
+fn what_no_body_has_is_named_by_link_and_joint() {
+    let inertia = |i: [f64; 3]| {
+        format!(
+            "<mass value='2'/><origin xyz='0.1 0.2 0.3' rpy='0.3 0.2 0.1'/><inertia ixx='{}' ixy='0' ixz='0' iyy='{}' iyz='0' izz='{}'/>",
+            i[0], i[1], i[2]
+        )
+    };
+    for (text, words) in [
+        (inertia([0.0, 0.0, 0.0]), "no inertia about its centre"),
+        (inertia([0.1, 0.1, 0.3]), "0.1000, 0.1000 and 0.3000 kg"),
+        (
+            inertia([0.1, -0.05, 0.1]),
+            "below zero about its centre of mass, −0.05000 kg",
+        ),
+        (
+            inertia([0.1, 0.2, 0.05]).replace("'2'", "'0'"),
+            "mass 0, but",
+        ),
+        (
+            inertia([0.0, 0.0, 0.0]).replace("'2'", "'0'"),
+            "neither mass nor",
+        ),
+    ] {
+        let said = said(&text);
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(
+            said[0].starts_with("Link `fore`, moved by joint `elbow`,") && said[0].contains(words),
+            "{words}: {said:?}"
+        );
+    }
+    // A thin plate by three digits, and a rod.
+    for possible in [[0.1, 0.2, 0.302], [0.1, 0.1, 0.0]] {
+        assert_eq!(said(&inertia(possible)), [""; 0]);
+    }
+}
+
+#[test]
+fn what_a_motion_does_not_show_may_stay_open() {
+    for text in [ONE_LINK_TEMPLATE, EDDA_TEMPLATE, IRP6_TEMPLATE, EMPS, XL330] {
+        let robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+        assert_eq!(robot.implausible_bodies(None), [""; 0], "{}", robot.name);
+    }
+    // As published: the last link is a point.
+    let tx40 = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
+    let said = tx40.implausible_bodies(None);
+    assert!(
+        said.len() == 1 && said[0].contains("joint `joint_6` has no inertia"),
+        "{said:?}"
+    );
+    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("r.toml")).unwrap();
+    // Less than its own mass at its centre of mass has about the axis.
+    robot.joints[0].inertial.as_mut().unwrap().inertia[5] = 0.01;
+    let said = robot.implausible_bodies(None);
+    assert!(
+        said.len() == 1 && said[0].contains("joint `link` has a moment of inertia of −0.0"),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn placeholders_of_exporters_are_no_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.urdf");
+    let load = |limit: &str| {
+        let text = format!(
+            "<robot name='r'><link name='base'/><link name='arm'><inertial><mass value='1'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial></link><joint name='one' type='revolute'><parent link='base'/><child link='arm'/><limit {limit}/></joint></robot>"
+        );
+        std::fs::write(&path, text).unwrap();
+        Description::load(&path)
+    };
+    for effort in ["0", "10000", "1e6", "99999", "2500000"] {
+        let read = load(&format!(
+            "lower='-1' upper='1' velocity='2' effort='{effort}'"
+        ))
+        .unwrap();
+        assert_eq!(read.robot.joints[0].limits.as_ref().unwrap().torque, None);
+        assert!(
+            read.remarks.len() == 1
+                && read.remarks[0].contains("joint `one` looks like a placeholder"),
+            "{:?}",
+            read.remarks
+        );
+    }
+    for effort in [87.0, 1000.0, 12000.0] {
+        let read = load(&format!(
+            "lower='-1' upper='1' velocity='2' effort='{effort}'"
+        ))
+        .unwrap();
+        assert_eq!(
+            read.robot.joints[0].limits.as_ref().unwrap().torque,
+            Some(effort)
+        );
+        assert_eq!(read.remarks, [""; 0]);
+    }
+    let read = load("lower='0' upper='0' velocity='0' effort='0'").unwrap();
+    assert_eq!(read.robot.joints[0].limits, None);
+    assert!(
+        read.remarks[0].contains("zero throughout"),
+        "{:?}",
+        read.remarks
+    );
+    assert!(
+        load("lower='-1' upper='1' velocity='2' effort='-3'")
+            .unwrap_err()
+            .to_string()
+            .contains("effort limit of joint `one` is -3")
+    );
+}

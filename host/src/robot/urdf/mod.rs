@@ -1,0 +1,69 @@
+//! URDF in and out.
+//!
+//! Leaves out: visuals, collision shapes, safety controllers and calibration, none of which enters the
+//! dynamics.
+
+mod edits;
+mod original;
+mod reader;
+mod remarks;
+mod spatial;
+mod tree;
+mod values;
+mod write;
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::error::RobotError;
+use super::{JointFriction, JointKind, JointLimits};
+use reader::{Reader, parsed};
+
+pub use original::Original;
+pub(super) use spatial::SpatialInertia;
+pub(crate) use values::is_placeholder;
+pub use write::Urdf;
+
+/// A joint and the body that it moves.
+#[derive(Debug)]
+pub(in crate::robot) struct Body {
+    pub joint: String,
+    /// The link that the joint moves.
+    pub link: String,
+    /// Links of this body that have an `<inertial>`: the one that the joint moves, and what is fixed to it.
+    pub heavy: Vec<String>,
+    pub kind: JointKind,
+    /// Frame of this joint (= of its child link) in the frame of the previous body at q = 0.
+    pub origin: Isometry3<f64>,
+    /// Unit vector of the axis in the joint's frame.
+    pub axis: Vector3<f64>,
+    /// In the joint's frame, with everything that is fixed to the link.
+    pub inertia: SpatialInertia,
+    pub limits: Option<JointLimits>,
+    pub friction: Option<JointFriction>,
+    pub reduction: Option<f64>,
+}
+
+/// The movable bodies from the base outwards; gravity is along −z of the base link.
+#[derive(Debug)]
+pub(in crate::robot) struct Chain {
+    pub name: String,
+    /// The base link.
+    pub base: String,
+    pub bodies: Vec<Body>,
+    /// What the user should know, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// Reads the text of a file; `path` only names it in messages.
+pub(super) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
+    let document = parsed(text, path)?;
+    Reader {
+        path,
+        document: &document,
+        remarks: RefCell::default(),
+    }
+    .chain()
+}

@@ -1,0 +1,263 @@
+//! A URDF file as its author wrote it, with other values in place of its own.
+//!
+//! What is not a value of the dynamics stays byte for byte: names, frames, meshes, comments, order. Values are turned
+//! into the file's own link frames. A body of several links that are fixed to each other has one inertia, which nothing
+//! divides: it stands in the link that the joint moves, and the others lose theirs.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rig_shared::multibody::column;
+use roxmltree::Document;
+
+use super::edits::{Edit, at, put_friction, put_inertia, spliced};
+use super::reader::{Xml, parsed};
+use super::spatial::SpatialInertia;
+use super::write::{comment, escaped, levelled, rpy};
+use super::{Chain, Urdf};
+use crate::robot::dh::convert;
+use crate::robot::error::RobotError;
+use crate::robot::{Inertial, Joint, Robot};
+
+/// Values that agree to this share of the largest of their kind are the same: what changing frames makes of them.
+const ROUNDING: f64 = 1e-12;
+/// Frames are those of the file where their parameters agree to this, rad and m.
+const SAME_FRAME: f64 = 1e-9;
+
+/// A URDF file, and the description that was read from it.
+#[derive(Debug)]
+pub struct Original {
+    text: String,
+    chain: Chain,
+    robot: Robot,
+    /// Frame 0 in the base link's frame.
+    base: Isometry3<f64>,
+    /// The frame of each moved link in its joint's frame of the description.
+    links: Vec<Isometry3<f64>>,
+}
+
+impl Original {
+    /// Reads the text of a file; `path` only names it in messages.
+    ///
+    /// # Errors
+    /// [`RobotError`], as [`Robot::from_urdf`].
+    pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
+        let chain = super::read(&text, path)?;
+        let converted = convert(&chain);
+        Ok(Self {
+            text,
+            chain,
+            robot: converted.robot,
+            base: converted.base,
+            links: converted.links,
+        })
+    }
+
+    /// The description.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// What the user should know of the file, one sentence each.
+    pub fn remarks(&self) -> &[String] {
+        &self.chain.remarks
+    }
+
+    /// The link that joint `joint` (from 0) moves.
+    pub fn link(&self, joint: usize) -> Option<&str> {
+        self.chain.bodies.get(joint).map(|body| body.link.as_str())
+    }
+
+    /// The file with the inertia and friction of `robot` wherever these differ from its own, and what it has no place for.
+    ///
+    /// Gravity of another direction than the file's puts a level link above the base link.
+    ///
+    /// # Errors
+    /// [`RobotError::NotUrdf`] where a joint of `robot` is not the file's, or its values cannot be written.
+    pub fn with_values(&self, robot: &Robot) -> Result<Urdf, RobotError> {
+        self.same_chain(robot)?;
+        let document = parsed(&self.text, Path::new(&self.chain.name))?;
+        let mut edits = Vec::new();
+        let mut remarks = Vec::new();
+        let (mut inertias, mut frictions) = (Vec::new(), Vec::new());
+        let (rows, before) = (
+            robot.standard_parameters(),
+            self.robot.standard_parameters(),
+        );
+        for (k, (joint, body)) in robot.joints.iter().zip(&self.chain.bodies).enumerate() {
+            if let Some(inertial) = &joint.inertial
+                && self.robot.joints[k]
+                    .inertial
+                    .as_ref()
+                    .is_none_or(|own| !same(own, inertial))
+            {
+                let seen = SpatialInertia::of(inertial).seen_from(&self.links[k].inverse());
+                let (link, merged) =
+                    put_inertia(&document, body, &seen, &mut edits).map_err(|why| {
+                        RobotError::NotUrdf {
+                            joint: joint.name.clone(),
+                            why,
+                        }
+                    })?;
+                inertias.push(link);
+                remarks.extend(merged);
+            }
+            let places = [column::VISCOUS, column::COULOMB];
+            let [new, old] = [&rows, &before].map(|rows| places.map(|place| rows[k][place]));
+            if new != old && put_friction(&document, &joint.name, new, &mut edits) {
+                frictions.push(joint.name.as_str());
+            }
+        }
+        let listed = |names: &[&str], what: &str| {
+            (!names.is_empty()).then(|| format!("{what} of {}", names.join(", ")))
+        };
+        let replaced: Vec<String> = [
+            listed(&inertias, "the inertial values"),
+            listed(&frictions, "damping and friction"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if !replaced.is_empty() {
+            remarks.insert(
+                0,
+                format!(
+                    "Replaced by those of the description \"{}\", in the links' own frames: {}; everything else is as it was.",
+                    robot.name,
+                    replaced.join("; ")
+                ),
+            );
+        }
+        self.level(&document, robot, &mut edits, &mut remarks);
+        robot.left_out(&rows, &mut remarks);
+        if edits.is_empty() {
+            return Ok(Urdf {
+                text: self.text.clone(),
+                remarks,
+            });
+        }
+        let newline = if self.text.contains("\r\n") {
+            "\r\n"
+        } else {
+            "\n"
+        };
+        edits.push(Edit {
+            range: at(document.root_element().range().start),
+            text: remarks
+                .iter()
+                .map(|remark| comment(remark) + "\n")
+                .collect(),
+        });
+        for edit in &mut edits {
+            edit.text = edit.text.replace('\n', newline);
+        }
+        Ok(Urdf {
+            text: spliced(&self.text, edits),
+            remarks,
+        })
+    }
+
+    /// Refuses a description of other joints or frames.
+    fn same_chain(&self, robot: &Robot) -> Result<(), RobotError> {
+        let numbers = |j: &Joint| [j.alpha, j.a, j.theta, j.d];
+        let strange = |joint: &Joint, why: String| RobotError::NotUrdf {
+            joint: joint.name.clone(),
+            why,
+        };
+        for (joint, own) in robot.joints.iter().zip(&self.robot.joints) {
+            if joint.name != own.name || joint.kind != own.kind {
+                return Err(strange(
+                    joint,
+                    format!("stands where the URDF file has joint `{}`", own.name),
+                ));
+            }
+            if numbers(joint)
+                .iter()
+                .zip(numbers(own))
+                .any(|(a, b)| (a - b).abs() > SAME_FRAME)
+            {
+                return Err(strange(
+                    joint,
+                    "has another frame (alpha, a, theta, d) than the one that the URDF file gives it".into(),
+                ));
+            }
+        }
+        let (n, own) = (robot.joints.len(), self.robot.joints.len());
+        if let Some(joint) = robot.joints.get(own).or_else(|| self.robot.joints.get(n)) {
+            return Err(strange(
+                joint,
+                format!("is not in both: the description has {n} joints and the URDF file {own}"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Puts a level link above the base link where gravity is not along −z of it.
+    fn level(
+        &self,
+        document: &Document<'_>,
+        robot: &Robot,
+        edits: &mut Vec<Edit>,
+        remarks: &mut Vec<String>,
+    ) {
+        if robot.gravity == self.robot.gravity {
+            return;
+        }
+        let gravity: Vector3<f64> = self.base.rotation * Vector3::from(robot.gravity);
+        let Some(rotation) = levelled(gravity, remarks) else {
+            return;
+        };
+        let root = document.root_element();
+        let free = |tag: &str, wish: &str| {
+            let mut name = wish.to_owned();
+            while root
+                .children()
+                .any(|n| n.has_tag_name(tag) && n.attribute("name") == Some(&name))
+            {
+                name.push('_');
+            }
+            name
+        };
+        let (link, joint) = (
+            free("link", "level_world"),
+            free("joint", "level_world_to_base"),
+        );
+        let base = &self.chain.base;
+        let degrees = UnitQuaternion::from_rotation_matrix(&rotation)
+            .angle()
+            .to_degrees();
+        remarks.push(format!(
+            "Gravity is not along -z of {base}: link {link} is level, and the fixed joint {joint} at the end of the file turns {base} in it by {degrees:.3} degrees. Where the simulator has the base as it stands, give it gravity {:?} m/s^2 in {base} instead, and remove both.",
+            [gravity.x, gravity.y, gravity.z]
+        ));
+        let text = format!(
+            "\n  <link name=\"{link}\"/>\n  <joint name=\"{joint}\" type=\"fixed\">\n    <parent link=\"{link}\"/>\n    <child link=\"{}\"/>\n    <origin xyz=\"0 0 0\" rpy=\"{}\"/>\n  </joint>",
+            escaped(base),
+            rpy(&rotation)
+        );
+        // After the last element; the chain has joints, so there is one.
+        if let Some(last) = root.children().rfind(Xml::is_element) {
+            edits.push(Edit {
+                range: at(last.range().end),
+                text,
+            });
+        }
+    }
+}
+
+/// Whether both are the same but for rounding.
+fn same(a: &Inertial, b: &Inertial) -> bool {
+    let alike = |a: &[f64], b: &[f64]| {
+        let size = a.iter().chain(b).fold(0.0f64, |m, v| m.max(v.abs()));
+        a.iter()
+            .zip(b)
+            .all(|(a, b)| (a - b).abs() <= ROUNDING * size)
+    };
+    alike(&[a.mass], &[b.mass])
+        && alike(&a.first_moment, &b.first_moment)
+        && alike(&a.inertia, &b.inertia)
+}
+
+#[cfg(test)]
+#[path = "original_test.rs"]
+mod tests;

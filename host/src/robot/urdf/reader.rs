@@ -1,0 +1,148 @@
+//! Elements and numbers of a URDF file, each refused by its line where it is wrong.
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use roxmltree::{Document, Node};
+
+use crate::robot::error::{Place, RobotError};
+
+/// A file being read.
+pub(super) struct Reader<'a> {
+    pub path: &'a Path,
+    pub document: &'a Document<'a>,
+    /// What the user should know, one sentence each.
+    pub remarks: RefCell<Vec<String>>,
+}
+
+/// An element.
+pub(super) type Xml<'a> = Node<'a, 'a>;
+
+/// The document, or where it is not well formed.
+pub(super) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, RobotError> {
+    Document::parse(text).map_err(|e| RobotError::Urdf {
+        path: path.into(),
+        place: Place {
+            line: e.pos().row as usize,
+            column: e.pos().col as usize,
+        },
+        message: format!(
+            "this is not well-formed XML ({}), but a URDF file is",
+            without_position(&e.to_string())
+        ),
+    })
+}
+
+/// The XML reader appends " at line:column", which the message already begins with.
+fn without_position(message: &str) -> &str {
+    match message.rsplit_once(" at ") {
+        Some((head, tail)) if tail.chars().all(|c| c.is_ascii_digit() || c == ':') => head,
+        _ => message,
+    }
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn error(&self, node: Xml<'a>, message: String) -> RobotError {
+        RobotError::Urdf {
+            path: self.path.into(),
+            place: self.place(node),
+            message,
+        }
+    }
+
+    pub(super) fn place(&self, node: Xml<'a>) -> Place {
+        let position = self.document.text_pos_at(node.range().start);
+        Place {
+            line: position.row as usize,
+            column: position.col as usize,
+        }
+    }
+
+    pub(super) fn attribute(&self, node: Xml<'a>, name: &str) -> Result<&'a str, RobotError> {
+        node.attribute(name).ok_or_else(|| {
+            let tag = node.tag_name().name();
+            self.error(
+                node,
+                format!("<{tag}> has no `{name}`; give it as {name}=\"…\""),
+            )
+        })
+    }
+
+    pub(super) fn parse_number(
+        &self,
+        node: Xml<'a>,
+        what: &str,
+        text: &str,
+    ) -> Result<f64, RobotError> {
+        match text.trim().parse::<f64>() {
+            Ok(v) if v.is_finite() => Ok(v),
+            _ if text.contains("${") => Err(self.error(
+                node,
+                format!("{what} is \"{text}\", an unexpanded macro; run xacro over the file first"),
+            )),
+            _ => Err(self.error(
+                node,
+                format!("{what} is \"{text}\", but it must be a finite number"),
+            )),
+        }
+    }
+
+    pub(super) fn number(&self, node: Xml<'a>, name: &str) -> Result<f64, RobotError> {
+        let what = format!("`{name}` of <{}>", node.tag_name().name());
+        self.parse_number(node, &what, self.attribute(node, name)?)
+    }
+
+    pub(super) fn optional_number(
+        &self,
+        node: Xml<'a>,
+        name: &str,
+    ) -> Result<Option<f64>, RobotError> {
+        node.attribute(name)
+            .map(|_| self.number(node, name))
+            .transpose()
+    }
+
+    pub(super) fn vector(
+        &self,
+        node: Xml<'a>,
+        name: &str,
+    ) -> Result<Option<Vector3<f64>>, RobotError> {
+        let Some(text) = node.attribute(name) else {
+            return Ok(None);
+        };
+        let what = format!("`{name}` of <{}>", node.tag_name().name());
+        let mut values = Vec::new();
+        for word in text.split_whitespace() {
+            values.push(self.parse_number(node, &what, word)?);
+        }
+        match values.as_slice() {
+            &[x, y, z] => Ok(Some(Vector3::new(x, y, z))),
+            _ => Err(self.error(
+                node,
+                format!("{what} is \"{text}\", but it must be three numbers"),
+            )),
+        }
+    }
+
+    /// `<origin xyz rpy>` of `node`; fixed-axis roll, pitch, yaw as URDF defines it.
+    pub(super) fn origin(&self, node: Xml<'a>) -> Result<Isometry3<f64>, RobotError> {
+        let Some(origin) = child(node, "origin") else {
+            return Ok(Isometry3::identity());
+        };
+        let xyz = self.vector(origin, "xyz")?.unwrap_or_else(Vector3::zeros);
+        let rpy = self.vector(origin, "rpy")?.unwrap_or_else(Vector3::zeros);
+        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), rpy.z)
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), rpy.y)
+            * Rotation3::from_axis_angle(&Vector3::x_axis(), rpy.x);
+        Ok(Isometry3::from_parts(
+            Translation3::from(xyz),
+            UnitQuaternion::from_rotation_matrix(&rotation),
+        ))
+    }
+}
+
+/// The first child element called `tag`.
+pub(super) fn child<'a>(node: Xml<'a>, tag: &str) -> Option<Xml<'a>> {
+    node.children().find(|n| n.has_tag_name(tag))
+}

@@ -1,0 +1,222 @@
+//! The tree of links as a chain of bodies, each moved by one joint.
+
+use std::collections::HashMap;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::reader::{Reader, Xml, child};
+use super::spatial::SpatialInertia;
+use super::{Body, Chain};
+use crate::robot::JointKind;
+use crate::robot::error::{Place, RobotError};
+
+/// A movable joint with the pose of its parent link in the body that it leaves.
+type Outgoing<'a> = (Xml<'a>, Isometry3<f64>);
+
+/// A link with all that is fixed to it.
+struct Rigid<'a> {
+    /// In the frame of the link; none where no part has one.
+    inertia: Option<SpatialInertia>,
+    /// Links that have one.
+    heavy: Vec<String>,
+    /// The one movable joint that leaves it.
+    outgoing: Option<Outgoing<'a>>,
+}
+
+impl<'a> Reader<'a> {
+    fn named(&self, tag: &str) -> Result<Vec<(&'a str, Xml<'a>)>, RobotError> {
+        let mut seen: HashMap<&str, Place> = HashMap::new();
+        let mut found = Vec::new();
+        for node in self
+            .document
+            .root_element()
+            .children()
+            .filter(|n| n.has_tag_name(tag))
+        {
+            let name = self.attribute(node, "name")?;
+            if let Some(first) = seen.insert(name, self.place(node)) {
+                return Err(self.error(
+                    node,
+                    format!(
+                        "{tag} `{name}` was already described at {first}; names must be unique"
+                    ),
+                ));
+            }
+            found.push((name, node));
+        }
+        Ok(found)
+    }
+
+    fn end(&self, joint: Xml<'a>, tag: &str) -> Result<&'a str, RobotError> {
+        let name = joint.attribute("name").unwrap_or_default();
+        let node = child(joint, tag).ok_or_else(|| {
+            self.error(
+                joint,
+                format!("joint `{name}` has no <{tag}>; give <{tag} link=\"…\"/>"),
+            )
+        })?;
+        self.attribute(node, "link")
+    }
+
+    pub(super) fn chain(&self) -> Result<Chain, RobotError> {
+        let root = self.document.root_element();
+        if root.tag_name().name() != "robot" {
+            return Err(self.error(
+                root,
+                format!(
+                    "the file begins with <{}>, but a URDF file begins with <robot>",
+                    root.tag_name().name()
+                ),
+            ));
+        }
+        let links: HashMap<&str, Xml<'a>> = self.named("link")?.into_iter().collect();
+        let joints = self.named("joint")?;
+        let reductions = self.reductions()?;
+        let mut children: HashMap<&str, Vec<Xml<'a>>> = HashMap::new();
+        let mut parent_of: HashMap<&str, &str> = HashMap::new();
+        for &(name, node) in &joints {
+            let (parent, moved) = (self.end(node, "parent")?, self.end(node, "child")?);
+            for link in [parent, moved] {
+                if !links.contains_key(link) {
+                    return Err(self.error(node, format!("joint `{name}` names link `{link}`, which the file does not describe; add <link name=\"{link}\"> or correct the name")));
+                }
+            }
+            if let Some(first) = parent_of.insert(moved, name) {
+                return Err(self.error(node, format!("link `{moved}` is the child of joint `{first}` and of joint `{name}`, a closed loop; only a serial chain from base to tip can be read")));
+            }
+            children.entry(parent).or_default().push(node);
+        }
+        let base = self.base(root, &parent_of)?;
+        let mut bodies = Vec::new();
+        let mut outgoing = self.rigid_body(base, &links, &children)?.outgoing;
+        while let Some((joint, to_joint)) = outgoing {
+            let (body, next) = self.body(joint, to_joint, &links, &children, &reductions)?;
+            bodies.push(body);
+            outgoing = next;
+        }
+        if bodies.is_empty() {
+            return Err(self.error(root, "the robot has no movable joint; it needs at least one revolute, continuous or prismatic joint".into()));
+        }
+        let moving = joints
+            .iter()
+            .filter(|(_, n)| n.attribute("type") != Some("fixed"))
+            .count();
+        if moving != bodies.len() {
+            return Err(self.error(root, format!("{} of the {moving} movable joints are not connected to base link `{base}`; every joint must belong to one chain", moving - bodies.len())));
+        }
+        Ok(Chain {
+            name: root.attribute("name").unwrap_or("robot").to_owned(),
+            base: base.to_owned(),
+            bodies,
+            remarks: self.remarks.take(),
+        })
+    }
+
+    fn base(&self, root: Xml<'a>, parent_of: &HashMap<&str, &str>) -> Result<&'a str, RobotError> {
+        let mut roots = Vec::new();
+        for (name, node) in self.named("link")? {
+            if !parent_of.contains_key(name) {
+                roots.push((name, node));
+            }
+        }
+        match roots.as_slice() {
+            [] => Err(self.error(root, "there is no base link (a link that is no joint's child); only a serial chain from base to tip can be read".into())),
+            [(name, _)] => Ok(name),
+            [(first, _), (second, node), ..] => Err(self.error(*node, format!("links `{first}` and `{second}` are both no joint's child; connect them by a fixed joint so that there is one base"))),
+        }
+    }
+
+    /// Joins `link` with all that is fixed to it.
+    fn rigid_body(
+        &self,
+        link: &'a str,
+        links: &HashMap<&str, Xml<'a>>,
+        children: &HashMap<&str, Vec<Xml<'a>>>,
+    ) -> Result<Rigid<'a>, RobotError> {
+        let mut total: Option<SpatialInertia> = None;
+        let mut heavy = Vec::new();
+        let mut outgoing: Option<Outgoing<'a>> = None;
+        let mut pending = vec![(link, Isometry3::identity())];
+        while let Some((name, pose)) = pending.pop() {
+            if let Some(&node) = links.get(name)
+                && let Some(part) = self.inertial(node)?
+            {
+                heavy.push(name.to_owned());
+                total = Some(
+                    total
+                        .unwrap_or_else(SpatialInertia::zero)
+                        .plus(&part.seen_from(&pose)),
+                );
+            }
+            for &joint in children.get(name).into_iter().flatten() {
+                if self.attribute(joint, "type")? == "fixed" {
+                    pending.push((self.end(joint, "child")?, pose * self.origin(joint)?));
+                } else if let Some((other, _)) = outgoing {
+                    let of = |n: Xml<'a>| n.attribute("name").unwrap_or_default();
+                    return Err(self.error(joint, format!(
+                        "the robot branches at link `{name}`: joints `{}` and `{}` both leave it or what is fixed to it; only a serial chain from base to tip can be read, so remove one branch or make its joint fixed",
+                        of(other), of(joint)
+                    )));
+                } else {
+                    outgoing = Some((joint, pose));
+                }
+            }
+        }
+        Ok(Rigid {
+            inertia: total,
+            heavy,
+            outgoing,
+        })
+    }
+
+    fn body(
+        &self,
+        node: Xml<'a>,
+        to_parent: Isometry3<f64>,
+        links: &HashMap<&str, Xml<'a>>,
+        children: &HashMap<&str, Vec<Xml<'a>>>,
+        reductions: &HashMap<&str, f64>,
+    ) -> Result<(Body, Option<Outgoing<'a>>), RobotError> {
+        let name = self.attribute(node, "name")?;
+        let kind_name = self.attribute(node, "type")?;
+        let kind = match kind_name {
+            "revolute" | "continuous" => JointKind::Revolute,
+            "prismatic" => JointKind::Prismatic,
+            other => return Err(self.error(node, format!("joint `{name}` is of type \"{other}\", but only revolute, continuous, prismatic and fixed joints can be read"))),
+        };
+        if let Some(mimic) = child(node, "mimic") {
+            return Err(self.error(mimic, format!("joint `{name}` mimics another joint, but only independent joints can be read; make it fixed or remove <mimic>")));
+        }
+        let axis = match child(node, "axis") {
+            // The default that URDF defines.
+            None => Vector3::x(),
+            Some(axis_node) => {
+                let axis = self.vector(axis_node, "xyz")?.unwrap_or_else(Vector3::x);
+                axis.try_normalize(1e-9).ok_or_else(|| self.error(axis_node, format!("the axis of joint `{name}` is the zero vector, but it must be a direction such as \"0 0 1\"")))?
+            }
+        };
+        let link = self.end(node, "child")?;
+        let rigid = self.rigid_body(link, links, children)?;
+        let inertia = rigid.inertia.ok_or_else(|| RobotError::NoInertial {
+            path: self.path.into(),
+            place: links
+                .get(link)
+                .map_or_else(|| self.place(node), |n| self.place(*n)),
+            link: link.to_owned(),
+            joint: name.to_owned(),
+        })?;
+        let body = Body {
+            joint: name.to_owned(),
+            link: link.to_owned(),
+            heavy: rigid.heavy,
+            kind,
+            origin: to_parent * self.origin(node)?,
+            axis,
+            inertia,
+            limits: self.limits(node, name, kind_name == "continuous")?,
+            friction: self.friction(node)?,
+            reduction: reductions.get(name).copied(),
+        };
+        Ok((body, rigid.outgoing))
+    }
+}

@@ -1,0 +1,175 @@
+//! Values of links and joints in a URDF file: inertia, limits, friction, gear ratios.
+
+use std::collections::HashMap;
+
+use nalgebra::Matrix3;
+
+use super::reader::{Reader, Xml, child};
+use super::spatial::SpatialInertia;
+use crate::robot::error::RobotError;
+use crate::robot::{JointFriction, JointLimits};
+
+/// Round effort limits from here on are taken for placeholders, N·m or N.
+const UNKNOWN_EFFORT: f64 = 1e4;
+
+impl<'a> Reader<'a> {
+    pub(super) fn inertial(&self, link: Xml<'a>) -> Result<Option<SpatialInertia>, RobotError> {
+        let Some(node) = child(link, "inertial") else {
+            return Ok(None);
+        };
+        let name = link.attribute("name").unwrap_or_default();
+        let part = |tag: &str| {
+            child(node, tag).ok_or_else(|| {
+                self.error(
+                    node,
+                    format!(
+                        "<inertial> of link `{name}` has no <{tag}>; it needs <mass> and <inertia>"
+                    ),
+                )
+            })
+        };
+        let mass_node = part("mass")?;
+        let mass = self.number(mass_node, "value")?;
+        if mass < 0.0 {
+            return Err(self.error(
+                mass_node,
+                format!("the mass of link `{name}` is {mass}, but it must be 0 or greater, in kg"),
+            ));
+        }
+        let i = part("inertia")?;
+        let [ixx, ixy, ixz, iyy, iyz, izz] = {
+            let mut values = [0.0; 6];
+            for (value, key) in values
+                .iter_mut()
+                .zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"])
+            {
+                *value = self.number(i, key)?;
+            }
+            values
+        };
+        let pose = self.origin(node)?;
+        let r = pose.rotation.to_rotation_matrix();
+        let about_centre =
+            r * Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz) * r.transpose();
+        Ok(Some(SpatialInertia::from_centre(
+            mass,
+            pose.translation.vector,
+            about_centre,
+        )))
+    }
+
+    pub(super) fn limits(
+        &self,
+        joint: Xml<'a>,
+        name: &str,
+        endless: bool,
+    ) -> Result<Option<JointLimits>, RobotError> {
+        let Some(node) = child(joint, "limit") else {
+            return Ok(None);
+        };
+        let position = if endless {
+            [f64::NEG_INFINITY, f64::INFINITY]
+        } else {
+            let bound = |key| self.optional_number(node, key).map(|v| v.unwrap_or(0.0));
+            [bound("lower")?, bound("upper")?]
+        };
+        let (velocity, effort) = (self.number(node, "velocity")?, self.number(node, "effort")?);
+        let remark = |text: String| {
+            let place = format!("{}:{}", self.path.display(), self.place(node));
+            self.remarks.borrow_mut().push(format!("{place}: {text}"));
+        };
+        if velocity == 0.0 && effort == 0.0 && position[0] == position[1] {
+            // What exporters of CAD programs write where nothing was entered.
+            remark(format!(
+                "<limit> of joint `{name}` is zero throughout, a placeholder; its limits count as not known."
+            ));
+            return Ok(None);
+        }
+        if position[0] >= position[1] {
+            return Err(self.error(node, format!("the lower limit of joint `{name}` is {} and the upper limit {}, but lower must be below upper", position[0], position[1])));
+        }
+        if velocity <= 0.0 {
+            return Err(self.error(node, format!("the velocity limit of joint `{name}` is {velocity}, but it must be greater than 0; remove <limit> where the limits are not known")));
+        }
+        if effort < 0.0 {
+            return Err(self.error(node, format!("the effort limit of joint `{name}` is {effort}, but it must be greater than 0, or 0 where it is not known")));
+        }
+        let placeholder = is_placeholder(effort, UNKNOWN_EFFORT);
+        if placeholder {
+            remark(format!(
+                "the effort limit {effort} of joint `{name}` looks like a placeholder; its torque limit counts as not known."
+            ));
+        }
+        Ok(Some(JointLimits {
+            position,
+            velocity,
+            acceleration: None,
+            torque: (!placeholder).then_some(effort),
+        }))
+    }
+
+    pub(super) fn friction(&self, joint: Xml<'a>) -> Result<Option<JointFriction>, RobotError> {
+        let Some(node) = child(joint, "dynamics") else {
+            return Ok(None);
+        };
+        let value = |key: &str| -> Result<f64, RobotError> {
+            let value = self.optional_number(node, key)?.unwrap_or(0.0);
+            if value >= 0.0 {
+                return Ok(value);
+            }
+            let name = joint.attribute("name").unwrap_or_default();
+            Err(self.error(node, format!("the {key} of joint `{name}` is {value}, but friction below zero would drive the joint; it must be 0 or greater")))
+        };
+        Ok(Some(JointFriction {
+            coulomb: value("friction")?,
+            viscous: value("damping")?,
+            offset: 0.0,
+        }))
+    }
+
+    /// Gear ratio by joint name; 1 is the customary placeholder for "none" and says nothing.
+    pub(super) fn reductions(&self) -> Result<HashMap<&'a str, f64>, RobotError> {
+        let mut found = HashMap::new();
+        for transmission in self
+            .document
+            .root_element()
+            .children()
+            .filter(|n| n.has_tag_name("transmission"))
+        {
+            let Some(reduction) = transmission
+                .descendants()
+                .find(|n| n.has_tag_name("mechanicalReduction"))
+            else {
+                continue;
+            };
+            let value = self.parse_number(
+                reduction,
+                "<mechanicalReduction>",
+                reduction.text().unwrap_or_default(),
+            )?;
+            if value == 0.0 {
+                return Err(self.error(reduction, "<mechanicalReduction> is 0, but it must be motor turns per joint turn, different from 0".into()));
+            }
+            let joints: Vec<Xml<'a>> = transmission
+                .children()
+                .filter(|n| n.has_tag_name("joint"))
+                .collect();
+            match joints.as_slice() {
+                [joint] if value != 1.0 => {
+                    found.insert(self.attribute(*joint, "name")?, value);
+                }
+                [_] => {}
+                _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// Whether an effort limit stands for "none": 0, powers of ten and rows of nines from `least` (N·m or N) on, and whatever
+/// is a million or more.
+pub(crate) fn is_placeholder(effort: f64, least: f64) -> bool {
+    let power = |x: f64| (x.log10() - x.log10().round()).abs() < 1e-12;
+    let round = power(effort) || (effort.fract() == 0.0 && power(effort + 1.0));
+    effort == 0.0 || effort >= 1e6 || (effort + 1.0 >= least && round)
+}

@@ -1,0 +1,346 @@
+//! A description as TOML, each line with its unit.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::effects::{check_effects, write_effect};
+use super::error::RobotError;
+use super::{Drive, Joint, JointKind, Region, Robot, Screw};
+
+/// Shortest form that reads back to the same number, always with a point or an exponent.
+pub(super) fn float(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn list(values: &[f64]) -> String {
+    let items: Vec<String> = values.iter().map(|v| float(*v)).collect();
+    format!("[{}]", items.join(", "))
+}
+
+pub(super) fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+pub(super) fn line(out: &mut String, key: &str, value: &str, comment: &str) {
+    let assignment = format!("{key} = {value}");
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "{assignment:<40} # {comment}");
+}
+
+pub(super) fn write(robot: &Robot) -> Result<String, RobotError> {
+    let mut out = String::new();
+    line(
+        &mut out,
+        "name",
+        &quoted(&robot.name),
+        "for titles and files",
+    );
+    line(
+        &mut out,
+        "gravity",
+        &list(&robot.gravity),
+        "in the base frame, m/s^2",
+    );
+    if robot.joints.is_empty() {
+        out.push_str("joint = []\n");
+    }
+    for joint in &robot.joints {
+        write_joint(&mut out, joint);
+    }
+    for region in &robot.workspace {
+        write_region(&mut out, region);
+    }
+    check_effects(robot).map_err(|fault| RobotError::Write {
+        robot: robot.name.clone(),
+        message: format!("{} is {}, but {}", fault.what, fault.found, fault.right),
+    })?;
+    for effect in &robot.effects {
+        write_effect(&mut out, robot, effect);
+    }
+    if let Some(band) = &robot.identified {
+        band.write(&mut out);
+    }
+    Ok(out)
+}
+
+fn write_region(out: &mut String, region: &Region) {
+    out.push_str("\n[[workspace]]\n");
+    line(
+        out,
+        "joint",
+        &quoted(&region.joint),
+        "whose link carries the point",
+    );
+    line(
+        out,
+        "point",
+        &list(&region.point),
+        "m, in that joint's frame",
+    );
+    for (key, value, comment) in [
+        ("min", region.min, "m, x y z in the base frame"),
+        ("max", region.max, "m"),
+        (
+            "normal",
+            region.normal,
+            "towards the allowed side of a plane",
+        ),
+    ] {
+        if let Some(value) = value {
+            line(out, key, &list(&value), comment);
+        }
+    }
+    if let Some(beyond) = region.beyond {
+        line(
+            out,
+            "beyond",
+            &float(beyond),
+            "m along the normal from the base frame's origin",
+        );
+    }
+}
+
+fn write_joint(out: &mut String, joint: &Joint) {
+    let kind = match joint.kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Prismatic => "prismatic",
+    };
+    let (angle, force) = joint.kind.units();
+    out.push_str("\n[[joint]]\n");
+    line(out, "name", &quoted(&joint.name), "unique in the robot");
+    line(out, "kind", &quoted(kind), "revolute or prismatic");
+    line(
+        out,
+        "alpha",
+        &float(joint.alpha),
+        "rad, rotation about x of frame i-1 (modified Denavit-Hartenberg)",
+    );
+    line(
+        out,
+        "a",
+        &float(joint.a),
+        "m, translation along x of frame i-1",
+    );
+    line(
+        out,
+        "theta",
+        &float(joint.theta),
+        "rad, rotation about z of frame i (offset where revolute)",
+    );
+    line(
+        out,
+        "d",
+        &float(joint.d),
+        "m, translation along z of frame i (offset where prismatic)",
+    );
+    if let Some(i) = &joint.inertial {
+        out.push_str("\n[joint.inertial]\n");
+        line(out, "mass", &float(i.mass), "kg");
+        line(
+            out,
+            "first_moment",
+            &list(&i.first_moment),
+            "m*c in frame i, kg*m",
+        );
+        line(
+            out,
+            "inertia",
+            &list(&i.inertia),
+            "Ixx Ixy Ixz Iyy Iyz Izz about the origin of frame i, kg*m^2",
+        );
+    }
+    if let Some(l) = &joint.limits {
+        out.push_str("\n[joint.limits]\n");
+        line(out, "position", &list(&l.position), angle);
+        line(out, "velocity", &float(l.velocity), &format!("{angle}/s"));
+        optional(out, "acceleration", l.acceleration, &format!("{angle}/s^2"));
+        optional(out, "torque", l.torque, force);
+    }
+    if let Some(f) = &joint.friction {
+        out.push_str("\n[joint.friction]\n");
+        line(out, "coulomb", &float(f.coulomb), force);
+        line(
+            out,
+            "viscous",
+            &float(f.viscous),
+            &format!("{force}*s/{angle}"),
+        );
+        line(
+            out,
+            "offset",
+            &float(f.offset),
+            &format!("{force}, constant torque or force at the joint"),
+        );
+    }
+    if let Some(d) = &joint.drive {
+        write_drive(out, d);
+    }
+    if let Some(c) = &joint.controller {
+        out.push_str("\n[joint.controller]\n");
+        line(out, "position_gain", &float(c.position_gain), "1/s");
+        line(
+            out,
+            "velocity_gain",
+            &float(c.velocity_gain),
+            &format!("controller output per {angle}/s"),
+        );
+        line(
+            out,
+            "torque_gain",
+            &float(c.torque_gain),
+            &format!("{force} per controller output"),
+        );
+    }
+}
+
+fn write_drive(out: &mut String, d: &Drive) {
+    out.push_str("\n[joint.drive]\n");
+    if d.screw.is_none() || d.gear_ratio != 0.0 {
+        line(
+            out,
+            "gear_ratio",
+            &float(d.gear_ratio),
+            "motor turns per joint turn, negative where the gear reverses",
+        );
+    }
+    if !d.couples.is_empty() {
+        line(
+            out,
+            "couples",
+            &table(&d.couples),
+            "motor turns per turn of these joints",
+        );
+    }
+    let beyond = [
+        (
+            "zero",
+            d.zero,
+            "rad, motor position where all joints are at zero (beyond the screw's)",
+        ),
+        (
+            "joint_inertia",
+            d.joint_inertia,
+            "kg*m^2 (kg where prismatic), seen at the joint beside the rotors",
+        ),
+        ("coulomb", d.coulomb, "N*m, on the motor side"),
+        ("viscous", d.viscous, "N*m*s/rad, on the motor side"),
+    ];
+    for (key, value, comment) in beyond {
+        if value != 0.0 {
+            line(out, key, &float(value), comment);
+        }
+    }
+    line(
+        out,
+        "rotor_inertia",
+        &float(d.rotor_inertia),
+        "kg*m^2, on the motor side",
+    );
+    if d.torque_constant != 0.0 {
+        line(
+            out,
+            "torque_constant",
+            &float(d.torque_constant),
+            "N*m/A, on the motor side",
+        );
+    }
+    optional(out, "resistance", d.resistance, "ohm");
+    optional(out, "inductance", d.inductance, "H");
+    optional(
+        out,
+        "encoder_counts_per_rev",
+        d.encoder_counts_per_rev,
+        "counts per motor turn after quadrature",
+    );
+    optional(
+        out,
+        "duty_full_scale",
+        d.duty_full_scale,
+        "value of the duty column that is the whole supply",
+    );
+    if let Some(p) = d.pole_pairs {
+        line(out, "pole_pairs", &p.to_string(), "0 where brushed");
+    }
+    if let Some(s) = &d.screw {
+        write_screw(out, s);
+    }
+}
+
+fn write_screw(out: &mut String, s: &Screw) {
+    out.push_str("\n[joint.drive.screw]\n");
+    line(
+        out,
+        "lead",
+        &float(s.lead),
+        "m per motor turn, negative where the screw shortens as the motor turns forwards",
+    );
+    line(out, "crank", &float(s.crank), "m");
+    line(
+        out,
+        "anchor",
+        &list(&s.anchor),
+        "m, fixed end of the screw in the crank's plane, the axle at the origin",
+    );
+    line(
+        out,
+        "angle",
+        &table(&s.angle),
+        "turns of the crank per turn of these joints",
+    );
+    line(
+        out,
+        "offset",
+        &float(s.offset),
+        "rad, the crank's angle where all joints are at zero",
+    );
+    if let Some(range) = &s.range {
+        line(
+            out,
+            "range",
+            &list(range),
+            "rad, lowest and highest angle of the crank",
+        );
+    }
+}
+
+/// Inline table of numbers by name.
+fn table(values: &BTreeMap<String, f64>) -> String {
+    let key = |name: &str| {
+        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if !name.is_empty() && name.chars().all(bare) {
+            name.to_owned()
+        } else {
+            quoted_key(name)
+        }
+    };
+    let items: Vec<String> = values
+        .iter()
+        .map(|(name, v)| format!("{} = {}", key(name), float(*v)))
+        .collect();
+    format!("{{ {} }}", items.join(", "))
+}
+
+/// A name as a basic TOML string on one line.
+fn quoted_key(name: &str) -> String {
+    let mut text = String::from("\"");
+    for c in name.chars() {
+        match c {
+            '"' | '\\' => {
+                text.push('\\');
+                text.push(c);
+            }
+            c if c.is_control() => {
+                let _ = write!(text, "\\u{:04X}", u32::from(c));
+            }
+            c => text.push(c),
+        }
+    }
+    text.push('"');
+    text
+}
+
+fn optional(out: &mut String, key: &str, value: Option<f64>, comment: &str) {
+    if let Some(v) = value {
+        line(out, key, &float(v), comment);
+    }
+}
