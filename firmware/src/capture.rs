@@ -8,14 +8,29 @@ use rig_shared::safety::SnapshotSample;
 /// Control ticks that the capture keeps: 0.15 s at 10 kHz.
 pub const CAPTURE_TICKS: usize = 1536;
 
-/// A tick in less memory: its number follows from its place, its position from the trigger's.
+/// A tick in less memory: its number follows from its place, its position from the last one's; duty and supply are kept
+/// finer than the bridge sets and the converter reads them.
 #[derive(Clone, Copy, Debug)]
 struct Packed {
     counts: i32,
     current: f32,
-    duty: f32,
-    supply: f32,
     reference: f32,
+    /// −1 to 1 in 65 534 steps about 32 768; the bridge has 8500.
+    duty: u16,
+    /// 2⁻¹⁰ V, up to 64 V; the converter's code is 9 mV.
+    supply: u16,
+}
+
+/// Steps of the duty from 0 to 1, and the code of 0.
+const DUTY: f32 = 32_767.0;
+const ZERO: f32 = 32_768.0;
+/// Steps of the supply in a volt.
+const SUPPLY: f32 = 1024.0;
+
+/// To the nearest; what is not there saturates. By way of 32 bits, which the microcontroller converts in one instruction.
+#[inline(always)]
+fn packed(x: f32) -> u16 {
+    ((x + 0.5) as u32).min(0xFFFF) as u16
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,9 +68,9 @@ impl Capture {
             ring: [Packed {
                 counts: 0,
                 current: 0.0,
-                duty: 0.0,
-                supply: 0.0,
                 reference: 0.0,
+                duty: 0,
+                supply: 0,
             }; CAPTURE_TICKS],
             next: 0,
             filled: 0,
@@ -87,9 +102,9 @@ impl Capture {
                 // The low half: the rest follows from the last tick, for no joint turns 2³¹ counts in a burst.
                 counts: sample.position as i32,
                 current: sample.current,
-                duty: sample.duty,
-                supply: sample.supply,
                 reference: sample.reference,
+                duty: packed(DUTY * sample.duty + ZERO),
+                supply: packed(SUPPLY * sample.supply),
             };
         }
         self.last = *sample;
@@ -166,8 +181,8 @@ impl Capture {
             tick: self.last.tick.saturating_sub(age),
             position: self.last.position - i64::from(back),
             current: packed.current,
-            duty: packed.duty,
-            supply: packed.supply,
+            duty: (f32::from(packed.duty) - ZERO) / DUTY,
+            supply: f32::from(packed.supply) / SUPPLY,
             reference: packed.reference,
         })
     }
@@ -207,6 +222,21 @@ mod tests {
             assert_eq!(capture.get(index).unwrap(), at(tick));
         }
         assert!(capture.get(CAPTURE_TICKS).is_none());
+    }
+
+    #[test]
+    fn duty_and_supply_are_kept_finer_than_they_come() {
+        let mut capture = Capture::new();
+        for (duty, supply) in [(0.95_f32, 23.987_f32), (-0.333, 36.3), (-1.0, 0.0)] {
+            capture.push(&SnapshotSample {
+                duty,
+                supply,
+                ..at(0)
+            });
+            let kept = capture.get(capture.len() - 1).unwrap();
+            assert!((kept.duty - duty).abs() < 0.1 / 4250.0, "{kept:?}");
+            assert!((kept.supply - supply).abs() < 1e-3, "{kept:?}");
+        }
     }
 
     #[test]

@@ -63,7 +63,7 @@ impl Clerk {
     ) -> Option<Settings> {
         state.heard = state.tick;
         let (id, body) = (examined.request.id, &examined.request.body);
-        if *body == RequestBody::Hello {
+        if matches!(body, RequestBody::Hello) {
             self.ledger.clear();
         }
         if let Some(earlier) = self.ledger.answered(id) {
@@ -75,7 +75,7 @@ impl Clerk {
             return None;
         }
         let result = carry_out(config, state, examined);
-        if result.is_ok() && *body == RequestBody::Store {
+        if result.is_ok() && matches!(body, RequestBody::Store) {
             self.storing = Some(id);
             return Some(*state.settings());
         }

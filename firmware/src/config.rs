@@ -57,6 +57,8 @@ pub struct Encoder {
     pub counts_per_motor_turn: u32,
     /// Bandwidth of the velocity observer, Hz.
     pub observer_bandwidth: f32,
+    /// Levels of A (2) and B (1) at which the index pulse stands.
+    pub index_levels: u8,
 }
 
 /// Fixed while the rig runs.
@@ -80,8 +82,27 @@ pub struct Config {
     pub largest_offset: f32,
     /// Silence of the host after which the rig comes to rest, ticks.
     pub host_silent_ticks: u32,
+    /// Time that the bridge takes from its enable to its outputs, ticks: nothing is asked of it meanwhile.
+    pub wake_ticks: u32,
     /// Further silence after which the bridge goes off and the fault latches, ticks.
     pub host_lost_ticks: u32,
+}
+
+impl Config {
+    /// Codes of the current, lower and upper, beyond which comparators switch the bridge off: what the checks call an
+    /// over-current at the highest limit that the parts stand.
+    pub fn current_thresholds(&self) -> [u16; 2] {
+        let most = self.monitor.current_margin * self.ratings.peak_current;
+        let codes = most / self.scaling.current_per_code.abs();
+        // Casts saturate at 0; a threshold at the converter's own end is none, and the checks are left.
+        [-codes, codes].map(|codes| ((self.scaling.current_zero + codes) as u16).min(4095))
+    }
+}
+
+/// Ticks that the bridge of the parts list takes from its enable to its outputs: 1 ms at most (DRV8874, SLVSF66, t_WAKE), and
+/// a tick in which that ends.
+pub const fn wake_ticks(control_hz: u32) -> u32 {
+    control_hz.div_ceil(1000) + 1
 }
 
 /// What parts stand that were chosen for these limits: currents and torque by a quarter more, as over-current is found at
@@ -120,4 +141,18 @@ pub struct Settings {
     pub limits: Limits<f32>,
     /// On-line estimator.
     pub estimator: EstimatorSettings<f32>,
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn comparators_act_between_the_checks_and_the_ends_of_the_converter() {
+        let (config, settings) = crate::nameplate::one_link();
+        let [lower, upper] = config.current_thresholds();
+        // 6 A of 8.06 mA a code: what the bridge of the parts list bears.
+        assert_eq!([lower, upper], [1303, 2792]);
+        let checked = settings.limits.peak_current * config.monitor.current_margin;
+        let of = |code: u16| (f32::from(code) - 2048.0) * config.scaling.current_per_code;
+        assert!(of(upper) > checked && of(lower) < -checked);
+    }
 }

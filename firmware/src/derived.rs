@@ -12,6 +12,9 @@ const ADAPTATION_DEAD_ZONE: f32 = 0.02;
 /// Largest share of the supply that the bridge may use: the rest is dead time and the bootstrap's refresh.
 const DUTY_LIMIT: f32 = 0.95;
 
+/// Share of the peak current below which the bridge loses less voltage.
+const FADE: f32 = 0.02;
+
 /// Constants of the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derived {
@@ -27,6 +30,8 @@ pub struct Derived {
     pub torque_per_ampere: f32,
     /// Control ticks in a period of the clock that times the encoder's edges.
     pub ticks_per_edge_period: f32,
+    /// Share of the bridge's loss that is made up for, per wanted ampere, 1/A.
+    pub fade_per_ampere: f32,
     /// Velocity observer.
     pub observer: encoder::Config<f32>,
     /// Position law.
@@ -52,6 +57,7 @@ impl Derived {
                 / config.encoder.counts_per_motor_turn as f32,
             torque_per_ampere: config.drive.joint_torque(1.0),
             ticks_per_edge_period: rate / EDGE_CLOCK_HZ as f32,
+            fade_per_ampere: 1.0 / (FADE * limits.peak_current),
             observer: encoder::Config::new(config.encoder.observer_bandwidth, rate),
             law: law::Config {
                 kind: settings.control,

@@ -12,8 +12,9 @@ use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::safety::monitor::MonitorConfig;
+use rig_shared::safety::voltage::VoltageModel;
 
-use crate::config::{Config, Encoder, Rates, Settings, ratings};
+use crate::config::{Config, Encoder, Rates, Settings, ratings, wake_ticks};
 use crate::sample::Scaling;
 
 /// The one-link rig of the template: what is fixed, and what holds until the host says otherwise.
@@ -29,19 +30,22 @@ pub fn one_link() -> (Config, Settings) {
         continuous_current: 1.6,
         peak_current: 3.2,
     };
+    let drive = Drive {
+        gear_ratio: 50.0,
+        rotor_inertia: 2.0e-5,
+        torque_constant: 0.05,
+        resistance: 0.6,
+        inductance: 0.5e-3,
+    };
+    let counts_per_motor_turn = 8192;
     let config = Config {
         rates,
         scaling: Scaling::default(),
-        drive: Drive {
-            gear_ratio: 50.0,
-            rotor_inertia: 2.0e-5,
-            torque_constant: 0.05,
-            resistance: 0.6,
-            inductance: 0.5e-3,
-        },
+        drive,
         encoder: Encoder {
-            counts_per_motor_turn: 8192,
+            counts_per_motor_turn,
             observer_bandwidth: 200.0,
+            index_levels: 0b00,
         },
         monitor: MonitorConfig {
             period: 1.0 / rate as f32,
@@ -53,7 +57,7 @@ pub fn one_link() -> (Config, Settings) {
             // Four times the counts of a tick at 6 rad/s: 39.1.
             largest_step: 161,
             persistence: 3,
-            encoder_lost_ticks: rate / 10,
+            voltage: VoltageModel::new(&drive, counts_per_motor_turn, 1.0 / rate as f32),
             stuck_ticks: rate / 20,
             stuck_duty: 0.02,
             thermal_time: 10.0,
@@ -62,6 +66,7 @@ pub fn one_link() -> (Config, Settings) {
         calibration_ticks: rate / 2,
         largest_offset: 0.5,
         host_silent_ticks: rate / 2,
+        wake_ticks: wake_ticks(rates.control_hz),
         host_lost_ticks: rate,
     };
     let settings = Settings {

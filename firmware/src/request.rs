@@ -3,7 +3,7 @@
 use rig_shared::control::{adaptive, current};
 use rig_shared::link::LinkParameters;
 use rig_shared::safety::{Fault, Limits, Mode};
-use rig_shared::trajectory::Extremes;
+use rig_shared::trajectory::{Course, Extremes};
 use rig_shared::wire::message::{Refusal, RequestBody};
 
 use crate::config::{Config, Settings};
@@ -40,7 +40,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         // While the flash is being written nothing may start that depends on every tick.
         _ if state.storing => Err(Refusal::Busy),
         RequestBody::Store => store(state),
-        RequestBody::Arm => arm(state),
+        RequestBody::Arm => arm(config, state),
         RequestBody::Start => start(config, state),
         RequestBody::Stop => match state.mode {
             Mode::Running => {
@@ -54,9 +54,9 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         RequestBody::SetPosition(position) => set_position(state, *position),
         RequestBody::SetTrajectory(trajectory) => {
             refuse_in_motion(state)?;
-            let extremes = examined.extremes.ok_or(Refusal::BadValue)?;
+            let (extremes, prepared) = examined.motion.ok_or(Refusal::BadValue)?;
             fits(&extremes, &state.settings.limits, None)?;
-            state.trajectory = Some((trajectory.clone(), extremes));
+            state.trajectory = Some((Course::new(trajectory.clone(), prepared), extremes));
             Ok(())
         }
         RequestBody::SetEffects(_) => {
@@ -126,11 +126,12 @@ fn store(state: &mut State) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn arm(state: &mut State) -> Result<(), Refusal> {
+fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
     match state.mode {
         Mode::Disarmed => {
             state.run = Run {
                 base: state.position,
+                awake: state.tick + u64::from(config.wake_ticks),
                 ..Run::default()
             };
             state.current_loop = current::State::default();
@@ -154,7 +155,8 @@ fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
     fits(extremes, &state.settings.limits, Some(state.run.base))?;
     let rate = u64::from(config.rates.control_hz);
     state.run.length = (trajectory.duration_micros().saturating_mul(rate)).div_ceil(1_000_000);
-    state.run.start = state.tick;
+    // A bridge that is not yet awake is waited for.
+    state.run.start = state.tick.max(state.run.awake);
     state.mode = Mode::Running;
     Ok(())
 }
@@ -175,6 +177,7 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     state.position = state.counts as f32 * state.derived.radians_per_count;
     state.reference.position = state.position;
     state.placed = true;
+    state.effects.displace();
     // Windows that are open hold counts from the old origin.
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);

@@ -20,13 +20,17 @@ pub struct Sample {
     pub supply: AdcCode,
     /// Motor temperature, converter code.
     pub temperature: AdcCode,
-    /// The driver or the comparator has pulled the break input.
+    /// The driver has pulled the break input, or something inside the chip has.
     pub driver_fault: bool,
+    /// A comparator has pulled it: too much current.
+    pub comparator: bool,
     /// The previous tick had not finished when this one was due.
     pub overrun: bool,
     /// The encoder's signals contradict each other: by how many counts its index is off, 0 where both channels
     /// changed at once.
     pub encoder_wrong: Option<i32>,
+    /// Nothing drives one of the encoder's wires.
+    pub encoder_open: bool,
     /// The stack has come near its end: bytes that are left.
     pub stack_left: Option<u32>,
 }
@@ -55,6 +59,23 @@ pub struct Scaling {
     pub temperature_per_code: f32,
 }
 
+/// Converter's references, over the nominal one, that a working regulator can give.
+const SUPPLY: [f32; 2] = [0.94, 1.06];
+
+impl Scaling {
+    /// Takes codes as those of a converter whose reference is so many times its nominal 3.3 V; not where no working board
+    /// has that. The current's zero stays: amplifier and converter share that reference.
+    pub fn correct(&mut self, supply: f32) -> bool {
+        let possible = (SUPPLY[0]..=SUPPLY[1]).contains(&supply);
+        if possible {
+            self.current_per_code *= supply;
+            self.supply_per_code *= supply;
+            self.temperature_per_code *= supply;
+        }
+        possible
+    }
+}
+
 impl Default for Scaling {
     /// Mid-supply current sense of ±16.5 A, a 1:11 supply divider and a 10 mV/K sensor with 0.5 V at 0 °C
     /// (the common analogue one) into a 3.3 V, 12-bit converter.
@@ -65,6 +86,26 @@ impl Default for Scaling {
             supply_per_code: 3.3 * 11.0 / 4096.0,
             temperature_at_zero: -50.0,
             temperature_per_code: 330.0 / 4096.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_mean_more_of_a_higher_reference() {
+        let nominal = Scaling::default();
+        let mut scaling = nominal;
+        assert!(scaling.correct(1.0));
+        assert_eq!(scaling, nominal);
+        assert!(scaling.correct(1.03));
+        assert!((scaling.current_per_code / nominal.current_per_code - 1.03).abs() < 1e-6);
+        for impossible in [0.5, 1.2, f32::NAN, f32::INFINITY] {
+            let mut scaling = nominal;
+            assert!(!scaling.correct(impossible));
+            assert_eq!(scaling, nominal);
         }
     }
 }

@@ -6,7 +6,7 @@ use rig_shared::encoder;
 use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
-use rig_shared::trajectory::{Extremes, Reference, Trajectory};
+use rig_shared::trajectory::{Course, Extremes, Reference};
 
 use crate::config::{Config, Settings};
 use crate::derived::Derived;
@@ -24,7 +24,7 @@ pub struct State {
     /// Mode.
     pub mode: Mode,
     /// The loaded trajectory, and how far it goes.
-    pub trajectory: Option<(Trajectory<f32>, Extremes<f32>)>,
+    pub trajectory: Option<(Course<f32>, Extremes<f32>)>,
     /// Settings are being stored: nothing but `Disarm` and the conversation is carried out meanwhile.
     pub storing: bool,
     /// The first fault since the last clearing.
@@ -51,11 +51,17 @@ pub struct State {
     pub(crate) derived: Derived,
     /// The settings have changed since `derived` was worked out.
     pub(crate) stale: bool,
+    /// The effects have changed since `settings` was told.
+    pub(crate) renewed: bool,
     /// The effects of the settings, checked.
     pub(crate) compensation: Compensation<f32>,
     pub(crate) effects: compensation::State<f32>,
     /// Constant error of the current that the effects know of, A.
     pub(crate) current_error: f32,
+    /// Voltage that the effects know the bridge to lose, V.
+    pub(crate) lost_voltage: f32,
+    /// What of that was made up for in the last tick, V.
+    pub(crate) regained: f32,
     /// What the effects have taken off the position in this tick, rad.
     pub(crate) position_error: f32,
     /// Torque ordered in the last tick, N·m.
@@ -80,6 +86,8 @@ pub struct State {
     /// The estimator is to start anew.
     pub(crate) forget: bool,
     pub(crate) updates_since_report: u16,
+    /// The estimate is to be reported with the next tick.
+    pub(crate) report_due: bool,
     /// Duty cycle that acts during this tick.
     pub(crate) duty: f32,
     pub(crate) run: Run,
@@ -92,6 +100,8 @@ pub(crate) struct Run {
     pub(crate) start: u64,
     /// Ticks that it takes.
     pub(crate) length: u64,
+    /// Tick from which on the bridge, just enabled, does as told.
+    pub(crate) awake: u64,
     /// Position that trajectory or hold is about, rad.
     pub(crate) base: f32,
     /// The stop under way.
@@ -160,12 +170,15 @@ impl State {
             compensation,
             effects: compensation::State::default(),
             current_error: compensation.current_error(derived.torque_per_ampere),
+            lost_voltage: compensation.lost_voltage(),
+            regained: 0.0,
             position_error: 0.0,
             drive_torque: 0.0,
             start_temperature: 0.0,
             warming: 0.0,
             derived,
             stale: false,
+            renewed: false,
             calibration: Calibration {
                 zero_code: config.scaling.current_zero,
                 ..Calibration::default()
@@ -181,9 +194,22 @@ impl State {
             previous: None,
             forget: false,
             updates_since_report: 0,
+            report_due: false,
             duty: 0.0,
             run: Run::default(),
         }
+    }
+
+    /// How warm the winding is by its own current, as a filtered square, A²: what a reset must not make forgotten.
+    pub fn heat(&self) -> f32 {
+        self.monitor.heat
+    }
+
+    /// Goes on from a winding as warm as that ([`State::heat`]); a heat that is no number is none. Whether it was overloaded is
+    /// not known, so that it must be cool first: an overload where it is not.
+    pub fn warm_up(&mut self, heat: f32) {
+        self.monitor.heat = if heat > 0.0 { heat } else { 0.0 };
+        self.monitor.overloaded = true;
     }
 
     /// What the host may replace, as it is now.
@@ -215,16 +241,28 @@ impl State {
         if self.stale {
             self.stale = false;
             self.derived = Derived::new(config, &self.settings);
+        } else if self.renewed {
+            self.renewed = false;
+            self.renew();
         }
     }
 
-    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain.
+    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain. What follows from
+    /// them is worked out in the next tick, as for [`State::apply`].
     pub(crate) fn replace_effects(&mut self, compensation: &Compensation<f32>) {
-        self.settings.effects = compensation.effects();
         self.compensation = *compensation;
-        self.effects = compensation::State::default();
-        self.current_error = compensation.current_error(self.derived.torque_per_ampere);
+        self.renewed = true;
         self.restart_estimator();
+    }
+
+    /// What follows from effects that have been replaced.
+    fn renew(&mut self) {
+        self.settings.effects = self.compensation.effects();
+        self.effects = compensation::State::default();
+        self.current_error = self
+            .compensation
+            .current_error(self.derived.torque_per_ampere);
+        self.lost_voltage = self.compensation.lost_voltage();
     }
 
     /// Has the estimator forget everything.

@@ -11,6 +11,7 @@ use rig_shared::trajectory::Reference;
 use rig_shared::units::Duty;
 use rig_shared::wire::message::{Estimate, StateSample};
 
+use crate::calibration::calibrate;
 use crate::config::Config;
 use crate::reference::Braking;
 use crate::sample::{Command, Sample};
@@ -46,7 +47,10 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     .or_else(|| board_fault(&sample));
     state.cause_acting = found.is_some();
     let found = found
-        .or_else(|| calibrate(config, state, sample, &readings))
+        .or_else(|| {
+            let calibrating = state.mode == Mode::Calibrating;
+            calibrating.then(|| calibrate(config, state, sample.current, readings.temperature))?
+        })
         .or_else(|| listen(config, state));
     if let Some((fault, value)) = found {
         output.fault = fall(state, fault, value);
@@ -58,7 +62,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
         duty,
         torque,
         explained,
-    } = if state.mode.drives() {
+    } = if state.mode.drives() && state.tick >= state.run.awake {
         drive(config, state, &readings, &mut limits)
     } else {
         Driven::default()
@@ -125,6 +129,7 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     // The checks see what the sensors say, the laws what is true of it.
     Readings {
         driver_fault: sample.driver_fault,
+        comparator: sample.comparator,
         overrun: sample.overrun,
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
@@ -134,10 +139,12 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         supply: f32::from(sample.supply.0) * scaling.supply_per_code,
         temperature,
         encoder_step: step as i32,
+        encoder_open: sample.encoder_open,
         position,
         velocity,
         duty: state.duty,
-        driving: state.mode.drives(),
+        lost_voltage: state.regained,
+        driving: state.mode.drives() && state.tick > state.run.awake,
     }
 }
 
@@ -147,35 +154,6 @@ fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
         return Some((Fault::EncoderSignal, counts as f32));
     }
     sample.stack_left.map(|left| (Fault::Stack, left as f32))
-}
-
-/// Measures the current offset while the bridge is off; a fault where it is implausible.
-fn calibrate(
-    config: &Config,
-    state: &mut State,
-    sample: Sample,
-    now: &Readings,
-) -> Option<(Fault, f32)> {
-    if state.mode != Mode::Calibrating {
-        return None;
-    }
-    let code = u64::from(sample.current.0);
-    state.calibration.ticks += 1;
-    state.calibration.sum += code;
-    state.calibration.squares += code * code;
-    if state.calibration.ticks < config.calibration_ticks {
-        return None;
-    }
-    let zero_code = state.calibration.sum as f32 / state.calibration.ticks as f32;
-    let offset = (zero_code - config.scaling.current_zero) * config.scaling.current_per_code;
-    if offset.abs() > config.largest_offset {
-        return Some((Fault::CurrentOffset, offset));
-    }
-    state.calibration.zero_code = zero_code;
-    state.calibration.std = state.calibration.std_of_mean() * config.scaling.current_per_code.abs();
-    state.start_temperature = now.temperature;
-    state.mode = Mode::Disarmed;
-    None
 }
 
 /// A silent host: first a controlled stop, then, if it stays silent, the fault.
@@ -200,6 +178,13 @@ fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
         value,
     };
     state.mode = Mode::Fault;
+    if matches!(
+        fault,
+        Fault::EncoderJump | Fault::EncoderLost | Fault::EncoderSignal
+    ) {
+        // Where the link stands is what the encoder says no longer.
+        state.placed = false;
+    }
     let first = state.latch.latch(record);
     if first {
         state.snapshot.freeze();
@@ -229,7 +214,7 @@ fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Refer
         Mode::Calibrating | Mode::Disarmed | Mode::Fault => return standing(state.position),
         Mode::Holding => standing(base),
         Mode::Running => {
-            let elapsed = state.tick - start;
+            let elapsed = state.tick.saturating_sub(start);
             match &state.trajectory {
                 Some((trajectory, _)) if elapsed < length => {
                     let offset = trajectory.at_tick(elapsed, config.rates.control_hz);
@@ -313,13 +298,16 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
     let peak = state.settings.limits.peak_current;
     let wanted = wish.max(-peak).min(peak);
     limits.set(Limit::Current, wanted != wish);
+    // In the direction of the wanted current, not of the noisy one, and fading where the ripple crosses zero.
+    let fade = (wanted * state.derived.fade_per_ampere).clamp(-1.0, 1.0);
+    state.regained = state.lost_voltage * fade;
     let output = current::step(
         &state.derived.current,
         &mut state.current_loop,
         current::Input {
             reference: wanted,
             current: now.current,
-            back_emf: config.drive.back_emf(state.velocity),
+            back_emf: config.drive.back_emf(state.velocity) + state.regained,
             supply: now.supply,
         },
     );

@@ -18,7 +18,7 @@ use crate::config::{Config, Settings};
 use crate::request::usable;
 
 /// Bytes that a copy takes at most; a whole number of 64-bit words, which flash is written in.
-pub const IMAGE: usize = 704;
+pub const IMAGE: usize = 1024;
 
 /// "RIG1".
 const MAGIC: u32 = u32::from_le_bytes(*b"RIG1");

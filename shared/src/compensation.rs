@@ -11,11 +11,15 @@
 //! * **What stands at a position** as well as in motion (cogging, eccentricity, springs, tilt) is given in full at the
 //!   measured position: it is a known torque like gravity, and wrong by the error of the position alone. Its speed
 //!   is the reference's, for the reason above.
+//! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
+//!   fed by the measured way it would close a loop of positive sign.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
+//! * **A voltage that the bridge loses** is given beside the current loop's, in the direction of the wanted current; within a
+//!   small band about none it fades, where the ripple crosses zero and so does the loss.
 //!
-//! Whatever else there is has no torque or reading that would undo it (elastic or loose transmission, delay, memory of
-//! distance), and is refused.
+//! Whatever else there is has no torque, voltage or reading that would undo it, and is refused with the reason
+//! ([`Role::refusal`]).
 //!
 //! Beside the torque to give, a tick says what of the drive's torque the effects *explain*: the same laws at the
 //! measured motion, in full. An estimator of the standard model must not see that part, or its parameters absorb it.
@@ -29,12 +33,12 @@ mod role;
 pub use now::Now;
 pub use role::{EffectFault, Role};
 
-use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
+use crate::effects::{Effect, Instant, Kind, Memory, Parameter, Scale};
 use crate::precompensation::{PrecompensationSettings, direction, finite, share};
 use crate::scalar::{Real, Scalar};
 
 /// Most effects that a rig compensates.
-pub const EFFECTS: usize = 4;
+pub const EFFECTS: usize = 8;
 
 /// The effects of a rig, from the front.
 pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
@@ -138,14 +142,28 @@ pub struct Reading<T> {
     pub slope: T,
 }
 
+/// What an effect does to the measured position, about the place where that was last worked out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Tangent<T> {
+    place: T,
+    error: T,
+    slope: T,
+}
+
 /// What effects remember.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T: Real> {
-    memories: [Memory<T>; EFFECTS],
-    /// Value of each law where the torque to give is taken from.
+    /// Of each law where the torque to give is taken from, and at the measured motion.
+    memories: [[Memory<T>; 2]; EFFECTS],
+    tangents: [Tangent<T>; EFFECTS],
+    reading_turn: usize,
+    /// Value of each law where the torque to give is taken from: dry ones from the front, standing ones from the end.
     planned: [T; EFFECTS],
     /// Value of each dry law at the measured motion.
     sliding: [T; EFFECTS],
+    /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
+    /// each round, so that no rounding piles up.
+    sums: [T; 3],
     turn: usize,
 }
 
@@ -154,7 +172,15 @@ impl<T: Real> State<T> {
     pub fn interrupt(&mut self) {
         self.planned = [T::ZERO; EFFECTS];
         self.sliding = [T::ZERO; EFFECTS];
+        self.sums = [T::ZERO; 3];
+        self.memories = [[Memory::default(); 2]; EFFECTS];
         self.turn = 0;
+    }
+
+    /// The link is said to stand elsewhere: what was worked out for another place no longer holds.
+    pub fn displace(&mut self) {
+        self.tangents = [Tangent::default(); EFFECTS];
+        self.reading_turn = 0;
     }
 }
 
@@ -162,6 +188,8 @@ impl<T: Real> State<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Job {
     effect: u8,
+    /// Place among the values.
+    place: u8,
     /// At the measured motion, instead of where the torque to give is taken from.
     sliding: bool,
 }
@@ -173,10 +201,15 @@ pub struct Compensation<T> {
     /// What is evaluated in turn, one law a tick.
     jobs: [Job; 2 * EFFECTS],
     count: u8,
+    /// Dry effects, and standing ones.
+    dry: u8,
+    standing: u8,
     /// Ticks until a law's turn comes again.
     round: T,
-    /// Some effect is in the position.
-    position: bool,
+    /// Effects in the position.
+    positions: u8,
+    /// Some effect depends on the transmitted torque.
+    needs_load: bool,
 }
 
 impl<T: Scalar> Compensation<T> {
@@ -190,23 +223,29 @@ impl<T: Scalar> Compensation<T> {
             let Some(effect) = effect else { continue };
             let checked = Compensated::new(*effect)?;
             all.effects[k] = Some(checked);
+            all.needs_load |= effect.kind == Kind::LoadFriction;
             match checked.role {
                 Role::Dry => {
-                    all.add(k, false);
-                    all.add(k, true);
+                    all.add(k, all.dry, false);
+                    all.add(k, all.dry, true);
+                    all.dry += 1;
                 }
-                Role::Standing => all.add(k, false),
-                Role::Position => all.position = true,
-                Role::Current => {}
+                Role::Standing => {
+                    all.standing += 1;
+                    all.add(k, EFFECTS as u8 - all.standing, false);
+                }
+                Role::Position => all.positions += 1,
+                Role::Current | Role::Voltage => {}
             }
         }
         Ok(all)
     }
 
-    fn add(&mut self, effect: usize, sliding: bool) {
+    fn add(&mut self, effect: usize, place: u8, sliding: bool) {
         if let Some(job) = self.jobs.get_mut(usize::from(self.count)) {
             *job = Job {
                 effect: effect as u8,
+                place,
                 sliding,
             };
             self.count += 1;
@@ -228,7 +267,21 @@ impl<T: Scalar> Compensation<T> {
     /// Whether there is anything to take off the position.
     #[inline(always)]
     pub fn has_position(&self) -> bool {
-        self.position
+        self.positions > 0
+    }
+
+    /// Whether an effect depends on the torque that the gear transmits.
+    #[inline(always)]
+    pub fn needs_load(&self) -> bool {
+        self.needs_load
+    }
+
+    /// Voltage that the bridge loses against the current, V.
+    pub fn lost_voltage(&self) -> T {
+        let lost = |one: &Compensated<T>| one.effect.gains[0];
+        let all = self.effects.iter().flatten();
+        all.filter(|one| one.role == Role::Voltage)
+            .fold(T::ZERO, |sum, one| sum + lost(one))
     }
 
     /// Constant error of the measured current, A, where a torque in N·m is so many per ampere.
@@ -251,14 +304,38 @@ impl<T: Scalar> Compensation<T> {
 
     /// What the encoder reads too much at this angle. Evaluated at the reading instead of the truth: wrong by the
     /// error's own square.
+    ///
+    /// One effect is evaluated in a tick that has time, in turn, and continued along its tangent until its turn comes again.
     #[inline(always)]
-    pub fn reading(&self, now: &Now<T>) -> Reading<T> {
+    pub fn reading(&self, state: &mut State<T>, now: &Now<T>) -> Reading<T> {
         let mut reading = Reading::default();
-        if !self.position || !now.placed {
+        if self.positions == 0 || !now.placed {
             return reading;
         }
+        let position = finite(now.position);
+        if !now.busy {
+            self.evaluate_tangent(state, now);
+        }
+        let tangents = self.effects.iter().zip(&state.tangents);
+        for (_, at) in tangents.filter(|(one, _)| one.is_some_and(|one| one.role == Role::Position))
+        {
+            reading.error += at.error + at.slope * (position - at.place);
+            reading.slope += at.slope;
+        }
+        reading
+    }
+
+    /// Works out the tangent of the next effect in the position.
+    #[inline(always)]
+    fn evaluate_tangent(&self, state: &mut State<T>, now: &Now<T>) {
         let span = T::from_f64(SLOPE_SPAN);
-        for one in self.effects.iter().flatten() {
+        for _ in 0..EFFECTS {
+            let k = state.reading_turn;
+            state.reading_turn = if k + 1 < EFFECTS { k + 1 } else { 0 };
+            let (Some(Some(one)), Some(tangent)) = (self.effects.get(k), state.tangents.get_mut(k))
+            else {
+                continue;
+            };
             if one.role != Role::Position {
                 continue;
             }
@@ -267,16 +344,19 @@ impl<T: Scalar> Compensation<T> {
             instant.position += span / now.gear_ratio;
             instant.motor_angle += span;
             let ahead = evaluate(&one.effect, &mut Memory::default(), &instant);
-            reading.error += here;
-            reading.slope += (ahead - here) * now.gear_ratio / span;
+            *tangent = Tangent {
+                place: finite(now.position),
+                error: here,
+                slope: (ahead - here) * now.gear_ratio / span,
+            };
+            return;
         }
-        reading
     }
 
     /// Torque to give, and torque that is explained. The result is finite for any input.
     ///
     /// One law is evaluated a tick, in turn, and stands until its turn comes again: a single effect of position at
-    /// every tick, four dry ones every eighth, and each in the middle of the time that it stands for.
+    /// every tick, four dry ones every eighth, eight every sixteenth, each in the middle of the time that it stands for.
     #[inline(always)]
     pub fn torque(
         &self,
@@ -287,7 +367,8 @@ impl<T: Scalar> Compensation<T> {
         if !now.busy {
             self.evaluate_next(settings, state, now);
         }
-        let share = if settings.enabled {
+        let [dry, standing, sliding] = state.sums;
+        let share = if settings.enabled && self.dry > 0 {
             share(
                 settings,
                 finite(now.reference.velocity),
@@ -296,22 +377,23 @@ impl<T: Scalar> Compensation<T> {
         } else {
             T::ZERO
         };
-        let mut output = Output::default();
-        let torques = state.planned.iter().zip(&state.sliding);
-        for (one, (planned, sliding)) in self.effects.iter().zip(torques) {
-            match one.map(|one| one.role) {
-                Some(Role::Dry) => {
-                    output.feed += share * *planned;
-                    output.explained += *sliding;
-                }
-                Some(Role::Standing) => {
-                    output.feed += *planned;
-                    output.explained += *planned;
-                }
-                _ => {}
-            }
+        Output {
+            feed: share * dry + standing,
+            explained: sliding + standing,
         }
-        output
+    }
+
+    /// The sums anew.
+    #[inline(never)]
+    fn add_up(&self, state: &mut State<T>) {
+        let sum =
+            |values: &mut dyn Iterator<Item = &T>| values.fold(T::ZERO, |sum, value| sum + *value);
+        let (dry, standing) = (usize::from(self.dry), usize::from(self.standing));
+        state.sums = [
+            sum(&mut state.planned.iter().take(dry)),
+            sum(&mut state.planned.iter().rev().take(standing)),
+            sum(&mut state.sliding.iter().take(dry)),
+        ];
     }
 
     #[inline(always)]
@@ -330,7 +412,8 @@ impl<T: Scalar> Compensation<T> {
             0
         };
         let k = usize::from(job.effect);
-        let (Some(Some(one)), Some(memory)) = (self.effects.get(k), state.memories.get_mut(k))
+        let (Some(Some(one)), Some([planned, sliding])) =
+            (self.effects.get(k), state.memories.get_mut(k))
         else {
             return;
         };
@@ -344,7 +427,7 @@ impl<T: Scalar> Compensation<T> {
         let (place, memory) = if job.sliding {
             instant.velocity = measured;
             instant.direction = measured.sgn();
-            (&mut state.sliding, &mut { *memory })
+            (&mut state.sliding, sliding)
         } else {
             let dry = one.role == Role::Dry;
             let ahead = wanted.abs().lt(measured.abs());
@@ -361,16 +444,28 @@ impl<T: Scalar> Compensation<T> {
             } else {
                 wanted.sgn()
             };
-            (&mut state.planned, memory)
+            (&mut state.planned, planned)
         };
         let nowhere = one.role == Role::Standing && !now.placed;
+        // Of dry friction nothing is given where nothing moves or is to, whatever a law remembers.
+        let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
         let torque = if nowhere {
             T::ZERO
         } else {
             evaluate(&one.effect, memory, &instant)
         };
-        if let Some(place) = place.get_mut(k) {
+        let torque = if rests { T::ZERO } else { torque };
+        let sum = match (one.role, job.sliding) {
+            (_, true) => 2,
+            (Role::Standing, _) => 1,
+            _ => 0,
+        };
+        if let Some(place) = place.get_mut(usize::from(job.place)) {
+            state.sums[sum] += torque - *place;
             *place = torque;
+        }
+        if state.turn == 0 {
+            self.add_up(state);
         }
     }
 }

@@ -75,8 +75,13 @@ fn settled<T: Scalar>(
     let compensation = Compensation::new(effects).unwrap();
     let mut state = State::default();
     let mut output = Output::default();
+    // A tick without time: what remembers a way makes none.
+    let now = Now {
+        period: T::ZERO,
+        ..*now
+    };
     for _ in 0..2 * EFFECTS {
-        output = compensation.torque(settings, &mut state, now);
+        output = compensation.torque(settings, &mut state, &now);
     }
     output
 }
@@ -160,7 +165,8 @@ fn effects_add_up() {
         angle_in_turn: 0.3,
         ..at(0.1, 0.08)
     };
-    let both = [Some(a), None, Some(b), None];
+    let mut both = [None; EFFECTS];
+    (both[0], both[2]) = (Some(a), Some(b));
     let sum = torque(&only(a), &now).feed + torque(&only(b), &now).feed;
     assert!((torque(&both, &now).feed - sum).abs() < 1e-15);
 }
@@ -226,7 +232,7 @@ fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
                         let output = compensation.torque(&SETTINGS, &mut state, &now);
                         assert!(output.feed.is_finite(), "{kind:?} {value}");
                         assert!(output.explained.is_finite(), "{kind:?} {value}");
-                        let reading = compensation.reading(&now);
+                        let reading = compensation.reading(&mut state, &now);
                         assert!(reading.error.is_finite() && reading.slope.is_finite());
                     }
                 }
@@ -250,11 +256,102 @@ fn what_is_wrong_with_an_effect_is_named() {
     let mut surplus = stribeck(0.1, 0.1);
     surplus.gains[3] = 1.0;
     assert_eq!(fault(surplus), EffectFault::Surplus);
-    let memory = typical(Kind::PreslidingDahl);
-    let refused = fault(memory);
-    assert_eq!(refused, EffectFault::NotCompensable(Kind::PreslidingDahl));
-    assert!(std::format!("{refused}").starts_with("presliding friction cannot be compensated"));
+    let refused = fault(typical(Kind::Backlash));
+    assert_eq!(refused, EffectFault::NotCompensable(Kind::Backlash));
+    assert!(std::format!("{refused}").contains(" cannot be compensated: it acts between"));
     assert!(Compensation::new(&only(stribeck(0.0, 0.1))).is_ok());
+}
+
+/// Two effects.
+fn both<T: Copy>([first, second]: [Effect<T>; 2]) -> Effects<T> {
+    let mut effects = [None; EFFECTS];
+    (effects[0], effects[1]) = (Some(first), Some(second));
+    effects
+}
+
+/// What nothing is done about is told by its name and with a reason, and only that.
+#[test]
+fn each_kind_has_a_role_or_a_reason() {
+    let refused: std::vec::Vec<_> = Kind::ALL
+        .iter()
+        .filter(|kind| Role::refusal(**kind).is_some())
+        .map(|kind| kind.about().name)
+        .collect();
+    let expected = [
+        "backlash",
+        "joint_elasticity",
+        "measurement_delay",
+        "payload",
+        "inertia_coupling",
+    ];
+    assert_eq!(refused, expected);
+}
+
+/// A reversal: the torque builds up over the reference's stroke, goes with the reference alone, and rests with it.
+#[test]
+fn friction_with_memory_is_given_over_the_way_of_the_reference() {
+    let effect = Effect::new(Kind::PreslidingDahl, &[1.0], &[0.01]);
+    let compensation = Compensation::new(&only(effect)).unwrap();
+    let mut state = State::default();
+    let mut go = |reference: f64, measured: f64, ticks: u32| {
+        let mut last = 0.0;
+        for _ in 0..ticks {
+            let now = Now {
+                period: 1e-4,
+                ..at(reference, measured)
+            };
+            last = compensation.torque(&SETTINGS, &mut state, &now).feed;
+        }
+        last / share(&SETTINGS, reference, measured)
+    };
+    // Twenty strokes on: nothing is left of the start.
+    assert!(go(0.5, 0.0, 4000).abs() < 1e-6);
+    // Half a stroke back: z = −1 + 2·exp(−½), the law gives z + 1.
+    let back = go(-0.5, 0.0, 100);
+    assert!((back - 2.0 * (-0.5_f64).exp()).abs() < 0.02, "{back}");
+    // The link's own motion changes nothing, and a reference that stands gives nothing.
+    assert_eq!(go(0.0, 0.3, 10), 0.0);
+}
+
+/// One at a time by tangents, and still to a hundredth of the amplitude at the template's highest speed.
+#[test]
+fn two_errors_of_the_encoder_are_taken_off_in_turn() {
+    let given = [
+        Kind::EncoderEccentricityMotor,
+        Kind::EncoderEccentricityJoint,
+    ];
+    let effects = both(given.map(|kind| Effect::new(kind, &[0.001, -0.0005], &[1.0])));
+    let compensation = Compensation::new(&effects).unwrap();
+    let mut state = State::default();
+    let mut worst = 0.0_f64;
+    for tick in 0..20_000 {
+        let position = 6.0 * 1e-4 * f64::from(tick);
+        let now = Now {
+            position,
+            motor_angle: 50.0 * position,
+            angle_in_turn: (50.0 * position).rem_euclid(core::f64::consts::TAU),
+            placed: true,
+            gear_ratio: 50.0,
+            ..Now::default()
+        };
+        let reading = compensation.reading(&mut state, &now);
+        let truth: f64 = effects
+            .iter()
+            .flatten()
+            .map(|effect| effect.torque(&mut Memory::default(), &now.instant(true)))
+            .sum();
+        if tick > 2 {
+            worst = worst.max((reading.error - truth).abs());
+        }
+    }
+    assert!(worst > 0.0 && worst < 1e-5, "{worst}");
+}
+
+#[test]
+fn what_the_bridge_loses_is_a_voltage() {
+    let lost = Compensation::new(&only(Effect::new(Kind::DriveDeadzone, &[0.4], &[]))).unwrap();
+    assert_eq!(lost.lost_voltage(), 0.4);
+    assert!(!lost.has_torque() && !lost.has_position());
 }
 
 proptest! {
@@ -283,13 +380,13 @@ proptest! {
             placed: true,
             ..Now::default()
         };
-        let effects = [Some(single(given[0])), Some(single(given[1])), None, None];
+        let effects = both(given.map(single));
         let f32s = settled(&effects, &settings, &now);
         let wide = Now::<f64> {
             angle_in_turn: angle.into(),
             ..at(reference.into(), measured.into())
         };
-        let f64s = torque(&[Some(given[0]), Some(given[1]), None, None], &wide);
+        let f64s = torque(&both(given), &wide);
         // An order of 24 takes the angle's rounding with it.
         prop_assert!((f64::from(f32s.feed) - f64s.feed).abs() < 1e-5);
         prop_assert!((f64::from(f32s.explained) - f64s.explained).abs() < 1e-5);

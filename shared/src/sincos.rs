@@ -17,11 +17,13 @@ const SINE: [f32; 3] = [-0.166_666_51, 8.331_978e-3, -1.949_557e-4];
 const COSINE: [f32; 3] = [4.166_664_7e-2, -1.388_736_7e-3, 2.443_838e-5];
 
 /// Sine and cosine of an angle in rad.
-#[inline]
+///
+/// Not inlined: models, effects and motions ask for them, and the chip's fast memory has no room for copies.
+#[inline(never)]
 pub(crate) fn sincosf(x: f32) -> (f32, f32) {
     // Written so that NaN goes the long way round too, and comes out as NaN.
     if !(x.abs() <= FURTHEST) {
-        return libm::sincosf(x);
+        return far(x);
     }
     let turns = x * core::f32::consts::FRAC_2_PI;
     let quarter = (turns + 0.5_f32.copysign(turns)) as i32;
@@ -36,6 +38,13 @@ pub(crate) fn sincosf(x: f32) -> (f32, f32) {
         2 => (-sine, -cosine),
         _ => (-cosine, sine),
     }
+}
+
+/// Beyond [`FURTHEST`]: large, slow, and never asked for by a rig.
+#[cold]
+#[inline(never)]
+fn far(x: f32) -> (f32, f32) {
+    libm::sincosf(x)
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ pub fn go_round<P: Port>(line: &mut Session<P>, folder: &Path) -> Circle {
             .tracking_rms()
     };
     let model = Robot::load(&found.join("model.toml")).unwrap();
-    let all = requests(&model).unwrap();
+    let all = requests(&model, false).unwrap().requests;
     let bare: Vec<RequestBody> = all
         .iter()
         .filter(|body| !matches!(body, RequestBody::SetEffects(_)))
@@ -135,7 +135,9 @@ pub fn go_round<P: Port>(line: &mut Session<P>, folder: &Path) -> Circle {
         RequestBody::SetEffects(effects) => Some(effects.to_vec()),
         _ => None,
     });
-    let described = requests(&Robot::load(&robot).unwrap()).unwrap();
+    let described = requests(&Robot::load(&robot).unwrap(), false)
+        .unwrap()
+        .requests;
     Circle {
         diagnosis: serde_json::from_str(&diagnosis).unwrap(),
         effects: effects.unwrap(),

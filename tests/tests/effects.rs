@@ -104,17 +104,18 @@ fn what_cannot_be_compensated_is_refused_by_name_and_changes_nothing() {
     let good = periodic(0.1, 2.0, 0.0);
     line.request(set(&[good]).remove(0)).unwrap();
     let before = *line.port().device().state().settings();
-    let memory = Effect {
-        kind: Kind::PreslidingDahl,
-        gains: [0.1, 0.0, 0.0, 0.0],
-        shapes: [0.01, 0.0, 0.0, 0.0],
-    };
-    let error = line.request(set(&[good, memory]).remove(0)).unwrap_err();
-    assert!(error.to_string().contains("presliding friction"), "{error}");
+    let play = Effect::new(Kind::Backlash, &[], &[0.01, 5e3, 5.0, 0.5]);
+    let error = line.request(set(&[good, play]).remove(0)).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("(the effect `backlash`): it acts between motor and link"),
+        "{error}"
+    );
     assert!(matches!(
         error,
         LinkError::Refused {
-            refusal: Refusal::NotCompensable(Kind::PreslidingDahl),
+            refusal: Refusal::NotCompensable(Kind::Backlash),
             ..
         }
     ));

@@ -2,11 +2,16 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use rig_host::link::LinkError;
+use rig_host::plant::effect::dead_time::DeadTime;
+use rig_host::plant::effect::end_stops::EndStops;
+use rig_host::plant::effect::winding_temperature::WindingTemperature;
 use rig_host::plant::{Faults, PlantConfig};
 use rig_shared::safety::{Fault, Mode};
-use rig_shared::trajectory::Trajectory;
+use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::message::{Refusal, RequestBody};
-use rig_tests::{Line, bench, calibrated, connect, excitation, nameplate, snapshot, wait};
+use rig_tests::{
+    Line, bench, calibrated, connect, driven, excitation, in_parallel, nameplate, snapshot, wait,
+};
 
 fn refused(line: &mut Line, body: RequestBody) -> Refusal {
     match line.request(body) {
@@ -158,7 +163,6 @@ fn over_speed_position_and_overload_from_outside() {
         Fault::Position
     );
 
-    // In motion: at rest so much current without a count is taken for a lost encoder.
     let mut line = moving(3);
     inject(&mut line, |f| f.external_torque = 5.0);
     wait(&mut line, 12.0);
@@ -173,6 +177,114 @@ fn over_speed_position_and_overload_from_outside() {
     );
     wait(&mut line, 8.0);
     line.request(RequestBody::ClearFault).unwrap();
+}
+
+fn latched(line: &Line) -> Option<Fault> {
+    line.port().device().state().latch.first().map(|r| r.fault)
+}
+
+/// Cut while the rig holds: found from the winding's voltage once something moves the link, before it has moved far.
+#[test]
+fn an_encoder_lost_while_holding_is_found_when_the_link_moves() {
+    let (mut line, _) = bench(8);
+    line.request(RequestBody::Arm).unwrap();
+    wait(&mut line, 0.5);
+    inject(&mut line, |f| f.encoder_cut = true);
+    wait(&mut line, 1.0);
+    // Nothing has moved: nothing can tell.
+    assert_eq!(latched(&line), None);
+    let truth = |line: &mut Line| line.port_mut().device_mut().plant_mut().truth();
+    let before = truth(&mut line).position;
+    inject(&mut line, |f| f.external_torque = 5.0);
+    let mut after = 0;
+    while latched(&line).is_none() && after < 1000 {
+        wait(&mut line, 1e-3);
+        after += 1;
+    }
+    let way = truth(&mut line).position - before;
+    println!("{after} ms, {way:.3} rad");
+    assert_eq!(latched(&line), Some(Fault::EncoderLost));
+    assert!(after <= 200 && way < 0.3, "{after} ms, {way} rad");
+}
+
+/// Against a stop with all that the limits allow: what heats the winding is named, not the encoder, which sees what there is.
+#[test]
+fn a_blocked_link_is_an_overload_and_no_lost_encoder() {
+    let mut plant = PlantConfig::laboratory(9);
+    let start = plant.initial_position;
+    plant.mechanism.end_stops = plant.mechanism.end_stops.map(|stops| EndStops {
+        range: [start - 0.1, start + 0.1],
+        ..stops
+    });
+    let mut line = connect(&nameplate(&plant), plant, 9);
+    calibrated(&mut line);
+    let levels = [0.8_f32].into_iter().collect();
+    let away = Staircase {
+        levels,
+        move_us: 1_000_000,
+        dwell_us: 20_000_000,
+    };
+    line.request(RequestBody::SetTrajectory(Trajectory::Staircase(away)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 6.0);
+    assert_eq!(latched(&line), Some(Fault::Overload));
+}
+
+/// Ten minutes of the hardest motion that the limits allow, with a warm winding and dead time: no false fault.
+#[test]
+fn hard_motion_raises_no_fault() {
+    let largest = in_parallel(2, |seed| {
+        let mut plant = PlantConfig::laboratory(10 + seed);
+        plant.bridge.dead_time = Some(DeadTime {
+            voltage: 0.3,
+            fade_current: 0.1,
+        });
+        plant.motor.temperature = Some(WindingTemperature {
+            resistance: 0.0039,
+            torque_constant: -0.002,
+        });
+        // 60 K above the surroundings with the RMS current of this motion.
+        plant.ambient = 60.0;
+        let motor = plant.motor;
+        let mut line = connect(&nameplate(&plant), plant, 10 + seed);
+        calibrated(&mut line);
+        let mut unexplained = (0.0_f64, 0.0_f64);
+        for k in 0..19 {
+            let run = driven(&mut line, vec![], hard(100 * seed + k), 0.0);
+            assert!(run.faults.is_empty(), "motion {k}: {:?}", run.faults);
+            for row in &run.rows {
+                let speed = motor_speed(row.qd1);
+                let rest = row.u1 - motor.resistance * row.i1 - motor.torque_constant * speed;
+                unexplained.0 += (rest - unexplained.0) / 20.0;
+                unexplained.1 = unexplained.1.max(unexplained.0.abs());
+            }
+        }
+        unexplained.1
+    });
+    println!("{largest:.2?} V unexplained at most");
+}
+
+/// The motor's speed at one of the joint, rad/s.
+fn motor_speed(joint: f64) -> f64 {
+    joint * PlantConfig::default().mechanism.ratio
+}
+
+/// 16 s of excitation at the limit of speed, as far as current for good and range allow.
+fn hard(seed: u64) -> Trajectory<f32> {
+    let Trajectory::Fourier(mut motion) = excitation(seed, 2, 6) else {
+        panic!("an excitation is a Fourier series")
+    };
+    let all = Trajectory::Fourier(motion.clone()).extremes();
+    let range = all.highest.max(-all.lowest);
+    let more = (5.9 / all.velocity)
+        .min(25.0 / all.acceleration)
+        .min(1.4 / range);
+    for part in motion.sine.iter_mut().chain(&mut motion.cosine) {
+        *part *= more;
+    }
+    Trajectory::Fourier(motion)
 }
 
 #[test]

@@ -8,7 +8,7 @@
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
 use embassy_stm32::pac::adccommon::vals::{Ckmode, Presc};
-use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC};
+use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC, VREFINTCAL};
 use rig_shared::units::AdcCode;
 
 use super::clock::{CORE_HZ, TICK_PRIORITY};
@@ -32,6 +32,15 @@ pub(crate) const LEAD: u16 =
 /// Start-up time of the voltage regulator, µs (DS12288, t_ADCVREG_STUP).
 const REGULATOR_US: u32 = 20;
 
+/// Channel of the chip's own reference, its buffer's start-up in µs (DS12288, V_REFINT and t_start_vrefint), and how often
+/// it is read.
+const REFERENCE_CHANNEL: u8 = 18;
+const REFERENCE_US: u32 = 20;
+const REFERENCE_READINGS: u32 = 16;
+/// What the factory measured it at, over what codes are taken for, V (DS12288, "Internal voltage reference calibration
+/// values"): 3.0 over 3.3, as whole numbers.
+const CALIBRATED_AT: [u32; 2] = [10, 11];
+
 /// The converter.
 pub(crate) struct Converter;
 
@@ -43,13 +52,15 @@ pub(crate) struct Codes {
 }
 
 impl Converter {
-    /// Calibrates the converter and has it wait for its trigger. The interrupt is not yet enabled.
-    pub(crate) fn new(pins: AnalogPins) -> Self {
+    /// Calibrates the converter and has it wait for its trigger. The interrupt is not yet enabled. Gives, too, the
+    /// converter's reference, which is the chip's supply, over the 3.3 V that it is taken for.
+    pub(crate) fn new(pins: AnalogPins) -> (Self, f32) {
         pins.connect();
         RCC.ahb2enr().modify(|w| w.set_adc12en(true));
         ADC12_COMMON.ccr().modify(|w| {
             w.set_ckmode(Ckmode::ASYNCHRONOUS);
             w.set_presc(Presc::DIV4);
+            w.set_vrefen(true);
         });
         let adc = ADC1;
         adc.cr().modify(|w| {
@@ -71,6 +82,7 @@ impl Converter {
                 w.set_difsel(channel, Difsel::SINGLE_ENDED);
             }
         });
+        let supply = supply();
         adc.smpr().write(|w| {
             for channel in [CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANNEL] {
                 w.set_smp(usize::from(channel), SampleTime::CYCLES24_5);
@@ -94,7 +106,7 @@ impl Converter {
         });
         adc.ier().write(|w| w.set_jeosie(true));
         adc.cr().modify(|w| w.set_jadstart(true));
-        Self
+        (Self, supply)
     }
 
     /// Lets the interrupt come, above every other.
@@ -128,4 +140,23 @@ impl Converter {
     pub(crate) fn is_waiting(&self) -> bool {
         ADC1.isr().read().jeos()
     }
+}
+
+/// The chip's supply over 3.3 V, from its own reference.
+fn supply() -> f32 {
+    let adc = ADC1;
+    cortex_m::asm::delay(REFERENCE_US * (CORE_HZ / 1_000_000));
+    // At least 4 µs of sampling (DS12288, t_S_vrefint): 247.5 cycles are 5.8.
+    adc.smpr2()
+        .write(|w| w.set_smp(usize::from(REFERENCE_CHANNEL) - 10, SampleTime::CYCLES247_5));
+    adc.sqr1().write(|w| w.set_sq(0, REFERENCE_CHANNEL));
+    let mut sum = 0;
+    for _ in 0..REFERENCE_READINGS {
+        adc.cr().modify(|w| w.set_adstart(true));
+        while !adc.isr().read().eoc() {}
+        sum += u32::from(adc.dr().read().rdata());
+    }
+    let calibrated = u32::from(VREFINTCAL.data().read());
+    let [over, under] = CALIBRATED_AT;
+    (calibrated * REFERENCE_READINGS * over) as f32 / (sum.max(1) * under) as f32
 }

@@ -3,7 +3,11 @@
 //! The counter runs freely over 32 bits and wraps. Where the index is wired it sets the counter to 0 counting
 //! up, to its top counting down (RM0440, TIM2, "Encoder index"); between two index pulses lie whole turns, so that the
 //! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
-//! moved is counts that were lost or made up on the way.
+//! moved is counts that were lost or made up on the way. Between two of them the counter stays within a turn of 0; beyond it
+//! one has not come. The timer's own check of the index (TIM2_SR.IERRF) compares with the counter's ends, which a counter of
+//! 32 bits has elsewhere, and is not used; that both channels changed at once (TERRF) is.
+//!
+//! The index acts in one of the four states of the channels (TIM2_ECR.IPOS), so that its own width does not matter.
 //!
 //! TIM5 times the edges: TIM2 sends the clock of its counter out as a trigger (TIM2_CR2.MMS = 8, "encoder clock
 //! output"), which is TIM5's ITR1 (RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"); there it captures a
@@ -17,6 +21,7 @@ use embassy_stm32::pac::timer::vals::{
     CcmrInputCcs, Ckd, Etp, Etps, FilterValue, Idir, Mms, Sms, Ts,
 };
 use embassy_stm32::pac::{RCC, TIM2, TIM5};
+use rig_firmware::config::Encoder;
 use rig_firmware::sample::EDGE_CLOCK_HZ;
 use rig_shared::units::EncoderCount;
 
@@ -65,7 +70,7 @@ pub(crate) struct EncoderTimer {
 
 impl EncoderTimer {
     /// Sets TIM2 up and starts it.
-    pub(crate) fn new(pins: EncoderPins, counts_per_turn: u32) -> Self {
+    pub(crate) fn new(pins: EncoderPins, encoder: &Encoder) -> Self {
         pins.connect();
         RCC.apb1enr1().modify(|w| w.set_tim2en(true));
         let timer = TIM2;
@@ -86,17 +91,20 @@ impl EncoderTimer {
             w.set_etps(Etps::DIV1);
             w.set_etp(Etp::NOT_INVERTED);
         });
+        // Where and when before whether (RM0440, TIM2_ECR: with IE reset).
         timer.ecr().write(|w| {
-            w.set_ie(true);
             w.set_idir(Idir::BOTH);
+            w.set_ipos(encoder.index_levels);
         });
+        timer.ecr().modify(|w| w.set_ie(true));
         timer.sr().write_value(Default::default());
         timer.cr2().write(|w| w.set_mms(Mms::ENCODER_CLOCK_OUTPUT));
         // The slave listens before the master begins.
         time_edges();
         timer.cr1().modify(|w| w.set_cen(true));
         Self {
-            counts_per_turn: NonZeroU32::new(counts_per_turn).unwrap_or(NonZeroU32::MIN),
+            counts_per_turn: NonZeroU32::new(encoder.counts_per_motor_turn)
+                .unwrap_or(NonZeroU32::MIN),
             last: timer.cnt().read(),
             step: 0,
             count: 0,
@@ -132,11 +140,22 @@ impl EncoderTimer {
                 self.indexed = true;
                 step = self.step;
             } else {
-                step = within;
                 if beside.unsigned_abs() > SLACK + self.step.unsigned_abs() / 2 {
+                    // Counts that were lost, or an index that is none: nobody knows, so the motion goes on as it was.
                     wrong = Some(beside);
+                    step = self.step;
+                } else {
+                    step = within;
                 }
             }
+        }
+        let turn = self.counts_per_turn.get() as i32;
+        let place = raw as i32;
+        let beyond = place >= turn + SLACK as i32 || place < -turn - SLACK as i32;
+        if self.indexed && beyond {
+            // Told once: without index the counter is as good as any.
+            self.indexed = false;
+            wrong = Some(if place < 0 { -turn } else { turn });
         }
         let age = now.wrapping_sub(TIM5.ccr(0).read());
         self.last = raw;

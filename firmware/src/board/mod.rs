@@ -3,10 +3,12 @@
 mod accelerated;
 mod adc;
 mod clock;
+mod comparator;
 mod cycles;
 mod encoder;
 mod fault;
 mod health;
+mod heat;
 mod link;
 mod pins;
 mod probe;
@@ -17,3 +19,4 @@ pub(crate) mod start;
 mod storage;
 mod tick;
 mod watchdog;
+mod wires;

@@ -1,9 +1,11 @@
 //! Which wire goes where: the one file that names pins. The table in `docs/firmware.md` says the same.
 
 use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::pac::gpio::vals::{Idr, Pupdr};
+use embassy_stm32::pac::{GPIOA, GPIOB};
 use embassy_stm32::peripherals::{
-    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB5, PB12, PC0,
-    PC1, PC2,
+    DMA1_CH1, DMA1_CH2, IWDG, LPUART1, PA0, PA1, PA2, PA3, PA5, PA8, PA9, PA15, PB0, PB5, PB12,
+    PC0, PC1, PC2,
 };
 use embassy_stm32::{Peri, Peripherals};
 
@@ -15,8 +17,8 @@ const AF_TIM2: u8 = 1;
 const AF_TIM2_ETR: u8 = 14;
 
 /// Converter channels of ADC1.
-pub(crate) const CURRENT_CHANNEL: u8 = 6; // PC0
-pub(crate) const SUPPLY_CHANNEL: u8 = 7; // PC1
+pub(crate) const CURRENT_CHANNEL: u8 = 7; // PC1
+pub(crate) const SUPPLY_CHANNEL: u8 = 6; // PC0
 pub(crate) const TEMPERATURE_CHANNEL: u8 = 8; // PC2
 
 /// The bridge's side of the wiring, its pins not yet driven.
@@ -55,8 +57,11 @@ pub(crate) struct EncoderPins {
 
 /// Current, supply, temperature.
 pub(crate) struct AnalogPins {
-    current: Peri<'static, PC0>,
-    supply: Peri<'static, PC1>,
+    /// Also the positive input of COMP3 (DS12288, pin definitions; RM0440, COMP, "non-inverting input assignment").
+    current: Peri<'static, PC1>,
+    /// The same wire once more, to the positive input of COMP4.
+    current_again: Peri<'static, PB0>,
+    supply: Peri<'static, PC0>,
     temperature: Peri<'static, PC2>,
 }
 
@@ -78,8 +83,9 @@ impl Pins {
                 index: p.PA15,
             },
             analog: AnalogPins {
-                current: p.PC0,
-                supply: p.PC1,
+                current: p.PC1,
+                current_again: p.PB0,
+                supply: p.PC0,
                 temperature: p.PC2,
             },
             link: LinkPins {
@@ -93,6 +99,30 @@ impl Pins {
             watchdog: p.IWDG,
         }
     }
+}
+
+/// Pins of channels A and B in GPIOA, and how their pulls are set there (RM0440, GPIOx_PUPDR: 1 up, 2 down).
+const CHANNELS: [usize; 2] = [0, 1];
+
+/// Pulls a channel of the encoder up or down: what drives it does not care.
+#[inline(always)]
+pub(crate) fn pull(channel: usize, up: bool) {
+    let pull = if up { Pupdr::PULL_UP } else { Pupdr::PULL_DOWN };
+    GPIOA
+        .pupdr()
+        .modify(|w| w.set_pupdr(CHANNELS[channel & 1], pull));
+}
+
+/// Whether a channel of the encoder is high.
+#[inline(always)]
+pub(crate) fn is_high(channel: usize) -> bool {
+    GPIOA.idr().read().idr(CHANNELS[channel & 1]) == Idr::HIGH
+}
+
+/// Whether the bridge holds its fault line low.
+#[inline(always)]
+pub(crate) fn driver_faults() -> bool {
+    GPIOB.idr().read().idr(12) == Idr::LOW
 }
 
 impl BridgePins {
@@ -123,10 +153,11 @@ impl EncoderPins {
 }
 
 impl AnalogPins {
-    /// Gives the inputs to the converter.
+    /// Gives the inputs to the converter and the comparators.
     pub(crate) fn connect(self) {
         for mut pin in [
             Flex::new(self.current),
+            Flex::new(self.current_again),
             Flex::new(self.supply),
             Flex::new(self.temperature),
         ] {

@@ -19,7 +19,8 @@ use rig_firmware::sample::Command;
 
 use super::adc::LEAD;
 use super::clock::CORE_HZ;
-use super::pins::BridgePins;
+use super::comparator;
+use super::pins::{BridgePins, driver_faults};
 
 /// Pulses a second.
 pub(crate) const PWM_HZ: u32 = 20_000;
@@ -31,14 +32,27 @@ const HIGH: u16 = TOP + 1;
 /// PWR_CR2.PLS: a chip's supply below 2.8 V counts as broken down (RM0440, PVD level 5). Its own lowest is 1.71 V.
 const SUPPLY_LEVEL: u8 = 5;
 
+/// COMP3 and COMP4, counted from 0.
+const COMPARATORS: [usize; 2] = [2, 3];
+
+/// What switches the outputs off without the program.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Break {
+    /// The bridge's fault line, or the chip's own troubles.
+    Driver,
+    /// Too much current.
+    Comparator,
+}
+
 /// The bridge.
 pub(crate) struct Bridge {
     enable: Output<'static>,
 }
 
 impl Bridge {
-    /// Sets TIM1 up with its outputs idle and the bridge disabled. `control_hz` must divide twice the pulse rate.
-    pub(crate) fn new(pins: BridgePins, control_hz: u32) -> Self {
+    /// Sets TIM1 up with its outputs idle and the bridge disabled. `control_hz` must divide twice the pulse rate;
+    /// `thresholds` are the comparators'.
+    pub(crate) fn new(pins: BridgePins, control_hz: u32, thresholds: [u16; 2]) -> Self {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);
             w.set_syscfgen(true);
@@ -80,10 +94,16 @@ impl Bridge {
             w.set_cce(0, true);
             w.set_cce(1, true);
         });
-        // The break input, active low; its source is the pin (reset value of AF1, written for clarity).
+        // The break input, active low; its sources are the pin and the comparators, which are high where they find too much
+        // current (RM0440, TIM1_AF1: BKCMP3E and BKCMP4E with their polarities).
+        comparator::start(thresholds);
         timer.af1().write(|w| {
             w.set_bkine(true);
             w.set_bkinp(Bkinp::NOT_INVERTED);
+            for comparator in COMPARATORS {
+                w.set_bkcmpe(comparator, true);
+                w.set_bkcmpp(comparator, Bkinp::INVERTED);
+            }
         });
         timer.bdtr().write(|w| {
             w.set_bke(0, true);
@@ -110,12 +130,19 @@ impl Bridge {
         TIM1.cr1().modify(|w| w.set_cen(true));
     }
 
-    /// Whether the break input or a system break has acted since the bridge was last switched on, or acts now.
+    /// What has acted on the outputs since the bridge was last switched on, or acts now.
     #[inline(always)]
-    pub(crate) fn broken(&self) -> bool {
+    pub(crate) fn broken(&self) -> Option<Break> {
         let flags = TIM1.sr().read();
         // What goes wrong inside the chip has a flag of its own, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
-        flags.bif(0) || flags.sbif()
+        if flags.sbif() || flags.bif(0) && driver_faults() {
+            Some(Break::Driver)
+        } else if flags.bif(0) {
+            // The line is up: a bridge that is in trouble holds it for a millisecond and more.
+            Some(Break::Comparator)
+        } else {
+            None
+        }
     }
 
     /// Puts a command on the outputs, effective from the next update on; switching off is at once.

@@ -40,15 +40,27 @@ impl<T> Inlet<T> {
 }
 
 impl<T> Outlet<T> {
-    /// Takes the oldest.
+    /// The oldest, where it lies: things here are large, and copying takes a tick's time.
     #[inline(always)]
-    pub(crate) fn take(&mut self) -> Option<T> {
+    pub(crate) fn oldest(&self) -> Option<&T> {
+        self.has_places();
+        self.0.peek()
+    }
+
+    /// Gives the oldest's place free.
+    #[inline(always)]
+    pub(crate) fn release(&mut self) {
+        self.has_places();
+        drop(self.0.dequeue());
+    }
+
+    #[inline(always)]
+    fn has_places(&self) {
         // As above.
         #[allow(unsafe_code)]
         unsafe {
             core::hint::assert_unchecked(self.0.capacity() < LONGEST);
         }
-        self.0.dequeue()
     }
 }
 

@@ -25,7 +25,8 @@ use super::queue::{Inlet, Outlet};
 use super::storage::Storage;
 use super::tick::{NOTES, REQUESTS, Tick};
 use super::watchdog::Watchdog;
-use super::{cycles, health, link, probe, stack, tick};
+use super::wires::Wires;
+use super::{cycles, health, heat, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
 
 static CONFIG: StaticCell<Config> = StaticCell::new();
@@ -52,17 +53,25 @@ pub(crate) fn run() -> ! {
     interrupt::TIM3.set_priority(LINK_PRIORITY);
     let pins = Pins::new(peripherals);
 
-    let (config, own) = nameplate::one_link();
+    let (mut config, own) = nameplate::one_link();
+    let (converter, supply) = Converter::new(pins.analog);
+    if !config.scaling.correct(supply) {
+        defmt::warn!(
+            "a supply of {=f32} times 3.3 V cannot be: codes are taken as at 3.3 V",
+            supply
+        );
+    }
     let config: &'static Config = CONFIG.init(config);
     let (storage, found) = Storage::open(config);
     let settings = found.settings.unwrap_or(own);
-    let bridge = Bridge::new(pins.bridge, config.rates.control_hz);
+    let thresholds = config.current_thresholds();
+    let bridge = Bridge::new(pins.bridge, config.rates.control_hz, thresholds);
     let state = state(config, settings);
+    state.warm_up(heat::kept().unwrap_or_default());
     let (note_in, note_out) = NOTE_QUEUE.init(spsc::Queue::new()).split();
     let (to_store, from_tick) = STORE_QUEUE.init(spsc::Queue::new()).split();
     let (request_in, request_out) = REQUEST_QUEUE.init(spsc::Queue::new()).split();
-    let encoder = EncoderTimer::new(pins.encoder, config.encoder.counts_per_motor_turn);
-    let converter = Converter::new(pins.analog);
+    let encoder = EncoderTimer::new(pins.encoder, &config.encoder);
     let Ok((sender, receiver)) = link::open(pins.link) else {
         unreachable!()
     };
@@ -77,6 +86,7 @@ pub(crate) fn run() -> ! {
         bridge,
         converter,
         encoder,
+        wires: Wires::new(),
         period_cycles: Tick::period(config.rates.control_hz),
         entered: 0,
         late: false,

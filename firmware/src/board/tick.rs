@@ -20,10 +20,12 @@ use super::clock::CORE_HZ;
 use super::cycles;
 use super::encoder::EncoderTimer;
 use super::health::Checkup;
-use super::pwm::Bridge;
+use super::heat;
+use super::pwm::{Break, Bridge};
 use super::queue::{Inlet, Outlet};
 use super::stack;
 use super::watchdog::{Part, report};
+use super::wires::Wires;
 
 /// Notes that the queue to the telemetry task holds.
 pub(crate) const NOTES: usize = 64;
@@ -41,6 +43,7 @@ pub(crate) struct Tick {
     pub(crate) bridge: Bridge,
     pub(crate) converter: Converter,
     pub(crate) encoder: EncoderTimer,
+    pub(crate) wires: Wires,
     pub(crate) period_cycles: u32,
     pub(crate) entered: u32,
     pub(crate) late: bool,
@@ -64,19 +67,24 @@ impl Tick {
         let apart = entered.wrapping_sub(self.entered);
         let overrun = self.late || apart > self.period_cycles + self.period_cycles / 2;
         self.entered = entered;
+        let broken = self.bridge.broken();
         let sample = Sample {
             encoder: motion.count,
             edge_age: Some(motion.edge_age),
             current: codes.current,
             supply: codes.supply,
             temperature: codes.temperature,
-            driver_fault: self.bridge.broken(),
+            driver_fault: broken == Some(Break::Driver),
             overrun,
+            comparator: broken == Some(Break::Comparator),
             encoder_wrong: motion.wrong,
+            // Not in the tick of the estimator's update, which is an even one, and has enough to do.
+            encoder_open: self.wires.look(self.state.tick & 1 != 0),
             stack_left: stack::near_end(),
         };
         let output = step(self.config, self.state, sample);
         self.bridge.apply(output.command);
+        heat::keep(self.state.tick, self.state.heat());
         self.clerk
             .report(self.state, self.capture, &output, &mut self.notes);
         self.serve();
@@ -106,16 +114,17 @@ impl Tick {
         if !self.notes.roomy() {
             return;
         }
-        let Some(examined) = self.requests.take() else {
+        let Some(examined) = self.requests.oldest() else {
             return;
         };
         let to_store = self.clerk.serve(
             self.config,
             self.state,
             self.capture,
-            &examined,
+            examined,
             &mut self.notes,
         );
+        self.requests.release();
         if let Some(settings) = to_store
             && !self.to_store.put(settings)
         {

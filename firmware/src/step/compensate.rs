@@ -6,6 +6,10 @@ use rig_shared::trajectory::Reference;
 use crate::config::Config;
 use crate::state::State;
 
+/// A law is evaluated in every so manieth tick, a power of two: more of them do not fit into the tick's budget under every
+/// motion.
+const EVERY: u64 = 4;
+
 /// What the tick knows before its readings are corrected.
 #[inline(always)]
 pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
@@ -22,14 +26,14 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
         motor_angle: counts as f32 * per_count,
         angle_in_turn: within as f32 * per_count,
         placed: state.placed,
-        // The estimator's update is the dearest thing that a tick does.
-        busy: state.estimation.ticks + 1 >= config.rates.estimator_decimation,
+        // An odd tick: the estimator's update, the dearest thing that a tick does, comes in even ones.
+        busy: state.tick & (EVERY - 1) != 1,
         drive_torque: state.drive_torque,
         load: 0.0,
         // To a tenth of a second, without the conversion of a 64-bit number.
         time: (state.tick >> 10) as u32 as f32 * (1024.0 * state.derived.period),
         warming: state.warming,
-        period: state.derived.period,
+        period: EVERY as f32 * state.derived.period,
     }
 }
 
@@ -40,7 +44,8 @@ pub(crate) fn correct(config: &Config, state: &mut State) {
         state.position_error = 0.0;
         return;
     }
-    let Reading { error, slope } = state.compensation.reading(&now(config, state));
+    let now = now(config, state);
+    let Reading { error, slope } = state.compensation.reading(&mut state.effects, &now);
     state.position -= error;
     state.velocity -= slope * state.velocity;
     state.position_error = error;
@@ -54,7 +59,11 @@ pub(crate) fn torque(config: &Config, state: &mut State) -> compensation::Output
     }
     let model = &state.settings.model;
     // The planned load, as the friction law's: the feedback would carry measurement noise into it.
-    let load = model.inertia * state.reference.acceleration + model.gravity_torque(state.position);
+    let load = if state.compensation.needs_load() {
+        model.inertia * state.reference.acceleration + model.gravity_torque(state.position)
+    } else {
+        0.0
+    };
     let now = Now {
         reference: state.reference,
         load,

@@ -16,18 +16,27 @@ const OFFSET: usize = PARAMETER_COUNT - 1;
 /// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
 /// same two windows: all belong to the instant between them, and no column lags another.
 pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
+    // In the tick after an update, which has enough to do.
+    let due = core::mem::take(&mut state.report_due);
+    update(config, state, tick);
+    due.then(|| estimate_report(state))
+}
+
+/// Fills a window; updates when it is full.
+fn update(config: &Config, state: &mut State, tick: &Tick) {
     // Half a window later than the telemetry's, so that not both are made in one tick.
     if state.tick < u64::from(config.rates.estimator_decimation / 2) {
-        return None;
+        return;
     }
     let window = state
         .estimation
-        .push(tick, config.rates.estimator_decimation)?;
+        .push(tick, config.rates.estimator_decimation);
+    let Some(window) = window else { return };
     if state.forget {
         state.forget = false;
         state.previous = None;
         state.estimator.restart();
-        return None;
+        return;
     }
     // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
     // doubt: neither says anything about the rig's parameters.
@@ -38,14 +47,14 @@ pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Optio
         learn(config, state, &before, &window);
     }
     if state.mode == Mode::Calibrating {
-        return None;
+        return;
     }
     state.updates_since_report += 1;
     if state.updates_since_report < config.rates.estimate_report_decimation {
-        return None;
+        return;
     }
     state.updates_since_report = 0;
-    Some(estimate_report(state))
+    state.report_due = true;
 }
 
 /// One update from two consecutive windows.

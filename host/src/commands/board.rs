@@ -67,6 +67,9 @@ enum Action {
         /// Robot description, such as the model.toml of a diagnosis
         #[arg(long)]
         model: PathBuf,
+        /// Send the rest where the description has effects that nothing can be done about
+        #[arg(long)]
+        leave_out: bool,
         /// Do not store: the next power on forgets them
         #[arg(long)]
         unstored: bool,
@@ -80,7 +83,15 @@ enum Action {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     // What can be wrong with the arguments is said before the rig is disturbed.
     let sent = match &args.action {
-        Action::Upload { model, .. } => requests(&Robot::load(model)?)?,
+        Action::Upload {
+            model, leave_out, ..
+        } => {
+            let upload = requests(&Robot::load(model)?, *leave_out)?;
+            for sentence in &upload.left_out {
+                ui.say(&format!("Left out: {sentence}."));
+            }
+            upload.requests
+        }
         Action::Capture { out, force, .. } if out.exists() && !force => {
             return Err(CommandError::Exists { path: out.clone() });
         }
@@ -115,7 +126,9 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
             let ticks = capture(&mut session, *after, out)?;
             ui.say(&format!("{}: {ticks} control ticks", out.display()));
         }
-        Action::Upload { model, unstored } => {
+        Action::Upload {
+            model, unstored, ..
+        } => {
             when_calibrated(&mut session, RequestBody::Disarm)?;
             for body in sent {
                 when_calibrated(&mut session, body)?;

@@ -2,7 +2,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use rig_firmware::config::{Config, Encoder, Rates, Settings, ratings};
+use rig_firmware::config::{Config, Encoder, Rates, Settings, ratings, wake_ticks};
 use rig_firmware::sample::Scaling;
 use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
@@ -14,6 +14,7 @@ use rig_shared::multibody::{gravity_vector, inertia_matrix};
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::safety::monitor::MonitorConfig;
+use rig_shared::safety::voltage::VoltageModel;
 use thiserror::Error;
 
 use crate::robot::{Joint, JointKind, Robot};
@@ -55,6 +56,16 @@ pub enum NameplateError {
         robot: String,
         /// Effects it has.
         effects: usize,
+    },
+    /// Effects that nothing can be done about.
+    #[error(
+        "{robot} has effects that the rig cannot compensate: {}; leave them out with --leave-out.", left_out.join("; ")
+    )]
+    NotCompensable {
+        /// Name of the robot.
+        robot: String,
+        /// Which, and why: a sentence each.
+        left_out: Vec<String>,
     },
     /// Not a revolute joint.
     #[error("joint \"{0}\" is prismatic: the rig's link turns, so its kind must be \"revolute\".")]
@@ -133,25 +144,27 @@ impl Nameplate {
             .ok_or_else(|| missing("drive.encoder_counts_per_rev"))?;
         let limits = limits(joint, drive)?;
         let model = link_parameters(robot)?;
+        let parts = Drive {
+            gear_ratio: drive.gear_ratio as f32,
+            rotor_inertia: drive.rotor_inertia as f32,
+            torque_constant: drive.torque_constant as f32,
+            resistance: drive
+                .resistance
+                .ok_or_else(|| missing("drive.resistance"))? as f32,
+            inductance: drive
+                .inductance
+                .ok_or_else(|| missing("drive.inductance"))? as f32,
+        };
         let config = Config {
             rates,
             scaling: Scaling::default(),
-            drive: Drive {
-                gear_ratio: drive.gear_ratio as f32,
-                rotor_inertia: drive.rotor_inertia as f32,
-                torque_constant: drive.torque_constant as f32,
-                resistance: drive
-                    .resistance
-                    .ok_or_else(|| missing("drive.resistance"))? as f32,
-                inductance: drive
-                    .inductance
-                    .ok_or_else(|| missing("drive.inductance"))? as f32,
-            },
+            drive: parts,
             encoder: Encoder {
                 counts_per_motor_turn: counts as u32,
                 observer_bandwidth: OBSERVER_BANDWIDTH,
+                index_levels: 0b00,
             },
-            monitor: monitor(&rates, &limits, counts, drive.gear_ratio),
+            monitor: monitor(&rates, &limits, counts, &parts),
             ratings: ratings(
                 &limits,
                 (core::f64::consts::TAU / (counts * drive.gear_ratio)) as f32,
@@ -159,6 +172,7 @@ impl Nameplate {
             calibration_ticks: rates.control_hz / 2,
             largest_offset: 0.5,
             host_silent_ticks: rates.control_hz / 2,
+            wake_ticks: wake_ticks(rates.control_hz),
             host_lost_ticks: rates.control_hz,
         };
         let gains = Gains::design(f64::from(model.inertia), POSITION_BANDWIDTH, 1.0);
@@ -273,9 +287,9 @@ fn friction(joint: &Joint) -> Friction<f32> {
 }
 
 /// Thresholds of the checks, from what the limits allow.
-fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, gear_ratio: f64) -> MonitorConfig {
+fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, drive: &Drive<f32>) -> MonitorConfig {
     let rate = rates.control_hz;
-    let counts_per_radian = counts * gear_ratio.abs() / core::f64::consts::TAU;
+    let counts_per_radian = counts * f64::from(drive.gear_ratio.abs()) / core::f64::consts::TAU;
     let fastest = f64::from(limits.velocity) * counts_per_radian / f64::from(rate);
     MonitorConfig {
         period: 1.0 / rate as f32,
@@ -287,7 +301,7 @@ fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, gear_ratio: f64) ->
         // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
         largest_step: (4.0 * fastest).ceil() as i32 + 4,
         persistence: 3,
-        encoder_lost_ticks: rate / 10,
+        voltage: VoltageModel::new(drive, counts as u32, 1.0 / rate as f32),
         stuck_ticks: rate / 20,
         stuck_duty: 0.02,
         thermal_time: 10.0,

@@ -1,11 +1,11 @@
 //! What a description asks a rig to be told.
 
-use rig_shared::compensation::EFFECTS;
-use rig_shared::effects::Effect;
+use rig_shared::compensation::{EFFECTS, Role};
+use rig_shared::effects::{Effect, Kind};
 use rig_shared::wire::message::RequestBody;
 
 use super::nameplate::{Nameplate, NameplateError};
-use crate::robot::Robot;
+use crate::robot::{Inertial, Robot};
 
 /// Limits, model, friction, gains and estimator; friction is compensated where `precompensation` says so.
 pub fn settings(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {
@@ -22,25 +22,131 @@ pub fn settings(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody
     ]
 }
 
-/// All of a description: the settings, precompensation on, and the effects.
+/// What a description comes to for the rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Upload {
+    /// What it is told, in this order.
+    pub requests: Vec<RequestBody>,
+    /// Effects that nothing is done about, with the reason: a sentence each.
+    pub left_out: Vec<String>,
+}
+
+/// All of a description: the settings, precompensation on, and the effects. A payload goes into the link's inertial
+/// parameters. Effects that nothing can be done about are left out where that is wanted, and an error where it is not.
 ///
 /// # Errors
-/// A description that is none of a one-link rig, or has more effects than a rig compensates.
-pub fn requests(robot: &Robot) -> Result<Vec<RequestBody>, NameplateError> {
-    let placed = robot.placed_effects();
-    if placed.len() > EFFECTS {
+/// A description that is none of a one-link rig, has more effects than a rig compensates, or one that it cannot.
+pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError> {
+    let mut loaded = robot.clone();
+    let (mut effects, mut left_out) = (Vec::new(), Vec::new());
+    for Effect {
+        kind,
+        gains,
+        shapes,
+    } in robot.placed_effects().into_iter().map(|one| one.effect)
+    {
+        if kind == Kind::Payload {
+            hang(&mut loaded, gains[0], shapes[0]);
+        } else if let Some(reason) = Role::refusal(kind) {
+            left_out.push(format!(
+                "the effect {} is not compensated: {reason}",
+                kind.about().name
+            ));
+        } else {
+            effects.push(Effect {
+                kind,
+                gains: gains.map(|value| value as f32),
+                shapes: shapes.map(|value| value as f32),
+            });
+        }
+    }
+    let robot = robot.name.clone();
+    if !left_out.is_empty() && !leave_out {
+        return Err(NameplateError::NotCompensable { robot, left_out });
+    }
+    let count = effects.len();
+    if count > EFFECTS {
         return Err(NameplateError::TooManyEffects {
-            robot: robot.name.clone(),
-            effects: placed.len(),
+            robot,
+            effects: count,
         });
     }
-    let single = |effect: Effect<f64>| Effect {
-        kind: effect.kind,
-        gains: effect.gains.map(|value| value as f32),
-        shapes: effect.shapes.map(|value| value as f32),
+    let mut requests = settings(&Nameplate::from_robot(&loaded)?, true);
+    requests.push(RequestBody::SetEffects(effects.into_iter().collect()));
+    Ok(Upload { requests, left_out })
+}
+
+/// A point mass (kg) on the link, so far along its x axis (m).
+fn hang(robot: &mut Robot, mass: f64, distance: f64) {
+    let Some(joint) = robot.joints.first_mut() else {
+        return;
     };
-    let mut all = settings(&Nameplate::from_robot(robot)?, true);
-    let effects = placed.iter().map(|one| single(one.effect)).collect();
-    all.push(RequestBody::SetEffects(effects));
-    Ok(all)
+    let link = joint.inertial.get_or_insert(Inertial {
+        mass: 0.0,
+        first_moment: [0.0; 3],
+        inertia: [0.0; 6],
+    });
+    link.mass += mass;
+    link.first_moment[0] += mass * distance;
+    // Iyy and Izz.
+    for place in [3, 5] {
+        link.inertia[place] += mass * distance * distance;
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::robot::ONE_LINK_TEMPLATE;
+
+    fn with(effects: &str) -> Robot {
+        let text = format!("{ONE_LINK_TEMPLATE}\n{effects}");
+        Robot::from_toml(&text, Path::new("rig.toml")).unwrap()
+    }
+
+    const BACKLASH: &str = "[[effect]]\nkind = 'backlash'\njoint = 'link'\ngap = 0.01\nstiffness = 5e3\ndamping = 5.0\nlink_friction = 0.5\n";
+    const STRIBECK: &str =
+        "[[effect]]\nkind = 'stribeck'\njoint = 'link'\nbreakaway = 0.1\nvelocity = 0.05\n";
+
+    #[test]
+    fn what_cannot_be_compensated_is_said_by_effect_with_the_reason() {
+        let robot = with(&format!("{BACKLASH}{STRIBECK}"));
+        let error = requests(&robot, false).unwrap_err().to_string();
+        assert!(
+            error.contains("backlash is not compensated: it acts between motor and link"),
+            "{error}"
+        );
+        assert!(!error.contains("stribeck"), "{error}");
+        let upload = requests(&robot, true).unwrap();
+        assert_eq!(upload.left_out.len(), 1);
+        assert!(matches!(
+            upload.requests.last(),
+            Some(RequestBody::SetEffects(effects)) if effects.len() == 1
+        ));
+        let many = with(&STRIBECK.repeat(EFFECTS + 1));
+        assert!(matches!(
+            requests(&many, true),
+            Err(NameplateError::TooManyEffects { .. })
+        ));
+    }
+
+    /// A point mass of 0.5 kg at 0.2 m: 0.02 kg·m² and 0.1 kg·m, 0.981 N·m of gravity.
+    #[test]
+    fn a_payload_goes_into_the_model() {
+        let payload = "[[effect]]\nkind = 'payload'\njoint = 'link'\nmass = 0.5\ndistance = 0.2\n";
+        let model = |robot: &Robot| {
+            let upload = requests(robot, false).unwrap();
+            let found = upload.requests.iter().find_map(|body| match body {
+                RequestBody::SetModel(model) => Some(*model),
+                _ => None,
+            });
+            found.unwrap()
+        };
+        let (bare, loaded) = (model(&with("")), model(&with(payload)));
+        assert!((loaded.inertia - bare.inertia - 0.02).abs() < 1e-6);
+        assert!((loaded.gravity_cos - bare.gravity_cos - 0.981).abs() < 1e-5);
+    }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::io;
 use std::time::Duration;
 
-use rig_shared::effects::Channel;
+use rig_shared::compensation::Role;
 use rig_shared::wire::message::Refusal;
 use rig_shared::wire::{EncodeError, EndMismatch};
 
@@ -153,14 +153,11 @@ pub fn describe(refusal: Refusal) -> Cow<'static, str> {
         }
         Refusal::NotCompensable(kind) => {
             let about = kind.about();
-            let mend = if about.channel == Channel::Load {
-                "put it into the link's inertial parameters"
-            } else {
-                "leave it out"
-            };
             return Cow::Owned(format!(
-                "the firmware does not compensate {} (the effect `{}`); {mend}",
-                about.title, about.name
+                "the firmware does not compensate {} (the effect `{}`): {}; leave it out",
+                about.title,
+                about.name,
+                Role::refusal(kind).unwrap_or("its list of effects is another one")
             ));
         }
     })

@@ -259,9 +259,11 @@ impl Plant {
             supply: faults.supply_stuck.map_or(supply, AdcCode),
             temperature: faults.temperature_stuck.map_or(temperature, AdcCode),
             driver_fault: faults.driver,
+            comparator: false,
             overrun: faults.overrun,
             // The plant has no board around it.
             encoder_wrong: None,
+            encoder_open: false,
             stack_left: None,
         }
     }

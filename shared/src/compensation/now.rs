@@ -31,7 +31,7 @@ pub struct Now<T> {
     pub time: T,
     /// Temperature above that at the start, K.
     pub warming: T,
-    /// Time since the last tick, s.
+    /// Time since the last tick that was not busy, s.
     pub period: T,
 }
 

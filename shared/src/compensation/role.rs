@@ -15,12 +15,34 @@ pub enum Role {
     Position,
     /// A correction of the measured current.
     Current,
+    /// A voltage in the direction of the current.
+    Voltage,
 }
 
 impl Role {
     /// What is done about effects of this kind; `None` where nothing can be.
     pub const fn of(kind: Kind) -> Option<Self> {
         Self::by(kind.about())
+    }
+
+    /// Why nothing is done about effects of this kind, and what to do instead; `None` where something is.
+    pub const fn refusal(kind: Kind) -> Option<&'static str> {
+        if Self::of(kind).is_some() {
+            return None;
+        }
+        Some(match kind.about().channel {
+            Channel::Transmission => {
+                "it acts between motor and link, where no torque of the motor undoes it: while teeth are apart or a shaft \
+                 twists, the encoder on the motor does not see where the link is"
+            }
+            Channel::Effort => {
+                "what is read late cannot be had earlier: it is one of the recording, so shift the columns of that"
+            }
+            Channel::Load => {
+                "a mass on the link belongs into the link's inertial parameters, with which the model compensates it"
+            }
+            _ => "it needs the motion of another joint, and the rig has one",
+        })
     }
 
     /// The same by what is known of the effect.
@@ -38,6 +60,7 @@ impl Role {
                 Some(Self::Position)
             }
             (Channel::Effort, _) if same(about.name, "current_offset") => Some(Self::Current),
+            (Channel::Voltage, _) => Some(Self::Voltage),
             _ => None,
         }
     }
@@ -69,8 +92,9 @@ impl fmt::Display for EffectFault {
         match self {
             Self::NotCompensable(kind) => write!(
                 f,
-                "{} cannot be compensated by a torque or a corrected reading",
-                kind.about().title
+                "{} cannot be compensated: {}",
+                kind.about().title,
+                Role::refusal(*kind).unwrap_or_default()
             ),
             Self::Parameter(name) => {
                 write!(f, "the effect's {name} is not within its physical bounds")

@@ -47,7 +47,7 @@ impl Law for PreslidingDahl {
             },
         ],
         needs: &[Need::Reversals(8)],
-        compensable: false,
+        compensable: true,
         leaves_out: "memory of inner loops beyond the last reversal",
     };
 

@@ -80,7 +80,7 @@ impl Law for PreslidingLugre {
             },
         ],
         needs: &[Need::Reversals(8), Need::SlowMotion(0.05)],
-        compensable: false,
+        compensable: true,
         leaves_out: "memory of inner loops beyond the last reversal; with much micro-damping the law is not passive",
     };
 

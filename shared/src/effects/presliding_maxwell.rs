@@ -71,7 +71,7 @@ impl Law for PreslidingMaxwell {
             },
         ],
         needs: &[Need::Reversals(8)],
-        compensable: false,
+        compensable: true,
         leaves_out: "frictional lag; yield displacements other than those four",
     };
 

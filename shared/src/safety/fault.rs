@@ -16,7 +16,8 @@ pub enum Fault {
     CurrentOffset,
     /// The encoder jumped further in a tick than the motor can turn; the value is in counts.
     EncoderJump,
-    /// The motor is driven hard and the encoder stands still; the value is the current in A.
+    /// Nothing drives one of the encoder's wires, or the winding's voltage tells of another speed than the encoder; the
+    /// value is the voltage in V that current and encoder leave unexplained.
     EncoderLost,
     /// Joint speed beyond its hard limit; the value is in rad/s.
     OverSpeed,

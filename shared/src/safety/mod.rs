@@ -8,6 +8,7 @@ mod limit;
 mod mode;
 pub mod monitor;
 mod snapshot;
+pub mod voltage;
 
 pub use fault::{Fault, FaultLatch, FaultRecord};
 pub use limit::{Limit, LimitSet, Limits};

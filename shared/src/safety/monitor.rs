@@ -1,11 +1,12 @@
 //! The checks of every control tick.
 //!
-//! Each looks at measured values only, never at what the controller believes, so that a wrong model
+//! Each looks at measured values only, never at what the controller believes, so that a wrong model of the link
 //! cannot hide a fault. Leaves out: everything that hardware must catch within a tick (short circuits go
 //! to the timer's break input and arrive here as [`Fault::Driver`]).
 
 use super::fault::Fault;
 use super::limit::Limits;
+use super::voltage::{self, VoltageModel, VoltageState};
 
 /// Thresholds that do not come with [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +27,8 @@ pub struct MonitorConfig {
     pub largest_step: i32,
     /// Ticks in a row that a single-sample check must fail, so that one disturbed sample stops nothing.
     pub persistence: u16,
-    /// Ticks without one encoder count, at more than half the peak current, that mean a lost encoder.
-    pub encoder_lost_ticks: u32,
+    /// By which the encoder is found to have lost the motor.
+    pub voltage: VoltageModel,
     /// Ticks with one and the same current code, while the duty varied, that mean a stuck converter.
     pub stuck_ticks: u32,
     /// Duty variation within `stuck_ticks` that a live converter must have answered.
@@ -39,12 +40,16 @@ pub struct MonitorConfig {
 /// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without
 /// current.
 const COOLED: f32 = 0.5;
+/// Ticks within which the noise of a live converter changes its code.
+const QUIET: u32 = 10;
 
 /// What the checks look at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
     /// Break input.
     pub driver_fault: bool,
+    /// A comparator has found too much current.
+    pub comparator: bool,
     /// The previous tick overran.
     pub overrun: bool,
     /// Converter code of the current.
@@ -59,12 +64,16 @@ pub struct Readings {
     pub temperature: f32,
     /// Encoder step of this tick, counts.
     pub encoder_step: i32,
+    /// Nothing drives one of the encoder's wires.
+    pub encoder_open: bool,
     /// Joint position, rad.
     pub position: f32,
     /// Joint velocity, rad/s.
     pub velocity: f32,
     /// Duty cycle that acts now, −1 to 1.
     pub duty: f32,
+    /// What the bridge loses of the voltage, as far as it is known, V.
+    pub lost_voltage: f32,
     /// Whether the bridge drives.
     pub driving: bool,
 }
@@ -77,15 +86,15 @@ pub struct MonitorState {
     bad_supply: u16,
     hot: u16,
     over_speed: u16,
-    still: u32,
+    voltage: VoltageState,
     same_code: u32,
     last_code: u16,
     duty_low: f32,
     duty_high: f32,
     /// Filtered square of the current, A².
-    heat: f32,
+    pub heat: f32,
     /// The heat has passed its limit and is not yet well below it again.
-    overloaded: bool,
+    pub overloaded: bool,
 }
 
 /// Counts up while `failing`; true once `persistence` ticks in a row failed.
@@ -142,17 +151,47 @@ pub fn step(
         !(now.velocity.abs() <= limits.velocity * config.velocity_margin),
         n,
     );
-    let pushing = now.driving && magnitude > 0.5 * limits.peak_current;
-    state.still = if pushing && now.encoder_step == 0 {
-        state.still.saturating_add(1)
+    // With the bridge off the voltage over the motor is nobody's.
+    let lost = if now.driving {
+        let applied = now.duty * now.supply - now.lost_voltage;
+        voltage::step(
+            &config.voltage,
+            &mut state.voltage,
+            applied,
+            now.current,
+            now.encoder_step,
+        )
     } else {
-        0
+        state.voltage = VoltageState::default();
+        false
     };
     let stuck = converter_is_stuck(config, state, now);
+    // A current that stands still is no witness against the encoder, until it has been found not to be stuck.
+    let suspect = (QUIET..config.stuck_ticks).contains(&state.same_code);
     let outside = now.driving
         && !(limits.position_low - config.position_margin <= now.position
             && now.position <= limits.position_high + config.position_margin);
 
+    let jumped = now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs();
+    let lost = now.encoder_open || lost && !suspect;
+    let late = now.overrun && now.driving;
+    // Nearly always nothing is wrong: the list costs more to make than to see that it is empty.
+    let any = now.driver_fault
+        | at_rail
+        | stuck
+        | over_current
+        | now.comparator
+        | jumped
+        | lost
+        | over_speed
+        | outside
+        | bad_supply
+        | hot
+        | state.overloaded
+        | late;
+    if !any {
+        return None;
+    }
     let faults = [
         (now.driver_fault, Fault::Driver, 0.0),
         // Before the over-current: a code at the rail is no measurement, though it reads as a large current.
@@ -161,23 +200,19 @@ pub fn step(
             Fault::AdcStuck,
             f32::from(now.current_code),
         ),
-        (over_current, Fault::OverCurrent, now.current),
         (
-            now.encoder_step.abs() > config.largest_step,
-            Fault::EncoderJump,
-            now.encoder_step as f32,
-        ),
-        (
-            state.still >= config.encoder_lost_ticks,
-            Fault::EncoderLost,
+            over_current || now.comparator,
+            Fault::OverCurrent,
             now.current,
         ),
+        (jumped, Fault::EncoderJump, now.encoder_step as f32),
+        (lost, Fault::EncoderLost, state.voltage.unexplained),
         (over_speed, Fault::OverSpeed, now.velocity),
         (outside, Fault::Position, now.position),
         (bad_supply, Fault::Supply, now.supply),
         (hot, Fault::Temperature, now.temperature),
         (state.overloaded, Fault::Overload, state.heat),
-        (now.overrun && now.driving, Fault::Deadline, 0.0),
+        (late, Fault::Deadline, 0.0),
     ];
     faults
         .into_iter()

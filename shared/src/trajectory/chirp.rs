@@ -4,8 +4,8 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::fourier::envelope;
+use super::phase::Phase;
 use super::{Elapsed, Reference};
-use crate::pair::Pair;
 use crate::scalar::Scalar;
 
 /// How the frequency runs from start to end.
@@ -20,7 +20,8 @@ pub enum Sweep {
 /// q(t) = E(t)·A(f)·sin φ(t) with φ' = 2πf and A(f) = A₀/√(1 + (ω/ωv)² + (ω/ωa)⁴), ωv = v/A₀, ωa² = a/A₀: then A ≤ A₀,
 /// A·ω ≤ v and A·ω² ≤ a. What envelope and sweep add to that is small for slow sweeps and counted by the check.
 ///
-/// The phase is computed with twice the scalar's digits, because hundreds of turns leave an `f32` none for the angle.
+/// The phase is computed in whole numbers, because hundreds of turns leave an `f32` no digits for the angle. A
+/// logarithmic sweep over less than 1/4096 octave is run as a linear one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Chirp<T> {
     /// Frequency at the start, Hz.
@@ -55,36 +56,24 @@ impl<T: Scalar> Chirp<T> {
         }
     }
 
+    /// What its phase follows from.
+    pub(super) fn phase(&self) -> Phase<T> {
+        let [start, end] = [self.start_hz, self.end_hz].map(T::to_f64);
+        Phase::new(start, end, self.sweep, self.duration_us)
+    }
+
     /// Phase within a turn (rad), angular frequency and its first two derivatives.
-    fn phase(&self, time: Elapsed<T>) -> (T, [T; 3]) {
-        let million = Pair::from_u32(1_000_000);
-        let length = Pair::from_u32(self.duration_us.max(1)) / million;
-        let micros = u32::try_from(time.micros).unwrap_or(u32::MAX);
-        let seconds = (Pair::from_u32(micros) + Pair::new(time.fraction)) / million;
-        let (low, high) = (Pair::new(self.start_hz), Pair::new(self.end_hz));
-        let (turns, hz) = match self.sweep {
-            Sweep::Linear => {
-                let slope = (high - low) / length;
-                let gained = slope * seconds;
-                let turns = seconds * (low + gained * Pair::new(T::from_f64(0.5)));
-                (turns, [(low + gained).value(), slope.value(), T::ZERO])
-            }
-            Sweep::Logarithmic => {
-                let change = (high / low).ln();
-                let rate = change / length;
-                let hz = low * (rate * seconds).exp();
-                // A sweep without change has no rate to divide by.
-                let turns = if change.value().abs().lt(T::from_f64(1e-9)) {
-                    low * seconds
-                } else {
-                    (hz - low) / rate
-                };
-                let (hz, rate) = (hz.value(), rate.value());
-                (turns, [hz, rate * hz, rate.squared() * hz])
-            }
-        };
+    #[inline(always)]
+    fn angle(&self, time: Elapsed<T>, phase: &Phase<T>) -> (T, [T; 3]) {
+        // Whoever asks is below the length, which is in 32 bits.
+        let micros = time.micros as u32;
+        let change = self.end_hz - self.start_hz;
+        let point = phase.at(micros, self.start_hz, change);
         let tau = T::from_f64(core::f64::consts::TAU);
-        (tau * turns.beside_whole(), hz.map(|x| tau * x))
+        let w = [point.hz, point.slope, point.bend].map(|x| tau * x);
+        // The share of a microsecond: the frequency's change within it turns nothing.
+        let rest = w[0] * time.fraction * T::from_f64(1e-6);
+        (tau * point.turns + rest, w)
     }
 
     /// Amplitude and its first two time derivatives, from the angular frequency and its.
@@ -101,16 +90,19 @@ impl<T: Scalar> Chirp<T> {
         let d2 = (f(2.0) * p + f(12.0) * q * square) * w1.squared()
             + (f(2.0) * p * w + f(4.0) * q * square * w) * w2;
         let value = self.amplitude / d.sqrt();
+        let over = T::ONE / d;
+        let (d1, d2) = (d1 * over, d2 * over);
         Reference {
             position: value,
-            velocity: -f(0.5) * value * d1 / d,
-            acceleration: value * (f(0.75) * (d1 / d).squared() - f(0.5) * d2 / d),
+            velocity: -f(0.5) * value * d1,
+            acceleration: value * (f(0.75) * d1.squared() - f(0.5) * d2),
         }
     }
 
     /// Amplitude under the envelope, angular frequency and its derivative.
-    fn carrier(&self, time: Elapsed<T>) -> (Reference<T>, T, T, T) {
-        let (angle, frequency) = self.phase(time);
+    #[inline(always)]
+    fn carrier(&self, time: Elapsed<T>, phase: &Phase<T>) -> (Reference<T>, T, T, T) {
+        let (angle, frequency) = self.angle(time, phase);
         let amplitude = self.amplitude(frequency);
         let [w, w1, _] = frequency;
         let amplitude = match envelope(time, self.ramp_us, u64::from(self.duration_us)) {
@@ -120,8 +112,9 @@ impl<T: Scalar> Chirp<T> {
         (amplitude, angle, w, w1)
     }
 
-    pub(super) fn at(&self, time: Elapsed<T>) -> Reference<T> {
-        let (amplitude, angle, w, w1) = self.carrier(time);
+    #[inline(always)]
+    pub(super) fn at(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
+        let (amplitude, angle, w, w1) = self.carrier(time, phase);
         let (s, c) = angle.sin_cos();
         let sine = Reference {
             position: s,
@@ -132,8 +125,8 @@ impl<T: Scalar> Chirp<T> {
     }
 
     /// What position, velocity and acceleration cannot exceed at a time, whatever the phase.
-    pub(super) fn bound(&self, time: Elapsed<T>) -> Reference<T> {
-        let (amplitude, _, w, w1) = self.carrier(time);
+    pub(super) fn bound(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
+        let (amplitude, _, w, w1) = self.carrier(time, phase);
         let two = T::from_f64(2.0);
         let length = |x: T, y: T| (x.squared() + y.squared()).sqrt();
         Reference {

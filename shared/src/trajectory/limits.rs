@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::phase::{HIGHEST_HZ, MOST_OCTAVES};
 use super::segment::Segment;
 use super::{Elapsed, Reference, SlowReversals, Trajectory};
 use crate::safety::Limits;
@@ -157,8 +158,11 @@ impl<T: Scalar> Trajectory<T> {
                 check(m.cosine.iter().all(finite), "cosine")
             }
             Self::Chirp(m) => {
-                check(positive(&m.start_hz), "start_hz")?;
-                check(positive(&m.end_hz), "end_hz")?;
+                let swept = |hz: &T| positive(hz) && hz.le(T::from_f64(HIGHEST_HZ));
+                check(swept(&m.start_hz), "start_hz")?;
+                check(swept(&m.end_hz), "end_hz")?;
+                let octaves = libm::log2(m.end_hz.to_f64() / m.start_hz.to_f64());
+                check(octaves.abs() <= MOST_OCTAVES, "end_hz")?;
                 check(m.duration_us > 0, "duration_us")?;
                 check(m.ramp_us > 0 && m.ramp_us <= m.duration_us / 2, "ramp_us")?;
                 check(positive(&m.amplitude), "amplitude")?;
@@ -218,13 +222,15 @@ impl<T: Scalar> Trajectory<T> {
                 }
             }
             Self::Chirp(m) => {
+                let phase = m.phase();
                 // Thousands of oscillations: bound them by their amplitude instead of looking at each.
                 for k in 0..=u64::from(SWEEP_SAMPLES) {
                     let micros = u64::from(m.duration_us) * k / u64::from(SWEEP_SAMPLES);
-                    let high = m.bound(Elapsed {
+                    let time = Elapsed {
                         micros,
                         fraction: T::ZERO,
-                    });
+                    };
+                    let high = m.bound(time, &phase);
                     let low = Reference {
                         position: -high.position,
                         ..high

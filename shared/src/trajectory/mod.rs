@@ -14,6 +14,7 @@
 mod chirp;
 mod fourier;
 mod limits;
+mod phase;
 mod segment;
 mod staged;
 
@@ -26,6 +27,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Real, Scalar};
+use phase::Phase;
 use segment::Segment;
 
 /// Largest number of harmonics of a Fourier trajectory.
@@ -169,13 +171,30 @@ impl<T: Scalar> Trajectory<T> {
     }
 
     fn at_elapsed(&self, time: Elapsed<T>) -> Reference<T> {
+        self.at_phase(time, &self.phase())
+    }
+
+    /// What the phase of a sweep follows from; of anything else that of one that stands.
+    fn phase(&self) -> Phase<T> {
+        match self {
+            Self::Chirp(motion) => motion.phase(),
+            _ => Phase::STILL,
+        }
+    }
+
+    fn at_phase(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         if time.micros >= self.duration_micros() {
             return Reference::rest(T::ZERO);
         }
+        self.within(time, phase)
+    }
+
+    /// Before its end.
+    fn within(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         match self {
             Self::Hold(_) => Reference::rest(T::ZERO),
             Self::Fourier(motion) => motion.at(time),
-            Self::Chirp(motion) => motion.at(time),
+            Self::Chirp(motion) => motion.at(time, phase),
             Self::Staircase(motion) => segment::at(|visit| motion.segments(visit), time),
             Self::SlowReversals(motion) => motion.at(time),
             Self::FrictionSweep(motion) => segment::at(|visit| motion.segments(visit), time),
@@ -190,6 +209,54 @@ impl<T: Scalar> Trajectory<T> {
             Self::FrictionSweep(motion) => motion.segments(visit),
             Self::Hold(_) | Self::Fourier(_) | Self::Chirp(_) => {}
         }
+    }
+}
+
+/// What follows from a trajectory and takes longer to work out than a control tick has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparation<T> {
+    phase: Phase<T>,
+    duration_micros: u64,
+}
+
+impl<T: Scalar> Trajectory<T> {
+    /// Works out what a [`Course`] needs: some thousand cycles of the microcontroller.
+    pub fn prepare(&self) -> Preparation<T> {
+        Preparation {
+            phase: self.phase(),
+            duration_micros: self.duration_micros(),
+        }
+    }
+}
+
+/// A trajectory ready for the control tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Course<T> {
+    trajectory: Trajectory<T>,
+    prepared: Preparation<T>,
+}
+
+impl<T: Scalar> Course<T> {
+    /// A trajectory with its own preparation; with another's its reference is another's too.
+    pub fn new(trajectory: Trajectory<T>, prepared: Preparation<T>) -> Self {
+        Self {
+            trajectory,
+            prepared,
+        }
+    }
+
+    /// Length, µs.
+    pub fn duration_micros(&self) -> u64 {
+        self.prepared.duration_micros
+    }
+
+    /// The reference at a control tick, as [`Trajectory::at_tick`] gives it.
+    pub fn at_tick(&self, tick: u64, rate_hz: u32) -> Reference<T> {
+        let time = Elapsed::from_tick(tick, rate_hz);
+        if time.micros >= self.prepared.duration_micros {
+            return Reference::rest(T::ZERO);
+        }
+        self.trajectory.within(time, &self.prepared.phase)
     }
 }
 

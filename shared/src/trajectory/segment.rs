@@ -59,6 +59,7 @@ impl<T: Real<Mask = bool>> Segment<T> {
 }
 
 /// 10s³ − 15s⁴ + 6s⁵ and its derivatives over a span in seconds.
+#[inline(never)]
 pub(super) fn quintic<T: Real>(s: T, span: T) -> Reference<T> {
     let f = T::from_f64;
     let rest = T::ONE - s;

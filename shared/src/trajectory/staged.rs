@@ -59,6 +59,14 @@ fn micros(seconds: f64) -> Option<u32> {
     (micros >= 1.0 && micros <= f64::from(u32::MAX)).then_some(micros as u32)
 }
 
+/// A quotient; in 32 bits where they are enough, which the microcontroller divides by hardware.
+fn divided(number: u64, by: u64) -> u64 {
+    match (u32::try_from(number), u32::try_from(by)) {
+        (Ok(number), Ok(by)) => u64::from(number / by.max(1)),
+        _ => number / by.max(1),
+    }
+}
+
 fn dwell<T: Real>(start: T, micros: u32) -> Segment<T> {
     Segment {
         micros,
@@ -188,7 +196,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
             let mut done = 0;
             if left >= lead && self.cycles > 0 {
                 // At most the number of cycles, so within 16 bits.
-                let whole = ((left - lead) / cycle.max(1)).min(u64::from(self.cycles) - 1);
+                let whole = divided(left - lead, cycle.max(1)).min(u64::from(self.cycles) - 1);
                 left -= lead + whole * cycle;
                 done = whole as u16 + 1;
             }

@@ -11,31 +11,45 @@ use rig_shared::units::Duty;
 use crate::ripple::Ripple;
 use crate::time::{Instant, from_seconds, to_seconds};
 
+/// The chip's supply, V.
+const NOMINAL: f64 = 3.3;
+
 /// What the two half bridges do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bridge {
     /// Mean of the first minus the second, −1 to 1 of the supply.
     pub duty: f64,
-    /// The driver's enable input is high.
+    /// The driver's enable input is high, and its inputs are not both low, which leaves the motor open.
     pub enabled: bool,
+    /// The driver's enable input is high.
+    pub enable: bool,
 }
+
+/// From the enable input to the outputs, at most (DRV8874, SLVSF66, t_WAKE), s.
+const WAKE: f64 = 1e-3;
 
 /// Faults on the board; what is wrong with the rig itself goes through [`Plant::faults_mut`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoardFaults {
-    /// The encoder's channel A is cut: its input stays low.
+    /// The encoder's channel A is cut: its input is where the chip's own pull takes it.
     pub channel_a_cut: bool,
     /// Channel B likewise.
     pub channel_b_cut: bool,
     /// The index likewise.
     pub index_cut: bool,
+    /// The index comes once where it should not. Taken when it does.
+    pub false_index: bool,
+    /// Both channels change once at the same time. Taken when they do.
+    pub skewed: bool,
+    /// The motor's wires touch: while the bridge drives, so much flows, A.
+    pub short: Option<f64>,
     /// Codes that the converter gives whatever is on its pins: current, supply, temperature.
     pub stuck: [Option<u16>; 3],
     /// The driver reports a fault: its output pulls the break input low and its bridge is off.
     pub driver: bool,
     /// The fault line is pulled low, but the driver does not switch off by itself.
     pub fault_line: bool,
-    /// The chip's own supply, V, where it is not its 3.3. Too low for the processor is nothing that is modelled.
+    /// The chip's own supply, V, where it is not its 3.3: the converter's reference, and the current amplifier's. Too low for the processor is nothing that is modelled.
     pub logic_supply: Option<f64>,
     /// The crystal does not swing.
     pub crystal_dead: bool,
@@ -59,6 +73,8 @@ pub struct Edges {
     pub last: Option<Instant>,
     /// The index, where it passed.
     pub index: Option<Index>,
+    /// Both channels changed at once.
+    pub skewed: bool,
 }
 
 /// The board.
@@ -83,12 +99,15 @@ pub struct Board {
     sampled: i64,
     register: u16,
     true_count: i64,
-    seen_count: i64,
+    /// Levels of A and B as the chip last had them.
+    levels: [bool; 2],
+    /// When the bridge's outputs follow its enable.
+    awake: Instant,
     /// When the encoder was last looked at.
     looked: Instant,
-    /// Times of every change of the driver's enable input.
+    /// Times at which the bridge came on or went off.
     pub enable_edges: Vec<(Instant, bool)>,
-    /// What the half bridges did when they were last enabled.
+    /// What the half bridges did when they last came on.
     pub first_duty: f64,
 }
 
@@ -120,7 +139,8 @@ impl Board {
             sampled: i64::from(sample.encoder.0),
             register: sample.encoder.0,
             true_count: i64::from(sample.encoder.0),
-            seen_count: 0,
+            levels: [false; 2],
+            awake: 0,
             looked: 0,
             enable_edges: Vec::new(),
             first_duty: 0.0,
@@ -160,16 +180,19 @@ impl Board {
         self.integrate(now);
         if bridge.enabled != self.bridge.enabled {
             self.enable_edges.push((now, bridge.enabled));
-            if bridge.enabled {
-                self.first_duty = bridge.duty;
-            }
+        }
+        if bridge.enable && !self.bridge.enable {
+            self.awake = now + from_seconds(WAKE);
         }
         self.bridge = bridge;
     }
 
     fn integrate(&mut self, now: Instant) {
-        let time = (now - self.since) as f64;
-        if self.bridge.enabled {
+        if self.bridge.enabled && now > self.awake {
+            if self.since <= self.awake {
+                self.first_duty = self.bridge.duty;
+            }
+            let time = (now - self.since.max(self.awake)) as f64;
             self.on_time += time;
             self.duty_time += time * self.bridge.duty;
         }
@@ -216,7 +239,46 @@ impl Board {
     /// Code of the analogue input: 0 current, 1 supply, 2 temperature.
     pub fn code(&self, input: usize) -> u16 {
         let stuck = self.faults.stuck.get(input).copied().flatten();
-        stuck.unwrap_or_else(|| self.codes.get(input).copied().unwrap_or(0))
+        stuck.unwrap_or_else(|| {
+            let level = match input {
+                0 => self.sense(),
+                _ => self.level(input, 0.0),
+            };
+            level.round().clamp(0.0, 4095.0) as u16
+        })
+    }
+
+    /// The chip's supply over the nominal one.
+    fn reference(&self) -> f64 {
+        self.faults.logic_supply.unwrap_or(NOMINAL) / NOMINAL
+    }
+
+    /// What is on an input, in codes of the converter, whose reference is the chip's supply: `zero` moves with that.
+    fn level(&self, input: usize, zero: f64) -> f64 {
+        let nominal = f64::from(self.codes.get(input).copied().unwrap_or(0));
+        zero + (nominal - zero) / self.reference()
+    }
+
+    /// What is on the current sense, in codes of the converter, without limits; the ripple within a pulse is left out.
+    pub fn sense(&self) -> f64 {
+        let scaling = self.plant.config().sensors.scaling;
+        let zero = f64::from(scaling.current_zero);
+        match self.faults.short {
+            Some(current) if self.bridge.enabled => {
+                zero + current / f64::from(scaling.current_per_code) / self.reference()
+            }
+            _ => self.level(0, zero),
+        }
+    }
+
+    /// What the chip's own reference reads: 1500 at the nominal supply, which is 1.2085 V (DS12288, V_REFINT: 1.182 to 1.232).
+    pub fn reference_code(&self) -> u16 {
+        (1500.0 / self.reference()).round() as u16
+    }
+
+    /// Levels of the encoder's channels at the chip.
+    pub fn levels(&self) -> [bool; 2] {
+        self.levels
     }
 
     /// What the current varies by within a pulse now.
@@ -262,11 +324,11 @@ impl Board {
         now - from_seconds(age)
     }
 
-    /// Counts that the timer sees up to `now` since the last call. The index stands where the true count is a multiple of
-    /// a turn.
+    /// Counts that the timer sees up to `now` since the last call, whose inputs pull a wire that is cut high or low. The index
+    /// stands where the true count is a multiple of a turn.
     ///
     /// With one channel cut, the other's edges count to and fro: the timer sees a step and takes it back.
-    pub fn edges(&mut self, now: Instant) -> Edges {
+    pub fn edges(&mut self, now: Instant, pulls: [bool; 2]) -> Edges {
         let reading = self.reading(now);
         let count = reading.floor() as i64;
         let before = self.true_count;
@@ -281,37 +343,39 @@ impl Board {
         } else {
             self.turn - 1 - within
         };
-        let broken = self.faults.channel_a_cut || self.faults.channel_b_cut;
-        let index = (passed && !self.faults.index_cut).then_some(Index {
+        let cut = [self.faults.channel_a_cut, self.faults.channel_b_cut];
+        let broken = cut.contains(&true);
+        let mut index = (passed && !self.faults.index_cut).then_some(Index {
             upwards,
             // With a channel cut nothing worth counting comes after it either.
             since: if broken { 0 } else { since as u32 },
         });
+        if core::mem::take(&mut self.faults.false_index) {
+            index = Some(Index { upwards, since: 0 });
+        }
+        let phase = count.rem_euclid(4) as usize;
         // Quadrature: A is high in phases 1 and 2, B in phases 2 and 3.
-        let seen = match (self.faults.channel_a_cut, self.faults.channel_b_cut) {
-            (false, false) => {
-                return Edges {
-                    counts: count - before,
-                    last,
-                    index,
-                };
-            }
-            (true, true) => {
-                return Edges {
-                    counts: 0,
-                    last: None,
-                    index,
-                };
-            }
-            (true, false) => i64::from(matches!(count.rem_euclid(4), 2 | 3)),
-            (false, true) => i64::from(matches!(count.rem_euclid(4), 1 | 2)),
-        };
-        let step = seen - self.seen_count;
-        self.seen_count = seen;
+        let driven = [matches!(phase, 1 | 2), matches!(phase, 2 | 3)];
+        let levels = [0, 1].map(|k| if cut[k] { pulls[k] } else { driven[k] });
+        let state = |[a, b]: [bool; 2]| i64::from(b) * 2 + i64::from(a != b);
+        let step = (state(levels) - state(self.levels)).rem_euclid(4);
+        self.levels = levels;
+        let skewed = core::mem::take(&mut self.faults.skewed);
+        if !broken {
+            return Edges {
+                counts: count - before,
+                last,
+                index,
+                skewed,
+            };
+        }
+        // Two states on: both have changed, and nobody knows which way.
+        let counts = [0, 1, 0, -1].get(step as usize).copied().unwrap_or(0);
         Edges {
-            counts: step,
-            last: last.filter(|_| step != 0),
+            counts,
+            last: (counts != 0).then_some(last.unwrap_or(now)),
             index,
+            skewed: skewed || step == 2,
         }
     }
 }

@@ -164,6 +164,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
     pub fn with_chip<T>(&mut self, act: impl FnOnce(&mut Chip) -> T) -> T {
         let mut chip = self.cpu.bus();
         let result = act(&mut chip);
+        chip.see_board();
         chip.interrupt_run();
         result
     }
@@ -528,7 +529,8 @@ fn factory_data() -> Vec<u8> {
     put(0x1FFF_7590, b"RIG-MCU-0001");
     put(0x1FFF_75E0, &512_u16.to_le_bytes());
     put(0x1FFF_75A8, &1034_u16.to_le_bytes());
-    put(0x1FFF_75AA, &1654_u16.to_le_bytes());
+    // VREFINT of 1.2085 V at 3.0 V.
+    put(0x1FFF_75AA, &1650_u16.to_le_bytes());
     put(0x1FFF_75CA, &1378_u16.to_le_bytes());
     bytes
 }

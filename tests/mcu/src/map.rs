@@ -26,8 +26,12 @@ pub enum Peripheral {
     Pwr,
     /// Low-power UART.
     Lpuart,
-    /// System configuration, with voltage reference buffer, comparators and operational amplifiers behind it.
+    /// System configuration, with voltage reference buffer and operational amplifiers behind it.
     Syscfg,
+    /// Comparators 1 to 7.
+    Comp,
+    /// DAC3.
+    Dac3,
     /// External interrupts.
     Exti,
     /// DMA controller, 1 or 2.
@@ -51,7 +55,7 @@ pub enum Peripheral {
 }
 
 /// Base address and size of every peripheral that is modelled.
-const PLACES: [(u32, u32, Peripheral); 33] = [
+const PLACES: [(u32, u32, Peripheral); 35] = [
     (0x4000_0000, 0x400, Peripheral::Tim(2)),
     (0x4000_0400, 0x400, Peripheral::Tim(3)),
     (0x4000_0800, 0x400, Peripheral::Tim(4)),
@@ -62,6 +66,7 @@ const PLACES: [(u32, u32, Peripheral); 33] = [
     (0x4000_7000, 0x400, Peripheral::Pwr),
     (0x4000_8000, 0x400, Peripheral::Lpuart),
     (0x4001_0000, 0x30, Peripheral::Syscfg),
+    (0x4001_0200, 0x100, Peripheral::Comp),
     (0x4001_0400, 0x400, Peripheral::Exti),
     (0x4001_2C00, 0x400, Peripheral::Tim(1)),
     (0x4001_3400, 0x400, Peripheral::Tim(8)),
@@ -82,6 +87,7 @@ const PLACES: [(u32, u32, Peripheral); 33] = [
     (0x4800_1400, 0x400, Peripheral::Gpio(5)),
     (0x4800_1800, 0x400, Peripheral::Gpio(6)),
     (0x5000_0000, 0x400, Peripheral::Adc12),
+    (0x5000_1000, 0x400, Peripheral::Dac3),
     (0xE000_1000, 0x1000, Peripheral::Dwt),
     (0xE000_E000, 0x1000, Peripheral::Scs),
     (0xE004_2000, 0x400, Peripheral::Dbgmcu),
@@ -96,7 +102,7 @@ pub fn peripheral(address: u32) -> Option<(Peripheral, u32)> {
 }
 
 /// Peripherals of the chip that are not modelled, so that an access can be told by name.
-const UNMODELLED: [(u32, &str); 34] = [
+const UNMODELLED: [(u32, &str); 33] = [
     (0x4000_2000, "CRS"),
     (0x4000_2400, "TAMP"),
     (0x4000_2800, "RTC"),
@@ -116,7 +122,6 @@ const UNMODELLED: [(u32, &str); 34] = [
     (0x4000_8400, "I2C4"),
     (0x4000_A000, "UCPD1"),
     (0x4001_0030, "VREFBUF"),
-    (0x4001_0200, "COMP"),
     (0x4001_0300, "OPAMP"),
     (0x4001_3000, "SPI1"),
     (0x4001_3800, "USART1"),
@@ -127,7 +132,7 @@ const UNMODELLED: [(u32, &str); 34] = [
     (0x4002_1400, "FMAC"),
     (0x4002_3000, "CRC"),
     (0x5000_0400, "ADC3/4/5"),
-    (0x5000_0800, "DAC"),
+    (0x5000_0800, "DAC1/2"),
     (0x5006_0000, "AES"),
     (0x5006_0800, "RNG"),
     (0xE000_0000, "ITM"),

@@ -2,7 +2,7 @@
 //! their times. Dual-bank, pages of 2 KiB. While a bank is busy, whoever fetches from it waits
 //! (section 3.3.2, read-while-write works across banks only).
 //!
-//! Left out: fast programming, option bytes, protection, ECC.
+//! Left out: fast programming, option bytes, protection; of ECC all but the flag of an error that a test names.
 
 use super::{Bank, Refusal, Register, told};
 use crate::cpu::Memory;
@@ -19,7 +19,10 @@ const ACR: u32 = 0x00;
 const KEYR: u32 = 0x08;
 const SR: u32 = 0x10;
 const CR: u32 = 0x14;
+const ECCR: u32 = 0x18;
 
+/// Cleared by writing it with one.
+const ECCD: u32 = 1 << 31;
 const EOP: u32 = 1;
 const PROGERR: u32 = 1 << 3;
 const PGAERR: u32 = 1 << 5;
@@ -91,6 +94,11 @@ impl Flash {
     /// Whether the prefetch is on.
     pub fn prefetches(&self) -> bool {
         self.bank.get(ACR) & 0x100 != 0
+    }
+
+    /// A word with two wrong bits has been read, in bank 1 or 2 (FLASH_ECCR: ECCD, BK_ECC).
+    pub fn double_error(&mut self, bank: u8) {
+        self.bank.put(ECCR, ECCD | u32::from(bank == 2) << 21);
     }
 
     /// When the job under way ends.
@@ -226,6 +234,11 @@ impl Flash {
                 Ok(())
             }
             CR => self.control(now, value),
+            ECCR => {
+                let kept = self.bank.get(ECCR) & !(value & ECCD);
+                self.bank.put(ECCR, kept);
+                self.bank.write(ECCR, value & !(ECCD | 1 << 21)).map(|_| ())
+            }
             _ => self.bank.write(offset, value).map(|_| ()),
         }
     }

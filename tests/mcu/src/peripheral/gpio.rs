@@ -82,6 +82,11 @@ impl Gpio {
         before != self.outside
     }
 
+    /// Level that the pin's own pull gives to a wire that nothing drives; low without one.
+    pub fn pulls_up(&self, pin: u32) -> bool {
+        self.bank.get(0x0C) >> (2 * pin) & 3 == 1
+    }
+
     /// Level that the board puts on a pin.
     pub fn outside(&self, pin: u32) -> bool {
         self.outside & 1 << pin != 0

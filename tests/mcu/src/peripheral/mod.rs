@@ -5,6 +5,8 @@
 //! effect is missing. A refusal ends the run; nothing is silently taken.
 
 pub mod adc;
+pub mod comp;
+pub mod dac;
 pub mod dma;
 pub mod dmamux;
 pub mod exti;

@@ -324,12 +324,13 @@ impl Rcc {
             Peripheral::Tim(_) => (APB2ENR, 20),
             Peripheral::Pwr => (APB1ENR1, 28),
             Peripheral::Lpuart => (APB1ENR2, 0),
-            Peripheral::Syscfg => (APB2ENR, 0),
+            Peripheral::Syscfg | Peripheral::Comp => (APB2ENR, 0),
             Peripheral::Dma(n) => (AHB1ENR, u32::from(n) - 1),
             Peripheral::Dmamux => (AHB1ENR, 2),
             Peripheral::Flash => (AHB1ENR, 8),
             Peripheral::Gpio(n) => (AHB2ENR, u32::from(n)),
             Peripheral::Adc12 => (AHB2ENR, 13),
+            Peripheral::Dac3 => (AHB2ENR, 18),
             Peripheral::Exti
             | Peripheral::Rcc
             | Peripheral::Iwdg

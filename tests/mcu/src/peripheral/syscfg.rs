@@ -45,6 +45,11 @@ impl Syscfg {
         self.0.get(0x1C) & 1 != 0
     }
 
+    /// CFGR2.ECCL: a flash word beyond repair acts on the timers' break inputs.
+    pub fn breaks_on_flash_error(&self) -> bool {
+        self.0.get(0x1C) & 8 != 0
+    }
+
     /// CFGR2.PVDL: the voltage detector acts on the timers' break inputs.
     pub fn breaks_on_low_supply(&self) -> bool {
         self.0.get(0x1C) & 4 != 0

@@ -32,7 +32,7 @@ fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
     assert!(report.crystal);
 }
 
-/// Bytes of a short conversation with motion.
+/// Bytes of a conversation of seven seconds: armed, in motion, at rest again.
 fn conversation(seed: u64) -> Vec<u8> {
     let line = Line {
         board: powered(seed),
@@ -43,8 +43,14 @@ fn conversation(seed: u64) -> Vec<u8> {
     let mut line = Session::open(port, SessionSettings::default()).unwrap();
     calibrated(&mut line);
     line.request(RequestBody::StartStream).unwrap();
+    line.request(RequestBody::SetTrajectory(excitation(2, 2, 1)))
+        .unwrap();
     line.request(RequestBody::Arm).unwrap();
     wait(&mut line, 0.3);
+    line.request(RequestBody::Start).unwrap();
+    // Two ramps of 2 s and a period of 2 s.
+    wait(&mut line, 6.5);
+    assert!(board(&mut line).with_board(|b| b.bridge().enabled));
     assert_eq!(board(&mut line).failure(), None);
     line.port_mut().device_mut().heard.take().unwrap()
 }
@@ -52,7 +58,7 @@ fn conversation(seed: u64) -> Vec<u8> {
 #[test]
 fn two_runs_give_the_same_bytes_and_another_rig_gives_others() {
     let first = conversation(2);
-    assert!(first.len() > 5000, "{} bytes", first.len());
+    assert!(first.len() > 200_000, "{} bytes", first.len());
     assert!(first == conversation(2));
     assert!(first != conversation(3));
 }

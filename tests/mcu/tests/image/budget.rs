@@ -3,8 +3,11 @@
 use heapless::Vec;
 use rig_mcu::chip::CONTROL_EXCEPTION;
 use rig_shared::compensation::EFFECTS;
+use rig_shared::control::ControlKind;
 use rig_shared::effects::{Effect, Kind};
-use rig_shared::trajectory::{Chirp, FrictionSweep, SlowReversals, Sweep, Trajectory};
+use rig_shared::trajectory::{
+    Chirp, FrictionSweep, HARMONICS, LEVELS, SPEEDS, SlowReversals, Staircase, Sweep, Trajectory,
+};
 use rig_shared::wire::message::RequestBody;
 use rig_tests::{driven, excitation};
 use serde::Deserialize;
@@ -22,6 +25,15 @@ struct Budget {
     flash_bytes: usize,
     ram_bytes: usize,
     stack_bytes: u32,
+    any: Most,
+}
+
+/// Of any motion under any law with any effects.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Most {
+    cycles_mean: f64,
+    cycles_worst: f64,
 }
 
 /// Cycles between two control ticks.
@@ -92,54 +104,128 @@ fn the_image_keeps_to_its_budget() {
     assert!(kept, "more than tests/mcu/budget.toml allows:\n{found}");
 }
 
-/// Motions other than the excitation, whose references are computed in the tick too. A chirp's phase takes twice the
-/// digits and runs from flash: more than the project's aim, and within the period.
-#[test]
-fn every_motion_keeps_to_the_period() {
+/// Effects of each sort at their dearest, as many as there can be: what runs beside every motion and law below.
+fn effects() -> [(&'static str, std::vec::Vec<Effect<f32>>); 4] {
+    let fill = |kinds: &[Effect<f32>]| kinds.iter().cycle().take(EFFECTS).copied().collect();
+    let lugre = Effect::new(Kind::PreslidingLugre, &[0.05, 0.1], &[0.01, 0.2, 0.05]);
+    let eccentric = Effect::new(Kind::EncoderEccentricityMotor, &[1e-5, 1e-5], &[1.0]);
+    let ripple = Effect::new(Kind::TorqueRipple, &[0.01, 0.01], &[7.0]);
+    let mixed = [
+        Effect::new(Kind::Stribeck, &[0.05], &[0.1]),
+        Effect::new(Kind::PositionFriction, &[0.02, 0.02], &[12.0]),
+        ripple,
+        Effect::new(Kind::DriveDeadzone, &[0.1], &[]),
+        eccentric,
+        lugre,
+        Effect::new(Kind::ViscousWarmupTime, &[0.02], &[600.0]),
+        Effect::new(Kind::CurrentOffset, &[0.01], &[]),
+    ];
+    [
+        ("none", vec![]),
+        ("dry with memory", fill(&[lugre])),
+        ("encoder and ripple", fill(&[eccentric, ripple])),
+        ("one of each sort", fill(&mixed)),
+    ]
+}
+
+fn motions() -> [(&'static str, Trajectory<f32>); 7] {
     let chirp = |sweep| {
         Trajectory::Chirp(Chirp {
             start_hz: 0.5,
             end_hz: 4.0,
             sweep,
-            duration_us: 1_500_000,
+            duration_us: 700_000,
             ramp_us: 300_000,
             amplitude: 0.05,
             velocity: 0.5,
             acceleration: 10.0,
         })
     };
-    // Most of the period, mean and worst.
-    let motions = [
-        ("linear chirp", chirp(Sweep::Linear), [0.31, 0.54]),
-        ("logarithmic chirp", chirp(Sweep::Logarithmic), [0.45, 0.70]),
+    let mut harmonics = excitation(41, 5, 1);
+    if let Trajectory::Fourier(motion) = &mut harmonics {
+        // As many as there can be, short.
+        motion.sine = [0.01; HARMONICS].into_iter().collect();
+        motion.cosine = motion.sine.clone();
+        (motion.period_us, motion.ramp_us) = (1_000_000, 300_000);
+        for part in motion.sine.iter_mut().chain(&mut motion.cosine) {
+            *part *= 0.1;
+        }
+    }
+    let levels = [0.001_f32; LEVELS].into_iter().collect();
+    [
+        ("hold", Trajectory::Hold(200_000)),
+        ("Fourier", harmonics),
+        ("linear chirp", chirp(Sweep::Linear)),
+        ("logarithmic chirp", chirp(Sweep::Logarithmic)),
+        (
+            "staircase",
+            Trajectory::Staircase(Staircase {
+                levels,
+                move_us: 20_000,
+                dwell_us: 20_000,
+            }),
+        ),
         (
             "slow reversals",
-            Trajectory::SlowReversals(SlowReversals::new(0.1, 0.2, &[0.05], 1).unwrap()),
-            [0.25, 0.5],
+            Trajectory::SlowReversals(SlowReversals::new(0.2, 0.1, &[0.05], 2).unwrap()),
         ),
         (
             "friction sweep",
-            Trajectory::FrictionSweep(FrictionSweep::new(&[0.3], 0.1, 0.1, 0.1, 3.0).unwrap()),
-            [0.25, 0.5],
+            Trajectory::FrictionSweep(
+                FrictionSweep::new(&[0.3; SPEEDS / 4], 0.02, 0.05, 0.01, 0.3).unwrap(),
+            ),
         ),
-    ];
+    ]
+}
+
+/// Every motion under every law with every sort of effects: the worst tick keeps to what the project promises, the mean to
+/// 1.6 % of the period beyond that (the budget file says with what).
+#[test]
+fn every_motion_law_and_effect_keeps_to_the_budget() {
+    let most: Most = toml::from_str::<Budget>(include_str!("../../budget.toml"))
+        .unwrap()
+        .any;
     let mut line = bench(41);
-    let mut text = String::new();
-    let mut kept = true;
-    for (name, motion, most) in motions {
-        board(&mut line).clear_costs();
-        let run = driven(&mut line, all_on(), motion, 0.05);
-        assert!(run.faults.is_empty(), "{name}: {:?}", run.faults);
-        let cost = board(&mut line).cost(CONTROL_EXCEPTION);
-        let mean = cost.cycles as f64 / cost.count as f64 / PERIOD;
-        let worst = cost.worst_cycles as f64 / PERIOD;
-        text += &format!(
-            "{name}: {:.1} % of the period, {:.1} % at worst\n",
-            100.0 * mean,
-            100.0 * worst
-        );
-        kept &= mean <= most[0] && worst <= most[1];
+    let (mut text, mut worst_of_all) = (String::new(), [0.0_f64; 2]);
+    for (law_name, law) in [
+        ("PD", ControlKind::ProportionalDerivative),
+        ("computed torque", ControlKind::ComputedTorque),
+        ("adaptive", ControlKind::Adaptive),
+    ] {
+        for (effects_name, effects) in effects() {
+            for (name, motion) in motions() {
+                let mut told = all_on();
+                told.retain(|body| !matches!(body, RequestBody::SetEffects(_)));
+                told.push(RequestBody::SetControl(law));
+                told.push(RequestBody::SetEffects(effects.iter().copied().collect()));
+                board(&mut line).clear_costs();
+                let run = driven(&mut line, told, motion, 0.02);
+                assert!(run.faults.is_empty(), "{name}: {:?}", run.faults);
+                let cost = board(&mut line).cost(CONTROL_EXCEPTION);
+                let found = [
+                    cost.cycles as f64 / cost.count as f64 / PERIOD,
+                    cost.worst_cycles as f64 / PERIOD,
+                ];
+                let [mean, worst] = found.map(|share| 100.0 * share);
+                text += &format!("{law_name}, {effects_name}, {name}: {mean:.1} % {worst:.1} %\n");
+                for (most, found) in worst_of_all.iter_mut().zip(found) {
+                    *most = most.max(found);
+                }
+            }
+        }
     }
-    println!("{text}");
-    assert!(kept, "\n{text}");
+    println!(
+        "{text}any_cycles_mean = {:.0}\nany_cycles_worst = {:.0}",
+        worst_of_all[0] * PERIOD,
+        worst_of_all[1] * PERIOD
+    );
+    let [mean, worst] = worst_of_all;
+    assert!(
+        mean <= 0.266 && worst <= 0.5,
+        "the tick takes too much of its period:\n{text}"
+    );
+    assert!(
+        mean * PERIOD <= most.cycles_mean && worst * PERIOD <= most.cycles_worst,
+        "more than tests/mcu/budget.toml allows:\n{text}"
+    );
 }

@@ -7,6 +7,7 @@ mod boot;
 mod budget;
 mod circle;
 mod faults;
+mod hardware;
 mod identification;
 mod storage;
 

@@ -1,0 +1,157 @@
+//! The lines between the chip's pins and the board around it.
+
+use super::{Chip, ChipError};
+use crate::board::Bridge;
+use crate::peripheral::Refusal;
+use crate::peripheral::gpio::Function;
+use crate::ripple::Ripple;
+use crate::time::{Instant, to_seconds};
+
+impl Chip {
+    /// What has changed outside acts at once, without waiting for anything else to happen.
+    pub fn see_board(&mut self) {
+        self.update_pins();
+        if let Err(refusal) = self.update_bridge(self.work.now) {
+            self.fail(ChipError::Hardware(refusal));
+        }
+    }
+
+    /// Pins that the board holds high: the receiving line idle, the fault line released.
+    pub(super) fn set_pins(&mut self) {
+        self.gpio[0].set_outside(3, true);
+        let fault = self.board.fault_pin();
+        self.gpio[1].set_outside(12, fault);
+    }
+
+    /// Codes on PC1, PC0, PC2 as far as the pins are analogue.
+    pub(super) fn codes(&self) -> Codes {
+        let [current, supply, temperature] = [(0, 1), (1, 0), (2, 2)].map(|(input, pin)| {
+            (self.gpio[2].function(pin) == Function::Analogue).then(|| self.board.code(input))
+        });
+        Codes {
+            reference: self.board.reference_code(),
+            current,
+            supply,
+            temperature,
+            ripple: self.board.ripple(),
+            middle: self.tim[0].underflow(self.work.now),
+        }
+    }
+
+    /// The pins that the board drives.
+    pub(super) fn update_pins(&mut self) {
+        let high = self.board.fault_pin();
+        if self.gpio[1].set_outside(12, high) && self.syscfg.port_of(12) == 1 {
+            self.exti.edge(12, high);
+        }
+        if self.gpio[1].function(12) == Function::Alternate(6) {
+            self.tim[0].set_break_pin(high);
+        }
+        self.compare();
+        let low = self.board.faults.logic_supply;
+        let low = low.is_some_and(|supply| self.pwr.detects_low(supply));
+        let break_down = low && self.syscfg.breaks_on_low_supply();
+        // The clock's failure acts whatever SYSCFG says.
+        self.tim[0].set_system_break(break_down || self.rcc.clock_failed());
+    }
+
+    /// The current sense on PC1, at COMP3's second input, and on PB0, at COMP4's first, against DAC3.
+    pub(super) fn compare(&mut self) {
+        let sense = self.board.sense();
+        let wired = |port: usize, pin| {
+            (self.gpio[port].function(pin) == Function::Analogue).then_some(sense)
+        };
+        let (pc1, pb0) = (wired(2, 1), wired(1, 0));
+        let third = self.comp.compare(3, [None, pc1], self.dac.output(0));
+        let fourth = self.comp.compare(4, [pb0, None], self.dac.output(1));
+        self.tim[0].set_comparator(3, third);
+        self.tim[0].set_comparator(4, fourth);
+    }
+
+    /// What PWM and enable pin make of the bridge. PA8 and PA9 by alternate function 6 (DS12288 table 13).
+    pub(super) fn update_bridge(&mut self, now: Instant) -> Result<(), Refusal> {
+        let mut half = [0.0; 2];
+        for (k, level) in half.iter_mut().enumerate() {
+            let pin = 8 + k as u32;
+            *level = match self.gpio[0].function(pin) {
+                Function::Alternate(6) => self.tim[0].output(k)?.unwrap_or(0.0),
+                Function::Output => f64::from(u8::from(self.gpio[0].drives_high(pin))),
+                _ => 0.0,
+            };
+        }
+        let enable = self.gpio[1].drives_high(5);
+        self.board.set_bridge(
+            now,
+            Bridge {
+                duty: half[0] - half[1],
+                // Both inputs low all the time: open.
+                enabled: enable && half != [0.0; 2],
+                enable,
+            },
+        );
+        Ok(())
+    }
+
+    /// The encoder's edges up to now, into the timers that count and time them: PA0 and PA1 by alternate function 1.
+    pub(super) fn count_edges(&mut self) {
+        let pulls = [0, 1].map(|pin| self.gpio[0].pulls_up(pin));
+        let edges = self.board.edges(self.work.now, pulls);
+        for (pin, level) in self.board.levels().into_iter().enumerate() {
+            self.gpio[0].set_outside(pin as u32, level);
+        }
+        let wired = (0..2).all(|pin| self.gpio[0].function(pin) == Function::Alternate(1));
+        if wired {
+            let tim = self.timer(2);
+            tim.quadrature(edges.counts);
+            if edges.skewed {
+                tim.transition_error();
+            }
+            if let Some(index) = edges.index {
+                tim.index(index.upwards, index.since);
+            }
+            if let Some(last) = edges.last
+                && tim.sends_encoder_clock()
+            {
+                self.timer(5).internal_trigger_1(last);
+            }
+        }
+    }
+
+    /// Bytes that the host puts on the serial line now. They reach the port only where PA3 is set up for it.
+    pub fn send(&mut self, bytes: &[u8]) {
+        if self.gpio[0].function(3) == Function::Alternate(12) {
+            self.lpuart.receive(self.work.now, bytes);
+            self.deadline = 0;
+        }
+    }
+
+    /// Bytes that have gone out on PA2 since the last call.
+    pub fn take_sent(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.lpuart.sent)
+    }
+}
+
+/// What is on the converter's pins: codes, and what the current's varies by within a pulse.
+pub(super) struct Codes {
+    reference: u16,
+    current: Option<u16>,
+    supply: Option<u16>,
+    temperature: Option<u16>,
+    ripple: Ripple,
+    /// Middle of a braking interval, while the pulses come.
+    middle: Option<Instant>,
+}
+
+pub(super) fn code_of(codes: &Codes, channel: u32, held: Instant) -> Option<u16> {
+    match channel {
+        6 => codes.supply,
+        7 => codes.current.map(|code| match codes.middle {
+            Some(middle) => codes.ripple.on(code, to_seconds(held) - to_seconds(middle)),
+            None => code,
+        }),
+        8 => codes.temperature,
+        // VREFINT.
+        18 => Some(codes.reference),
+        _ => None,
+    }
+}

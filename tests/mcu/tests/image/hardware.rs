@@ -1,0 +1,291 @@
+//! What the hardware does by itself, and what of it the program finds: comparators, encoder wires and index, lock-up, flash
+//! errors, the bridge's wake-up, the converter's reference, heat across a reset.
+
+use std::time::Duration;
+
+use rig_host::link::LinkError;
+use rig_mcu::chip::Chip;
+use rig_mcu::peripheral::rcc::Cause;
+use rig_mcu::rig::power_on;
+use rig_mcu::time::{NEVER, from_seconds};
+use rig_shared::safety::{Fault, SnapshotSample};
+use rig_shared::trajectory::{Staircase, Trajectory};
+use rig_shared::wire::message::{Refusal, Report, RequestBody, ResetCause};
+use rig_tests::{calibrated, excitation, wait};
+
+use crate::faults::{off_after, refused};
+use crate::{BoardSession, bench, board, greeted, health, image, moving, place, plant, snapshot};
+
+/// Whether TIM1's outputs are on, after so many seconds in which the processor does nothing.
+fn outputs_after(line: &mut BoardSession, seconds: f64, injure: impl FnOnce(&mut Chip)) -> bool {
+    let until = board(line).with_chip(|chip| {
+        injure(chip);
+        chip.held_until = chip.work.now + from_seconds(seconds);
+        chip.held_until
+    });
+    board(line).run_until(until).unwrap();
+    board(line).with_chip(|chip| chip.timer(1).main_output())
+}
+
+/// The burst over the wire.
+fn captured(line: &mut BoardSession) -> Vec<SnapshotSample> {
+    line.request(RequestBody::GetCapture).unwrap();
+    let (mut ticks, mut total) = (Vec::new(), usize::MAX);
+    while ticks.len() < total {
+        let report = line.next_report(Duration::from_millis(500)).unwrap();
+        if let Report::Capture(part) = report.unwrap() {
+            assert_eq!(usize::from(part.first), ticks.len());
+            total = usize::from(part.total);
+            ticks.extend(part.samples);
+        }
+    }
+    ticks
+}
+
+/// A short in the motor's wires, either way, faster than a tick: off within 5 µs and without the program, told as what it is,
+/// and the ticks before and after kept at 10 kHz.
+#[test]
+fn a_short_is_switched_off_by_the_comparators_and_kept_in_the_capture() {
+    for (seed, current) in [(70, 9.0), (71, -9.0)] {
+        let mut line = moving(seed);
+        assert!(!outputs_after(&mut line, 5e-6, |chip| {
+            chip.board.faults.short = Some(current);
+        }));
+        wait(&mut line, 0.1);
+        let (record, _) = snapshot(&mut line);
+        assert_eq!(record.fault, Fault::OverCurrent, "{current} A");
+        board(&mut line).with_board(|b| b.faults.short = None);
+        let ticks = captured(&mut line);
+        assert!(
+            ticks
+                .windows(2)
+                .all(|pair| pair[1].tick == pair[0].tick + 1)
+        );
+        let at = ticks.iter().position(|tick| tick.tick == record.tick);
+        let at = at.unwrap();
+        assert_eq!((ticks.len(), ticks.len() - 1 - at), (1536, 192));
+        assert!(ticks[..at].iter().any(|tick| tick.duty != 0.0));
+        assert!(ticks[at + 1..].iter().all(|tick| tick.duty == 0.0));
+        line.request(RequestBody::ClearFault).unwrap();
+        line.request(RequestBody::Arm).unwrap();
+        wait(&mut line, 0.05);
+        assert!(board(&mut line).with_board(|b| b.bridge().enabled));
+    }
+}
+
+/// Below the comparators' 6 A and above the checks' 4.8 A: the checks take three ticks.
+#[test]
+fn what_the_comparators_let_through_the_checks_find() {
+    let mut line = moving(72);
+    assert!(outputs_after(&mut line, 5e-6, |chip| {
+        chip.board.faults.short = Some(5.4);
+    }));
+    let after = off_after(&mut line, 1e-3).unwrap();
+    assert!((2e-4..6e-4).contains(&after), "{after}");
+    assert_eq!(snapshot(&mut line).0.fault, Fault::OverCurrent);
+}
+
+#[test]
+fn too_high_a_supply_is_a_fault_as_too_low_a_one_is() {
+    let mut line = moving(73);
+    board(&mut line).with_board(|b| b.plant_mut().faults_mut().supply = Some(33.0));
+    assert!(off_after(&mut line, 1e-3).is_some());
+    let (record, _) = snapshot(&mut line);
+    assert!(
+        record.fault == Fault::Supply && record.value > 30.0,
+        "{record:?}"
+    );
+}
+
+/// At rest, where no motion could tell: a wire that nothing drives follows the chip's own pull.
+#[test]
+fn a_cut_encoder_wire_is_found_at_rest() {
+    for (seed, cut) in [(74, [true, true]), (75, [true, false]), (76, [false, true])] {
+        let mut line = bench(seed);
+        line.request(RequestBody::Arm).unwrap();
+        wait(&mut line, 0.5);
+        board(&mut line).with_board(|b| {
+            [b.faults.channel_a_cut, b.faults.channel_b_cut] = cut;
+        });
+        let after = off_after(&mut line, 0.03);
+        println!("{cut:?}: {after:?} s");
+        assert!(
+            after.is_some_and(|after| after < 0.015),
+            "{cut:?}: {after:?}"
+        );
+        assert_eq!(snapshot(&mut line).0.fault, Fault::EncoderLost, "{cut:?}");
+        // It acts whether the bridge is on or off.
+        let clear = RequestBody::ClearFault;
+        assert_eq!(refused(&mut line, clear), Refusal::CauseActing);
+    }
+}
+
+/// Pressed against a stop with all that the limits allow.
+#[test]
+fn a_blocked_link_is_an_overload() {
+    let mut rig = plant(77);
+    let start = rig.initial_position;
+    rig.mechanism.end_stops = rig.mechanism.end_stops.map(|mut stops| {
+        stops.range = [start - 0.1, start + 0.1];
+        stops
+    });
+    let mut line = greeted(power_on(image(), rig, 77).unwrap());
+    calibrated(&mut line);
+    let away = Staircase {
+        levels: [0.8].into_iter().collect(),
+        move_us: 1_000_000,
+        dwell_us: 20_000_000,
+    };
+    line.request(RequestBody::SetTrajectory(Trajectory::Staircase(away)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 6.0);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Overload);
+}
+
+#[test]
+fn a_missed_a_false_and_a_skewed_encoder_signal_are_told_apart() {
+    type Injury = fn(&mut Chip);
+    let turn = 8192.0_f32;
+    let cases: [(&str, Injury, fn(f32) -> bool); 3] = [
+        (
+            "index cut",
+            |c| c.board.faults.index_cut = true,
+            |value| value.abs() == 8192.0,
+        ),
+        (
+            "false index",
+            |c| c.board.faults.false_index = true,
+            |value| value != 0.0 && value.abs() <= 4096.0,
+        ),
+        (
+            "both channels at once",
+            |c| c.board.faults.skewed = true,
+            |value| value == 0.0,
+        ),
+    ];
+    for (k, (name, injure, expected)) in cases.into_iter().enumerate() {
+        let mut line = moving(78 + k as u64);
+        let from = board(&mut line).with_board(|b| b.plant().truth().motor_position);
+        board(&mut line).with_chip(injure);
+        assert!(off_after(&mut line, 1.0).is_some(), "{name}");
+        let (record, _) = snapshot(&mut line);
+        let to = board(&mut line).with_board(|b| b.plant().truth().motor_position);
+        let counts = (to - from).abs() / core::f64::consts::TAU * f64::from(turn);
+        println!("{name}: {record:?} after {counts:.0} counts");
+        assert_eq!(record.fault, Fault::EncoderSignal, "{name}");
+        assert!(expected(record.value), "{name}: {record:?}");
+        line.request(RequestBody::ClearFault).unwrap();
+    }
+}
+
+/// The outputs follow the enable after a millisecond at most: nothing is asked of them before, so that nothing winds up.
+#[test]
+fn the_bridge_is_given_its_time_to_wake() {
+    let mut line = bench(81);
+    for _ in 0..2 {
+        line.request(RequestBody::Arm).unwrap();
+        let enabled = board(&mut line).with_board(|b| b.enable_edges.last().copied());
+        let (at, on) = enabled.unwrap();
+        assert!(on);
+        let first = board(&mut line).with_chip(|chip| (chip.work.now, chip.board.first_duty));
+        // The answer may have come later than that.
+        if first.0 < at + from_seconds(1e-3) {
+            let duty = board(&mut line).with_board(|b| b.bridge().duty);
+            assert_eq!(duty, 0.0);
+        }
+        wait(&mut line, 0.1);
+        assert_eq!(board(&mut line).with_board(|b| b.first_duty), 0.0);
+        assert_ne!(board(&mut line).with_board(|b| b.bridge().duty), 0.0);
+        line.request(RequestBody::Disarm).unwrap();
+    }
+}
+
+/// The chip's supply is the converter's reference: at 3.2 V every code is 3 % more, and is taken for what it is.
+#[test]
+fn codes_are_corrected_by_the_chip_s_own_reference() {
+    let mut emulated = power_on(image(), plant(82), 82).unwrap();
+    emulated.with_board(|b| b.faults.logic_supply = Some(3.2));
+    let mut line = greeted(emulated);
+    calibrated(&mut line);
+    place(&mut line);
+    line.request(RequestBody::Capture(100)).unwrap();
+    wait(&mut line, 0.05);
+    let ticks = captured(&mut line);
+    let mean = ticks.iter().map(|tick| f64::from(tick.supply)).sum::<f64>() / ticks.len() as f64;
+    let truth = board(&mut line).with_board(|b| b.plant().config().bridge.supply);
+    println!("{mean:.3} V of {truth} V");
+    assert!((mean - truth).abs() < 0.03, "{mean} V");
+}
+
+/// A processor that locks up, and a flash word that cannot be corrected, take the outputs without a program that runs.
+#[test]
+fn lock_up_and_flash_errors_take_the_outputs_in_hardware() {
+    let mut line = moving(83);
+    board(&mut line).with_chip(|chip| chip.held_until = NEVER);
+    board(&mut line).with_chip(|chip| chip.lock_up());
+    assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
+    // Nothing runs until the watchdog bites.
+    board(&mut line).run_for(0.5).unwrap();
+    board(&mut line).with_chip(|chip| chip.held_until = 0);
+    assert!(matches!(
+        board(&mut line).resets[..],
+        [(_, Cause::Watchdog)]
+    ));
+
+    // In the program's bank: off at once, and started anew by the non-maskable interrupt.
+    let mut line = moving(84);
+    board(&mut line).with_chip(|chip| chip.flash_error(1));
+    assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
+    board(&mut line).run_for(0.1).unwrap();
+    assert!(matches!(
+        board(&mut line).resets[..],
+        [(_, Cause::Software)]
+    ));
+    assert_eq!(health(&mut line).reset, ResetCause::Software);
+
+    // In the settings' bank, as an interrupted store leaves it: off all the same, but the program goes on.
+    let mut line = moving(85);
+    board(&mut line).with_chip(|chip| chip.flash_error(2));
+    assert!(!board(&mut line).with_chip(|chip| chip.timer(1).main_output()));
+    wait(&mut line, 0.1);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Driver);
+    assert_eq!(board(&mut line).resets, []);
+    line.request(RequestBody::ClearFault).unwrap();
+    line.request(RequestBody::Arm).unwrap();
+}
+
+/// A motor that was overloaded before a reset is so after it, and has cooled no further than time says.
+#[test]
+fn a_reset_does_not_cool_the_motor() {
+    let mut line = bench(86);
+    let (_, settings) = rig_firmware::nameplate::one_link();
+    let mut limits = settings.limits;
+    limits.continuous_current = 0.1;
+    line.request(RequestBody::SetLimits(limits)).unwrap();
+    line.request(RequestBody::Store).unwrap();
+    line.request(RequestBody::SetTrajectory(excitation(86, 5, 2)))
+        .unwrap();
+    line.request(RequestBody::Arm).unwrap();
+    line.request(RequestBody::Start).unwrap();
+    wait(&mut line, 3.0);
+    assert_eq!(snapshot(&mut line).0.fault, Fault::Overload);
+    for cause in [Cause::Software, Cause::Pin, Cause::Watchdog] {
+        board(&mut line).reset(cause);
+        wait(&mut line, 0.3);
+        assert_eq!(snapshot(&mut line).0.fault, Fault::Overload, "{cause:?}");
+        let clear = RequestBody::ClearFault;
+        assert_eq!(refused(&mut line, clear), Refusal::CauseActing);
+    }
+    // Half of the heat has gone after 0.7 thermal times of 10 s.
+    wait(&mut line, 8.0);
+    line.request(RequestBody::ClearFault).unwrap();
+    assert!(!matches!(
+        line.request(RequestBody::Arm),
+        Err(LinkError::Refused {
+            refusal: Refusal::FaultLatched,
+            ..
+        })
+    ));
+}
