@@ -58,7 +58,7 @@ fn conversation(seed: u64) -> Vec<u8> {
 #[test]
 fn two_runs_give_the_same_bytes_and_another_rig_gives_others() {
     let first = conversation(2);
-    assert!(first.len() > 200_000, "{} bytes", first.len());
+    assert!(first.len() > 150_000, "{} bytes", first.len());
     assert!(first == conversation(2));
     assert!(first != conversation(3));
 }
