@@ -394,7 +394,7 @@ pub struct JointFigures {
     pub name: String,
     /// N·m or N; not a number (null) where none of the joint's rows could be used, as of one that stands still.
     pub train_residual_rms: f64,
-    /// N·m or N; null without a hold-out.
+    /// N·m or N; null without a hold-out or where none of the joint's rows in it could be used.
     pub holdout_residual_rms: Option<f64>,
     /// RMS of the residual over RMS of the torque.
     pub train_relative_error: f64,

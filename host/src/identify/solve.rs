@@ -497,19 +497,12 @@ fn solve(
             .iter()
             .enumerate()
             .map(|(j, joint)| {
-                // Without a row there is no error, not one of zero.
-                let judged = |report: &ResidualReport, value: f64| {
-                    if report.rows > 0 { value } else { f64::NAN }
-                };
-                let held = holdout_residuals
-                    .as_ref()
-                    .map(|h| &h[j])
-                    .filter(|h| h.rows > 0);
+                let held = holdout_residuals.as_ref().map(|h| &h[j]);
                 JointFigures {
                     name: joint.name.clone(),
-                    train_residual_rms: judged(&train[j], train[j].rms),
+                    train_residual_rms: train[j].rms,
                     holdout_residual_rms: held.map(|h| h.rms),
-                    train_relative_error: judged(&train[j], train[j].relative_error),
+                    train_relative_error: train[j].relative_error,
                     holdout_relative_error: held.map(|h| h.relative_error),
                 }
             })

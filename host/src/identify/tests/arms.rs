@@ -305,15 +305,11 @@ pub(super) fn bodies(chance: &mut Chance, n: usize) -> Vec<[f64; 10]> {
 fn intervals_at_zero_are_those_of_the_data() {
     let (mut inside, mut all, mut at_zero) = (0, 0, 0);
     for seed in 0..10 {
-        let mut robot = arm(3, 80 + seed);
-        for joint in &mut robot.joints {
-            let friction = joint.friction.as_mut().unwrap();
-            (friction.viscous, friction.coulomb) = (0.01, 0.01);
-            joint.drive.as_mut().unwrap().rotor_inertia = 1e-7;
-        }
+        let robot = arm(3, 80 + seed);
+        // More than friction and drives make.
         let noise = Noise {
             position: 2e-6,
-            torque: 1.0,
+            torque: 5.0,
             ..Default::default()
         };
         let recording = record(&robot, 15.0, 200.0, noise, seed);
@@ -341,7 +337,8 @@ fn intervals_at_zero_are_those_of_the_data() {
         }
     }
     println!("{inside} of {all} inside, {at_zero} near zero");
-    assert!(at_zero >= 5, "{at_zero} of {all}: nothing was at its bound");
+    // The barrier's own bend at a value x alone is one of 3.2·x.
+    assert!(at_zero >= 2, "{at_zero} of {all}: nothing was at its bound");
     assert!(inside as f64 >= 0.9 * all as f64, "{inside} of {all}");
 }
 
