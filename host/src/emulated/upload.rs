@@ -5,7 +5,7 @@ use rig_shared::effects::{Effect, Kind};
 use rig_shared::wire::message::RequestBody;
 
 use super::nameplate::{Nameplate, NameplateError};
-use crate::robot::{Inertial, Robot};
+use crate::robot::Robot;
 
 /// Limits, model, friction, gains and estimator; friction is compensated where `precompensation` says so.
 pub fn settings(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {
@@ -37,7 +37,6 @@ pub struct Upload {
 /// # Errors
 /// A description that is none of a one-link rig, has more effects than a rig compensates, or one that it cannot.
 pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError> {
-    let mut loaded = robot.clone();
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
     for Effect {
         kind,
@@ -46,8 +45,10 @@ pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError
     } in robot.placed_effects().into_iter().map(|one| one.effect)
     {
         if kind == Kind::Payload {
-            hang(&mut loaded, gains[0], shapes[0]);
-        } else if let Some(reason) = Role::refusal(kind) {
+            // The nameplate's model has it already.
+            continue;
+        }
+        if let Some(reason) = Role::refusal(kind) {
             left_out.push(format!(
                 "the effect {} is not compensated: {reason}",
                 kind.about().name
@@ -60,38 +61,22 @@ pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError
             });
         }
     }
-    let robot = robot.name.clone();
     if !left_out.is_empty() && !leave_out {
-        return Err(NameplateError::NotCompensable { robot, left_out });
+        return Err(NameplateError::NotCompensable {
+            robot: robot.name.clone(),
+            left_out,
+        });
     }
     let count = effects.len();
     if count > EFFECTS {
         return Err(NameplateError::TooManyEffects {
-            robot,
+            robot: robot.name.clone(),
             effects: count,
         });
     }
-    let mut requests = settings(&Nameplate::from_robot(&loaded)?, true);
+    let mut requests = settings(&Nameplate::from_robot(robot)?, true);
     requests.push(RequestBody::SetEffects(effects.into_iter().collect()));
     Ok(Upload { requests, left_out })
-}
-
-/// A point mass (kg) on the link, so far along its x axis (m).
-fn hang(robot: &mut Robot, mass: f64, distance: f64) {
-    let Some(joint) = robot.joints.first_mut() else {
-        return;
-    };
-    let link = joint.inertial.get_or_insert(Inertial {
-        mass: 0.0,
-        first_moment: [0.0; 3],
-        inertia: [0.0; 6],
-    });
-    link.mass += mass;
-    link.first_moment[0] += mass * distance;
-    // Iyy and Izz.
-    for place in [3, 5] {
-        link.inertia[place] += mass * distance * distance;
-    }
 }
 
 #[cfg(test)]
