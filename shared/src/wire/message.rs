@@ -36,6 +36,10 @@ pub struct Request {
 
 /// What the host can ask for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is no heap to box it on, and a message is stored for one command only"
+)]
 pub enum RequestBody {
     /// Ask for the [`Greeting`]; first in every version, so that it is always understood.
     Hello,
