@@ -248,7 +248,7 @@ fn a_torque_of_the_wrong_sign_is_recognised() {
         let tau = 0.12 * qdd + 2.9 * q.cos() + 0.3 * qd + 0.4 * qd.signum();
         row[2] = format!("{:.6}", -tau);
     });
-    names(&sentence(&path), &["sign", "tau1", "gear_ratio"]);
+    names(&sentence(&path), &["wrong sign", "reverse tau1"]);
 }
 
 #[test]

@@ -77,7 +77,7 @@ impl Judge<'_> {
             "sign",
             j,
             format!(
-                "tau{n} and q{n} are counted in opposite senses: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
+                "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
                 -loss.value, inertia.value
             ),
         )))
