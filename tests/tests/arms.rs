@@ -154,12 +154,9 @@ fn lwr_stood_on_a_base_that_is_not_level() {
         let tilt = found.base_tilt.unwrap();
         println!("LWR4+ run {run}: {tilt:?}");
         let [x, y, _] = tilt.gravity;
-        // Two components, each with such a standard deviation.
+        // What else the model lacks moves each of them by more than its own standard deviation.
         let off = (x - 0.064).hypot(y + 0.203) / 9.81;
-        assert!(
-            off < 3.0 * tilt.std * 2f64.sqrt() && tilt.std < 0.1 * tilt.angle,
-            "{off}"
-        );
+        assert!(off < 5.0 * tilt.std && tilt.std < 0.1 * tilt.angle, "{off}");
     }
 }
 

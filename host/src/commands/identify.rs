@@ -221,7 +221,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     let (found, held) = (training.faults(&robot)?, holdout.faults(&robot)?);
     for sentence in found.doubtful.iter().chain(&held.doubtful) {
-        ui.remark(&format!("{sentence} Or the description is that far off."));
+        ui.remark(&format!(
+            "{sentence} Or the description is that far off, or the motion too short to tell."
+        ));
     }
     let mut wrong = [found.wrong, held.wrong].concat();
     let strange = training.strange_references(&robot)?;
