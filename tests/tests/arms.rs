@@ -156,7 +156,8 @@ fn lwr_stood_on_a_base_that_is_not_level() {
         let [x, y, _] = tilt.gravity;
         // What else the model lacks moves each of them by more than its own standard deviation.
         let off = (x - 0.064).hypot(y + 0.203) / 9.81;
-        assert!(off < 5.0 * tilt.std && tilt.std < 0.1 * tilt.angle, "{off}");
+        assert!(off < 5.0 * tilt.std, "{off}");
+        assert!(tilt.angle > 5.0 * tilt.std, "{tilt:?}");
     }
 }
 
