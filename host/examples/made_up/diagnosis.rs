@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::outcome::{
-    Absorbed, Curves, DataFault, Detectable, Diagnosis, Map, NextExperiment, NotTestable, Place,
-    Remainder, Step, Tried, Value, Verdict, Waterfall,
+    About, Absorbed, Curves, DataFault, Detectable, Diagnosis, Map, NextExperiment, NotTestable,
+    Place, Remainder, Step, Tried, Value, Verdict, Waterfall,
 };
 
 /// Nothing in it yet but a name and a verdict.
@@ -178,6 +178,7 @@ fn steps() -> Vec<Step> {
             p_value: 1e-30,
             runner_up: Some("presliding".into()),
             runner_up_gap_closed: Some(0.12),
+            rms_unit: "N*m".into(),
             train_rms: [0.214, 0.096],
             holdout_rms: Some([0.224, 0.099]),
             motion_rms: Some([4.1e-3, 9.7e-4]),
@@ -196,6 +197,7 @@ fn steps() -> Vec<Step> {
             p_value: 4e-9,
             runner_up: Some("gear_eccentricity".into()),
             runner_up_gap_closed: Some(0.31),
+            rms_unit: "N*m".into(),
             train_rms: [0.096, 0.055],
             holdout_rms: Some([0.099, 0.056]),
             motion_rms: Some([9.7e-4, 6.1e-4]),
@@ -349,6 +351,7 @@ pub(super) fn data_fault() -> Diagnosis {
     Diagnosis {
         data_faults: vec![DataFault {
             kind: "sign".into(),
+            about: About::Torque,
             recording: "train.csv".into(),
             joint: "link".into(),
             text: "Over the whole recording the motor takes energy from the link that nothing puts in; the sign of i1 or of q1 is turned round.".into(),

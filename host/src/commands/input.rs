@@ -8,6 +8,7 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
 use crate::data::{Block, Implausible, Source, plausibility, strange_references};
+use crate::diagnose::outcome::About;
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
 use crate::robot::{Description, Robot};
@@ -127,11 +128,7 @@ impl Inputs {
         for source in &self.sources {
             for fault in faults_at_start(robot, source, UNIT_CHECK_ROWS)? {
                 // How large a torque should be is known from the description alone, whose masses may be stand-ins.
-                // A torque that seems late can be one joint's short motion: the last second of the Stäubli TX40's fifth joint is
-                // explained by a shift as well as by anything.
-                let unsure = fault.text.starts_with("tau")
-                    && matches!(fault.kind.as_str(), "unit" | "ratio" | "clock");
-                let list = if unsure {
+                let list = if fault.about == About::TorqueScale {
                     &mut faults.doubtful
                 } else {
                     &mut faults.wrong
@@ -239,12 +236,16 @@ pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recordin
         .collect()
 }
 
+/// The same of two names of one file; a file that is not there is told of by whoever reads it.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
+}
+
 /// A recording that was learnt from says nothing as a judge.
 ///
 /// # Errors
 /// A sentence naming a recording that is given as both.
 pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(), CommandError> {
-    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     match holdout
         .iter()
         .find(|held| data.iter().any(|path| real(path) == real(held)))
@@ -259,7 +260,6 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
 
 /// A recording that is learnt from twice makes every interval too narrow.
 pub(crate) fn refuse_twice(data: &[PathBuf]) -> Result<(), CommandError> {
-    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     for (k, path) in data.iter().enumerate() {
         if data[..k].iter().any(|before| real(before) == real(path)) {
             return Err(CommandError::Sentence(format!(

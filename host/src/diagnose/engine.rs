@@ -14,6 +14,7 @@ use super::profile::Profile;
 use super::refit::{Joint, Refit};
 use super::sanity::faults;
 use super::search::{Search, with};
+use super::winding::{contradict, name_something, settled, tell, windings};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::robot::{Robot, title_of};
@@ -87,13 +88,16 @@ pub fn diagnose(
         .collect();
     let judge = Judge {
         robot,
+        search: &search,
         rows: &loaded.rows,
         coordinates: &coordinates,
         pairs: floor::repeats(&loaded.runs),
         base: &refit.base,
         seed: options.seed,
     };
-    let mut judged = judge.judged(found);
+    let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options.seed)?;
+    let mut judged = judge.judged(found)?;
+    let said = settled(&windings, &search, &refit.base, &mut judged.chosen)?;
     let descent = Descent::of(&bench, &refit, &judged.chosen, sealed.as_ref())?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
         judged.left = left_of_held(robot, &held.last(), &judged.floors);
@@ -103,12 +107,19 @@ pub fn diagnose(
     let after = &joint.solution;
     progress(0.95);
     let mut steps = steps(&search, &refit, &judged, &joint, &descent)?;
+    for (step, word) in steps.iter_mut().zip(said) {
+        word.applied(step);
+    }
     let change = change(&bench, &refit, &refit.explained(chosen, after), after);
     steps.extend((change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors)));
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
-        verdict: verdict(&judged, change.is_some()),
+        verdict: verdict(
+            &judged,
+            name_something(&windings),
+            change.is_some() || contradict(&windings),
+        ),
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
@@ -149,7 +160,9 @@ pub fn diagnose(
             ],
         },
     };
-    let model = finish(&found, &mut diagnosis)?;
+    let mut model = finish(&found, &mut diagnosis)?;
+    tell(windings, &mut diagnosis, &mut model);
+    diagnosis.words.extend(silent);
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok((diagnosis, model))
@@ -256,6 +269,7 @@ fn steps(
             p_value: profile.evidence.corrected(trials),
             runner_up: None,
             runner_up_gap_closed: None,
+            rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
             train_rms: train,
             holdout_rms: unseen,
             motion_rms: None,
@@ -285,6 +299,7 @@ fn change_step(robot: &Robot, change: &Change, descent: &Descent, floors: &[f64]
         p_value: change.p_value,
         runner_up: None,
         runner_up_gap_closed: None,
+        rms_unit: robot.joints[j].kind.units().1.to_owned(),
         train_rms: train,
         holdout_rms: unseen,
         motion_rms: None,
@@ -293,10 +308,11 @@ fn change_step(robot: &Robot, change: &Change, descent: &Descent, floors: &[f64]
     })
 }
 
-fn verdict(judged: &Judged, changed: bool) -> Verdict {
+/// `by_voltage`: whether the voltage has named something.
+fn verdict(judged: &Judged, by_voltage: bool, changed: bool) -> Verdict {
     if judged.left.is_some() {
         Verdict::Remainder
-    } else if !judged.chosen.is_empty() {
+    } else if !judged.chosen.is_empty() || by_voltage {
         Verdict::Explained
     } else if changed {
         Verdict::ParameterChange

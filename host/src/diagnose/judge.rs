@@ -2,6 +2,7 @@
 
 use rig_shared::effects::Kind;
 
+use super::DiagnoseError;
 use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, locate};
@@ -9,12 +10,14 @@ use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Rows;
 use super::runs::Run;
-use super::search::with;
+use super::search::{Search, with};
 use super::testable;
 use crate::robot::Robot;
 
 /// Share of its gap that a step must close to stand beside a remainder.
 const HALF: f64 = 0.5;
+/// … and at least, where nothing else would close half as much in its place.
+const QUARTER: f64 = 0.25;
 /// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings: the filters'
 /// treatment of a true structure leaves up to a tenth more.
 const BEYOND_FLOOR: f64 = 1.25;
@@ -31,6 +34,8 @@ const NO_DIFFERENCE: f64 = 2.5;
 pub(super) struct Judge<'a, 'r> {
     /// As it was given.
     pub(super) robot: &'a Robot,
+    /// The library on the training data.
+    pub(super) search: &'a Search<'r>,
     /// The training data.
     pub(super) rows: &'a Rows,
     /// Their coordinates, joint by joint.
@@ -55,23 +60,48 @@ pub(super) struct Judged {
 
 impl Judge<'_, '_> {
     /// Which of the effects found stand, and what they leave.
-    pub(super) fn judged(&self, found: Vec<Profile>) -> Judged {
-        let judged = self.as_found(found);
-        if judged.left.is_none() {
-            return judged;
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn judged(&self, found: Vec<Profile>) -> Result<Judged, DiagnoseError> {
+        let mut judged = self.as_found(found);
+        // Beside something unknown, a name that closes less of the gap than it leaves is a guess at it, unless nothing else
+        // comes near.
+        while judged.left.is_some() {
+            let Judged { chosen, floors, .. } = &judged;
+            let closes = |k: usize| {
+                let j = chosen[k].candidate.joint;
+                let rms = |but| with(self.base, chosen, but).rms(j);
+                closed([rms(Some(k)), rms(None)], floors[j])
+            };
+            let mut doubtful: Vec<(usize, f64)> = (0..chosen.len())
+                .map(|k| (k, closes(k)))
+                .filter(|(_, share)| *share < HALF)
+                .collect();
+            doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let mut guess = None;
+            for (k, share) in doubtful {
+                if share < QUARTER || !self.stands_out(chosen, k)? {
+                    guess = Some(k);
+                    break;
+                }
+            }
+            let Some(guess) = guess else { break };
+            let mut stand = judged.chosen;
+            stand.remove(guess);
+            judged = self.as_found(stand);
         }
-        // Beside something unknown, a name that closes less than half of what was there is a guess at it.
-        let Judged { chosen, floors, .. } = judged;
-        let closes = |k: usize| {
-            let j = chosen[k].candidate.joint;
-            let at = |count: usize| with(self.base, &chosen[..count], None).rms(j);
-            closed([at(k), at(k + 1)], floors[j]) >= HALF
-        };
-        let stand: Vec<Profile> = (chosen.iter().enumerate())
-            .filter(|(k, _)| closes(*k))
-            .map(|(_, profile)| profile.clone())
-            .collect();
-        self.as_found(stand)
+        Ok(judged)
+    }
+
+    /// Whether nothing else in its place takes away half as much.
+    fn stands_out(&self, chosen: &[Profile], k: usize) -> Result<bool, DiagnoseError> {
+        let own = &chosen[k];
+        let name = own.candidate.kind.about().name;
+        let rivals = self.search.alternatives(self.base, chosen, k)?;
+        Ok((rivals.iter())
+            .filter(|r| r.candidate.kind.about().name != name)
+            .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
 
     fn as_found(&self, chosen: Vec<Profile>) -> Judged {

@@ -153,7 +153,7 @@ pub(super) fn detectable(
 }
 
 /// Gain of a projected column from which on it is taken. `count` columns are judged together.
-fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f64> {
+pub(super) fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -> Option<f64> {
     let left = fit.left();
     let length = dot_self(column);
     // The RMS that is to fall by the least gain is that with the effect in it.

@@ -36,6 +36,7 @@ mod solve;
 pub mod testable;
 mod transmission;
 pub mod voltage;
+mod winding;
 
 pub use engine::diagnose;
 pub use outcome::Diagnosis;

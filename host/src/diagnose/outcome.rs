@@ -70,7 +70,9 @@ pub struct Step {
     pub runner_up: Option<String>,
     /// Share of this step's gap that the runner-up would have closed.
     pub runner_up_gap_closed: Option<f64>,
-    /// RMS of the torque residual of the joint, before and after this step, N·m or N.
+    /// Unit of the residual that this step takes away, ASCII: N*m or N of the torque; V of the motor's voltage.
+    pub rms_unit: String,
+    /// RMS of the joint's residual, before and after this step.
     pub train_rms: [f64; 2],
     /// The same on the hold-out; null without one.
     pub holdout_rms: Option<[f64; 2]>,
@@ -163,14 +165,30 @@ pub struct Remainder {
 /// Something about a recording that no physics explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
-    /// `sign`, `unit`, `ratio`, `clock`, `saturation`, `too-short`, `not-moving`.
+    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `saturation`, `too-short`, `not-moving`.
     pub kind: String,
+    /// Which columns.
+    #[serde(skip)]
+    pub about: About,
     /// Which recording.
     pub recording: String,
     /// Name of the joint.
     pub joint: String,
     /// What is wrong and what would be right, a sentence.
     pub text: String,
+}
+
+/// What of a recording a fault is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum About {
+    /// Time, or the recording as a whole.
+    Recording,
+    /// A joint's position or velocity.
+    Motion,
+    /// A joint's torque.
+    Torque,
+    /// How large a torque is, of which only the description tells.
+    TorqueScale,
 }
 
 /// RMS of the torque residual from model to model down to the floor, one joint.

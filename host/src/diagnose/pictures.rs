@@ -29,7 +29,7 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
         let coordinate = telling(profile, &found.coordinates[j], &joints[j]);
         list.extend(coordinate.map(|c| Map {
             step: Some(k),
-            ..map(rows, &c, [&before, &after], j, &joints[j])
+            ..map(rows, &c, [&before, &after], j).of(&joints[j])
         }));
     }
     let last = with(found.base, found.chosen, None);
@@ -50,10 +50,21 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
         list.extend(coordinate.map(|c| Map {
             // Without a step its law would be the sum of all.
             law: Vec::new(),
-            ..map(rows, c, [found.base, &last], j, joint)
+            ..map(rows, c, [found.base, &last], j).of(joint)
         }));
     }
     list
+}
+
+impl Map {
+    /// Of the torque of a joint.
+    fn of(self, joint: &Joint) -> Self {
+        Self {
+            joint: joint.name.clone(),
+            residual_unit: joint.kind.units().1.to_owned(),
+            ..self
+        }
+    }
 }
 
 /// The coordinate over which an effect shows.
@@ -100,19 +111,17 @@ fn telling(profile: &Profile, all: &[Coordinate], joint: &Joint) -> Option<Coord
     all.iter().find(|c| c.name == name).cloned()
 }
 
-/// Mean residuals of a joint over a coordinate; what lies between them is the law as far as the rest of the model does not
+/// Mean residuals of a joint over a coordinate, name and unit left empty; what lies between them is the law as far as the rest of the model does not
 /// take it up.
-fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize, own: &Joint) -> Map {
+pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize) -> Map {
     let (place, edges) = bins(&over.values, &rows.keep[joint], BINS);
     let [before, after] = fits.map(|fit| {
         let residual = fit.residual(joint);
         means(&place, &residual, fit.block_of_rows())
     });
     let mut map = Map {
-        joint: own.name.clone(),
         coordinate: over.name.to_owned(),
         unit: over.unit.to_owned(),
-        residual_unit: own.kind.units().1.to_owned(),
         ..Map::default()
     };
     for b in 0..BINS {

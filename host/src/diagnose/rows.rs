@@ -76,6 +76,11 @@ impl Thinning {
         out.extend(self.kept(signal.len()).map(|k| smooth[k]));
     }
 
+    /// A signal behind the low-pass, at its own rate.
+    pub(super) fn smooth(&self, signal: &[f64]) -> Vec<f64> {
+        self.low_pass.zero_phase(signal)
+    }
+
     /// What is kept of signals of one length.
     pub(super) fn thinned(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut thin = Vec::with_capacity(signals.len());

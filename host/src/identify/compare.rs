@@ -174,13 +174,13 @@ fn distance(
     }
 }
 
-/// Fits with every estimator of `list` and judges. `measured` are the RMS torques of training data and hold-out, joint by
+/// Fits with every estimator of `list` and judges, by `held` of the hold-out where there is one. `measured` are the RMS torques of training data and hold-out, joint by
 /// joint, where the rows do not hold all of the torque.
 pub(super) fn compare(
     problem: &Problem,
     parts: &Parts,
     prior: &Prior,
-    holdout: &[&dyn Recording],
+    held: Option<&[TriangularFactor]>,
     list: &[Estimator],
     names: &[String],
     measured: Option<&[Vec<f64>; 2]>,
@@ -188,7 +188,6 @@ pub(super) fn compare(
     let weighted = least(problem, parts, problem.weights)?;
     let weighted_covariance = weighted.kept.covariance();
     let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;
-    let held = judge(problem, holdout)?;
     let torque = measured.map_or_else(|| parts.torque_rms(), |[training, _]| training.clone());
     let mut rows = Vec::new();
     let mut instrumental: Option<Fitted> = None;
@@ -220,7 +219,7 @@ pub(super) fn compare(
                             .map(|(e, t)| e / t.max(f64::MIN_POSITIVE))
                             .collect(),
                     ),
-                    holdout_relative_error: held.as_ref().map(|factors| {
+                    holdout_relative_error: held.map(|factors| {
                         let whole = measured.map(|[_, holdout]| holdout.as_slice());
                         relative_errors(factors, &fitted.full.whole, whole)
                     }),

@@ -100,6 +100,15 @@ impl Coordinates {
     fn misfit(&self, c: &DVector<f64>) -> DVector<f64> {
         self.singular.component_mul(c) - &self.target
     }
+
+    /// Of the data and of pulls whose Hessian times `lift` is `strength` times `bent`.
+    fn hessian(&self, bent: &DMatrix<f64>, strength: f64) -> DMatrix<f64> {
+        let mut sum = self.lift.tr_mul(bent) * strength;
+        for (k, singular) in self.singular.iter().enumerate() {
+            sum[(k, k)] += singular.powi(2);
+        }
+        sum
+    }
 }
 
 /// The pulls' value at π, `None` outside the cone.
@@ -214,7 +223,6 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         },
         prior,
     );
-    let m = prior.centre.len();
     let mut pi = DVector::from_column_slice(&prior.centre);
     let mut c = space.lower(&prior.centre, &prior.scale);
     let value = |c: &DVector<f64>, pi: &DVector<f64>, strength: f64| {
@@ -237,11 +245,8 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         let (slope, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
         let gradient = space.singular.component_mul(&space.misfit(&c))
             + space.lift.transpose() * slope * strength;
-        let mut hessian = space.lift.transpose() * bent * strength;
-        for k in 0..m {
-            hessian[(k, k)] += space.singular[k].powi(2);
-        }
-        let (cholesky, scale) = scaled_cholesky(hessian).ok_or_else(not_settled)?;
+        let (cholesky, scale) =
+            scaled_cholesky(space.hessian(&bent, strength)).ok_or_else(not_settled)?;
         let step = -cholesky
             .solve(&gradient.component_mul(&scale))
             .component_mul(&scale);
@@ -272,12 +277,9 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
             standing = 0;
             if last {
                 let bent = believed(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
-                let mut hessian = space.lift.transpose() * bent * prior.strength;
-                for k in 0..m {
-                    hessian[(k, k)] += space.singular[k].powi(2);
-                }
                 // L·Lᵀ = S·H·S: H⁻¹ = S·L⁻ᵀ·L⁻¹·S.
-                let (cholesky, scale) = scaled_cholesky(hessian).ok_or_else(not_settled)?;
+                let (cholesky, scale) = scaled_cholesky(space.hessian(&bent, prior.strength))
+                    .ok_or_else(not_settled)?;
                 let mut whiten = DMatrix::from_diagonal(&scale);
                 if !cholesky.l_dirty().solve_lower_triangular_mut(&mut whiten) {
                     return Err(not_settled());

@@ -153,6 +153,15 @@ impl Belief {
         })
     }
 
+    /// Base columns over values of unit deviation.
+    fn spread(&self, deviation: &DVector<f64>) -> DMatrix<f64> {
+        let mut spread = self.combination.clone();
+        for (c, mut column) in spread.column_iter_mut().enumerate() {
+            column *= deviation[c];
+        }
+        spread
+    }
+
     /// Logarithm of the evidence but for a constant, mean and variances. A·Aᵀ + 1 is formed: with its diagonal scaled to
     /// one that costs the square of what base parameters are told apart by, not of their sizes.
     pub(super) fn judged(
@@ -161,11 +170,7 @@ impl Belief {
         deviation: &DVector<f64>,
     ) -> Result<Judged, IdentifyError> {
         let Seen { r, z, left } = data;
-        let mut spread = self.combination.clone();
-        for (c, mut column) in spread.column_iter_mut().enumerate() {
-            column *= deviation[c];
-        }
-        let mut seen = r * spread;
+        let mut seen = r * self.spread(deviation);
         let mut sum = &seen * seen.transpose();
         for k in 0..sum.nrows() {
             sum[(k, k)] += 1.0;
@@ -202,10 +207,7 @@ impl Belief {
         deviation: &DVector<f64>,
     ) -> Result<Posterior, IdentifyError> {
         let Seen { r, z, .. } = data;
-        let mut spread = self.combination.clone();
-        for (c, mut column) in spread.column_iter_mut().enumerate() {
-            column *= deviation[c];
-        }
+        let spread = self.spread(deviation);
         let seen = r * &spread;
         // In the basis of its singular vectors the data's covariance is diagonal: nothing is squared.
         let svd = seen.svd(true, true);

@@ -157,6 +157,12 @@ pub(super) fn further(
     let estimator = problem.options.estimator;
     let wanted = problem.robot.joints.len() > 1
         || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
+    let compared = !problem.options.compare.is_empty();
+    let held = if wanted || compared {
+        judge(problem, holdout)?
+    } else {
+        None
+    };
     let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
     let (std, _) = classical(&tempered, data, problem.start)?;
     further.free = (problem.start.iter().zip(&std))
@@ -183,7 +189,6 @@ pub(super) fn further(
                     ModelKind::Differential => None,
                     ModelKind::Integral => judge(problem, problem.training)?,
                 };
-                let held = judge(problem, holdout)?;
                 further.standard = Some(standard_set(
                     problem,
                     &prior,
@@ -201,7 +206,7 @@ pub(super) fn further(
             )),
         }
     }
-    if !problem.options.compare.is_empty() {
+    if compared {
         let collected;
         let parts = match &own {
             Some(own) => &own.parts,
@@ -215,7 +220,7 @@ pub(super) fn further(
             problem,
             parts,
             &prior,
-            holdout,
+            held.as_deref(),
             &problem.options.compare,
             &names,
             result.measured.as_ref(),

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::check::{Fault, Step};
-use super::written::{float, line};
+use super::written::{float, line, list};
 use crate::prepare::Treatment;
 
 /// Longest lead, s: a torque that acts so much later is of another motion.
@@ -101,11 +101,10 @@ impl IdentifiedBand {
             &float(self.rate),
             "rows per second after the low-pass over torque and regressor",
         );
-        let speeds: Vec<String> = self.min_speed.iter().map(|v| float(*v)).collect();
         line(
             out,
             "min_speed",
-            &format!("[{}]", speeds.join(", ")),
+            &list(&self.min_speed),
             "rad/s or m/s by joint; slower rows were left out",
         );
         if self.torque_lead != 0.0 {

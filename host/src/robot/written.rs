@@ -12,7 +12,7 @@ pub(super) fn float(value: f64) -> String {
     format!("{value:?}")
 }
 
-fn list(values: &[f64]) -> String {
+pub(super) fn list(values: &[f64]) -> String {
     let items: Vec<String> = values.iter().map(|v| float(*v)).collect();
     format!("[{}]", items.join(", "))
 }

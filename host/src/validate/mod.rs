@@ -352,15 +352,12 @@ fn treatment(
     };
     let mut prepare = options.prepare.clone();
     let stated = "as the description was identified.";
-    let [mut own_cutoff, mut own_decimation] = [false; 2];
-    if prepare.cutoff == Choice::Auto && band.cutoff < 0.5 * first.sample_rate {
+    if prepare.cutoff == Choice::Auto {
         prepare.cutoff = Choice::Fixed(band.cutoff);
-        own_cutoff = true;
     }
     if prepare.decimation == Choice::Auto {
         let rows = (first.sample_rate / band.rate).round().max(1.0);
         prepare.decimation = Choice::Fixed(rows as usize);
-        own_decimation = true;
     }
     if prepare.torque_lead == 0.0 {
         prepare.torque_lead = band.torque_lead;
@@ -373,10 +370,10 @@ fn treatment(
         let own = Treatment::decide(surveys, &options.prepare, limits)?;
         return Ok((own, Some(note)));
     };
-    if own_cutoff {
+    if options.prepare.cutoff == Choice::Auto {
         treatment.cutoff_reason = format!("{} Hz, {stated}", band.cutoff);
     }
-    if own_decimation {
+    if options.prepare.decimation == Choice::Auto {
         treatment.decimation_reason = format!("One row in {}, {stated}", treatment.decimation);
     }
     if prepare.speed_threshold == Choice::Auto {

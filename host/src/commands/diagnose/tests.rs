@@ -23,6 +23,7 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
         p_value: 1e-9,
         runner_up: None,
         runner_up_gap_closed: None,
+        rms_unit: "N*m".into(),
         train_rms: [0.2, 0.1],
         holdout_rms: None,
         motion_rms: None,

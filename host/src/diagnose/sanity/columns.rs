@@ -1,7 +1,7 @@
 //! What the columns say about themselves and each other, without a model.
 
 use super::super::Run;
-use super::super::outcome::DataFault;
+use super::super::outcome::{About, DataFault};
 use super::names;
 use crate::data::{Block, Implausible, JointColumns, plausibility, velocity_scale};
 use crate::robot::{JointKind, Robot};
@@ -20,9 +20,16 @@ pub(super) fn label(runs: &[&Run]) -> String {
 }
 
 /// A fault of the recording.
-pub(super) fn fault(runs: &[&Run], kind: &str, joint: &str, text: String) -> DataFault {
+pub(super) fn fault(
+    runs: &[&Run],
+    kind: &str,
+    about: About,
+    joint: &str,
+    text: String,
+) -> DataFault {
     DataFault {
         kind: kind.to_owned(),
+        about,
         recording: label(runs),
         joint: joint.to_owned(),
         text,
@@ -62,6 +69,7 @@ pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
         fault(
             runs,
             "too-short",
+            About::Recording,
             "",
             format!(
                 "The recording holds {rows} rows, {time:.2} s; at least {FEWEST} rows and {SHORTEST} s are needed, half a minute with reversals would be right."
@@ -83,7 +91,7 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     };
     plausibility(&block, robot).first().map(|found| {
         let Implausible::Milliseconds { step } = found else {
-            return fault(runs, "clock", "", found.to_string());
+            return fault(runs, "clock", About::Recording, "", found.to_string());
         };
         // A recording in milliseconds has fewer than 200 of them between rows, one in microseconds no fewer.
         let unit = if *step >= 200.0 {
@@ -94,6 +102,7 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
         fault(
             runs,
             "clock",
+            About::Recording,
             "",
             format!("t looks like {unit}: its steps are {step:.4}, where seconds would be right."),
         )
@@ -118,13 +127,13 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
             ..Block::default()
         };
         for problem in plausibility(&block, robot) {
-            let joint = match &problem {
+            let (joint, about) = match &problem {
                 Implausible::Degrees { joint, .. }
                 | Implausible::Position { joint, .. }
                 | Implausible::Velocity { joint, .. }
-                | Implausible::VelocityScale { joint, .. }
-                | Implausible::EffortTooLarge { joint, .. }
-                | Implausible::EffortTooSmall { joint, .. } => *joint,
+                | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
+                Implausible::EffortTooLarge { joint, .. }
+                | Implausible::EffortTooSmall { joint, .. } => (*joint, About::TorqueScale),
                 Implausible::Milliseconds { .. } | Implausible::ReferenceScale { .. } => continue,
             };
             let joint = joint.saturating_sub(1);
@@ -138,7 +147,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                     "{text} Divided by the gear ratio {ratio} it would fit as well: it may be the motor's angle."
                 );
             }
-            found.push((joint, fault(runs, "unit", name, text)));
+            found.push((joint, fault(runs, "unit", about, name, text)));
         }
     }
     found
@@ -174,6 +183,7 @@ pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
         return Some(fault(
             runs,
             "sign",
+            About::Motion,
             &joint.name,
             format!(
                 "qd{n} has the opposite sign of the change of q{n} over time; reverse one of them."
@@ -196,6 +206,7 @@ pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     Some(fault(
         runs,
         kind,
+        About::Motion,
         &joint.name,
         format!(
             "qd{n} is {:.4} times the change of q{n} over time; {what}.",
@@ -224,6 +235,7 @@ pub(super) fn at_limit(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
         fault(
             runs,
             "saturation",
+            About::Torque,
             &joint.name,
             format!(
                 "tau{} stands at its limit of {limit} for {:.0} % of the time in motion; record a motion that needs less.",

@@ -21,7 +21,7 @@ mod swaps;
 #[cfg(test)]
 mod tests;
 
-use super::outcome::DataFault;
+use super::outcome::{About, DataFault};
 use super::runs::runs_of_blocks;
 use super::{DiagnoseError, Run};
 use crate::data::Source;
@@ -59,6 +59,7 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
                 found.push(columns::fault(
                     &own,
                     "not-moving",
+                    About::Recording,
                     "",
                     "No joint moves by more than the noise of its encoder; record a motion, or check that the position column is alive.".to_owned(),
                 ));
@@ -124,7 +125,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         // What a wrong unit of one joint does to the others is its consequence, as is what a wrong position makes of the
         // torque.
         let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
-        let of_torque = |f: &DataFault| f.text.starts_with("tau");
+        let of_torque = |f: &DataFault| matches!(f.about, About::Torque | About::TorqueScale);
         judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
     }
     // The model says more closely what the limits only notice.

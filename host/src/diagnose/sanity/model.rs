@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::super::outcome::DataFault;
+use super::super::outcome::{About, DataFault};
 use super::super::{DiagnoseError, Run};
 use super::columns::fault;
 use super::fit::{Fit, Measured};
@@ -23,6 +23,11 @@ pub(super) const GOOD: f64 = 0.2;
 const SHIFT: f64 = 0.1;
 /// Farthest shift that is tried, s; no more than a quarter of the recording.
 const FARTHEST: f64 = 5.0;
+/// Times its length that a joint must move for to show a shift: a single short motion is explained by one as well as by
+/// anything (the last second of the Stäubli TX40's fifth joint).
+const SHOWN_BY: f64 = 5.0;
+/// Share of a joint's highest speed above which it moves.
+const IN_MOTION: f64 = 0.05;
 /// Rows of one trial of several joints.
 pub(super) const TRIAL: usize = 500;
 
@@ -103,8 +108,8 @@ impl<'a> Judge<'a> {
         &self.robot.joints[joint].name
     }
 
-    pub(super) fn say(&self, kind: &str, joint: usize, text: String) -> DataFault {
-        fault(self.runs, kind, self.name(joint), text)
+    pub(super) fn say(&self, kind: &str, about: About, joint: usize, text: String) -> DataFault {
+        fault(self.runs, kind, about, self.name(joint), text)
     }
 
     /// A torque that was cut where the motion needs more: a fit to the rest goes on beyond the cut.
@@ -133,6 +138,7 @@ impl<'a> Judge<'a> {
             || {
                 self.say(
                     "saturation",
+                    About::Torque,
                     j,
                     format!(
                         "tau{} is cut at {level:.4} for {:.0} % of the time, where the motion needs {excess:.4} more on average; record without the limit, or a motion that needs less.",
@@ -162,10 +168,15 @@ impl<'a> Judge<'a> {
             .filter(|k| left[*k] <= 1.3 * least)
             .min_by_key(|k| k.abs_diff(reach))?;
         let shift = (at as f64 - reach as f64) * self.rows.period;
-        (shift.abs() > SHIFT).then(|| {
+        let speed = &self.rows.qd[j];
+        let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
+        let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
+        (shift.abs() > SHIFT && shown).then(|| {
             let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
             self.say(
                 "clock",
+                About::Torque,
                 j,
                 format!(
                     "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.0} % of its variance, as recorded {:.0} %; give both by one clock.",
@@ -295,6 +306,7 @@ impl<'a> Judge<'a> {
         };
         self.say(
             kind,
+            About::Motion,
             j,
             format!(
                 "q{} fits its torque {factor:.4} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::super::DiagnoseError;
-use super::super::outcome::DataFault;
+use super::super::outcome::{About, DataFault};
 use super::fit::{Fit, Measured, about_mean};
 use super::model::{Judge, model_error};
 use super::names;
@@ -75,6 +75,7 @@ impl Judge<'_> {
         };
         Ok(Some(self.say(
             "sign",
+            About::Torque,
             j,
             format!(
                 "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
@@ -158,6 +159,7 @@ impl Judge<'_> {
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
                 self.say(
                     kind,
+                    About::TorqueScale,
                     j,
                     format!("tau{n} is {factor:.4} times what the description's {of} needs, {what}."),
                 )
@@ -171,6 +173,7 @@ impl Judge<'_> {
                 let clock = (i / g).abs().sqrt();
                 Some(self.say(
                     "clock",
+                    About::Recording,
                     j,
                     format!(
                         "Gravity fits the description, but the inertia seen in the motion is {:.4} times what it states: t looks like {}, {clock:.4} of them a second.",
@@ -196,6 +199,7 @@ impl Judge<'_> {
                 };
                 Some(self.say(
                     "sign",
+                    About::Motion,
                     j,
                     format!(
                         "Gravity acts on joint {n} {g:.2} times as the description says; {which}."

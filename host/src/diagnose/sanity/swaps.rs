@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use rig_shared::multibody::column;
 
 use super::super::DiagnoseError;
-use super::super::outcome::DataFault;
+use super::super::outcome::{About, DataFault};
 use super::fit::{Fit, about_mean};
 use super::model::{GOOD, Judge, POOR, TRIAL, model_error};
 use super::rows::Rows;
@@ -102,7 +102,7 @@ impl Judge<'_> {
         let model = format!(
             "the model leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %"
         );
-        let swapped = |column: &str, other: &str, [i, j]: [usize; 2]| {
+        let swapped = |about: About, column: &str, other: &str, [i, j]: [usize; 2]| {
             let (a, b) = (i + 1, j + 1);
             let or = match found.twin {
                 true => format!(" (or {other}{a} and {other}{b})"),
@@ -110,11 +110,12 @@ impl Judge<'_> {
             };
             self.say(
                 "swap",
+                about,
                 i,
                 format!("{column}{a} and {column}{b}{or} stand in each other's columns: swapped, {model}; give each its own."),
             )
         };
-        let turned = |column: &str, other: &str, j: usize| {
+        let turned = |about: About, column: &str, other: &str, j: usize| {
             let n = j + 1;
             let or = match found.twin {
                 true => format!(" (or {other}{n})"),
@@ -122,6 +123,7 @@ impl Judge<'_> {
             };
             self.say(
                 "sign",
+                about,
                 j,
                 format!(
                     "{column}{n}{or} is counted the other way round: reversed, {model}; reverse it."
@@ -129,10 +131,10 @@ impl Judge<'_> {
             )
         };
         match found.mixed {
-            Mixed::Torques(pair) => swapped("tau", "q", pair),
-            Mixed::Positions(pair) => swapped("q", "tau", pair),
-            Mixed::Torque(j) => turned("tau", "q", j),
-            Mixed::Position(j) => turned("q", "tau", j),
+            Mixed::Torques(pair) => swapped(About::Torque, "tau", "q", pair),
+            Mixed::Positions(pair) => swapped(About::Motion, "q", "tau", pair),
+            Mixed::Torque(j) => turned(About::Torque, "tau", "q", j),
+            Mixed::Position(j) => turned(About::Motion, "q", "tau", j),
         }
     }
 

@@ -160,6 +160,7 @@ impl Told<'_> {
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
+            rms_unit: self.robot.joints[0].kind.units().0.to_owned(),
             train_rms: pair(&self.train),
             holdout_rms: holdout,
             motion_rms: Some(judged),

@@ -98,12 +98,25 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         vec![what.to_owned(), before, after]
     };
     let effort = |rms: [f64; 2]| {
-        rms.map(|v| format!("{} {}", format_significant(v, 3), parts::unit(&torque)))
+        rms.map(|v| {
+            format!(
+                "{} {}",
+                format_significant(v, 3),
+                parts::unit(&step.rms_unit)
+            )
+        })
     };
-    let mut rows = vec![row("Torque residual, training", effort(step.train_rms))];
+    let what = match step.rms_unit.as_str() {
+        "V" => "Voltage",
+        _ => "Torque",
+    };
+    let mut rows = vec![row(
+        &format!("{what} residual, training"),
+        effort(step.train_rms),
+    )];
     rows.extend(
         step.holdout_rms
-            .map(|rms| row("Torque residual, held back", effort(rms))),
+            .map(|rms| row(&format!("{what} residual, held back"), effort(rms))),
     );
     rows.extend(step.motion_rms.map(|rms| {
         let unit = words::position_unit(&torque);

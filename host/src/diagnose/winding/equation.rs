@@ -1,0 +1,149 @@
+//! The voltage equation of one motor as rows of a regression.
+
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::bench::Loaded;
+use crate::diagnose::locate::Coordinate;
+use crate::diagnose::rows::{Column, Rows};
+use crate::prepare::central_difference;
+use crate::robot::Robot;
+
+/// Places of the nominal columns: resistance,
+pub(super) const CURRENT: usize = 0;
+/// inductance,
+pub(super) const CHANGE: usize = 1;
+/// back-EMF,
+pub(super) const SPEED: usize = 2;
+/// what sampling apart does to it,
+pub(super) const ACCELERATION: usize = 3;
+/// and the current sensor's zero.
+pub(super) const CONSTANT: usize = 4;
+const COLUMNS: usize = 5;
+/// Place of the current among the coordinates.
+pub(super) const ACROSS: usize = 0;
+
+/// Currents below which a dead zone fades, because ripple crosses zero within the pulse, A: from none to half an ampere, as
+/// switching and inductance have it.
+pub(super) const FADES: [f64; 7] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+
+/// Rows of one joint's voltage with the columns of its winding.
+pub(super) struct Equation {
+    /// The voltage stands for the torque, V.
+    pub(super) rows: Rows,
+    /// Voltage lost per volt of a dead zone, for each of [`FADES`].
+    pub(super) dead_zones: Vec<Column>,
+    /// Of the joint, by the description, N·m/A or N/A.
+    pub(super) torque_per_ampere: f64,
+    current: Vec<f64>,
+    speed: Vec<f64>,
+}
+
+impl Equation {
+    /// Of a joint; none where its voltage was not recorded throughout or its torque stands for no current.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] without runs.
+    pub(super) fn of(
+        robot: &Robot,
+        joint: usize,
+        loaded: &Loaded,
+    ) -> Result<Option<Self>, DiagnoseError> {
+        let own = robot.joints.get(joint);
+        let Some(drive) = own.and_then(|j| j.drive.as_ref()) else {
+            return Ok(None);
+        };
+        let torque_per_ampere = drive.gear_ratio * drive.torque_constant;
+        let alone =
+            (robot.joints.iter().filter_map(|j| j.drive.as_ref())).all(|d| d.couples.is_empty());
+        let recorded = !loaded.runs.is_empty()
+            && (loaded.runs.iter()).all(|run| run.joints[joint].voltage.is_some());
+        if torque_per_ampere == 0.0 || !alone || !recorded {
+            return Ok(None);
+        }
+        let thinning = &loaded.rows.thinning;
+        let mut columns = vec![Vec::new(); COLUMNS];
+        let [mut voltage, mut current, mut speed] = [const { Vec::new() }; 3];
+        let mut dead = vec![Vec::new(); FADES.len()];
+        for run in &loaded.runs {
+            let joint = &run.joints[joint];
+            let Some(u) = &joint.voltage else { continue };
+            let i: Vec<f64> = joint.tau.iter().map(|t| t / torque_per_ampere).collect();
+            let scaled = |signal: &[f64]| -> Vec<f64> {
+                signal.iter().map(|x| drive.gear_ratio * x).collect()
+            };
+            let omega = scaled(&joint.qd);
+            thinning.push(u, &mut voltage);
+            thinning.push(&i, &mut columns[CURRENT]);
+            thinning.push(
+                &central_difference(&i, 1.0 / run.rate),
+                &mut columns[CHANGE],
+            );
+            thinning.push(&omega, &mut columns[SPEED]);
+            thinning.push(&scaled(&joint.qdd), &mut columns[ACCELERATION]);
+            thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
+            // The sign of what the current is without its noise.
+            let smooth = thinning.smooth(&i);
+            for (dead, fade) in dead.iter_mut().zip(FADES) {
+                let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
+                thinning.push(&lost, dead);
+            }
+            thinning.pick(&smooth, &mut current);
+            thinning.pick(&omega, &mut speed);
+        }
+        let count = voltage.len();
+        let one = |values: Vec<f64>| -> Column { vec![Some(values)] };
+        Ok(Some(Self {
+            rows: Rows {
+                thinning: thinning.clone(),
+                count,
+                starts: loaded.rows.starts.clone(),
+                period: loaded.rows.period,
+                torque: vec![voltage],
+                keep: vec![vec![true; count]],
+                nominal: columns.into_iter().map(one).collect(),
+            },
+            dead_zones: dead.into_iter().map(one).collect(),
+            torque_per_ampere,
+            current,
+            speed,
+        }))
+    }
+
+    /// What the voltage may depend on; the current stands at [`ACROSS`].
+    pub(super) fn coordinates(&self) -> Vec<Coordinate> {
+        let of = |name, unit, values: &[f64]| Coordinate {
+            name,
+            unit,
+            values: values.to_vec(),
+        };
+        vec![
+            of("current of the motor", "A", &self.current),
+            of("speed of the motor", "rad/s", &self.speed),
+        ]
+    }
+
+    /// RMS of what coefficients leave, V: those of the nominal columns, then that of a dead zone.
+    pub(super) fn rms(&self, values: &[f64], dead_zone: Option<usize>) -> f64 {
+        let effect = dead_zone.and_then(|k| self.dead_zones.get(k));
+        let columns: Vec<&Column> = self.rows.nominal.iter().chain(effect).collect();
+        let squares: f64 = (0..self.rows.count)
+            .map(|k| {
+                let explained: f64 = (columns.iter().zip(values))
+                    .map(|(column, value)| column[0].as_ref().map_or(0.0, |c| value * c[k]))
+                    .sum();
+                (self.rows.torque[0][k] - explained).powi(2)
+            })
+            .sum();
+        (squares / self.rows.count.max(1) as f64).sqrt()
+    }
+}
+
+/// What an inverter loses at a current per volt of its dead zone.
+fn lost(current: f64, fade: f64) -> f64 {
+    if current == 0.0 {
+        0.0
+    } else if fade == 0.0 {
+        current.signum()
+    } else {
+        (current / fade).tanh()
+    }
+}

@@ -1,0 +1,99 @@
+//! A constant torque or a constant error of its sensor: the voltage tells.
+
+use rig_shared::effects::Kind;
+
+use super::Winding;
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::fit::Fit;
+use crate::diagnose::outcome::Step;
+use crate::diagnose::profile::Profile;
+use crate::diagnose::search::{Search, with};
+
+/// Effects that are one constant in the torque.
+const CONSTANTS: [Kind; 3] = [
+    Kind::AsymmetricCoulomb,
+    Kind::TorqueOffset,
+    Kind::CurrentOffset,
+];
+/// What the voltage says of the sensor counts as the torque's constant, or as nothing, within so many standard deviations …
+const WITHIN: f64 = 3.0;
+/// … and this share of the constant.
+const SHARE: f64 = 0.2;
+
+/// What the voltage says of a constant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::diagnose) enum Word {
+    /// The sensor reads it without a current.
+    Sensor,
+    /// The sensor reads nothing without a current.
+    Torque,
+    /// Neither, or both.
+    Open,
+}
+
+impl Winding {
+    fn word(&self, constant: f64, std: f64) -> Word {
+        let [offset, own] = self.offset;
+        let room = WITHIN * std.hypot(own) + SHARE * constant.abs();
+        match ((offset - constant).abs() < room, offset.abs() < room) {
+            (true, false) => Word::Sensor,
+            (false, true) => Word::Torque,
+            _ => Word::Open,
+        }
+    }
+}
+
+/// For each effect what the voltage says of it; a constant that is the sensor's gets that name.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(in crate::diagnose) fn settled(
+    windings: &[Winding],
+    search: &Search,
+    base: &Fit,
+    chosen: &mut [Profile],
+) -> Result<Vec<Word>, DiagnoseError> {
+    let mut words = vec![Word::Open; chosen.len()];
+    for k in 0..chosen.len() {
+        let candidate = chosen[k].candidate;
+        let winding = windings.iter().find(|w| w.joint == candidate.joint);
+        let Some(winding) = winding.filter(|_| CONSTANTS.contains(&candidate.kind)) else {
+            continue;
+        };
+        let (Some([gain]), Some([std]), Some(column)) = (
+            chosen[k].evidence.gains.first_chunk(),
+            chosen[k].evidence.stds.first_chunk(),
+            (chosen[k].columns.first()).and_then(|c| c[candidate.joint].as_ref()),
+        ) else {
+            continue;
+        };
+        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+        words[k] = winding.word(gain * mean, std * mean.abs());
+        let sensor =
+            |c: &&super::Candidate| c.kind == Kind::CurrentOffset && c.joint == candidate.joint;
+        if words[k] == Word::Sensor
+            && let Some(c) = search.library.iter().position(|c| sensor(&c))
+            && let Some(profile) = search.profile(&with(base, chosen, Some(k)), c, None)?
+        {
+            chosen[k] = profile;
+        }
+    }
+    Ok(words)
+}
+
+impl Word {
+    /// Takes the names that the voltage excludes out of a step.
+    pub(in crate::diagnose) fn applied(self, step: &mut Step) {
+        let sensor = Kind::CurrentOffset.about().name;
+        match self {
+            Self::Sensor => step.set.retain(|name| *name == step.effect),
+            Self::Torque => {
+                step.set.retain(|name| name != sensor);
+                if step.runner_up.as_deref() == Some(sensor) {
+                    (step.runner_up, step.runner_up_gap_closed) = (None, None);
+                }
+            }
+            Self::Open => {}
+        }
+    }
+}

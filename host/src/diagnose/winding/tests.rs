@@ -1,0 +1,131 @@
+//! The emulated rig's own winding, inverter and current sensor: volts that fade at low current, ripple, delays and noise that
+//! the equation does not have.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::diagnose::outcome::{Diagnosis, Verdict};
+use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
+use crate::diagnose::{Options, diagnose};
+use crate::robot::Robot;
+use rig_shared::effects::Kind;
+
+fn made(hidden: Option<Effect>, seed: u64) -> Made {
+    let hidden = hidden.map(|effect| Hidden { joint: 0, effect });
+    Scenario {
+        seconds: [30.0, 15.0],
+        ..Scenario::new(hidden.into_iter().collect(), seed)
+    }
+    .make()
+    .unwrap()
+}
+
+fn asked(made: &Made, robot: &Robot) -> (Diagnosis, Robot) {
+    diagnose(
+        robot,
+        &[&made.train, made.repeat.as_ref().unwrap()],
+        &[&made.holdout],
+        &Options::default(),
+        &mut |_| (),
+    )
+    .unwrap()
+}
+
+#[test]
+fn a_dead_zone_shows_in_the_voltage_alone() {
+    let made = made(Some(Effect::DriveDeadzone { voltage: 0.6 }), 5);
+    let (found, model) = asked(&made, &made.robot);
+    let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
+    assert_eq!(names, ["drive_deadzone"], "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::Explained);
+    let step = &found.steps[0];
+    let volts = &step.parameters["volts"];
+    // The rig's falls off in a straight line below 0.1 A.
+    assert!((volts.value - 0.6).abs() < 0.05 * 0.6, "{volts:?}");
+    assert!(step.gap_closed > 0.9, "{}", step.gap_closed);
+    assert_eq!(found.gap_closed, Some(step.gap_closed));
+    assert_eq!(step.rms_unit, "V");
+    let map = found.maps.iter().find(|m| m.step == Some(0)).unwrap();
+    assert_eq!((map.unit.as_str(), map.residual_unit.as_str()), ("A", "V"));
+    let effect = &model.effects[0].effect;
+    assert_eq!(
+        (effect.kind, effect.gains[0]),
+        (Kind::DriveDeadzone, volts.value)
+    );
+}
+
+#[test]
+fn without_one_the_voltage_names_nothing_and_says_what_it_would_have_shown() {
+    let made = made(None, 6);
+    let (found, _) = asked(&made, &made.robot);
+    assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
+    let size = found
+        .detectable
+        .iter()
+        .find(|d| d.effect == "drive_deadzone");
+    let size = size.unwrap();
+    assert!(
+        size.unit == "V" && size.size > 0.0 && size.size < 0.1,
+        "{size:?}"
+    );
+    assert!(found.tried.iter().any(|t| t.effect == "drive_deadzone"));
+}
+
+#[test]
+fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
+    let sensor = made(Some(Effect::CurrentOffset { current: 0.12 }), 7);
+    let (found, _) = asked(&sensor, &sensor.robot);
+    assert_eq!(found.steps.len(), 1, "{:?}", found.words);
+    assert_eq!(found.steps[0].set, ["current_offset"]);
+    let drive = sensor.robot.joints[0].drive.as_ref().unwrap();
+    let truth = 0.12 * drive.gear_ratio * drive.torque_constant;
+    let value = &found.steps[0].parameters["offset"];
+    assert!(
+        (value.value - truth).abs() < 4.0 * value.std + 0.03 * truth,
+        "{value:?}, {truth}"
+    );
+
+    let torque = made(Some(Effect::TorqueOffset { torque: 0.3 }), 8);
+    let (found, _) = asked(&torque, &torque.robot);
+    let set = &found.steps[0].set;
+    assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
+    assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
+}
+
+/// The torque column alone would scale with the constant; the back-EMF does not.
+#[test]
+fn a_wrong_torque_constant_is_contradicted_by_the_back_emf() {
+    let made = made(None, 9);
+    let mut robot = made.robot.clone();
+    let drive = robot.joints[0].drive.as_mut().unwrap();
+    drive.pole_pairs = Some(0);
+    let (right, _) = asked(&made, &robot);
+    assert_eq!(right.verdict, Verdict::NothingMissing, "{:?}", right.words);
+    let drive = robot.joints[0].drive.as_mut().unwrap();
+    drive.torque_constant *= 1.2;
+    let (wrong, _) = asked(&made, &robot);
+    assert_eq!(wrong.verdict, Verdict::ParameterChange, "{:?}", wrong.words);
+    let words = wrong.words.join(" ");
+    assert!(
+        words.contains("torque constant") && words.contains("0.83"),
+        "{words}"
+    );
+}
+
+#[test]
+fn a_column_that_is_no_motor_voltage_says_nothing() {
+    let mut made = made(None, 10);
+    for recording in [
+        &mut made.train,
+        made.repeat.as_mut().unwrap(),
+        &mut made.holdout,
+    ] {
+        for block in &mut recording.blocks {
+            let volts = block.joints[0].voltage.as_mut().unwrap();
+            volts.fill(24.0);
+        }
+    }
+    let (found, _) = asked(&made, &made.robot);
+    assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
+    let said = |w: &String| w.starts_with("Nothing is concluded from the motor voltage");
+    assert!(found.words.iter().any(said), "{:?}", found.words);
+}
