@@ -25,7 +25,7 @@ use super::floor;
 use super::judge::closed;
 use super::limits::smallest;
 use super::locate::locate;
-use super::outcome::{Detectable, Diagnosis, Map, Place, Step, Tried, Value};
+use super::outcome::{Absorbed, Detectable, Diagnosis, Map, Place, Step, Tried, Value};
 use super::pictures::map;
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Column;
@@ -62,6 +62,7 @@ struct DeadZone {
     volts: f64,
     step: Step,
     places: Vec<Place>,
+    absorbed: Vec<Absorbed>,
     map: Map,
 }
 
@@ -237,6 +238,7 @@ fn winding(
                     ..p
                 })
                 .collect(),
+            absorbed: absorbed(&own.name, &before, &after),
             map: Map {
                 joint: own.name.clone(),
                 residual_unit: "V".to_owned(),
@@ -273,6 +275,24 @@ fn value(solution: &Solution, k: usize, unit: &str) -> Value {
         std: solution.std(k),
         unit: unit.to_owned(),
     }
+}
+
+/// What a dead zone had done to resistance and back-EMF.
+fn absorbed(joint: &str, before: &Solution, after: &Solution) -> Vec<Absorbed> {
+    let moved = |(place, name, unit): (usize, &str, &str)| Absorbed {
+        parameter: format!("{name} of the motor of {joint}"),
+        unit: unit.to_owned(),
+        before: before.values[place],
+        after: after.values[place],
+        sigmas: (after.values[place] - before.values[place]).abs()
+            / after.std(place).max(f64::MIN_POSITIVE),
+    };
+    [
+        (CURRENT, "resistance", "Ohm"),
+        (SPEED, "back-EMF", "V*s/rad"),
+    ]
+    .map(moved)
+    .into()
 }
 
 /// Why to believe a dead zone, one sentence.
@@ -359,6 +379,11 @@ pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mu
                 format_significant(after, 3)
             ));
             diagnosis.places.extend(dead.places);
+            diagnosis.places.sort_by(|a, b| b.share.total_cmp(&a.share));
+            diagnosis.absorbed.extend(dead.absorbed);
+            diagnosis
+                .absorbed
+                .sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
             diagnosis.maps.push(Map {
                 step: Some(diagnosis.steps.len()),
                 ..dead.map

@@ -9,6 +9,8 @@ use crate::report::{
 
 /// Letters for which there is room below the axis on a narrow window; longer names give way to numbers.
 const ROOM: usize = 48;
+/// A smaller share is none.
+const LEAST_SHARE: f64 = 0.005;
 /// From this ratio of highest to floor on, bars from zero would hide the last steps.
 const TALL: f64 = 20.0;
 
@@ -185,10 +187,11 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
     )))
 }
 
+/// What goes with something, in words.
 pub(super) fn texts(places: &[Place]) -> Vec<String> {
     places
         .iter()
-        .filter(|place| !place.text.is_empty())
+        .filter(|place| !place.text.is_empty() && place.share >= LEAST_SHARE)
         .map(|place| place.text.clone())
         .collect()
 }

@@ -26,7 +26,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     );
     if let Some(about) = words::about(&step.effect, law) {
         section = section.with(Block::Text(format!(
-            "How it shows: {}. The torque that it asks for: {}. After {}.\n\nIn descriptions and results it is called {}{}.",
+            "How it shows: {}. Its equation: {}. After {}.\n\nIn descriptions and results it is called {}{}.",
             about.signature,
             about.equation,
             about.source,
