@@ -9,7 +9,7 @@ use super::floor;
 use super::judge::{Judge, Judged, closed, left_of_held, rank};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
-use super::outcome::{Diagnosis, Step, Tried, Verdict};
+use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
 use super::profile::Profile;
 use super::refit::{Joint, Refit};
 use super::sanity::faults;
@@ -109,6 +109,7 @@ pub fn diagnose(
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict: verdict(&judged, change.is_some()),
+        residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
