@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::outcome::{
     About, Absorbed, Curves, DataFault, Detectable, Diagnosis, Map, NextExperiment, NotTestable,
-    Place, Remainder, Step, Tried, Value, Verdict, Waterfall,
+    Place, Remainder, Residual, Step, Tried, Value, Verdict, Waterfall,
 };
 
 /// Nothing in it yet but a name and a verdict.
@@ -13,6 +13,7 @@ fn empty(verdict: Verdict, words: &[&str]) -> Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: "one-link rig".into(),
         verdict,
+        residual: Residual::Torque,
         words: words.iter().map(|w| (*w).into()).collect(),
         noise_floor_rms: Vec::new(),
         noise_floor_how: String::new(),

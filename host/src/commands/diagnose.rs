@@ -7,11 +7,15 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, refuse_shared};
 use super::ui::Ui;
+use crate::data::EffortNeed;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
-use crate::diagnose::{Options, diagnose};
+use crate::diagnose::voltage::diagnose_voltage;
+use crate::diagnose::{DiagnoseError, Options, diagnose};
 use crate::files::{folder, write_whole};
 use crate::pages::{self, Context};
+use crate::prepare::Recording;
 use crate::report::{self, format_significant, format_value};
+use crate::robot::Robot;
 
 /// Says what the model lacks: where prediction and recording disagree, which physical effect is missing, what it takes
 /// away on data held back, and when there is nothing left to find.
@@ -20,6 +24,9 @@ use crate::report::{self, format_significant, format_value};
 /// motion back with --holdout: an effect that is really there improves that one, too. Slow motion and reversals show
 /// friction; several speeds, positions and loads show the rest. What the recordings cannot show is listed, with the
 /// experiment that would show it.
+///
+/// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs
+/// freely on that voltage and its position is compared instead.
 ///
 /// The description should be what is believed of the robot: its values are fitted again, and are compared with what they
 /// were.
@@ -52,8 +59,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = args.robot.load(ui)?;
     refuse_shared(&args.data, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
-    let training = Inputs::read(&robot, &args.data)?;
-    let holdout = Inputs::read(&robot, &args.holdout)?;
+    let (training, holdout, workflow) = read(&robot, args)?;
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }
@@ -62,7 +68,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);
-    let (found, model) = diagnose(
+    let (found, model) = workflow(
         &robot,
         &training.recordings(),
         &holdout.recordings(),
@@ -91,6 +97,29 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     write_whole(&args.out.join("report.html"), page.as_bytes())?;
     print(ui, &found, &args.out);
     Ok(())
+}
+
+/// One of the two ways from recordings to a verdict.
+type Workflow = fn(
+    &Robot,
+    &[&dyn Recording],
+    &[&dyn Recording],
+    &Options,
+    &mut dyn FnMut(f64),
+) -> Result<(Diagnosis, Robot), DiagnoseError>;
+
+/// The recordings, and how they are diagnosed: one joint without torque or current goes by its voltage.
+fn read(robot: &Robot, args: &Args) -> Result<(Inputs, Inputs, Workflow), CommandError> {
+    if robot.joints.len() == 1 {
+        let all = |paths| Inputs::read_with(robot, paths, EffortNeed::Optional);
+        let (training, holdout) = (all(&args.data)?, all(&args.holdout)?);
+        if !training.any_effort() && !holdout.any_effort() {
+            return Ok((training, holdout, diagnose_voltage));
+        }
+    }
+    let training = Inputs::read(robot, &args.data)?;
+    let holdout = Inputs::read(robot, &args.holdout)?;
+    Ok((training, holdout, diagnose))
 }
 
 /// The result at a glance.

@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
-use crate::data::{Block, Implausible, Source, plausibility, strange_references};
+use crate::data::{Block, EffortNeed, Implausible, Source, plausibility, strange_references};
 use crate::diagnose::outcome::About;
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
@@ -73,9 +73,21 @@ impl Inputs {
     /// # Errors
     /// What is wrong, by file and line.
     pub(crate) fn read(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
+        Self::read_with(robot, paths, EffortNeed::Required)
+    }
+
+    /// As [`Self::read`], saying whether the torque may be missing.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn read_with(
+        robot: &Robot,
+        paths: &[PathBuf],
+        need: EffortNeed,
+    ) -> Result<Self, CommandError> {
         let sources = paths
             .iter()
-            .map(|path| Source::open(path, robot))
+            .map(|path| Source::open_with(path, robot, need))
             .collect::<Result<_, _>>()?;
         Ok(Self { sources })
     }
@@ -169,6 +181,11 @@ impl Inputs {
                 .iter()
                 .map(move |warning| format!("{}: {warning}", source.path().display()))
         })
+    }
+
+    /// Whether any of them has a torque or a current.
+    pub(crate) fn any_effort(&self) -> bool {
+        self.sources.iter().any(Source::has_effort)
     }
 
     /// Bytes in all files.

@@ -346,7 +346,13 @@ fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts,
             let m = movers[gap] + 1;
             return Err(if m == k {
                 format!(
-                    "there is neither `tau{k}` (torque of joint `{joint}`, N·m or N) nor `i{k}` (its motor current, A) nor `taum{k}` (its motor torque, N·m); one of them is needed, and the columns are {}",
+                    "there is neither `tau{k}` (torque of joint `{joint}`, N·m or N) nor `i{k}` (its motor current, A) nor `taum{k}` (its motor torque, N·m); one of them is needed{}, and the columns are {}",
+                    if n == 1 && (has("u1".into()).is_some() || names.iter().any(|c| c == "supply"))
+                    {
+                        " (`rig diagnose` alone identifies a joint from its motor voltage)"
+                    } else {
+                        ""
+                    },
                     shown(names)
                 )
             } else {

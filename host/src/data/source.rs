@@ -201,6 +201,12 @@ impl Source {
         self.sampling
     }
 
+    /// Whether the joints have a torque: their own, or from the motors' currents or torques.
+    pub fn has_effort(&self) -> bool {
+        let effort = |role| matches!(role, Role::Effort(..) | Role::MotorEffort(..));
+        self.layout.columns.iter().any(|c| effort(c.role))
+    }
+
     /// Names of the file's columns in their order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.layout.columns.iter().map(|c| c.name.as_str())

@@ -9,7 +9,7 @@ use super::floor;
 use super::judge::{Judge, Judged, closed, left_of_held, rank};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
-use super::outcome::{Diagnosis, Step, Tried, Verdict};
+use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
 use super::profile::Profile;
 use super::refit::{Joint, Refit};
 use super::sanity::faults;
@@ -120,6 +120,7 @@ pub fn diagnose(
             name_something(&windings),
             change.is_some() || contradict(&windings),
         ),
+        residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),

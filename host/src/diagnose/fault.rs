@@ -1,6 +1,6 @@
 //! The diagnosis of recordings that cannot be what they say.
 
-use super::outcome::{DataFault, Diagnosis, Verdict};
+use super::outcome::{DataFault, Diagnosis, Residual, Verdict};
 use super::sentences;
 use crate::robot::Robot;
 
@@ -10,6 +10,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict: Verdict::DataFault,
+        residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: Vec::new(),
         noise_floor_how: String::new(),

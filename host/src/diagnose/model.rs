@@ -54,6 +54,8 @@ pub(super) fn described(
         Some(&weights(robot, base.combination.ncols())),
     );
     model.gravity = gravity;
+    // What its values were identified from before says nothing about the new ones.
+    model.identified = None;
     for fitted in effects {
         let kind = fitted.candidate.kind;
         if kind == Kind::GravityTilt {

@@ -20,6 +20,17 @@ pub enum Verdict {
     DataFault,
 }
 
+/// What is compared, and all residuals, floors and gaps are of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Residual {
+    /// The torque that the model predicts for the recorded motion, N·m or N.
+    #[default]
+    Torque,
+    /// The position of the model that runs freely on the recorded voltage, rad or m.
+    Position,
+}
+
 /// Where part of the gap sits.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
@@ -70,7 +81,8 @@ pub struct Step {
     pub runner_up: Option<String>,
     /// Share of this step's gap that the runner-up would have closed.
     pub runner_up_gap_closed: Option<f64>,
-    /// Unit of the residual that this step takes away, ASCII: N*m or N of the torque; V of the motor's voltage.
+    /// Unit of the residual that this step takes away, ASCII: that of [`Diagnosis::residual`], or V of what shows in the motor's
+    /// voltage alone.
     pub rms_unit: String,
     /// RMS of the joint's residual, before and after this step.
     pub train_rms: [f64; 2],
@@ -152,7 +164,7 @@ pub struct NextExperiment {
 pub struct Remainder {
     /// Name of the joint.
     pub joint: String,
-    /// RMS beyond the noise floor, N·m or N.
+    /// RMS beyond the noise floor, in the residual's unit.
     pub rms: f64,
     /// RMS over the noise floor.
     pub ratio: f64,
@@ -191,12 +203,12 @@ pub enum About {
     TorqueScale,
 }
 
-/// RMS of the torque residual from model to model down to the floor, one joint.
+/// RMS of the residual from model to model down to the floor, one joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Waterfall {
     /// Name of the joint.
     pub joint: String,
-    /// ASCII, N*m or N.
+    /// ASCII, N*m or N; rad or m where [`Diagnosis::residual`] is the position.
     pub unit: String,
     /// Names of the models: `frozen description`, `refitted`, then each effect.
     pub models: Vec<String>,
@@ -240,7 +252,7 @@ pub struct Curves {
     pub recording: String,
     /// s
     pub t: Vec<f64>,
-    /// Measured and what the models without and with the effects predict, N·m or N.
+    /// Measured and what the models without and with the effects predict, N·m or N; empty where none was recorded.
     pub torque: [Vec<f64>; 3],
     /// Measured and simulated positions without and with the effects, rad or m; empty where not simulated.
     pub motion: [Vec<f64>; 3],
@@ -274,9 +286,11 @@ pub struct Diagnosis {
     pub robot: String,
     /// What became of the gap.
     pub verdict: Verdict,
+    /// What is compared.
+    pub residual: Residual,
     /// The verdict in words, sentences.
     pub words: Vec<String>,
-    /// Per joint, N·m or N.
+    /// Per joint, in the residual's unit.
     pub noise_floor_rms: Vec<f64>,
     /// How it was estimated, a sentence.
     pub noise_floor_how: String,

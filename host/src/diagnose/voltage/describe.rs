@@ -6,7 +6,7 @@ use super::plant::{NAMES, NOMINAL, Plant};
 use super::search::{Model, Trial, on_the_voltage};
 use crate::diagnose::judge::closed;
 use crate::diagnose::outcome::{
-    Absorbed, Diagnosis, Remainder, Step, Tried, Value, Verdict, Waterfall,
+    Absorbed, Curves, Diagnosis, Remainder, Residual, Step, Tried, Value, Verdict, Waterfall,
 };
 use crate::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
 use rig_shared::effects::Effect;
@@ -19,6 +19,8 @@ const EQUAL: f64 = 0.03;
 /// Everything that was found.
 pub(super) struct Told<'a> {
     pub robot: &'a Robot,
+    /// To draw.
+    pub curves: Vec<Curves>,
     /// rad or m
     pub floor: f64,
     /// From model to model.
@@ -29,11 +31,21 @@ pub(super) struct Told<'a> {
     /// The nominal one first.
     pub models: Vec<Model>,
     pub rounds: Vec<Vec<Trial>>,
+    /// On recordings left out of the fit, before each round.
+    pub unseen: Vec<f64>,
+    /// Which voltage, in words.
+    pub driven: String,
 }
 
 impl Told<'_> {
     fn joint(&self) -> String {
         self.robot.joints[0].name.clone()
+    }
+
+    /// A position error as printed.
+    fn thousandths(&self, error: f64) -> String {
+        let unit = self.robot.joints[0].kind.units().0;
+        format!("{:.2} m{unit}", 1e3 * error)
     }
 
     fn judged(&self) -> &[f64] {
@@ -68,9 +80,10 @@ impl Told<'_> {
             "the recordings held back"
         };
         let mut words = vec![format!(
-            "No torque or current was recorded: the model ran freely on the recorded voltage, and its position was compared. It is off by {:.2} mrad (RMS) on {on}, {:.2} before any effect.",
-            1e3 * last,
-            1e3 * first
+            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. It is off by {} (RMS) on {on}, {} before any effect.",
+            self.driven,
+            self.thousandths(last),
+            self.thousandths(first)
         )];
         if self
             .models
@@ -89,14 +102,15 @@ impl Told<'_> {
             ratio: last / self.floor.max(f64::MIN_POSITIVE),
             places: Vec::new(),
             text: format!(
-                "the free-running position is off by {:.2} mrad, {:.1} times the encoder's step; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
-                1e3 * last, last / self.floor.max(f64::MIN_POSITIVE)
+                "the simulated position is off by {}, {:.1} times the encoder's step; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+                self.thousandths(last), last / self.floor.max(f64::MIN_POSITIVE)
             ),
         });
         Diagnosis {
             schema: "rig-diagnosis/1".into(),
             robot: self.robot.name.clone(),
             verdict,
+            residual: Residual::Position,
             words,
             noise_floor_rms: vec![self.floor],
             noise_floor_how: "the encoder's smallest step over √12, of the position: a lower bound, as nothing was recorded twice".into(),
@@ -112,7 +126,7 @@ impl Told<'_> {
             data_faults: Vec::new(),
             waterfall: vec![Waterfall {
                 joint: self.joint(),
-                unit: "rad".into(),
+                unit: self.robot.joints[0].kind.units().0.into(),
                 models: std::iter::once("refitted".to_owned())
                     .chain(self.models.last().into_iter().flat_map(|m| m.effects.iter().map(|k| title_of(*k))))
                     .collect(),
@@ -122,7 +136,7 @@ impl Told<'_> {
             }],
             tried: self.tried(),
             maps: Vec::new(),
-            curves: Vec::new(),
+            curves: self.curves.clone(),
         }
     }
 
@@ -166,8 +180,9 @@ impl Told<'_> {
             motion_rms: Some(judged),
             gap_closed: closed(judged, self.floor),
             why: format!(
-                "the free-running position of recordings that it was not fitted to is off by {:.2} mrad with it",
-                1e3 * best
+                "The simulated position of recordings that it was not fitted to is off by {} with it, {} before.",
+                self.thousandths(best),
+                self.thousandths(self.unseen[k - 1])
             ),
         }
     }
@@ -214,12 +229,12 @@ impl Told<'_> {
 
     fn tried(&self) -> Vec<Tried> {
         let of = |(step, round): (usize, &Vec<Trial>)| {
-            let before = self.train[step];
+            let before = self.unseen[step];
             let one = |t: &Trial| Tried {
                 effect: title_of(t.kind),
                 joint: self.joint(),
                 step,
-                gain: 1.0 - t.unseen.unwrap_or(t.train).min(before) / before,
+                gain: 1.0 - t.unseen.unwrap_or(before) / before,
                 gain_sigmas: 0.0,
                 p_value: (t.p_value * round.len() as f64).min(1.0),
                 refused: t.refused.clone(),
@@ -232,6 +247,8 @@ impl Told<'_> {
     /// The description with what was found.
     pub(super) fn robot(&self, plant: &Plant) -> Robot {
         let mut robot = self.robot.clone();
+        // What its values were identified from before says nothing about the new ones.
+        robot.identified = None;
         let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {
             return robot;
         };

@@ -1,5 +1,6 @@
 //! Recordings as a voltage-driven simulation takes them: rows as they were written, no filter, no even grid.
 
+use super::law::Law;
 use crate::diagnose::DiagnoseError;
 use crate::prepare::Recording;
 
@@ -9,21 +10,39 @@ const SIDE: usize = 5;
 const GAP: f64 = 5.0;
 /// Column that says whether the drive is on.
 const ENABLE: &str = "torque_enable";
+/// Column of the supply's voltage.
+const SUPPLY: &str = "supply";
 
 /// A stretch of a recording without a gap.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Log {
+    /// Of which recording.
+    pub label: String,
     /// s
     pub t: Vec<f64>,
     /// rad or m
     pub q: Vec<f64>,
     /// V
     pub u: Vec<f64>,
+    /// Reference position, rad or m; empty where none was recorded.
+    pub reference: Vec<f64>,
+    /// V; 1 where it was not recorded.
+    pub supply: Vec<f64>,
+    /// The controller, where the recording shows it.
+    pub law: Option<Law>,
     /// Whether the drive is on; an idle bridge lets no current flow, so that nothing brakes.
     pub on: Vec<bool>,
 }
 
 impl Log {
+    /// s
+    pub(super) fn duration(&self) -> f64 {
+        self.t
+            .last()
+            .zip(self.t.first())
+            .map_or(0.0, |(b, a)| b - a)
+    }
+
     /// Velocity and acceleration at a row by a parabola through its neighbours.
     pub(super) fn slope(&self, row: usize) -> [f64; 2] {
         let last = self.t.len().saturating_sub(1);
@@ -99,7 +118,10 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
             };
             let joins = list.len() > first && list.last().is_some_and(follows);
             if !(block.continues && list.len() > first || joins) {
-                list.push(Log::default());
+                list.push(Log {
+                    label: source.label(),
+                    ..Log::default()
+                });
             }
             let rows = block.len();
             let on = block.extra.iter().find(|(name, _)| name == ENABLE);
@@ -107,11 +129,15 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
                 || vec![true; rows],
                 |(_, c)| c.iter().map(|x| *x != 0.0).collect(),
             );
+            let supply = block.extra.iter().find(|(name, _)| name == SUPPLY);
+            let supply = supply.map_or_else(|| vec![1.0; rows], |(_, c)| c.clone());
             if let (Some(log), Some(joint)) = (list.last_mut(), block.joints.into_iter().next()) {
                 log.t.extend(block.t);
                 log.q.extend(joint.q);
                 log.u.extend(joint.voltage.unwrap_or_default());
                 log.on.extend(on);
+                log.supply.extend(supply);
+                log.reference.extend(joint.reference.unwrap_or_default());
             }
             Ok(())
         })?;
@@ -121,5 +147,8 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
     }
     // Shorter than two parabolas there is nothing to simulate.
     list.retain(|log| log.t.len() > 4 * SIDE);
+    for log in &mut list {
+        log.law = Law::of(log);
+    }
     Ok(list)
 }

@@ -4,13 +4,17 @@
 //! voltage, and the gap is that of the position, in rad (or m). Identifiable are the torque per volt and the back-EMF,
 //! the drive's inertia and friction, against the link's inertia and weight, which the description must state. Effects come
 //! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as `search` says; all
-//! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position.
+//! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position: each recording is
+//! simulated from its first row to its last ([`LONGEST`] at most, after which it starts anew), without a look at the
+//! measured motion in between.
 //!
 //! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; the
 //! controller's own part, which is in the recorded voltage.
 
 mod describe;
+mod faults;
 mod fit;
+mod law;
 mod log;
 mod plant;
 mod search;
@@ -23,31 +27,16 @@ use self::describe::Told;
 use self::log::{Log, logs};
 use self::plant::Plant;
 use self::search::{Model, Search, library};
-use super::outcome::Diagnosis;
+use super::fault::faulty;
+use super::outcome::{Curves, Diagnosis};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::robot::{JointKind, Robot};
 
-/// Whether this is the workflow for these recordings: one joint, and every recording has a voltage and no torque.
-///
-/// # Errors
-/// What reading gives.
-pub fn applies(robot: &Robot, recordings: &[&dyn Recording]) -> Result<bool, DiagnoseError> {
-    let mut all = robot.joints.len() == 1 && !recordings.is_empty();
-    for recording in recordings {
-        recording.each_block(65_536, &mut |block| {
-            all &= block.joints.first().is_some_and(|joint| {
-                joint.tau.is_empty()
-                    && joint
-                        .voltage
-                        .as_ref()
-                        .is_some_and(|u| u.len() == block.t.len())
-            });
-            Ok(())
-        })?;
-    }
-    Ok(all)
-}
+/// Longest stretch that is simulated in one, s: a joint without weight drifts from its start without bounds.
+const LONGEST: f64 = 10.0;
+/// Most recordings that are drawn.
+const DRAWN: usize = 4;
 
 /// Finds what the model of a voltage-driven joint lacks. The second result is the description with the effects and the
 /// parameters identified anew.
@@ -62,16 +51,20 @@ pub fn diagnose_voltage(
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Diagnosis, Robot), DiagnoseError> {
-    let plant = plant(robot)?;
-    let train = logs(training)?;
-    if train.is_empty() {
+    if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
+    let plant = plant(robot)?;
+    let train = logs(training)?;
     let sealed = logs(holdout)?;
+    let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &sealed])?;
+    if !wrong.is_empty() {
+        return Ok((faulty(robot, wrong), robot.clone()));
+    }
     let search = |logs| Search {
         plant: &plant,
         logs,
-        library: library(&options.without),
+        library: library(&options.without, train.iter().any(|log| log.law.is_some())),
         threads: crate::prepare::threads(options.threads),
     };
     let bench = search(&train);
@@ -82,28 +75,82 @@ pub fn diagnose_voltage(
     })?;
     progress(0.2);
     let mut rounds = Vec::new();
-    let models = bench.run(&nominal, &mut |round, trials| {
+    let mut unseen = Vec::new();
+    let models = bench.run(&nominal, &mut |round, before, trials| {
+        unseen.push(before);
         rounds.push(trials.to_vec());
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
     let judge = search(&sealed);
-    let rms = |bench: &Search<'_>, model: &Model| bench.rms(model);
+    let drawn = if sealed.is_empty() { &bench } else { &judge };
     let found = Told {
+        curves: curves(&robot.joints[0].name, drawn, &models),
         robot,
         floor: floor(&train),
-        train: models.iter().map(|m| rms(&bench, m)).collect(),
+        train: models.iter().map(|m| bench.freely(m)).collect(),
         holdout: if sealed.is_empty() {
             Vec::new()
         } else {
-            models.iter().map(|m| rms(&judge, m)).collect()
+            models.iter().map(|m| judge.freely(m)).collect()
         },
         deviations: models.iter().map(|m| bench.deviations(m)).collect(),
         models,
         rounds,
+        unseen,
+        driven: driven(&train, &sealed),
     };
     let result = (found.diagnosis(), found.robot(&plant));
     progress(1.0);
     Ok(result)
+}
+
+/// Motion of the recordings in which the effects change the simulation most, without effects and with all of them.
+fn curves(joint: &str, search: &Search<'_>, models: &[Model]) -> Vec<Curves> {
+    let (Some(first), Some(last)) = (models.first(), models.last()) else {
+        return Vec::new();
+    };
+    let mut list: Vec<(f64, Curves)> = (0..search.logs.len())
+        .map(|k| {
+            let log = &search.logs[k];
+            let [without, with] = [first, last].map(|m| search.simulated(m, k));
+            let change = (without.iter().zip(&with)).map(|(a, b)| (a - b).powi(2));
+            let curves = Curves {
+                joint: joint.to_owned(),
+                recording: log.label.clone(),
+                t: log.t.clone(),
+                torque: Default::default(),
+                motion: [
+                    log.q.clone(),
+                    without.clone(),
+                    if models.len() > 1 {
+                        with.clone()
+                    } else {
+                        Vec::new()
+                    },
+                ],
+            };
+            (change.sum(), curves)
+        })
+        .collect();
+    list.sort_by(|a, b| b.0.total_cmp(&a.0));
+    list.truncate(DRAWN);
+    list.into_iter().map(|(_, curves)| curves).collect()
+}
+
+/// Which voltage drives the model, in words.
+fn driven(train: &[Log], sealed: &[Log]) -> String {
+    let all = train.len() + sealed.len();
+    let closed = train
+        .iter()
+        .chain(sealed)
+        .filter(|log| log.law.is_some())
+        .count();
+    let law = "given by the controller that each recording shows (proportional to the position error, within the supply)";
+    match closed {
+        0 => "as it was recorded".into(),
+        _ if closed == all => law.into(),
+        _ => format!("{law} in {closed} of {all} recordings and as it was recorded in the others"),
+    }
 }
 
 /// What the description knows of the joint.

@@ -1,7 +1,8 @@
 //! One joint that a voltage drives, simulated freely from a recorded start.
 //!
 //! J·q̈ + g(q) + viscous·q̇ + friction + offset = gain·(u − emf·q̇), current without delay (L neglected), none where the
-//! drive is off. Steps after Moreau (1988), as in [`crate::simulate`]: dry friction is whatever value within its bounds
+//! drive is off. The voltage is the recorded one, or
+//! in the closed loop that of the recording's own controller. Steps after Moreau (1988), as in [`crate::simulate`]: dry friction is whatever value within its bounds
 //! brings the joint to rest, so it really sticks. What is proportional to the velocity is taken at the end of the step.
 //!
 //! Leaves out: inductance, sag of the supply between rows, heating, play and elasticity of the gear.
@@ -111,7 +112,7 @@ impl Plant {
             .map(|p| p.gains[0])
             .sum();
         parts.retain(|p| p.kind != Kind::MeasurementDelay);
-        let mut voltage = Voltage {
+        let mut between = Between {
             log,
             row: segment.from,
         };
@@ -140,7 +141,14 @@ impl Plant {
                     ..Instant::default()
                 };
                 let weight = self.weight(middle);
-                let mut effective = if on { voltage.at(now + late) } else { 0.0 };
+                let mut effective = match log.law {
+                    _ if !on => 0.0,
+                    Some(law) => {
+                        let reference = between.at(now, &log.reference);
+                        law.voltage(reference, middle, v)
+                    }
+                    None => between.at(now + late, &log.u),
+                };
                 if on {
                     let net = effective - emf * v;
                     at.drive_torque = gain * net;
@@ -195,14 +203,14 @@ impl Plant {
     }
 }
 
-/// Voltage over time: on a line between two rows of one state of the drive, held where that changes.
-struct Voltage<'a> {
+/// Columns over time: on a line between two rows of one state of the drive, held where that changes.
+struct Between<'a> {
     log: &'a Log,
     row: usize,
 }
 
-impl Voltage<'_> {
-    fn at(&mut self, time: f64) -> f64 {
+impl Between<'_> {
+    fn at(&mut self, time: f64, column: &[f64]) -> f64 {
         let log = self.log;
         while self.row + 1 < log.t.len() && log.t[self.row + 1] <= time {
             self.row += 1;
@@ -212,9 +220,9 @@ impl Voltage<'_> {
         }
         let (k, next) = (self.row, self.row + 1);
         if next >= log.t.len() || log.on[k] != log.on[next] {
-            return log.u[k];
+            return column[k];
         }
         let share = ((time - log.t[k]) / (log.t[next] - log.t[k])).clamp(0.0, 1.0);
-        log.u[k] + share * (log.u[next] - log.u[k])
+        column[k] + share * (column[next] - column[k])
     }
 }

@@ -3,6 +3,7 @@
 
 use rig_shared::effects::{Channel, Kind, Parameter, Scale};
 
+use super::LONGEST;
 use super::fit::{Problem, WINDOW, segments, start};
 use super::log::{Log, Segment};
 use super::plant::{NOMINAL, Plant};
@@ -10,11 +11,11 @@ use crate::prepare::each_of;
 
 /// Folds of the cross-validation at most.
 const FOLDS: usize = 4;
-/// Blocks at least: fewer recordings are cut into pieces, so that a sign test can say something.
+/// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
 const BLOCKS: usize = 8;
 /// Share of the error on recordings not fitted to that an effect has to take away.
 const LEAST_GAIN: f64 = 0.03;
-/// Level of the sign test over the blocks.
+/// Level of the signed-rank test over the blocks.
 const LEVEL: f64 = 0.05;
 /// Candidates of a round that go to the cross-validation, the best by training error first.
 const SHORT_LIST: usize = 3;
@@ -40,7 +41,7 @@ pub(super) struct Trial {
     pub train: f64,
     /// RMS on blocks not fitted to; none where it did not come so far.
     pub unseen: Option<f64>,
-    /// Sign test, not corrected.
+    /// Signed-rank test, not corrected.
     pub p_value: f64,
     /// Why it was not taken; empty for the one that was.
     pub refused: String,
@@ -54,8 +55,8 @@ pub(super) struct Search<'a> {
     pub threads: usize,
 }
 
-/// Effects whose laws the simulation of one voltage-driven joint has.
-pub(super) fn library(without: &[Kind]) -> Vec<Kind> {
+/// Effects whose laws the simulation of one voltage-driven joint has; in the closed loop no recorded voltage can be late.
+pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
     [
         Kind::Stribeck,
         Kind::AsymmetricCoulomb,
@@ -69,7 +70,7 @@ pub(super) fn library(without: &[Kind]) -> Vec<Kind> {
         Kind::Spring,
     ]
     .into_iter()
-    .filter(|kind| !without.contains(kind))
+    .filter(|kind| !without.contains(kind) && !(closed && *kind == Kind::MeasurementDelay))
     .collect()
 }
 
@@ -91,13 +92,27 @@ impl Search<'_> {
         if whole.len() >= BLOCKS || whole.is_empty() {
             return whole;
         }
-        let all: f64 = self.logs.iter().map(duration).sum();
+        let all: f64 = self.logs.iter().map(Log::duration).sum();
         segments(self.logs, |_| true, all / (BLOCKS + whole.len()) as f64)
     }
 
-    /// RMS of the free-running position.
+    /// RMS of the free-running position over the blocks.
     pub(super) fn rms(&self, model: &Model) -> f64 {
         self.problem(model, self.blocks()).rms(&model.theta)
+    }
+
+    /// RMS of the free-running position over whole recordings.
+    pub(super) fn freely(&self, model: &Model) -> f64 {
+        let whole = segments(self.logs, |_| true, LONGEST);
+        self.problem(model, whole).rms(&model.theta)
+    }
+
+    /// Simulated positions of one recording; empty where it cannot be simulated.
+    pub(super) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
+        let whole = segments(self.logs, |k| k == log, LONGEST);
+        let error = self.problem(model, whole).residual(&model.theta);
+        let pairs = error.iter().flatten().zip(&self.logs[log].q);
+        pairs.map(|(error, q)| q + error).collect()
     }
 
     /// Standard deviations in the order of the free parameters.
@@ -248,11 +263,12 @@ impl Search<'_> {
         (self.logs.iter().flat_map(|log| &log.u)).fold(0.0, |m, u| m.max(u.abs()))
     }
 
-    /// Adds effects while they are worth it. `report` is told of every trial of a round.
+    /// Adds effects while they are worth it. `report` is told of every round: its number, the error on recordings left out of
+    /// the fit before it, and all trials.
     pub(super) fn run(
         &self,
         nominal: &Model,
-        report: &mut dyn FnMut(usize, &[Trial]),
+        report: &mut dyn FnMut(usize, f64, &[Trial]),
     ) -> Vec<Model> {
         let mut models = vec![nominal.clone()];
         while models.len() <= MOST {
@@ -288,7 +304,8 @@ impl Search<'_> {
                 trial.unseen = Some(rms);
                 let pairs = before.iter().zip(&after).filter(|(b, a)| a != b);
                 let wins = pairs.clone().filter(|(b, a)| a < b).count();
-                trial.p_value = sign_test(wins, pairs.count());
+                let gains: Vec<f64> = pairs.map(|(b, a)| (b / a).ln()).collect();
+                trial.p_value = signed_rank(&gains);
                 trial.refused = if !(rms <= (1.0 - LEAST_GAIN) * whole) {
                     "takes less than 3 % off the motion of recordings it was not fitted to".into()
                 } else if trial.p_value > LEVEL {
@@ -312,7 +329,7 @@ impl Search<'_> {
                     trial.refused = "another takes away more".into();
                 }
             }
-            report(models.len() - 1, &trials);
+            report(models.len() - 1, whole, &trials);
             match best.and_then(|k| trials.swap_remove(k).model) {
                 Some(next) => models.push(next),
                 None => break,
@@ -322,21 +339,24 @@ impl Search<'_> {
     }
 }
 
-fn duration(log: &Log) -> f64 {
-    log.t.last().zip(log.t.first()).map_or(0.0, |(b, a)| b - a)
-}
-
-/// Chance of at least `wins` of `count` where winning and losing are equally likely.
-pub(super) fn sign_test(wins: usize, count: usize) -> f64 {
-    let mut term = 0.5_f64.powi(count as i32);
-    let mut sum = 0.0;
-    for k in 0..=count {
-        if k >= wins {
-            sum += term;
+/// Chance of such gains where each is as likely to be a loss of its size: Wilcoxon's signed-rank test (1945), one-sided, its
+/// distribution exact. `gains` are logarithms of error before over after; those of zero say nothing.
+pub(super) fn signed_rank(gains: &[f64]) -> f64 {
+    let mut gains: Vec<f64> = gains.iter().copied().filter(|g| *g != 0.0).collect();
+    gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let largest = gains.len() * (gains.len() + 1) / 2;
+    // Chance of each sum of the ranks of gains.
+    let mut chance = vec![0.0; largest + 1];
+    chance[0] = 1.0;
+    for rank in 1..=gains.len() {
+        for sum in (0..=largest).rev() {
+            let with = if sum >= rank { chance[sum - rank] } else { 0.0 };
+            chance[sum] = 0.5 * (chance[sum] + with);
         }
-        term *= (count - k) as f64 / (k + 1) as f64;
     }
-    sum.min(1.0)
+    let ranks = gains.iter().enumerate().filter(|(_, g)| **g > 0.0);
+    let observed: usize = ranks.map(|(k, _)| k + 1).sum();
+    chance[observed..].iter().sum::<f64>().min(1.0)
 }
 
 /// Whether the effect acts on the voltage.

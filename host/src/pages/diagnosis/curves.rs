@@ -21,7 +21,9 @@ pub(super) fn section(found: &Diagnosis) -> Option<Section> {
             .iter()
             .find(|w| w.joint == curves.joint)
             .map_or("", |w| w.unit.as_str());
-        section.blocks.extend(torque(curves, unit).map(Block::Plot));
+        if curves.torque.iter().any(|t| !t.is_empty()) {
+            section.blocks.extend(torque(curves, unit).map(Block::Plot));
+        }
         if curves.motion.iter().any(|m| !m.is_empty()) {
             section
                 .blocks

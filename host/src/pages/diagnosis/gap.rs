@@ -1,7 +1,7 @@
 //! How large the gap is and where it sits.
 
 use super::{parts, words};
-use crate::diagnose::outcome::{Diagnosis, Map, Place, Waterfall};
+use crate::diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
 use crate::report::{
     Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
     format_significant,
@@ -22,7 +22,14 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
     let mut section = Section::new(
         "gap",
         "From the description down to the noise",
-        "How much torque each model leaves unexplained: first the description as it was given, then the same equations with their parameters fitted again, then each effect added in turn. Where the bars reach the line, nothing but noise is left.",
+        match found.residual {
+            Residual::Torque => {
+                "How much torque each model leaves unexplained: first the description as it was given, then the same equations with their parameters fitted again, then each effect added in turn. Where the bars reach the line, nothing but noise is left."
+            }
+            Residual::Position => {
+                "How far the position of each model runs away from the recorded one when it is driven by the recorded voltage alone, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
+            }
+        },
     );
     if !found.noise_floor_how.is_empty() {
         section = section.with(Block::Text(format!(
@@ -36,20 +43,20 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
         });
     section
         .blocks
-        .extend(moved.iter().map(|w| Block::Plot(bars(w))));
+        .extend(moved.iter().map(|w| Block::Plot(bars(found, w))));
     if !still.is_empty() {
         section.blocks.push(Block::Details {
             summary: format!(
                 "Joints in which nothing was found: {}",
                 words::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
             ),
-            blocks: still.iter().map(|w| Block::Plot(bars(w))).collect(),
+            blocks: still.iter().map(|w| Block::Plot(bars(found, w))).collect(),
         });
     }
     Some(section.with(figures(found)))
 }
 
-fn bars(w: &Waterfall) -> Plot {
+fn bars(found: &Diagnosis, w: &Waterfall) -> Plot {
     let n = w.models.len();
     let short: Vec<String> = w
         .models
@@ -66,7 +73,8 @@ fn bars(w: &Waterfall) -> Plot {
     } else {
         short
     };
-    let unit = parts::unit(&w.unit);
+    let shown = words::shown(found, &w.unit);
+    let unit = &shown.unit;
     let places: Vec<f64> = (0..n).map(|k| k as f64).collect();
     let highest = w
         .train
@@ -75,9 +83,9 @@ fn bars(w: &Waterfall) -> Plot {
         .fold(0.0f64, |m, v| m.max(*v));
     let tall = w.floor > 0.0 && highest > TALL * w.floor;
     let (y, style) = if tall {
-        (Axis::log("residual RMS", &unit), Style::Line)
+        (Axis::log("residual RMS", unit), Style::Line)
     } else {
-        (Axis::new("residual RMS", &unit), Style::Bars)
+        (Axis::new("residual RMS", unit), Style::Bars)
     };
     let mut plot = Plot::new(
         format!("Joint {}: residual from model to model", w.joint),
@@ -89,7 +97,7 @@ fn bars(w: &Waterfall) -> Plot {
         Role::Before,
         style.clone(),
         places.clone(),
-        w.train.clone(),
+        shown.scaled(&w.train),
     ));
     if !w.holdout.is_empty() {
         plot = plot.with(Series::new(
@@ -97,7 +105,7 @@ fn bars(w: &Waterfall) -> Plot {
             Role::After,
             style,
             places,
-            w.holdout.clone(),
+            shown.scaled(&w.holdout),
         ));
     }
     let mut note = String::new();
@@ -107,12 +115,12 @@ fn bars(w: &Waterfall) -> Plot {
     if tall {
         note.push_str("Logarithmic: the first model leaves far more than the last. ");
     }
-    note.push_str(&format!(
-        "Noise floor {} {unit}.",
-        format_significant(w.floor, 3)
-    ));
-    plot.mark(Marker::horizontal(w.floor, "noise floor"))
-        .note(note)
+    note.push_str(&format!("Noise floor {}.", shown.value(w.floor)));
+    plot.mark(Marker::horizontal(
+        shown.scaled(&[w.floor])[0],
+        "noise floor",
+    ))
+    .note(note)
 }
 
 fn figures(found: &Diagnosis) -> Block {
@@ -132,6 +140,7 @@ fn figures(found: &Diagnosis) -> Block {
         .waterfall
         .iter()
         .flat_map(|w| {
+            let shown = words::shown(found, &w.unit);
             w.models.iter().enumerate().map(move |(k, model)| {
                 let (train, holdout) = (value(&w.train, k), value(&w.holdout, k));
                 let judged = if w.holdout.is_empty() { train } else { holdout };
@@ -139,13 +148,13 @@ fn figures(found: &Diagnosis) -> Block {
                     w.joint.clone(),
                     (k + 1).to_string(),
                     model.clone(),
-                    format_significant(train, 3),
+                    shown.number(train),
                 ];
                 if held {
-                    row.push(format_significant(holdout, 3));
+                    row.push(shown.number(holdout));
                 }
                 row.extend([
-                    parts::unit(&w.unit),
+                    shown.unit.clone(),
                     format!("{} ×", format_significant(judged / w.floor, 3)),
                 ]);
                 row
@@ -153,7 +162,10 @@ fn figures(found: &Diagnosis) -> Block {
         })
         .collect();
     Block::Table(Table {
-        caption: "RMS of the torque residual, model by model".into(),
+        caption: format!(
+            "RMS of the {}, model by model",
+            words::shown(found, "").what
+        ),
         columns,
         rows,
         note: format!(

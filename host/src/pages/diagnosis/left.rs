@@ -1,6 +1,6 @@
 //! What the missing effects had done to the parameters, and what is left without a name.
 
-use super::{gap, parts};
+use super::{gap, parts, words};
 use crate::diagnose::outcome::{Absorbed, Diagnosis};
 use crate::report::{Block, Column, Section, Table, format_significant, format_value};
 
@@ -79,7 +79,8 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         .waterfall
         .iter()
         .find(|w| w.joint == remainder.joint)
-        .map_or(String::new(), |w| parts::unit(&w.unit));
+        .map_or("", |w| w.unit.as_str());
+    let shown = words::shown(found, unit);
     let mut section = Section::new(
         "left",
         "What is left without a name",
@@ -87,9 +88,9 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::warning(remainder.text.clone()))
     .with(Block::Text(format!(
-        "Joint {}: {} {unit} RMS beyond the noise; the whole residual is {} times the noise floor.",
+        "Joint {}: {} RMS beyond the noise; the whole residual is {} times the noise floor.",
         remainder.joint,
-        format_significant(remainder.rms, 3),
+        shown.value(remainder.rms),
         format_significant(remainder.ratio, 3)
     )));
     let texts = gap::texts(&remainder.places);

@@ -104,9 +104,10 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
         );
     }
     if let ([floor], [joint]) = (found.noise_floor_rms.as_slice(), found.waterfall.as_slice()) {
+        let shown = words::shown(found, &joint.unit);
         facts.push(
-            Fact::new("Noise floor", format_significant(*floor, 3))
-                .unit(parts::unit(&joint.unit))
+            Fact::new("Noise floor", shown.number(*floor))
+                .unit(shown.unit)
                 .note("RMS of what no model can predict"),
         );
     }

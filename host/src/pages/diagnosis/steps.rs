@@ -1,10 +1,8 @@
 //! One effect that was found: what gave it away, what it is worth, why to believe it.
 
 use super::{gap, parts, words};
-use crate::diagnose::outcome::{Diagnosis, Step};
-use crate::report::{
-    Block, Column, NoteKind, Section, Table, format_p_value, format_significant, format_value,
-};
+use crate::diagnose::outcome::{Diagnosis, Residual, Step};
+use crate::report::{Block, Column, NoteKind, Section, Table, format_p_value, format_value};
 
 /// What the figure of a step shows.
 const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something. The line is the effect's law, fitted to the data. The dots after should lie on zero.";
@@ -50,7 +48,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
                 format_p_value(step.p_value)
             ),
         })
-        .with(name(step))
+        .with(name(found, step))
 }
 
 fn parameters(step: &Step) -> Block {
@@ -97,28 +95,19 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         let [before, after] = values;
         vec![what.to_owned(), before, after]
     };
-    let effort = |rms: [f64; 2]| {
-        rms.map(|v| {
-            format!(
-                "{} {}",
-                format_significant(v, 3),
-                parts::unit(&step.rms_unit)
-            )
-        })
+    let shown = words::shown(found, &step.rms_unit);
+    let what = match found.residual {
+        _ if step.rms_unit == "V" => "Voltage residual",
+        Residual::Torque => "Torque residual",
+        Residual::Position => "Error of the simulated position",
     };
-    let what = match step.rms_unit.as_str() {
-        "V" => "Voltage",
-        _ => "Torque",
-    };
-    let mut rows = vec![row(
-        &format!("{what} residual, training"),
-        effort(step.train_rms),
-    )];
-    rows.extend(
-        step.holdout_rms
-            .map(|rms| row(&format!("{what} residual, held back"), effort(rms))),
-    );
-    rows.extend(step.motion_rms.map(|rms| {
+    let residual =
+        |on: &str, rms: [f64; 2]| row(&format!("{what}, {on}"), rms.map(|v| shown.value(v)));
+    let mut rows = vec![residual("training", step.train_rms)];
+    rows.extend(step.holdout_rms.map(|rms| residual("held back", rms)));
+    // Where the residual is the motion's, that has been said.
+    let motion = (step.motion_rms).filter(|_| found.residual == Residual::Torque);
+    rows.extend(motion.map(|rms| {
         let unit = words::position_unit(&torque);
         row(
             "Error of the simulated motion",
@@ -146,7 +135,7 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
 }
 
 /// How sure the name is.
-fn name(step: &Step) -> Block {
+fn name(found: &Diagnosis, step: &Step) -> Block {
     let runner_up = match (&step.runner_up, step.runner_up_gap_closed) {
         (Some(name), Some(share)) => format!(
             " The next best name, {}, would have closed {} % of this step's gap.",
@@ -163,9 +152,13 @@ fn name(step: &Step) -> Block {
         ));
     }
     parts::warning(format!(
-        "These data do not settle the name: {} explain{} them as well as {}. The torque is the same either way, so the model can be used; the name cannot be relied on before an experiment separates them.{runner_up}",
+        "These data do not settle the name: {} explain{} them as well as {}. The {} is the same either way, so the model can be used; the name cannot be relied on before an experiment separates them.{runner_up}",
         words::listed(&rivals),
         if rivals.len() == 1 { "s" } else { "" },
-        words::name(&step.effect)
+        words::name(&step.effect),
+        match found.residual {
+            Residual::Torque => "torque",
+            Residual::Position => "motion",
+        }
     ))
 }

@@ -2,8 +2,9 @@
 
 use rig_shared::effects::{About, Kind};
 
-use crate::diagnose::outcome::{Step, Verdict};
-use crate::report::{NoteKind, Tone};
+use super::parts;
+use crate::diagnose::outcome::{Diagnosis, Residual, Step, Verdict};
+use crate::report::{NoteKind, Tone, format_significant};
 
 /// A verdict in a word or two.
 pub fn verdict(verdict: Verdict) -> &'static str {
@@ -105,7 +106,53 @@ pub(super) fn or_dash(text: &str) -> String {
     if text.is_empty() { "–" } else { text }.into()
 }
 
-/// Unit of the position that belongs to a unit of torque or force.
+/// Unit of the position that belongs to a unit of a residual.
 pub(super) fn position_unit(torque: &str) -> &'static str {
-    if torque == "N" { "m" } else { "rad" }
+    match torque {
+        "N" | "m" => "m",
+        _ => "rad",
+    }
+}
+
+/// How residuals are printed: torques as they are, positions in thousandths.
+pub(super) struct Shown {
+    /// Of a printed number to the number itself.
+    scale: f64,
+    /// As printed.
+    pub(super) unit: String,
+    /// What the residual is of, for captions.
+    pub(super) what: &'static str,
+}
+
+impl Shown {
+    /// A value, three digits.
+    pub(super) fn number(&self, value: f64) -> String {
+        format_significant(self.scale * value, 3)
+    }
+
+    /// A value with its unit.
+    pub(super) fn value(&self, value: f64) -> String {
+        format!("{} {}", self.number(value), self.unit)
+    }
+
+    /// Values for a plot.
+    pub(super) fn scaled(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().map(|v| self.scale * v).collect()
+    }
+}
+
+/// How residuals in `unit` are printed.
+pub(super) fn shown(found: &Diagnosis, unit: &str) -> Shown {
+    match found.residual {
+        Residual::Torque => Shown {
+            scale: 1.0,
+            unit: parts::unit(unit),
+            what: "torque residual",
+        },
+        Residual::Position => Shown {
+            scale: 1e3,
+            unit: format!("m{}", parts::unit(unit)),
+            what: "simulated position's error",
+        },
+    }
 }
