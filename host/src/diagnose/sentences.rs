@@ -9,6 +9,8 @@ use crate::robot::Joint;
 
 /// From so many standard deviations on a parameter has moved.
 const MOVED: f64 = 3.0;
+/// Times the RMS that the description leaves, from which on fitting again has made it worse.
+const WORSE: f64 = 1.1;
 
 fn number(x: f64) -> String {
     format_significant(x, 3)
@@ -57,6 +59,7 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
         words.push(effects(d));
     }
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    words.extend(worse_refitted(d));
     if let Some(remainder) = &d.remainder {
         words.push(format!(
             "At joint {} an RMS of {} beyond the noise floor stays without a name, {} times the floor.",
@@ -139,8 +142,9 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         format!("The torque residual of joint {} is", w.joint)
     } else {
         format!(
-            "The torque residual of joint {} falls from {} to",
+            "The torque residual of joint {} {} from {} to",
             w.joint,
+            if last > first { "rises" } else { "falls" },
             number(*first)
         )
     };
@@ -149,6 +153,20 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         number(*last),
         number(w.floor),
     ))
+}
+
+/// Joints whose hold-out the description predicts better than its parameters fitted again: the motion did not determine them.
+fn worse_refitted(d: &Diagnosis) -> Option<String> {
+    let joints: Vec<String> = (d.waterfall.iter())
+        .filter(|w| matches!(w.holdout[..], [given, refitted, ..] if refitted > WORSE * given))
+        .map(|w| w.joint.clone())
+        .collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "Parameters fitted to the training data predict the hold-out worse than the description does at {}: the training motion does not determine them. Give it livelier motion, or a description by `rig identify`, which weighs what the data leave open.",
+            listed(&joints)
+        )
+    })
 }
 
 /// The candidate that came closest to being taken.
