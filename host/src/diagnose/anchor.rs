@@ -2,7 +2,8 @@
 //!
 //! Gravity's direction, a zero angle and a constant torque can all be taken up by base parameters. Where the description
 //! states such a value, it is held: what the data add to it is then an effect with a name (a tilted base, an offset)
-//! instead of a silently wrong parameter. Where it states nothing, the parameter is free and the effect not testable.
+//! instead of a silently wrong parameter. Where it states nothing, the parameter is free and the effect not testable. Of
+//! several joints a motion leaves much open: what it tells less of than the description is held, too.
 
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -75,6 +76,13 @@ impl Anchor {
             stated: inertial && friction,
             gravity_held,
         }
+    }
+
+    /// Holds base parameters that were free by themselves at what the description states.
+    pub(super) fn hold(&mut self, parameters: &[usize]) {
+        let alone = |d: &Direction| matches!(d.as_slice(), [(k, _)] if parameters.contains(k));
+        self.free.retain(|direction| !alone(direction));
+        self.held.extend(parameters);
     }
 
     /// Columns of the free directions.

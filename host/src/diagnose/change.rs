@@ -38,12 +38,14 @@ pub(super) struct Change {
     pub(super) p_value: f64,
 }
 
-/// Compares the refit with the description. `known` is the torque that the effects found explain.
+/// Compares the refit with the description. `known` is the torque that the effects found explain, `without` is not
+/// named.
 pub(super) fn change(
     bench: &Bench,
     refit: &Refit,
     known: &Column,
     after: &Solution,
+    without: &[Kind],
 ) -> Option<Change> {
     let (anchor, free) = (&bench.anchor, &refit.free);
     if !anchor.stated {
@@ -72,7 +74,8 @@ pub(super) fn change(
         return None;
     }
     let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
-    if let Some(load) = payload(bench, after, &prior)
+    if !without.contains(&Kind::Payload)
+        && let Some(load) = payload(bench, after, &prior)
         && let Some(e) = evidence(&load.1)
         && speaks(&e)
     {

@@ -11,7 +11,7 @@ use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
 use super::profile::Profile;
-use super::refit::{Joint, Refit};
+use super::refit::{Joint, Refit, open};
 use super::sanity::faults;
 use super::search::{Search, with};
 use super::winding::{contradict, name_something, settled, tell, windings};
@@ -34,9 +34,9 @@ pub fn diagnose(
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
-    let bench = Bench::of(robot, training)?;
-    let loaded = bench.load(training)?;
-    let sealed = if holdout.is_empty() {
+    let mut bench = Bench::of(robot, training)?;
+    let mut loaded = bench.load(training)?;
+    let mut sealed = if holdout.is_empty() {
         None
     } else {
         Some(bench.load(holdout)?)
@@ -47,6 +47,13 @@ pub fn diagnose(
             return Ok((faulty(robot, wrong), robot.clone()));
         }
     }
+    let open = open(&bench, &loaded.rows);
+    if !open.is_empty() {
+        bench.anchor.hold(&open);
+        loaded = bench.rows(loaded.runs)?;
+        sealed = sealed.map(|s| bench.rows(s.runs)).transpose()?;
+    }
+    let bench = bench;
     progress(0.1);
     let lead = {
         let refit = Refit::of(&bench, &loaded.rows)?;
@@ -95,7 +102,7 @@ pub fn diagnose(
         base: &refit.base,
         seed: options.seed,
     };
-    let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options.seed)?;
+    let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
     let mut judged = judge.judged(found)?;
     let said = settled(&windings, &search, &refit.base, &mut judged.chosen)?;
     let descent = Descent::of(&bench, &refit, &judged.chosen, sealed.as_ref())?;
@@ -110,7 +117,8 @@ pub fn diagnose(
     for (step, word) in steps.iter_mut().zip(said) {
         word.applied(step);
     }
-    let change = change(&bench, &refit, &refit.explained(chosen, after), after);
+    let explained = refit.explained(chosen, after);
+    let change = change(&bench, &refit, &explained, after, &options.without);
     steps.extend((change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors)));
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
@@ -164,9 +172,31 @@ pub fn diagnose(
     let mut model = finish(&found, &mut diagnosis)?;
     tell(windings, &mut diagnosis, &mut model);
     diagnosis.words.extend(silent);
+    diagnosis.words.extend(held(&bench, &open));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok((diagnosis, model))
+}
+
+/// What was left as the description has it.
+fn held(bench: &Bench, open: &[usize]) -> Option<String> {
+    let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The training motion tells less of {} than the description, so {} as described: {}.",
+            if names.len() == 1 {
+                "one base parameter"
+            } else {
+                "some base parameters"
+            },
+            if names.len() == 1 {
+                "it stays"
+            } else {
+                "they stay"
+            },
+            names.join(", ")
+        )
+    })
 }
 
 /// A search from the refitted nominal model on.

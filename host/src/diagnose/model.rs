@@ -146,7 +146,7 @@ fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<Strin
 }
 
 /// How easily each standard parameter moves: as large as it is, at least a share of the largest of its kind.
-fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
+pub(super) fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
     let prior = standard(robot, columns);
     let links = robot.joints.len() * COLUMNS;
     let kind = |c: usize| match c.checked_sub(links) {

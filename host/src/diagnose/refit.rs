@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use rig_shared::effects::{Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
 use super::bench::Bench;
 use super::columns::Source;
-use super::fit::Fit;
+use super::fit::{Fit, dot};
 use super::floor;
+use super::model::weights;
 use super::outcome::{Absorbed, Value};
 use super::profile::Profile;
 use super::rows::{Column, Rows, combined};
@@ -18,6 +20,10 @@ use super::solve::{Solution, solve};
 
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
 const DIFFERENCE: f64 = 0.01;
+/// Relative uncertainty of what a description states, as in an identification of several joints.
+const RIGHT_TO: f64 = 2.0;
+/// Share of the description's variance from which on data have added hardly anything.
+const HARDLY_BETTER: f64 = 0.5;
 
 /// The nominal model on the training data, its free parameters fitted anew.
 pub(super) struct Refit<'r> {
@@ -40,19 +46,8 @@ impl<'r> Refit<'r> {
     pub(super) fn of(bench: &Bench, rows: &'r Rows) -> Result<Self, DiagnoseError> {
         let n = rows.joints();
         let free = bench.anchor.columns(rows);
-        let fitted = |mut fit: Fit<'r>| {
-            for column in &free {
-                fit.push(column);
-            }
-            fit
-        };
-        let first = fitted(Fit::new(rows, vec![1.0; n], 0.1));
-        let scale: Vec<f64> = (0..n)
-            .map(|j| 1.0 / first.rms(j).max(f64::MIN_POSITIVE))
-            .collect();
-        let residuals: Vec<Vec<f64>> = (0..n).map(|j| first.residual(j)).collect();
-        let plain = Fit::new(rows, scale, floor::memory(rows, &residuals));
-        let base = fitted(plain.clone());
+        let (plain, _) = weighed(rows, &free);
+        let base = fitted(plain.clone(), &free);
         let before = solve(&plain, &free.iter().collect::<Vec<_>>(), &[]).ok_or_else(|| {
             DiagnoseError::Model(
                 "its nominal parameters are not excited by this motion; record a livelier one."
@@ -164,6 +159,67 @@ impl<'r> Refit<'r> {
         list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
         list
     }
+}
+
+fn fitted<'r>(mut fit: Fit<'r>, columns: &[Column]) -> Fit<'r> {
+    for column in columns {
+        fit.push(column);
+    }
+    fit
+}
+
+/// The rows in units of what columns leave of each joint, and the time that this remembers, s.
+fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
+    let n = rows.joints();
+    let first = fitted(Fit::new(rows, vec![1.0; n], 0.1), columns);
+    let scale: Vec<f64> = (0..n)
+        .map(|j| 1.0 / first.rms(j).max(f64::MIN_POSITIVE))
+        .collect();
+    let residuals: Vec<Vec<f64>> = (0..n).map(|j| first.residual(j)).collect();
+    let memory = floor::memory(rows, &residuals);
+    (Fit::new(rows, scale, memory), memory)
+}
+
+/// Base parameters of several joints of which a motion tells less than the description, right to a factor of
+/// [`RIGHT_TO`]: those that data and description together know hardly better than the description alone.
+pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
+    let anchor = &bench.anchor;
+    if rows.joints() < 2 || !anchor.stated {
+        return Vec::new();
+    }
+    let free = anchor.columns(rows);
+    let (fit, memory) = weighed(rows, &free);
+    let combination = &bench.nominal.base.combination;
+    let sizes = weights(bench.robot, combination.ncols());
+    let spread: Vec<f64> = (anchor.free.iter())
+        .map(|direction| {
+            let squares = (0..sizes.len()).map(|c| {
+                let along: f64 = direction
+                    .iter()
+                    .map(|&(k, f)| f * combination[(k, c)])
+                    .sum();
+                (along * sizes[c]).powi(2)
+            });
+            RIGHT_TO * squares.sum::<f64>().sqrt()
+        })
+        .collect();
+    let columns: Vec<Vec<f64>> = free.iter().map(|column| fit.weighted(column)).collect();
+    let rows_in_one = (memory / rows.period).max(1.0);
+    let known = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+        let own = if a == b { 1.0 } else { 0.0 };
+        spread[a] * spread[b] * dot(&columns[a], &columns[b]) / rows_in_one + own
+    });
+    let Some(known) = known.cholesky() else {
+        return Vec::new();
+    };
+    let left = known.inverse();
+    (anchor.free.iter().enumerate())
+        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER)
+        .filter_map(|(_, direction)| match direction.as_slice() {
+            [(b, _)] => Some(*b),
+            _ => None,
+        })
+        .collect()
 }
 
 /// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics

@@ -105,6 +105,19 @@ impl Answer {
     }
 }
 
+/// A name and those that a recording of torque, motor position and voltage, as the benchmark's are, cannot tell from it.
+pub(super) fn same_by_voltage(name: &str) -> BTreeSet<&str> {
+    let told = |a: &str, b: &str| {
+        (Kind::ALL.iter().map(|kind| kind.about()))
+            .filter(|about| about.name == a)
+            .flat_map(|about| about.confused)
+            .any(|c| c.with == b && c.separated_by.contains("voltage"))
+    };
+    let mut class = exact_class(name);
+    class.retain(|other| !told(name, other) && !told(other, name));
+    class
+}
+
 /// A name and those that no recording of torque and motor position can tell from it, itself among them.
 pub fn exact_class(name: &str) -> BTreeSet<&str> {
     let mut class = BTreeSet::from([name]);

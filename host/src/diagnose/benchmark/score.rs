@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::answer::{Answer, exact_class, is_right};
+use super::answer::{Answer, exact_class, is_right, same_by_voltage};
 use super::cases::Group;
 use super::parameters::Compared;
 use super::wilson::Proportion;
@@ -99,12 +99,13 @@ impl Outcome {
         self.answer.as_ref().is_some_and(|a| a.remainder)
     }
 
-    /// Whether it is one effect with exact partners, and all of them were returned as the first set.
+    /// Whether it is one effect with partners that its recording cannot tell from it, and all of them were returned as the
+    /// first set.
     fn whole_set(&self) -> Option<bool> {
         let [truth] = self.truth()[..] else {
             return None;
         };
-        let class = exact_class(truth);
+        let class = same_by_voltage(truth);
         let set = self.answer.as_ref()?.named.first();
         (class.len() > 1).then(|| {
             set.is_some_and(|named| class.iter().all(|name| named.set.iter().any(|s| s == name)))

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use rig_shared::effects::Kind;
 
+use super::answer::same_by_voltage;
 use super::*;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Noise, Scenario};
 
@@ -74,6 +75,13 @@ fn exact_partners_count_as_one_name() {
     assert!(is_right("current_offset", "torque_offset"));
     assert!(is_right("asymmetric_coulomb", "current_offset"));
     assert!(!is_right("gravity_tilt", "torque_offset"));
+    // The voltage tells a sensor from a torque.
+    let left = |name| same_by_voltage(name).into_iter().collect::<Vec<_>>();
+    assert_eq!(left("current_offset"), ["current_offset"]);
+    assert_eq!(
+        left("torque_offset"),
+        ["asymmetric_coulomb", "torque_offset"]
+    );
     assert!(!is_right("stribeck", "presliding"));
 }
 

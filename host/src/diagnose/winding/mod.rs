@@ -17,7 +17,6 @@ mod tests;
 use rig_shared::effects::{Effect, Kind, SHAPES};
 
 use self::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
-use super::DiagnoseError;
 use super::bench::{Bench, Loaded};
 use super::columns::Candidate;
 use super::fit::Fit;
@@ -30,6 +29,7 @@ use super::pictures::map;
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Column;
 use super::solve::{Solution, solve};
+use super::{DiagnoseError, Options};
 use crate::report::{format_significant, format_value};
 use crate::robot::{Robot, RobotEffect};
 
@@ -37,6 +37,8 @@ pub(super) use self::settle::settled;
 
 /// A winding that leaves more than this share of the voltage's squares is not the one that was recorded.
 const EXPLAINED: f64 = 0.1;
+/// Least share of what is left of the voltage that a dead zone takes away.
+const LEAST_SHARE: f64 = 0.1;
 /// Relative difference of back-EMF and torque constant that is said: magnets and load change them by less.
 const CONSTANT_OFF: f64 = 0.05;
 /// … and of the resistance: copper gains 0.39 % a kelvin.
@@ -74,7 +76,7 @@ pub(super) fn windings(
     bench: &Bench,
     loaded: &Loaded,
     sealed: Option<&Loaded>,
-    seed: u64,
+    options: &Options,
 ) -> Result<(Vec<Winding>, Vec<String>), DiagnoseError> {
     let (mut found, mut silent) = (Vec::new(), Vec::new());
     for joint in 0..bench.robot.joints.len() {
@@ -85,7 +87,14 @@ pub(super) fn windings(
             Some(sealed) => Equation::of(bench.robot, joint, sealed)?,
             None => None,
         };
-        match winding(bench.robot, joint, loaded, &training, held.as_ref(), seed) {
+        match winding(
+            bench.robot,
+            joint,
+            loaded,
+            &training,
+            held.as_ref(),
+            options,
+        ) {
             Ok(winding) => found.push(winding),
             Err(why) => silent.push(format!(
                 "Nothing is concluded from the motor voltage of joint {}: {why}.",
@@ -102,7 +111,7 @@ fn winding(
     loaded: &Loaded,
     training: &Equation,
     held: Option<&Equation>,
-    seed: u64,
+    options: &Options,
 ) -> Result<Winding, String> {
     let rows = &training.rows;
     let columns: Vec<_> = rows.nominal.iter().collect();
@@ -151,7 +160,8 @@ fn winding(
         vanished: None,
     });
     let refused = match &profile {
-        Some(profile) => profile.refused(trials),
+        _ if options.without.contains(&Kind::DriveDeadzone) => Some("it was left out".to_owned()),
+        Some(profile) => profile.refused(trials).or_else(|| too_small(profile)),
         None => Some("it takes no voltage along the current".to_owned()),
     };
     let about = Kind::DriveDeadzone.about();
@@ -204,7 +214,7 @@ fn winding(
             0,
             &own.name,
             floor,
-            seed,
+            options.seed,
         );
         let at = before.values.len();
         let volts = after.values[at];
@@ -259,6 +269,21 @@ fn winding(
         tried,
         detectable,
         dead_zone,
+    })
+}
+
+/// Why a voltage that stands is none of an inverter's: what else the equation lacks bends it by as much.
+fn too_small(profile: &Profile) -> Option<String> {
+    let volts = profile.evidence.gains[0];
+    let least = Kind::DriveDeadzone.about().gains[0].range[0];
+    let share = profile.evidence.gain;
+    (volts < least || share < LEAST_SHARE).then(|| {
+        format!(
+            "{} V, which take {} % of what is left; at least {least} V and {} % would be a dead zone",
+            format_significant(volts, 2),
+            format_significant(100.0 * share, 2),
+            100.0 * LEAST_SHARE
+        )
     })
 }
 
