@@ -28,6 +28,17 @@ const BLOCK: f64 = 1.0;
 const EXPLAINED: f64 = 0.98;
 /// Rows at most that it is regressed from.
 const ROWS: usize = 20_000;
+/// What the torque is regressed on: position and velocity error, integral of the former, velocity and acceleration of the
+/// reference, its sine and cosine (a weight fed forward), a constant.
+const COLUMNS: usize = 8;
+/// Controllers that are tried, by their columns, the simplest first: where a motion has few frequencies, many columns say the
+/// same. With the reference's velocity beside the velocity error, feedback of the velocity alone is among them.
+const SETS: [&[usize]; 4] = [
+    &[0, 1, 7],
+    &[0, 1, 3, 7],
+    &[0, 1, 3, 4, 5, 6, 7],
+    &[0, 1, 2, 3, 4, 5, 6, 7],
+];
 /// A motion is worse when its RMS grows by more than this share …
 const WORSE: f64 = 0.02;
 /// … and its squares by more than so many standard deviations of their change from block to block.
@@ -201,31 +212,27 @@ impl<'a> Replay<'a> {
         ])
     }
 
-    /// The first effect that makes the motion worse, both where it came in and among all.
+    /// The first effect that makes the motion worse where it came in, and among all as far as these can be simulated.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn spoiling(&self, chosen: &[Profile]) -> Result<Option<usize>, DiagnoseError> {
-        let Some(all) = self.errors(chosen)? else {
-            return Ok(None);
-        };
+        let mut before = self.errors(&[])?;
         for k in 0..chosen.len() {
-            let (Some(before), Some(after)) =
-                (self.errors(&chosen[..k])?, self.errors(&chosen[..=k])?)
-            else {
-                continue;
+            let after = self.errors(&chosen[..=k])?;
+            let worse = |[a, b]: [&Option<Errors>; 2]| match (a, b) {
+                (Some(a), Some(b)) => Some(a.worse_than(b)),
+                _ => None,
             };
-            if !after.worse_than(&before) {
-                continue;
+            if worse([&after, &before]) == Some(true) {
+                let mut others = chosen.to_vec();
+                others.remove(k);
+                let [all, without] = [chosen, &others].map(|list| self.errors(list));
+                if worse([&all?, &without?]) != Some(false) {
+                    return Ok(Some(k));
+                }
             }
-            let mut others = chosen.to_vec();
-            others.remove(k);
-            if self
-                .errors(&others)?
-                .is_some_and(|without| all.worse_than(&without))
-            {
-                return Ok(Some(k));
-            }
+            before = after;
         }
         Ok(None)
     }
@@ -281,7 +288,6 @@ fn stand_in(robot: &Robot, runs: &[Run]) -> Result<Controller, SimulateError> {
 
 /// The controller that the references and torques of the runs show; none where there are none, or they do not.
 fn regressed(runs: &[Run]) -> Option<Controller> {
-    const COLUMNS: usize = 8;
     let every = runs
         .iter()
         .map(Run::len)
@@ -325,22 +331,32 @@ fn regressed(runs: &[Run]) -> Option<Controller> {
             count += 1.0;
         }
     }
-    // Columns of very different units, some of them nothing at all.
-    let scale: Vec<f64> = (0..COLUMNS)
-        .map(|i| normal[(i, i)].sqrt())
-        .map(|s| if s > 0.0 { 1.0 / s } else { 0.0 })
-        .collect();
-    let scaled = DMatrix::from_fn(COLUMNS, COLUMNS, |i, j| {
-        scale[i] * scale[j] * normal[(i, j)]
-    });
-    let target = DVector::from_fn(COLUMNS, |i, _| scale[i] * right[i]);
-    let x = scaled.svd(true, true).solve(&target, 1.0e-10).ok()?;
-    let about = power - mean * mean / f64::max(count, 1.0);
-    let explained = x.dot(&target) - mean * mean / f64::max(count, 1.0);
-    let (kp, kd) = (scale[0] * x[0], scale[1] * x[1]);
-    (explained >= EXPLAINED * about && kp > 0.0 && kd > 0.0).then_some(Controller {
-        position_gain: kp / kd,
-        velocity_gain: kd,
-        torque_gain: 1.0,
+    let constant = mean * mean / f64::max(count, 1.0);
+    SETS.iter().find_map(|set| {
+        // Columns of very different units, some of them nothing at all.
+        let scale = |i: usize| {
+            let size = normal[(i, i)].sqrt();
+            if size > 0.0 { 1.0 / size } else { 0.0 }
+        };
+        let n = set.len();
+        let entry = |a: usize, b: usize| {
+            let (i, j) = (set[a], set[b]);
+            scale(i) * scale(j) * normal[(i, j)]
+        };
+        let target = DVector::from_fn(n, |a, _| scale(set[a]) * right[set[a]]);
+        let svd = DMatrix::from_fn(n, n, entry).svd(true, true);
+        let x = svd.solve(&target, 1.0e-10).ok()?;
+        let explained = x.dot(&target) - constant;
+        let (kp, kd) = (scale(0) * x[0], scale(1) * x[1]);
+        (explained >= EXPLAINED * (power - constant) && kp > 0.0 && kd > 0.0).then_some(
+            Controller {
+                position_gain: kp / kd,
+                velocity_gain: kd,
+                torque_gain: 1.0,
+            },
+        )
     })
 }
+
+#[cfg(test)]
+mod tests;

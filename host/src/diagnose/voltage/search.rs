@@ -72,7 +72,7 @@ pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
         Kind::Spring,
     ]
     .into_iter()
-    .filter(|kind| !without.contains(kind) && !(closed && *kind == Kind::MeasurementDelay))
+    .filter(|kind| !(without.contains(kind) || closed && *kind == Kind::MeasurementDelay))
     .collect()
 }
 
