@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::run::{rig, robot, succeed};
+use crate::run::{real_data, refuse, rig, robot, succeed};
 
 /// 20 s of the one-link rig with inertia, gravity and friction; `change` is done to position and torque.
 fn recording(folder: &Path, change: impl Fn(f64, f64) -> (f64, f64)) -> PathBuf {
@@ -66,4 +66,50 @@ fn degrees_are_a_fault_of_the_data() {
 #[test]
 fn a_torque_with_its_sign_swapped_is_a_fault_of_the_data() {
     fault(|q, tau| (q, -tau), "sign", "tau1");
+}
+
+/// A servo without a current sensor: its voltage alone, of some of the recordings, names what its makers' study names.
+#[test]
+fn a_servo_is_diagnosed_by_its_voltage() {
+    let Some(data) = real_data("rhoban_xl330") else {
+        return;
+    };
+    let file = |motion: &str, gain: u32| data.join(format!("{motion}_kp{gain}_m0.49_l0.1.csv"));
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = rig();
+    command
+        .args(["diagnose", "--robot"])
+        .arg(robot("xl330.toml"));
+    for gain in [100, 800] {
+        for motion in ["sin_sin", "up_and_down"] {
+            command.arg("--data").arg(file(motion, gain));
+        }
+    }
+    command.arg("--holdout").arg(file("sin_time_square", 200));
+    let said = succeed(command.arg("--out").arg(&out));
+    assert!(said.contains("No torque or current was recorded"), "{said}");
+    let text = fs::read_to_string(out.join("diagnosis.json")).unwrap();
+    let found: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(found["residual"], "position");
+    let fall = &found["waterfall"][0];
+    assert_eq!(fall["unit"], "rad");
+    // Duclusaud et al. 2024 leave 45 to 67 mrad with their models, fitted to such recordings.
+    let held = fall["holdout"].as_array().unwrap();
+    let last = held.last().unwrap().as_f64().unwrap();
+    assert!(last < 0.06, "{held:?}");
+    assert!(!found["steps"].as_array().unwrap().is_empty(), "{found}");
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("mrad") && page.contains("position, measured and simulated"));
+    // The description is one that other commands load, and they say why they cannot use the recording.
+    let sentence = refuse(
+        rig()
+            .args(["validate", "--robot"])
+            .arg(out.join("model.toml"))
+            .arg("--data")
+            .arg(file("sin_sin", 200))
+            .arg("--out")
+            .arg(folder.path().join("validated")),
+    );
+    assert!(sentence.contains("motor voltage"), "{sentence}");
 }

@@ -16,6 +16,7 @@ fn empty(verdict: Verdict, words: &[&str]) -> Diagnosis {
         residual: Residual::Torque,
         words: words.iter().map(|w| (*w).into()).collect(),
         noise_floor_rms: Vec::new(),
+        motion_how: String::new(),
         noise_floor_how: String::new(),
         torque_lead: Vec::new(),
         places: Vec::new(),

@@ -9,6 +9,7 @@ use super::floor;
 use super::judge::{Judge, Judged, closed, left_of_held, rank};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
+use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
 use super::profile::Profile;
 use super::refit::{Joint, Refit, open};
@@ -84,7 +85,7 @@ pub fn diagnose(
         refit,
         search,
         found,
-        tried,
+        mut tried,
     } = pass;
     progress(0.85);
     let coordinates: Vec<_> = (0..robot.joints.len())
@@ -102,9 +103,22 @@ pub fn diagnose(
         base: &refit.base,
         seed: options.seed,
     };
+    // What is refused is refused by the training data; the hold-out shows what the rest is worth.
+    let values = &search.source.values;
+    let trial = Replay::of(&bench, &refit, values, loaded);
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
     let mut judged = judge.judged(found)?;
+    // A name that makes the simulated motion worse stands in for something else.
+    while let Some(k) = trial.spoiling(&judged.chosen)? {
+        let mut stand = judged.chosen;
+        refuse(robot, &mut tried, &stand.remove(k));
+        judged = judge.judged(stand)?;
+    }
     let said = settled(&windings, &search, &refit.base, &mut judged.chosen)?;
+    let replay = match &sealed {
+        Some(sealed) => Replay::of(&bench, &refit, values, sealed),
+        None => trial,
+    };
     let descent = Descent::of(&bench, &refit, &judged.chosen, sealed.as_ref())?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
         judged.left = left_of_held(robot, &held.last(), &judged.floors);
@@ -113,13 +127,21 @@ pub fn diagnose(
     let joint = refit.joint(&search.source, chosen)?;
     let after = &joint.solution;
     progress(0.95);
-    let mut steps = steps(&search, &refit, &judged, &joint, &descent)?;
+    let motion = (0..=chosen.len())
+        .map(|count| Ok(replay.errors(&chosen[..count])?.map(|errors| errors.rms())))
+        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+    let mut steps = steps(&search, &refit, &judged, &joint, &descent, &motion)?;
     for (step, word) in steps.iter_mut().zip(said) {
         word.applied(step);
     }
     let explained = refit.explained(chosen, after);
     let change = change(&bench, &refit, &explained, after, &options.without);
-    steps.extend((change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors)));
+    if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
+    {
+        let given = replay.errors_of(robot).map(|errors| errors.rms());
+        step.motion_rms = (given.zip(motion.last().copied().flatten())).map(|(a, b)| [a, b]);
+        steps.push(step);
+    }
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
@@ -132,6 +154,7 @@ pub fn diagnose(
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
+        motion_how: replay.how.clone(),
         torque_lead: lead,
         places: judge.places(floors),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
@@ -167,6 +190,7 @@ pub fn diagnose(
                 bench.remaining(drawn, &refit.before.values, &[])?,
                 bench.remaining(drawn, &after.values, chosen)?,
             ],
+            motion: replay.drawn(chosen)?,
         },
     };
     let mut model = finish(&found, &mut diagnosis)?;
@@ -281,6 +305,7 @@ fn steps(
     judged: &Judged,
     joint: &Joint,
     descent: &Descent,
+    motion: &[Option<f64>],
 ) -> Result<Vec<Step>, DiagnoseError> {
     let Judged { chosen, floors, .. } = judged;
     let trials = search.trials();
@@ -303,7 +328,7 @@ fn steps(
             rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
             train_rms: train,
             holdout_rms: unseen,
-            motion_rms: None,
+            motion_rms: motion[k].zip(motion[k + 1]).map(|(a, b)| [a, b]),
             gap_closed: closed(unseen.unwrap_or(train), floors[j]),
             why: String::new(),
         };
@@ -312,6 +337,16 @@ fn steps(
         steps.push(step);
     }
     Ok(steps)
+}
+
+/// Says of an effect that was taken why it does not stand.
+fn refuse(robot: &Robot, tried: &mut [Tried], spoilt: &Profile) {
+    let title = title_of(spoilt.candidate.kind);
+    let joint = &robot.joints[spoilt.candidate.joint].name;
+    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
+    if let Some(taken) = tried.iter_mut().find(own) {
+        taken.refused = "explains torque, but the simulated motion gets worse with it".into();
+    }
 }
 
 /// The step of a change that has an effect's name.

@@ -14,6 +14,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         words: Vec::new(),
         noise_floor_rms: Vec::new(),
         noise_floor_how: String::new(),
+        motion_how: String::new(),
         torque_lead: Vec::new(),
         places: Vec::new(),
         steps: Vec::new(),

@@ -3,7 +3,7 @@
 use super::anchor::Anchor;
 use super::fit::Fit;
 use super::locate::Coordinate;
-use super::model::{Fitted, described};
+use super::model::with_effects;
 use super::outcome::Diagnosis;
 use super::profile::Profile;
 use super::rows::{Nominal, Rows};
@@ -49,6 +49,8 @@ pub(super) struct Drawn<'a> {
     pub(super) rows: &'a Rows,
     /// Left by the refitted nominal model and by the one with all effects.
     pub(super) left: [Vec<Vec<f64>>; 2],
+    /// Positions that the same models give when simulated, run by run; empty where they are not.
+    pub(super) motion: [Vec<Vec<f64>>; 2],
 }
 
 /// Fills what the search itself does not, and gives the description with what was found.
@@ -56,25 +58,13 @@ pub(super) struct Drawn<'a> {
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<Robot, DiagnoseError> {
-    let free = found.anchor.free.len();
-    let mut at = free;
-    let mut effects = Vec::new();
-    for profile in found.chosen {
-        let gains = &found.after.values[at..at + profile.columns.len()];
-        at += profile.columns.len();
-        effects.push(Fitted {
-            candidate: profile.candidate,
-            gains,
-            shapes: profile.shapes,
-        });
-    }
-    let (model, remarks) = described(
+    let (model, remarks) = with_effects(
         found.robot,
         found.nominal,
         found.anchor,
-        &found.after.values[..free],
+        &found.after.values,
         &found.search.source.values,
-        &effects,
+        found.chosen,
     );
     diagnosis.maps = pictures::maps(found);
     diagnosis.curves = pictures::curves(found);

@@ -20,6 +20,7 @@ mod lead;
 mod limits;
 mod locate;
 mod model;
+mod motion;
 pub mod outcome;
 mod pictures;
 mod predicted;

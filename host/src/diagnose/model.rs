@@ -8,6 +8,7 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use super::anchor::Anchor;
 use super::columns::Candidate;
+use super::profile::Profile;
 use super::rows::Nominal;
 use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
@@ -76,6 +77,30 @@ pub(super) fn described(
             .push(within(robot, fitted, gains, &mut remarks));
     }
     (model, remarks)
+}
+
+/// [`described`] with the effects that were found: `values` are the coefficients of the free nominal directions, then those
+/// of the effects' columns.
+pub(super) fn with_effects(
+    robot: &Robot,
+    nominal: &Nominal,
+    anchor: &Anchor,
+    values: &[f64],
+    formed_at: &[f64],
+    chosen: &[Profile],
+) -> (Robot, Vec<String>) {
+    let (free, mut gains) = values.split_at(anchor.free.len());
+    let mut effects = Vec::new();
+    for profile in chosen {
+        let (own, rest) = gains.split_at(profile.columns.len());
+        gains = rest;
+        effects.push(Fitted {
+            candidate: profile.candidate,
+            gains: own,
+            shapes: profile.shapes,
+        });
+    }
+    described(robot, nominal, anchor, free, formed_at, &effects)
 }
 
 /// Gravity turned as the fitted angles say. For one joint the torque is exactly that of the fit, whose angle multiplies the

@@ -294,6 +294,8 @@ pub struct Diagnosis {
     pub noise_floor_rms: Vec<f64>,
     /// How it was estimated, a sentence.
     pub noise_floor_how: String,
+    /// How the motion was simulated, or why not, a sentence.
+    pub motion_how: String,
     /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
     pub torque_lead: Vec<f64>,
     /// Where the gap sits, most of it first.

@@ -232,6 +232,22 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
             .map(|(k, tau)| if keep[*k] { tau - left[*k] } else { f64::NAN })
             .collect()
     };
+    let [first, last] = &drawn.motion;
+    let simulated = |all: &Vec<Vec<f64>>| -> Vec<f64> {
+        let mut thinned = Vec::new();
+        if let Some(q) = all.get(r).filter(|q| q.len() == run.len()) {
+            rows.thinning.push(q, &mut thinned);
+        }
+        let at = picked.iter().filter_map(|k| thinned.get(k - start));
+        at.copied().collect()
+    };
+    let motion = if first.is_empty() {
+        Default::default()
+    } else {
+        let own = run.joints[joint].q.clone();
+        let measured = (0..drawn.runs.len()).map(|k| if k == r { own.clone() } else { Vec::new() });
+        [&measured.collect(), first, last].map(simulated)
+    };
     Some(Curves {
         joint: found.robot.joints[joint].name.clone(),
         recording: run.label.clone(),
@@ -245,7 +261,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
                 predicted(with)
             },
         ],
-        motion: Default::default(),
+        motion,
     })
 }
 

@@ -60,6 +60,7 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     }
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
     words.extend(worse_refitted(d));
+    words.extend(motion(d));
     if let Some(remainder) = &d.remainder {
         words.push(format!(
             "At joint {} an RMS of {} beyond the noise floor stays without a name, {} times the floor.",
@@ -80,16 +81,22 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     }
     let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
     if let Some(a) = moved.filter(|_| !d.steps.is_empty()) {
+        let [before, after] = apart(a.before, a.after);
         words.push(format!(
-            "Without {} the fit had bent its parameters: {} came out as {} instead of {} {}.",
+            "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",
             if d.steps.len() == 1 { "it" } else { "them" },
             a.parameter,
-            number(a.before),
-            number(a.after),
             a.unit
         ));
     }
     words
+}
+
+/// Two numbers with as many digits as tell them apart.
+fn apart(a: f64, b: f64) -> [String; 2] {
+    let with = |digits| [a, b].map(|x| format_significant(x, digits));
+    let differ = |pair: &[String; 2]| pair[0] != pair[1];
+    (3..8).map(with).find(differ).unwrap_or_else(|| with(8))
 }
 
 /// What was found and what it is worth.
@@ -167,6 +174,19 @@ fn worse_refitted(d: &Diagnosis) -> Option<String> {
             listed(&joints)
         )
     })
+}
+
+/// The simulated motion's error from the refitted description to the last model.
+fn motion(d: &Diagnosis) -> Option<String> {
+    let ([first, ..], [.., last]) = (d.steps.first()?.motion_rms?, d.steps.last()?.motion_rms?);
+    let unit = match d.waterfall.first()?.unit.as_str() {
+        "N" => "mm",
+        _ => "mrad",
+    };
+    let [first, last] = [first, last].map(|x| number(1e3 * x));
+    Some(format!(
+        "The simulated motion is off by {last} {unit} RMS, {first} {unit} before."
+    ))
 }
 
 /// The candidate that came closest to being taken.

@@ -189,6 +189,17 @@ impl Effects {
         }
     }
 
+    /// What acts on a joint whose torque sensor reads `reading`, at the same instants: [`Self::read_effort`] turned round; the
+    /// last value holds.
+    pub(crate) fn applied_effort(&self, joint: usize, reading: &[f64], period: f64) -> Vec<f64> {
+        let (delay, offset) = self.effort(joint);
+        let mut torque = shifted(reading, delay / period);
+        for value in &mut torque {
+            *value -= offset;
+        }
+        torque
+    }
+
     /// Delay, s, and offset, N·m or N, of a joint's torque reading.
     pub(crate) fn effort(&self, joint: usize) -> (f64, f64) {
         let sum = |kind| {

@@ -102,7 +102,7 @@ impl Told<'_> {
             ratio: last / self.floor.max(f64::MIN_POSITIVE),
             places: Vec::new(),
             text: format!(
-                "the simulated position is off by {}, {:.1} times the encoder's step; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+                "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
                 self.thousandths(last), last / self.floor.max(f64::MIN_POSITIVE)
             ),
         });
@@ -113,7 +113,11 @@ impl Told<'_> {
             residual: Residual::Position,
             words,
             noise_floor_rms: vec![self.floor],
-            noise_floor_how: "the encoder's smallest step over √12, of the position: a lower bound, as nothing was recorded twice".into(),
+            noise_floor_how: "The encoder's smallest step over √12, of the position: a lower bound, as no repeated runs are compared here.".into(),
+            motion_how: format!(
+                "The motor voltage drives each model, {}.",
+                self.driven
+            ),
             torque_lead: Vec::new(),
             places: Vec::new(),
             gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
@@ -170,7 +174,7 @@ impl Told<'_> {
             joint: self.joint(),
             set,
             parameters: self.parameters(last, k - 1),
-            p_value: own.map_or(1.0, |t| (t.p_value * round.len() as f64).min(1.0)),
+            p_value: own.map_or(1.0, |t| t.p_value),
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
@@ -236,7 +240,7 @@ impl Told<'_> {
                 step,
                 gain: 1.0 - t.unseen.unwrap_or(before) / before,
                 gain_sigmas: 0.0,
-                p_value: (t.p_value * round.len() as f64).min(1.0),
+                p_value: t.p_value,
                 refused: t.refused.clone(),
             };
             round.iter().map(one).collect::<Vec<_>>()

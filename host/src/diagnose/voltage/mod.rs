@@ -35,6 +35,8 @@ use crate::robot::{JointKind, Robot};
 
 /// Longest stretch that is simulated in one, s: a joint without weight drifts from its start without bounds.
 const LONGEST: f64 = 10.0;
+/// An effect that makes the motion of recordings held back worse by more than this share of its RMS does not stand.
+const WORSE: f64 = 0.02;
 /// Most recordings that are drawn.
 const DRAWN: usize = 4;
 
@@ -76,23 +78,41 @@ pub fn diagnose_voltage(
     progress(0.2);
     let mut rounds = Vec::new();
     let mut unseen = Vec::new();
-    let models = bench.run(&nominal, &mut |round, before, trials| {
+    let mut models = bench.run(&nominal, &mut |round, before, trials| {
         unseen.push(before);
         rounds.push(trials.to_vec());
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
     let judge = search(&sealed);
+    let mut holdout: Vec<f64> = if sealed.is_empty() {
+        Vec::new()
+    } else {
+        models.iter().map(|m| judge.freely(m)).collect()
+    };
+    // An effect that spoils a motion it was not fitted to does not stand, nor do those that came after it.
+    let spoilt = holdout
+        .windows(2)
+        .position(|pair| pair[1] > (1.0 + WORSE) * pair[0]);
+    if let Some(k) = spoilt {
+        holdout.truncate(k + 1);
+        let taken = models
+            .drain(k + 1..)
+            .next()
+            .and_then(|m| m.effects.last().copied());
+        rounds.truncate(k + 1);
+        for trial in rounds.iter_mut().flatten() {
+            if trial.refused.is_empty() && Some(trial.kind) == taken {
+                trial.refused = "makes the motion of the recordings held back worse".into();
+            }
+        }
+    }
     let drawn = if sealed.is_empty() { &bench } else { &judge };
     let found = Told {
         curves: curves(&robot.joints[0].name, drawn, &models),
         robot,
         floor: floor(&train),
         train: models.iter().map(|m| bench.freely(m)).collect(),
-        holdout: if sealed.is_empty() {
-            Vec::new()
-        } else {
-            models.iter().map(|m| judge.freely(m)).collect()
-        },
+        holdout,
         deviations: models.iter().map(|m| bench.deviations(m)).collect(),
         models,
         rounds,

@@ -13,9 +13,11 @@ use crate::prepare::each_of;
 const FOLDS: usize = 4;
 /// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
 const BLOCKS: usize = 8;
+/// Length of the pieces whose errors are compared, s.
+const PIECE: f64 = 2.0;
 /// Share of the error on recordings not fitted to that an effect has to take away.
 const LEAST_GAIN: f64 = 0.03;
-/// Level of the signed-rank test over the blocks.
+/// Level of the signed-rank test over the pieces.
 const LEVEL: f64 = 0.05;
 /// Candidates of a round that go to the cross-validation, the best by training error first.
 const SHORT_LIST: usize = 3;
@@ -41,7 +43,7 @@ pub(super) struct Trial {
     pub train: f64,
     /// RMS on blocks not fitted to; none where it did not come so far.
     pub unseen: Option<f64>,
-    /// Signed-rank test, not corrected.
+    /// Signed-rank test, corrected for the candidates that came to it.
     pub p_value: f64,
     /// Why it was not taken; empty for the one that was.
     pub refused: String,
@@ -70,7 +72,7 @@ pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
         Kind::Spring,
     ]
     .into_iter()
-    .filter(|kind| !without.contains(kind) && !(closed && *kind == Kind::MeasurementDelay))
+    .filter(|kind| !(without.contains(kind) || closed && *kind == Kind::MeasurementDelay))
     .collect()
 }
 
@@ -170,38 +172,34 @@ impl Search<'_> {
         if self.rms(&b) < self.rms(&a) { b } else { a }
     }
 
-    /// RMS of every block, of a model fitted to the other folds.
-    fn unseen(&self, model: &Model) -> Vec<f64> {
+    /// Sum of squares and number of rows of every piece of the recordings, of a model fitted to other blocks; infinite where
+    /// that cannot be simulated.
+    fn unseen(&self, model: &Model) -> Vec<[f64; 2]> {
         let blocks = self.blocks();
         let folds = FOLDS.min(blocks.len()).max(1);
-        let mut errors = vec![0.0; blocks.len()];
+        let mut pieces = vec![Vec::new(); blocks.len()];
         for fold in 0..folds {
-            let rest = |at: usize| at % folds != fold;
-            let pick = |keep: bool| -> Vec<(usize, Segment)> {
-                let numbered = blocks.iter().enumerate();
-                numbered
-                    .filter(|(at, _)| rest(*at) == keep)
-                    .map(|(_, b)| *b)
-                    .collect()
-            };
-            let fitted = self.fitted(model, pick(true));
-            for at in (0..blocks.len()).filter(|at| !rest(*at)) {
-                errors[at] = self.problem(model, vec![blocks[at]]).rms(&fitted.theta);
+            let kept = |at: &usize| at % folds == fold;
+            let rest = (0..blocks.len()).filter(|at| !kept(at));
+            let fitted = self.fitted(model, rest.map(|at| blocks[at]).collect());
+            for at in (0..blocks.len()).filter(kept) {
+                let (log, segment) = blocks[at];
+                let t = &self.logs[log].t[segment.from..segment.to];
+                let residual = self
+                    .problem(model, vec![blocks[at]])
+                    .residual(&fitted.theta);
+                let place = |k: usize| ((t[k] - t[0]) / PIECE) as usize;
+                let count = place(t.len() - 1) + 1;
+                let mut sums = vec![[0.0; 2]; count];
+                for k in 0..t.len() {
+                    let error = residual.as_ref().map_or(f64::INFINITY, |r| r[k]);
+                    let sum = &mut sums[place(k)];
+                    *sum = [sum[0] + error * error, sum[1] + 1.0];
+                }
+                pieces[at] = sums;
             }
         }
-        errors
-    }
-
-    fn pooled(&self, errors: &[f64]) -> f64 {
-        let rows = self
-            .blocks()
-            .into_iter()
-            .map(|(_, s)| (s.to - s.from) as f64);
-        let (sum, count) = errors
-            .iter()
-            .zip(rows)
-            .fold((0.0, 0.0), |(s, c), (e, rows)| (s + rows * e * e, c + rows));
-        (sum / f64::max(count, 1.0)).sqrt()
+        pieces.into_iter().flatten().collect()
     }
 
     /// `model` with one more effect, fitted to all recordings from several starts.
@@ -295,23 +293,24 @@ impl Search<'_> {
             });
             trials.sort_by(|a, b| a.train.total_cmp(&b.train));
             let before = self.unseen(&model);
-            let whole = self.pooled(&before);
+            let whole = pooled(&before);
             let count = SHORT_LIST.min(trials.len());
             each_of(self.threads, &mut trials[..count], &|_, trial| {
                 let Some(found) = &trial.model else { return };
                 let after = self.unseen(found);
-                let rms = self.pooled(&after);
+                let rms = pooled(&after);
                 trial.unseen = Some(rms);
-                let pairs = before.iter().zip(&after).filter(|(b, a)| a != b);
-                let wins = pairs.clone().filter(|(b, a)| a < b).count();
-                let gains: Vec<f64> = pairs.map(|(b, a)| (b / a).ln()).collect();
-                trial.p_value = signed_rank(&gains);
+                let gains: Vec<f64> = (before.iter().zip(&after))
+                    .map(|(b, a)| (b[0] / a[0]).ln())
+                    .collect();
+                let wins = gains.iter().filter(|g| **g > 0.0).count();
+                trial.p_value = (count as f64 * signed_rank(&gains)).min(1.0);
                 trial.refused = if !(rms <= (1.0 - LEAST_GAIN) * whole) {
                     "takes less than 3 % off the motion of recordings it was not fitted to".into()
                 } else if trial.p_value > LEVEL {
                     format!(
-                        "helps {wins} of {} recordings not fitted to, which may be chance",
-                        before.len()
+                        "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
+                        gains.len()
                     )
                 } else {
                     String::new()
@@ -339,10 +338,16 @@ impl Search<'_> {
     }
 }
 
+/// RMS over pieces.
+fn pooled(pieces: &[[f64; 2]]) -> f64 {
+    let [sum, rows] = (pieces.iter()).fold([0.0; 2], |a, p| [a[0] + p[0], a[1] + p[1]]);
+    (sum / f64::max(rows, 1.0)).sqrt()
+}
+
 /// Chance of such gains where each is as likely to be a loss of its size: Wilcoxon's signed-rank test (1945), one-sided, its
-/// distribution exact. `gains` are logarithms of error before over after; those of zero say nothing.
+/// distribution exact. `gains` are logarithms of error before over after; those of zero, or of no number, say nothing.
 pub(super) fn signed_rank(gains: &[f64]) -> f64 {
-    let mut gains: Vec<f64> = gains.iter().copied().filter(|g| *g != 0.0).collect();
+    let mut gains: Vec<f64> = gains.iter().copied().filter(|g| g.abs() > 0.0).collect();
     gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let largest = gains.len() * (gains.len() + 1) / 2;
     // Chance of each sum of the ranks of gains.

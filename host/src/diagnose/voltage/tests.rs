@@ -1,26 +1,13 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::*;
-use crate::data::{Block, EffortNeed, JointColumns, Source, data_dir};
-use crate::diagnose::outcome::Verdict;
+use crate::data::{Block, JointColumns};
 use crate::prepare::InMemory;
 use crate::robot::XL330;
 
 fn robot() -> Robot {
     Robot::from_toml(XL330, Path::new("xl330.toml")).unwrap()
-}
-
-fn recordings(robot: &Robot, of: impl Fn(&str) -> bool) -> Vec<Source> {
-    let Some(folder) = data_dir().map(|d| d.join("rhoban_xl330")) else {
-        return Vec::new();
-    };
-    let entries = std::fs::read_dir(folder).map(|list| list.flatten().map(|e| e.path()));
-    let mut paths: Vec<PathBuf> = entries.map(Iterator::collect).unwrap_or_default();
-    paths.retain(|p| p.extension().is_some_and(|e| e == "csv") && of(&p.display().to_string()));
-    paths.sort();
-    let open = |p: &PathBuf| Source::open_with(p, robot, EffortNeed::Optional).unwrap();
-    paths.iter().map(open).collect()
 }
 
 fn list<R: Recording>(sources: &[R]) -> Vec<&dyn Recording> {
@@ -30,28 +17,6 @@ fn list<R: Recording>(sources: &[R]) -> Vec<&dyn Recording> {
 fn found(train: &[&dyn Recording], sealed: &[&dyn Recording]) -> (Diagnosis, Robot) {
     let robot = robot();
     diagnose_voltage(&robot, train, sealed, &Options::default(), &mut |_| ()).unwrap()
-}
-
-#[test]
-fn the_servo_lacks_friction_that_grows_with_the_load() {
-    let robot = robot();
-    let train = recordings(&robot, |name| !name.contains("kp200"));
-    let sealed = recordings(&robot, |name| name.contains("kp200"));
-    if train.is_empty() {
-        println!("skipped: the recordings of the XL330 are not here");
-        return;
-    }
-    let (found, model) = found(&list(&train), &list(&sealed));
-    println!("{:?} {:?}", found.waterfall, found.steps);
-    // A published study of this servo names it, too (Duclusaud et al. 2024, models M3 to M6).
-    assert_eq!(found.steps[0].effect, "load_friction");
-    let unseen = &found.waterfall[0].holdout;
-    assert!(unseen[unseen.len() - 1] < 0.7 * unseen[0], "{unseen:?}");
-    // The free-running error is far above the encoder's step, and that is said.
-    assert_eq!(found.verdict, Verdict::Remainder);
-    let text = model.to_toml().unwrap();
-    let again = Robot::from_toml(&text, Path::new("model.toml")).unwrap();
-    assert_eq!(again.effects.len(), found.steps.len());
 }
 
 /// A pendulum under voltage by small semi-implicit Euler steps: its own physics, no step of the simulation under test.
@@ -131,4 +96,54 @@ fn signed_ranks_have_their_exact_chances() {
     assert_eq!(p(&[-0.1, -0.2, 0.0]), 1.0);
     // Six of eight, the two losses small: tabulated (Wilcoxon 1945), 5/256 for ranks 1 and 2 lost.
     assert!((p(&[-0.1, -0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]) - 5.0 / 256.0).abs() < 1e-15);
+}
+
+#[test]
+fn a_servo_law_is_read_off_its_voltage() {
+    let t: Vec<f64> = (0..1000).map(|k| 5.0e-3 * k as f64).collect();
+    let q: Vec<f64> = t.iter().map(|t| 0.5 * (3.0 * t).sin()).collect();
+    let reference: Vec<f64> = t.iter().map(|t| 0.9 * (3.0 * t + 0.4).sin()).collect();
+    // The supply sags by 0.5 V at full share; its reading jumps from row to row.
+    let share = |k: usize| (2.0 * (reference[k] - q[k])).clamp(-0.8, 0.8);
+    let jump = |k: usize| if k.is_multiple_of(2) { 0.3 } else { -0.3 };
+    let supply: Vec<f64> = (0..t.len())
+        .map(|k| 7.4 - 0.5 * share(k).abs() + jump(k))
+        .collect();
+    let mut log = Log {
+        u: (0..t.len()).map(|k| share(k) * supply[k]).collect(),
+        on: vec![true; t.len()],
+        t,
+        q,
+        reference,
+        supply,
+        ..Log::default()
+    };
+    let law = law::Law::of(&log).unwrap();
+    assert!(
+        (law.proportional - 2.0).abs() < 1e-9 && law.derivative == 0.0,
+        "{law:?}"
+    );
+    assert!((law.most - 0.8).abs() < 1e-12, "{law:?}");
+    assert!(
+        (law.supply[0] - 7.4).abs() < 0.02 && (law.supply[1] + 0.5).abs() < 0.05,
+        "{law:?}"
+    );
+    assert!((law.voltage(0.1, 0.0, 3.0) - 0.2 * 7.3).abs() < 0.01);
+    // A voltage that follows something else.
+    log.u.reverse();
+    assert_eq!(law::Law::of(&log), None);
+}
+
+#[test]
+fn a_voltage_against_the_motion_is_a_fault_of_the_data() {
+    let runs = [0, 1].map(|number| {
+        let mut run = pendulum(number, 0.0);
+        for u in run.blocks[0].joints[0].voltage.iter_mut().flatten() {
+            *u = -*u;
+        }
+        run
+    });
+    let found = found(&list(&runs), &[]).0;
+    let kinds: Vec<&str> = found.data_faults.iter().map(|f| f.kind.as_str()).collect();
+    assert_eq!(kinds, ["sign"], "{found:?}");
 }

@@ -3,7 +3,7 @@
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::locate::Coordinate;
-use crate::diagnose::rows::{Column, Rows};
+use crate::diagnose::rows::{Column, Rows, combined};
 use crate::prepare::central_difference;
 use crate::robot::Robot;
 
@@ -23,7 +23,9 @@ pub(super) const ACROSS: usize = 0;
 
 /// Currents below which a dead zone fades, because ripple crosses zero within the pulse, A: from none to half an ampere, as
 /// switching and inductance have it.
-pub(super) const FADES: [f64; 7] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+pub(super) const FADES: [f64; 11] = [
+    0.0, 0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.17, 0.25, 0.5,
+];
 
 /// Rows of one joint's voltage with the columns of its winding.
 pub(super) struct Equation {
@@ -106,6 +108,16 @@ impl Equation {
             current,
             speed,
         }))
+    }
+
+    /// What more fading would change, so that its being unknown widens the interval of the rest; nothing at the grid's ends.
+    pub(super) fn fading(&self, k: usize) -> Vec<Column> {
+        let around = k
+            .checked_sub(1)
+            .and_then(|before| Some((self.dead_zones.get(before)?, self.dead_zones.get(k + 1)?)));
+        (around.into_iter())
+            .map(|(before, after)| combined(1, [(before, -1.0), (after, 1.0)]))
+            .collect()
     }
 
     /// What the voltage may depend on; the current stands at [`ACROSS`].

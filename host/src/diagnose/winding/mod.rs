@@ -178,7 +178,7 @@ fn winding(
     let all: Vec<_> = columns.iter().copied().chain(dead(fade)).collect();
     let stands = refused.is_none();
     let after = match stands {
-        true => solve(&plain, &all, &[]).ok_or_else(lacking)?,
+        true => solve(&plain, &all, &training.fading(fade)).ok_or_else(lacking)?,
         false => before.clone(),
     };
     let mut last = base.clone();

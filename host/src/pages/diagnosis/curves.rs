@@ -15,6 +15,9 @@ pub(super) fn section(found: &Diagnosis) -> Option<Section> {
         "Measured and predicted, over time",
         "A stretch of a recording, with the model refitted but without the effects, and with them. First the curves themselves, then what each model misses: the smaller the lower curve, the better.",
     );
+    if !found.motion_how.is_empty() {
+        section = section.with(Block::Text(found.motion_how.clone()));
+    }
     for curves in drawn {
         let unit = found
             .waterfall

@@ -27,7 +27,7 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
                 "How much torque each model leaves unexplained: first the description as it was given, then the same equations with their parameters fitted again, then each effect added in turn. Where the bars reach the line, nothing but noise is left."
             }
             Residual::Position => {
-                "How far the position of each model runs away from the recorded one when it is driven by the recorded voltage alone, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
+                "How far the position of each model runs away from the recorded one when it is driven by the motor voltage, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
             }
         },
     );
@@ -81,7 +81,8 @@ fn bars(found: &Diagnosis, w: &Waterfall) -> Plot {
         .iter()
         .chain(&w.holdout)
         .fold(0.0f64, |m, v| m.max(*v));
-    let tall = w.floor > 0.0 && highest > TALL * w.floor;
+    // A free-running position stays far above the encoder's step; there is no fall to a floor to show.
+    let tall = found.residual == Residual::Torque && w.floor > 0.0 && highest > TALL * w.floor;
     let (y, style) = if tall {
         (Axis::log("residual RMS", unit), Style::Line)
     } else {

@@ -1,7 +1,7 @@
 //! What these data could not say, what was tried, and what to do next.
 
 use super::{parts, words};
-use crate::diagnose::outcome::{Diagnosis, NotTestable, Tried};
+use crate::diagnose::outcome::{Diagnosis, NotTestable, Residual, Tried};
 use crate::report::{Block, Column, Section, Table, format_p_value, format_significant};
 
 /// A longer table is folded.
@@ -170,37 +170,42 @@ pub(super) fn tried(found: &Diagnosis) -> Option<Section> {
         }
         list.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let taken = list.iter().any(|t| t.refused.is_empty());
+        // Positions are compared piece by piece of recordings, by a test that has no such figure.
+        let sigmas = found.residual == Residual::Torque;
+        let mut columns = vec![
+            Column::text("Effect"),
+            Column::text("Joint"),
+            Column::number("Takes away", "%"),
+        ];
+        if sigmas {
+            columns.push(Column::number("Gain over its std", ""));
+        }
+        columns.extend([Column::number("p", ""), Column::text("Outcome")]);
+        let row = |t: &&Tried| {
+            let mut row = vec![
+                words::name(&t.effect),
+                words::or_dash(&t.joint),
+                parts::percent(t.gain),
+            ];
+            if sigmas {
+                row.push(format_significant(t.gain_sigmas, 2));
+            }
+            row.push(format_p_value(t.p_value));
+            row.push(if t.refused.is_empty() {
+                "taken".into()
+            } else {
+                format!("refused: {}", t.refused)
+            });
+            row
+        };
         let table = Table {
             caption: format!(
                 "Round {}{}, the largest gain first",
                 round + 1,
                 if taken { "" } else { ": nothing was taken" }
             ),
-            columns: vec![
-                Column::text("Effect"),
-                Column::text("Joint"),
-                Column::number("Takes away", "%"),
-                Column::number("Gain over its std", ""),
-                Column::number("p", ""),
-                Column::text("Outcome"),
-            ],
-            rows: list
-                .iter()
-                .map(|t| {
-                    vec![
-                        words::name(&t.effect),
-                        words::or_dash(&t.joint),
-                        parts::percent(t.gain),
-                        format_significant(t.gain_sigmas, 2),
-                        format_p_value(t.p_value),
-                        if t.refused.is_empty() {
-                            "taken".into()
-                        } else {
-                            format!("refused: {}", t.refused)
-                        },
-                    ]
-                })
-                .collect(),
+            columns,
+            rows: list.iter().map(row).collect(),
             note: "Takes away: share of the residual's RMS on stretches that the effect was not fitted to; below zero it makes things worse there.".into(),
         };
         section
