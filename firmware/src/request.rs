@@ -177,7 +177,6 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     state.position = state.counts as f32 * state.derived.radians_per_count;
     state.reference.position = state.position;
     state.placed = true;
-    state.effects.displace();
     // Windows that are open hold counts from the old origin.
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);

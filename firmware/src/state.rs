@@ -255,7 +255,8 @@ impl State {
         self.restart_estimator();
     }
 
-    /// What follows from effects that have been replaced.
+    /// What follows from effects that have been replaced. Not inlined: the tick's fast memory has no room for what is seldom.
+    #[inline(never)]
     fn renew(&mut self) {
         self.settings.effects = self.compensation.effects();
         self.effects = compensation::State::default();

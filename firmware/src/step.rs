@@ -119,7 +119,9 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let step = counts - state.counts;
     state.counts = counts;
     // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
-    state.position = counts as f32 * state.derived.radians_per_count;
+    // In 32 bits where they are enough, which the chip converts by hardware.
+    let exact = i32::try_from(counts).map_or(counts as f32, |counts| counts as f32);
+    state.position = exact * state.derived.radians_per_count;
     state.velocity = motion.velocity * state.derived.radians_per_count;
     let (position, velocity) = (state.position, state.velocity);
     compensate::correct(config, state);
@@ -298,8 +300,10 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
     let peak = state.settings.limits.peak_current;
     let wanted = wish.max(-peak).min(peak);
     limits.set(Limit::Current, wanted != wish);
-    // In the direction of the wanted current, not of the noisy one, and fading where the ripple crosses zero.
-    let fade = (wanted * state.derived.fade_per_ampere).clamp(-1.0, 1.0);
+    // In the direction that the current will have, not in that of the noisy or of the wanted one, and fading where the ripple
+    // crosses zero.
+    let expected = current::expect(&state.derived.current, &mut state.current_loop, wanted);
+    let fade = (expected * state.derived.fade_per_ampere).clamp(-1.0, 1.0);
     state.regained = state.lost_voltage * fade;
     let output = current::step(
         &state.derived.current,

@@ -10,7 +10,8 @@
 //!   the faster of reference and link, any other at the reference: no torque grows with the measured speed.
 //! * **What stands at a position** as well as in motion (cogging, eccentricity, springs, tilt) is given in full at the
 //!   measured position: it is a known torque like gravity, and wrong by the error of the position alone. Its speed
-//!   is the reference's, for the reason above.
+//!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
+//!   is given for where the link will be when the torque acts ([`Now::lead`]).
 //! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
 //!   fed by the measured way it would close a loop of positive sign.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
@@ -24,105 +25,27 @@
 //! Beside the torque to give, a tick says what of the drive's torque the effects *explain*: the same laws at the
 //! measured motion, in full. An estimator of the standard model must not see that part, or its parameters absorb it.
 //!
-//! Leaves out: what the feed-forward does not reach because of the current loop's lag; effects that name another
-//! joint.
+//! Leaves out: that the current loop gives fast torques smaller; effects that name another joint.
 
+mod compensated;
 mod now;
 mod role;
+mod wave;
 
 pub use now::Now;
 pub use role::{EffectFault, Role};
 
-use crate::effects::{Effect, Instant, Kind, Memory, Parameter, Scale};
+use crate::effects::{Effect, Instant, Kind, Memory};
 use crate::precompensation::{PrecompensationSettings, direction, finite, share};
 use crate::scalar::{Real, Scalar};
+use compensated::{Compensated, evaluate};
+use wave::{Stand, Waves};
 
 /// Most effects that a rig compensates.
 pub const EFFECTS: usize = 8;
 
 /// The effects of a rig, from the front.
 pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
-
-/// Slow and fast, rad/s: whether an effect falls with speed.
-const SPEEDS: [f64; 2] = [1e-3, 10.0];
-/// The slope of the encoder's error is taken over this angle of the motor, rad: within 1 % for an error of once a
-/// turn, a hundred times above the rounding of `f32`.
-const SLOPE_SPAN: f64 = 0.02;
-
-/// An effect that has passed its checks, with what follows from it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Compensated<T> {
-    effect: Effect<T>,
-    role: Role,
-    /// All shapes are whole: the motor's angle within a turn says as much as the angle itself, and better.
-    whole: bool,
-    /// It is smaller at high speed than at low speed.
-    falls: bool,
-}
-
-impl<T: Scalar> Compensated<T> {
-    fn new(effect: Effect<T>) -> Result<Self, EffectFault> {
-        let kind = effect.kind;
-        let role = Role::of(kind).ok_or(EffectFault::NotCompensable(kind))?;
-        let about = kind.about();
-        within(about.gains, &effect.gains, false)?;
-        within(about.shapes, &effect.shapes, true)?;
-        let whole = |shape: &T| shape.to_f64() as i64 as f64 == shape.to_f64();
-        let sliding = |speed: f64| {
-            let at = Instant {
-                velocity: T::from_f64(speed),
-                direction: T::ONE,
-                load: T::ONE,
-                ..Instant::default()
-            };
-            evaluate(&effect, &mut Memory::default(), &at).abs()
-        };
-        Ok(Self {
-            effect,
-            role,
-            whole: effect.shapes.iter().all(whole),
-            falls: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
-        })
-    }
-}
-
-/// Every law of the registry is in here: once, not at every place that asks.
-#[inline(never)]
-fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: &Instant<T>) -> T {
-    let terms = effect
-        .kind
-        .compensated_terms(&effect.shapes, &mut memory.0, at);
-    let sum = effect
-        .gains
-        .iter()
-        .zip(terms)
-        .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term);
-    finite(sum)
-}
-
-/// `divided`: the law divides by those that are searched in ratios, and has no value where they are 0.
-fn within<T: Scalar>(
-    parameters: &[Parameter],
-    values: &[T],
-    divided: bool,
-) -> Result<(), EffectFault> {
-    for (k, value) in values.iter().enumerate() {
-        let value = value.to_f64();
-        let Some(parameter) = parameters.get(k) else {
-            if value == 0.0 {
-                continue;
-            }
-            return Err(EffectFault::Surplus);
-        };
-        let [low, high] = parameter.bounds;
-        let open = divided && parameter.scale == Scale::Logarithmic;
-        let above = if open { low < value } else { low <= value };
-        if !(above && value <= high && value.is_finite()) {
-            return Err(EffectFault::Parameter(parameter.name));
-        }
-    }
-    Ok(())
-}
 
 /// What effects ask for in a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -142,21 +65,12 @@ pub struct Reading<T> {
     pub slope: T,
 }
 
-/// What an effect does to the measured position, about the place where that was last worked out.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Tangent<T> {
-    place: T,
-    error: T,
-    slope: T,
-}
-
 /// What effects remember.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T: Real> {
     /// Of each law where the torque to give is taken from, and at the measured motion.
     memories: [[Memory<T>; 2]; EFFECTS],
-    tangents: [Tangent<T>; EFFECTS],
-    reading_turn: usize,
+    stand: Stand<T>,
     /// Value of each law where the torque to give is taken from: dry ones from the front, standing ones from the end.
     planned: [T; EFFECTS],
     /// Value of each dry law at the measured motion.
@@ -164,7 +78,7 @@ pub struct State<T: Real> {
     /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
     /// each round, so that no rounding piles up.
     sums: [T; 3],
-    turn: usize,
+    turn: u8,
 }
 
 impl<T: Real> State<T> {
@@ -177,10 +91,11 @@ impl<T: Real> State<T> {
         self.turn = 0;
     }
 
-    /// The link is said to stand elsewhere: what was worked out for another place no longer holds.
-    pub fn displace(&mut self) {
-        self.tangents = [Tangent::default(); EFFECTS];
-        self.reading_turn = 0;
+    /// Nobody knows where the link stands: what is periodic stands nowhere. Not inlined: it is seldom.
+    #[cold]
+    #[inline(never)]
+    fn forget(&mut self) {
+        self.stand = Stand::default();
     }
 }
 
@@ -206,8 +121,7 @@ pub struct Compensation<T> {
     standing: u8,
     /// Ticks until a law's turn comes again.
     round: T,
-    /// Effects in the position.
-    positions: u8,
+    waves: Waves<T>,
     /// Some effect depends on the transmitted torque.
     needs_load: bool,
 }
@@ -230,14 +144,14 @@ impl<T: Scalar> Compensation<T> {
                     all.add(k, all.dry, true);
                     all.dry += 1;
                 }
-                Role::Standing => {
+                Role::Standing if effect.kind.periodic().is_none() => {
                     all.standing += 1;
                     all.add(k, EFFECTS as u8 - all.standing, false);
                 }
-                Role::Position => all.positions += 1,
-                Role::Current | Role::Voltage => {}
+                Role::Standing | Role::Position | Role::Current | Role::Voltage => {}
             }
         }
+        all.waves = Waves::new(&all.effects);
         Ok(all)
     }
 
@@ -261,13 +175,13 @@ impl<T: Scalar> Compensation<T> {
     /// Whether there is a torque to work out.
     #[inline(always)]
     pub fn has_torque(&self) -> bool {
-        self.count > 0
+        self.count > 0 || self.waves.of_torque()
     }
 
-    /// Whether there is anything to take off the position.
+    /// Whether there is anything that turns with an angle, and is to be told of it at every tick.
     #[inline(always)]
-    pub fn has_position(&self) -> bool {
-        self.positions > 0
+    pub fn turns(&self) -> bool {
+        self.waves.any()
     }
 
     /// Whether an effect depends on the torque that the gear transmits.
@@ -302,61 +216,31 @@ impl<T: Scalar> Compensation<T> {
         sum
     }
 
-    /// What the encoder reads too much at this angle. Evaluated at the reading instead of the truth: wrong by the
-    /// error's own square.
-    ///
-    /// One effect is evaluated in a tick that has time, in turn, and continued along its tangent until its turn comes again.
+    /// Turns what is periodic to where the link is. What the encoder reads too much there: evaluated at the reading instead of
+    /// the truth, which is wrong by the error's own square.
     #[inline(always)]
-    pub fn reading(&self, state: &mut State<T>, now: &Now<T>) -> Reading<T> {
-        let mut reading = Reading::default();
-        if self.positions == 0 || !now.placed {
-            return reading;
+    pub fn turn(&self, state: &mut State<T>, now: &Now<T>) -> Reading<T> {
+        if !now.placed {
+            state.forget();
+            return Reading::default();
         }
-        let position = finite(now.position);
-        if !now.busy {
-            self.evaluate_tangent(state, now);
+        if now.turns {
+            self.waves.turn(&mut state.stand, now);
         }
-        let tangents = self.effects.iter().zip(&state.tangents);
-        for (_, at) in tangents.filter(|(one, _)| one.is_some_and(|one| one.role == Role::Position))
-        {
-            reading.error += at.error + at.slope * (position - at.place);
-            reading.slope += at.slope;
+        if !self.waves.of_position() {
+            return Reading::default();
         }
-        reading
-    }
-
-    /// Works out the tangent of the next effect in the position.
-    #[inline(always)]
-    fn evaluate_tangent(&self, state: &mut State<T>, now: &Now<T>) {
-        let span = T::from_f64(SLOPE_SPAN);
-        for _ in 0..EFFECTS {
-            let k = state.reading_turn;
-            state.reading_turn = if k + 1 < EFFECTS { k + 1 } else { 0 };
-            let (Some(Some(one)), Some(tangent)) = (self.effects.get(k), state.tangents.get_mut(k))
-            else {
-                continue;
-            };
-            if one.role != Role::Position {
-                continue;
-            }
-            let mut instant = now.instant(one.whole);
-            let here = evaluate(&one.effect, &mut Memory::default(), &instant);
-            instant.position += span / now.gear_ratio;
-            instant.motor_angle += span;
-            let ahead = evaluate(&one.effect, &mut Memory::default(), &instant);
-            *tangent = Tangent {
-                place: finite(now.position),
-                error: here,
-                slope: (ahead - here) * now.gear_ratio / span,
-            };
-            return;
+        let [motor, joint] = self.waves.position(&state.stand, now);
+        Reading {
+            error: motor.value + joint.value,
+            slope: motor.slope * now.gear_ratio + joint.slope,
         }
     }
 
     /// Torque to give, and torque that is explained. The result is finite for any input.
     ///
-    /// One law is evaluated a tick, in turn, and stands until its turn comes again: a single effect of position at
-    /// every tick, four dry ones every eighth, eight every sixteenth, each in the middle of the time that it stands for.
+    /// One law is evaluated in a tick that has time, in turn, and stands until its turn comes again, each in the middle of the
+    /// time that it stands for. Periodic ones are as [`turn`](Self::turn) has left them, which is to be called first.
     #[inline(always)]
     pub fn torque(
         &self,
@@ -377,10 +261,20 @@ impl<T: Scalar> Compensation<T> {
         } else {
             T::ZERO
         };
-        Output {
+        let mut output = Output {
             feed: share * dry + standing,
             explained: sliding + standing,
+        };
+        if self.waves.of_torque() {
+            let [torque, of_drive] = self.waves.torque(&state.stand, now);
+            let drive = finite(now.drive_torque);
+            output.feed += torque.value + drive * of_drive.value;
+            // Given for where the link will be, explained where it is.
+            let way = -now.lead * finite(now.velocity) * now.gear_ratio;
+            let [torque, of_drive] = [torque, of_drive].map(|sum| sum.after(way));
+            output.explained += torque.value + drive * of_drive.value;
         }
+        output
     }
 
     /// The sums anew.
@@ -403,10 +297,13 @@ impl<T: Scalar> Compensation<T> {
         state: &mut State<T>,
         now: &Now<T>,
     ) {
-        let Some(job) = self.jobs.get(state.turn) else {
+        if self.count == 0 {
+            return;
+        }
+        let Some(job) = self.jobs.get(usize::from(state.turn)) else {
             return;
         };
-        state.turn = if state.turn + 1 < usize::from(self.count) {
+        state.turn = if state.turn + 1 < self.count {
             state.turn + 1
         } else {
             0

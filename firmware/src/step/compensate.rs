@@ -17,7 +17,13 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
     let turn = config.encoder.counts_per_motor_turn as i32;
     // Exact to a count as long as the counts are below 2³¹.
     let counts = state.counts as i32;
-    let within = counts.checked_rem_euclid(turn).unwrap_or_default();
+    // An odd tick: the estimator's update, the dearest thing that a tick does, comes in even ones.
+    let busy = state.tick & (EVERY - 1) != 1;
+    let within = if busy {
+        0
+    } else {
+        counts.checked_rem_euclid(turn).unwrap_or_default()
+    };
     Now {
         reference: Reference::default(),
         position: state.position,
@@ -26,26 +32,27 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
         motor_angle: counts as f32 * per_count,
         angle_in_turn: within as f32 * per_count,
         placed: state.placed,
-        // An odd tick: the estimator's update, the dearest thing that a tick does, comes in even ones.
-        busy: state.tick & (EVERY - 1) != 1,
+        busy,
+        turns: state.tick & 1 != 0,
         drive_torque: state.drive_torque,
         load: 0.0,
         // To a tenth of a second, without the conversion of a 64-bit number.
         time: (state.tick >> 10) as u32 as f32 * (1024.0 * state.derived.period),
         warming: state.warming,
         period: EVERY as f32 * state.derived.period,
+        lead: state.derived.current.lag,
     }
 }
 
-/// Takes the encoder's error off position and velocity.
+/// Turns periodic effects with the link, and takes the encoder's error off position and velocity.
 #[inline(always)]
 pub(crate) fn correct(config: &Config, state: &mut State) {
-    if !state.compensation.has_position() {
+    if !state.compensation.turns() {
         state.position_error = 0.0;
         return;
     }
     let now = now(config, state);
-    let Reading { error, slope } = state.compensation.reading(&mut state.effects, &now);
+    let Reading { error, slope } = state.compensation.turn(&mut state.effects, &now);
     state.position -= error;
     state.velocity -= slope * state.velocity;
     state.position_error = error;

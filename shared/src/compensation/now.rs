@@ -23,6 +23,9 @@ pub struct Now<T> {
     pub placed: bool,
     /// Whether the tick has enough else to do: the laws then stand as they are for one tick more.
     pub busy: bool,
+    /// Whether what is periodic is turned in this tick, as it must be in every one that is not busy; in the others it goes along
+    /// its parabola.
+    pub turns: bool,
     /// Torque that the drive gives, N·m.
     pub drive_torque: T,
     /// Torque that the gear transmits, N·m.
@@ -33,6 +36,8 @@ pub struct Now<T> {
     pub warming: T,
     /// Time since the last tick that was not busy, s.
     pub period: T,
+    /// How long a torque that is ordered takes to act, s.
+    pub lead: T,
 }
 
 impl<T: Real> Now<T> {

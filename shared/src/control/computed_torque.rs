@@ -26,9 +26,10 @@ pub fn step<T: Real<Mask = bool>>(
         + (config.gains.proportional * (reference.position - measured.position)
             + config.gains.derivative * (reference.velocity - measured.velocity))
             / config.design_inertia;
-    let load = model.inertia * acceleration + model.gravity_torque(measured.position);
+    let gravity = model.gravity_torque(measured.position);
+    let load = model.inertia * acceleration + gravity;
     // The feedback part would carry measurement noise into the load: the planned load decides friction.
-    let planned = model.inertia * reference.acceleration + model.gravity_torque(measured.position);
+    let planned = model.inertia * reference.acceleration + gravity;
     let dry = Friction {
         viscous: T::ZERO,
         viscous_asymmetry: T::ZERO,

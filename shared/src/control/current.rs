@@ -22,11 +22,19 @@ pub struct Config<T> {
     pub integral: T,
     /// Largest share of the supply that the bridge may use, 0 to 1.
     pub duty_limit: T,
+    /// How long the current takes to be what its reference was, s.
+    pub lag: T,
+    /// Share of the way to its reference that the current goes in a period.
+    pub closed: T,
 }
 
 impl<T: Real> Config<T> {
     /// The loop for a drive, a bandwidth ([`Gains::current_bandwidth`], Hz) and a period (s). Resistance and
     /// inductance must be above zero.
+    ///
+    /// The lag is the inverse of the velocity gain of the loop, which is of type 1: the time by which a ramp, and near enough
+    /// any slow change, comes late, whatever the delay between computing and applying a voltage (Franklin, Powell and
+    /// Emami-Naeini 2015, sec. 4.2).
     pub fn design(drive: &Drive<T>, gains: &Gains<T>, period: T, duty_limit: T) -> Self {
         let omega = T::from_f64(core::f64::consts::TAU) * gains.current_bandwidth;
         let closed = one_minus_exp(omega * period);
@@ -35,6 +43,8 @@ impl<T: Real> Config<T> {
             proportional: closed * drive.resistance / open,
             integral: closed * drive.resistance,
             duty_limit,
+            lag: period / closed,
+            closed,
         }
     }
 }
@@ -50,6 +60,16 @@ fn one_minus_exp<T: Real>(x: T) -> T {
 pub struct State<T> {
     /// Voltage that the integrator holds, V.
     pub integral: T,
+    /// What the current should be at the end of the period, A.
+    pub expected: T,
+}
+
+/// What the current will be when the voltage for this reference acts, A: the reference behind the loop's lag. It turns
+/// where the current does, without its noise. To be asked once in a period.
+#[inline(always)]
+pub fn expect<T: Real>(config: &Config<T>, state: &mut State<T>, reference: T) -> T {
+    state.expected += config.closed * (reference - state.expected);
+    state.expected
 }
 
 /// What the loop sees in one period.
@@ -171,6 +191,31 @@ mod tests {
         }
     }
 
+    /// A ramp, with the period between computing and applying a voltage that a board has, and without.
+    #[test]
+    fn a_ramp_comes_late_by_the_lag() {
+        let config = config();
+        for delayed in [false, true] {
+            let (mut state, mut current, mut held) = (State::default(), 0.0, 0.0);
+            for tick in 0..400 {
+                let reference = 10.0 * PERIOD * f64::from(tick);
+                if tick > 300 {
+                    let late = (reference - current) / 10.0;
+                    assert!((late / config.lag - 1.0).abs() < 1e-6, "{late}");
+                }
+                let input = Input {
+                    reference,
+                    current,
+                    back_emf: 0.0,
+                    supply: 24.0,
+                };
+                let voltage = step(&config, &mut state, input).voltage;
+                wind(&mut current, if delayed { held } else { voltage }, 0.0);
+                held = voltage;
+            }
+        }
+    }
+
     #[test]
     fn voltage_limit_is_kept_and_the_integrator_does_not_wind_up() {
         let (mut state, mut current) = (State::default(), 0.0);
@@ -216,7 +261,10 @@ mod tests {
 
     #[test]
     fn no_supply_or_no_number_gives_no_voltage() {
-        let mut state = State { integral: 1.0 };
+        let mut state = State {
+            integral: 1.0,
+            ..State::default()
+        };
         for input in [
             Input {
                 reference: 1.0,

@@ -26,6 +26,18 @@ pub enum Direction {
     Indifferent,
 }
 
+/// Of what a periodic effect is a sinusoid: its terms are cosine and sine of its first shape, the order, times that angle,
+/// and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Periodic {
+    /// Of the motor's angle.
+    Motor,
+    /// Of the motor's angle, times the torque of the drive.
+    MotorTimesDrive,
+    /// Of the joint's angle.
+    Joint,
+}
+
 /// How a parameter is searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {

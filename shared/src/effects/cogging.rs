@@ -1,8 +1,8 @@
 //! Detent torque of the motor's magnets.
 
 use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale, wave,
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,
+    SHAPES, Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -52,6 +52,7 @@ impl Law for Cogging {
         compensable: true,
         leaves_out: "higher harmonics of the order",
     };
+    const PERIODIC: Option<Periodic> = Some(Periodic::Motor);
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {

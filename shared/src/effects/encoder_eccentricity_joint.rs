@@ -1,8 +1,8 @@
 //! A code disc or magnet off the joint's axis.
 
 use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale, wave,
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,
+    SHAPES, Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -59,6 +59,7 @@ impl Law for EncoderEccentricityJoint {
         compensable: false,
         leaves_out: "interpolation errors within a line of the code disc",
     };
+    const PERIODIC: Option<Periodic> = Some(Periodic::Joint);
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {

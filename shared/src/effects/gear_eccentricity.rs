@@ -1,8 +1,8 @@
 //! Torque of teeth whose lever arm varies over a turn.
 
 use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale, wave,
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,
+    SHAPES, Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -69,6 +69,7 @@ impl Law for GearEccentricity {
         compensable: true,
         leaves_out: "the error of the joint's angle that comes with it, amplitudes that grow with the load",
     };
+    const PERIODIC: Option<Periodic> = Some(Periodic::Motor);
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {

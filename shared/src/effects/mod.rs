@@ -37,7 +37,7 @@ mod torque_saturation;
 mod viscous_warmup_temperature;
 mod viscous_warmup_time;
 
-pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Scale};
+pub use about::{About, Channel, Confusion, Direction, Need, Parameter, Periodic, Scale};
 pub use backlash::transmitted;
 
 use postcard_schema::Schema;
@@ -95,6 +95,8 @@ fn wave<T: Real>(order: T, angle: T) -> [T; GAINS] {
 trait Law {
     /// What it is.
     const ABOUT: About;
+    /// Of what it is a sinusoid, where it is one.
+    const PERIODIC: Option<Periodic> = None;
 
     /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
     fn terms<T: Real>(
@@ -126,6 +128,13 @@ macro_rules! registry {
                 }
             }
 
+            /// Of what it is a sinusoid, where it is one.
+            pub const fn periodic(self) -> Option<Periodic> {
+                match self {
+                    $(Self::$kind => <$module::$kind as Law>::PERIODIC),+
+                }
+            }
+
             /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
             #[inline(always)]
             pub fn terms<T: Real>(
@@ -139,7 +148,8 @@ macro_rules! registry {
                 }
             }
 
-            /// The same without the laws that nothing compensates, whose code a chip need not hold: 0.
+            /// The same without the laws that nothing compensates, and without the periodic ones, which are turned with the
+            /// angle instead: a chip need not hold their code. 0 for them.
             #[inline(always)]
             pub(crate) fn compensated_terms<T: Real>(
                 self,
@@ -149,7 +159,10 @@ macro_rules! registry {
             ) -> [T; GAINS] {
                 match self {
                     $(Self::$kind => {
-                        if const { Role::by(&<$module::$kind as Law>::ABOUT).is_some() } {
+                        if const {
+                            Role::by(&<$module::$kind as Law>::ABOUT).is_some()
+                                && <$module::$kind as Law>::PERIODIC.is_none()
+                        } {
                             $module::$kind::terms(shapes, memory, at)
                         } else {
                             [T::ZERO; GAINS]

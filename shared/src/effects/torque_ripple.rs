@@ -1,8 +1,8 @@
 //! A torque constant that varies with the motor's angle.
 
 use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale, wave,
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,
+    SHAPES, Scale, wave,
 };
 use crate::scalar::Real;
 
@@ -64,6 +64,7 @@ impl Law for TorqueRipple {
         compensable: true,
         leaves_out: "the field-weakening range, higher harmonics of the order",
     };
+    const PERIODIC: Option<Periodic> = Some(Periodic::MotorTimesDrive);
 
     #[inline(always)]
     fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {

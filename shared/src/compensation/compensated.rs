@@ -1,0 +1,88 @@
+//! One effect that has passed its checks.
+
+use super::role::{EffectFault, Role};
+use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
+use crate::precompensation::finite;
+use crate::scalar::{Real, Scalar};
+
+/// Slow and fast, rad/s: whether an effect falls with speed.
+const SPEEDS: [f64; 2] = [1e-3, 10.0];
+
+/// An effect that has passed its checks, with what follows from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Compensated<T> {
+    pub(super) effect: Effect<T>,
+    pub(super) role: Role,
+    /// All shapes are whole: the motor's angle within a turn says as much as the angle itself, and better.
+    pub(super) whole: bool,
+    /// It is smaller at high speed than at low speed.
+    pub(super) falls: bool,
+}
+
+impl<T: Scalar> Compensated<T> {
+    /// Checks an effect.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn new(effect: Effect<T>) -> Result<Self, EffectFault> {
+        let kind = effect.kind;
+        let role = Role::of(kind).ok_or(EffectFault::NotCompensable(kind))?;
+        let about = kind.about();
+        within(about.gains, &effect.gains, false)?;
+        within(about.shapes, &effect.shapes, true)?;
+        let whole = |shape: &T| shape.to_f64() as i64 as f64 == shape.to_f64();
+        let sliding = |speed: f64| {
+            let at = Instant {
+                velocity: T::from_f64(speed),
+                direction: T::ONE,
+                load: T::ONE,
+                ..Instant::default()
+            };
+            evaluate(&effect, &mut Memory::default(), &at).abs()
+        };
+        Ok(Self {
+            effect,
+            role,
+            whole: effect.shapes.iter().all(whole),
+            falls: sliding(SPEEDS[1]).lt(sliding(SPEEDS[0])),
+        })
+    }
+}
+
+/// Value of an effect that is not periodic. Every law of the registry is in here: once, not at every place that asks.
+#[inline(never)]
+pub(super) fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: &Instant<T>) -> T {
+    let terms = effect
+        .kind
+        .compensated_terms(&effect.shapes, &mut memory.0, at);
+    let sum = effect
+        .gains
+        .iter()
+        .zip(terms)
+        .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term);
+    finite(sum)
+}
+
+/// `divided`: the law divides by those that are searched in ratios, and has no value where they are 0.
+fn within<T: Scalar>(
+    parameters: &[Parameter],
+    values: &[T],
+    divided: bool,
+) -> Result<(), EffectFault> {
+    for (k, value) in values.iter().enumerate() {
+        let value = value.to_f64();
+        let Some(parameter) = parameters.get(k) else {
+            if value == 0.0 {
+                continue;
+            }
+            return Err(EffectFault::Surplus);
+        };
+        let [low, high] = parameter.bounds;
+        let open = divided && parameter.scale == Scale::Logarithmic;
+        let above = if open { low < value } else { low <= value };
+        if !(above && value <= high && value.is_finite()) {
+            return Err(EffectFault::Parameter(parameter.name));
+        }
+    }
+    Ok(())
+}
