@@ -154,7 +154,7 @@ pub fn diagnose(
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
-        motion_how: replay.how.clone(),
+        motion_how: replay.told(chosen)?,
         torque_lead: lead,
         places: judge.places(floors),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),

@@ -17,7 +17,7 @@ use super::model::with_effects;
 use super::profile::Profile;
 use super::refit::Refit;
 use super::runs::Run;
-use crate::robot::{Controller, Robot};
+use crate::robot::{Controller, Robot, title_of};
 use crate::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
 
 /// Longest step, s.
@@ -76,7 +76,7 @@ pub(super) struct Replay<'a> {
     runs: &'a [Run],
     controller: Option<Controller>,
     /// Which controller, or why nothing is simulated, a sentence.
-    pub(super) how: String,
+    how: String,
 }
 
 impl<'a> Replay<'a> {
@@ -161,6 +161,26 @@ impl<'a> Replay<'a> {
         let one = |run: &Run| replayed(robot, &model, controller, run);
         let all: Result<_, SimulateError> = self.runs.iter().map(one).collect();
         all.map_err(|e| e.to_string())
+    }
+
+    /// How the motion was simulated, and why not from the first model on that could not be, sentences.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn told(&self, chosen: &[Profile]) -> Result<String, DiagnoseError> {
+        if self.controller.is_none() {
+            return Ok(self.how.clone());
+        }
+        for count in 0..=chosen.len() {
+            if let Err(why) = self.simulated(&self.model(&chosen[..count])?) {
+                let whose = match count.checked_sub(1).map(|k| chosen[k].candidate.kind) {
+                    Some(kind) => format!("The model with {} among its effects", title_of(kind)),
+                    None => "The model without effects".to_owned(),
+                };
+                return Ok(format!("{} {whose} was not simulated: {why}", self.how));
+            }
+        }
+        Ok(self.how.clone())
     }
 
     /// What a description's motion is off by; none where it cannot be simulated.

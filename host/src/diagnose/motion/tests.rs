@@ -21,7 +21,7 @@ fn robot(coulomb: f64) -> Robot {
 fn recorded(robot: &Robot, controller: &Controller) -> Run {
     let t: Vec<f64> = (0..10_000).map(|k| k as f64 / RATE).collect();
     let reference: Vec<f64> = (t.iter())
-        .map(|t| 0.8 * (2.0 * t).sin() + 0.3 * (7.0 * t).sin())
+        .map(|t| 0.4 * (1.0 - (2.0 * t).cos()) + 0.1 * (1.0 - (7.0 * t).cos()))
         .collect();
     let model = Model::from_robot(robot).unwrap();
     let motion = closed_loop(
