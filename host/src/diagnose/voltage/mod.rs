@@ -5,7 +5,7 @@
 //! the drive's inertia and friction, against the link's inertia and weight, which the description must state. Effects come
 //! in one at a time, by the motion of recordings that they were not fitted to (Stone 1974), as `search` says; all
 //! numbers of the result in `train_rms`, `holdout_rms`, waterfall and floor are of the position: each recording is
-//! simulated from its first row to its last ([`LONGEST`] at most, after which it starts anew), without a look at the
+//! simulated from its first row to its last (`LONGEST` at most, after which it starts anew), without a look at the
 //! measured motion in between.
 //!
 //! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; the
