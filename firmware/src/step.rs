@@ -119,9 +119,8 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let step = counts - state.counts;
     state.counts = counts;
     // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
-    // In 32 bits where they are enough, which the chip converts by hardware.
-    let exact = i32::try_from(counts).map_or(counts as f32, |counts| counts as f32);
-    state.position = exact * state.derived.radians_per_count;
+    // In 32 bits, which the chip converts by hardware: 5000 joint turns.
+    state.position = counts as i32 as f32 * state.derived.radians_per_count;
     state.velocity = motion.velocity * state.derived.radians_per_count;
     let (position, velocity) = (state.position, state.velocity);
     compensate::correct(config, state);

@@ -24,7 +24,8 @@
 //! at 5000 43 (52), at 20 000 91 (95), at 400 000 24 (26).
 //!
 //! Where a timer has captured when an edge came, the position is known at that very instant instead of somewhere in its
-//! sample. Measured with it (200 Hz at 10 kHz, test `times_of_edges_make_the_velocity_smooth`; TIMES), counts/s:
+//! sample. Ripple measured with it (200 Hz at 10 kHz, test `times_of_edges_make_the_velocity_smooth`), counts/s, and without: at
+//! 100 counts/s 0.044 (0.19), at 1000 0.0045 (16), at 20 000 0.063 (203), at 400 000 1.3 (72).
 //!
 //! Position is an integer of counts plus a fraction, velocity and acceleration are per sample inside, so `f32`
 //! resolves the same after any number of turns.

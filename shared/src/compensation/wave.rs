@@ -2,7 +2,7 @@
 //! formula once in a while.
 //!
 //! cosine·cos φ + sine·sin φ and what it is a quarter of a period on are two numbers that turn into each other by the order
-//! times what the angle has moved: for half of what sine and cosine of the angle cost, and as right in whatever tick a
+//! times what the angle has moved: for less than what sine and cosine of the angle cost, and as right in whatever tick a
 //! wave's turn to be set right comes. Between two turns the sums of all waves go on by their first and second derivatives.
 //!
 //! Where the phase moves by more than 1.5 rad from one turn to the next (order 84 over 50 : 1 above 1.8 rad/s) there is no wave: a
