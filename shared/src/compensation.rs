@@ -16,7 +16,7 @@
 //!   fed by the measured way it would close a loop of positive sign.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
-//! * **A voltage that the bridge loses** is given beside the current loop's, in the direction of the wanted current; within a
+//! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a
 //!   small band about none it fades, where the ripple crosses zero and so does the loss.
 //!
 //! Whatever else there is has no torque, voltage or reading that would undo it, and is refused with the reason
