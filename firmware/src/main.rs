@@ -1,7 +1,7 @@
 //! The rig on its board: a NUCLEO-G474RE. See `docs/firmware.md` for wiring and first start.
 //!
 //! ```text
-//!  TIM1 ──update──► ADC1 ──end of sequence──► interrupt: step, duty ──► TIM1          (board::tick)
+//!  TIM1 ──update──► TIM4 ──► ADC1 ──end of sequence──► interrupt: step, duty ──► TIM1 (board::tick)
 //!                     TIM2 (encoder) ────────────┘  ▲ requests      │ notes
 //!                                                   │               ▼
 //!  LPUART1 ──DMA──► command task: decode, examine ──┘    telemetry task: frames ──DMA──► LPUART1
