@@ -8,8 +8,11 @@
 //! simulated from its first row to its last (`LONGEST` at most, after which it starts anew), without a look at the
 //! measured motion in between.
 //!
-//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; the
-//! controller's own part, which is in the recorded voltage.
+//! Where the recording's references and voltage show the controller, the loop is closed (`law`) and no recorded voltage drives.
+//! Held-back recordings have a say: an effect that makes their motion worse does not stand.
+//!
+//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; integral action
+//! and feed-forward of the controller, which then is in the recorded voltage.
 
 mod describe;
 mod faults;
