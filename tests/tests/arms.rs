@@ -65,8 +65,8 @@ fn errors(found: &Identification) -> Vec<f64> {
         .collect()
 }
 
-/// No joint worse than `published` (to the digit that is published), and most of them better; `excepted` are joints that
-/// are, and what they may be left at (docs/arms.md). One better of two counts as most.
+/// No joint worse than `published` (to the digit that is published), and most of them better; `excepted` are joints with a
+/// bound of their own (docs/arms.md). One better of two counts as most.
 fn no_worse(what: &str, found: &[f64], published: &[f64], excepted: &[(usize, f64)]) {
     println!("{what}: {found:.1?} %, published {published:?} %");
     let mut better = 0;
@@ -287,11 +287,14 @@ fn tx40_predicts_the_rest_of_its_motion() {
     };
     let robot = described("tx40.toml");
     let place = tempfile::tempdir().unwrap();
-    let published = [8.4, 8.3, 15.6, 12.2, 45.1, 19.3];
-    // 70 % of the time in which the arm moves (up to 7.5 s), and 70 % of the file: what is left of joint 5 there is no
-    // larger than in training, only its torque is (docs/arms.md).
-    let moving: &[(usize, f64)] = &[];
-    for (until, end, excepted) in [(5250, 7500, moving), (6300, 9000, &[(5, 49.3)])] {
+    // 70 % of the time in which the arm moves (7.5 s), which the published errors are of, and 70 % of the file, at whose end
+    // it rests: least squares as published, repeated there (docs/arms/tx40.py, 40 Hz, fast rows), leave what stands beside.
+    // Joint 5 is held to what it is left at, a quarter of a per cent more than was measured.
+    let moving = [8.4, 8.3, 15.6, 12.2, 45.1, 19.3];
+    let whole = [8.4, 7.9, 9.5, 10.4, 58.6, 17.2];
+    let cases: [(usize, usize, [f64; 6], &[(usize, f64)]); 2] =
+        [(5250, 7500, moving, &[]), (6300, 9000, whole, &[(5, 49.4)])];
+    for (until, end, published, excepted) in cases {
         let train = tx40_part(&data, place.path(), &format!("train{until}.csv"), 0..until);
         let rest = tx40_part(&data, place.path(), &format!("rest{until}.csv"), until..end);
         for model in BOTH {

@@ -6,6 +6,7 @@
 mod columns;
 mod csv;
 mod error;
+mod jump;
 mod mcap_rows;
 mod motors;
 mod plausibility;

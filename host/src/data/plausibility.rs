@@ -4,6 +4,7 @@
 //! factors of unit mistakes are 57 (degrees) and 1000 (milli). Without limits in the robot's description
 //! only what the columns say about each other is checked.
 
+use super::jump::jump;
 use super::{Block, JointColumns};
 use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 
@@ -56,6 +57,26 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// A position that jumps.
+    #[error(
+        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {at} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}"
+    )]
+    Jump {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the row before the largest jump, s.
+        at: f64,
+        /// Largest jump.
+        by: f64,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// Largest change from row to row apart from jumps.
+        fastest: f64,
+        /// What would be right.
+        mend: &'static str,
+        /// rad or m.
+        unit: &'static str,
+    },
     /// Measured velocity and change of position do not belong together.
     #[error(
         "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
@@ -84,7 +105,7 @@ pub enum Implausible {
     },
     /// Effort far above the limit.
     #[error(
-        "tau{joint} looks too large by a factor of about 1000 (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
+        "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
     )]
     EffortTooLarge {
         /// Joint, 1-based.
@@ -98,7 +119,7 @@ pub enum Implausible {
     },
     /// Effort far below what moves the joint.
     #[error(
-        "tau{joint} looks too small by a factor of about 1000 (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
+        "tau{joint} looks too small by a factor of about 1000, as k{unit} would be (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
     )]
     EffortTooSmall {
         /// Joint, 1-based.
@@ -126,6 +147,7 @@ impl Implausible {
         match self {
             Self::Degrees { joint, .. }
             | Self::Position { joint, .. }
+            | Self::Jump { joint, .. }
             | Self::Velocity { joint, .. } => format!("q{joint}"),
             Self::VelocityScale { joint, .. } => format!("qd{joint}"),
             Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
@@ -182,7 +204,24 @@ fn check_joint(
     if columns.q.is_empty() {
         return;
     }
-    if let Some(limits) = &joint.limits {
+    if let Some(jump) = jump(t, &columns.q) {
+        found.push(Implausible::Jump {
+            joint: k,
+            at: t[jump.row],
+            by: jump.by,
+            more: match jump.count {
+                1 => String::new(),
+                n => format!(" and at {} more places", n - 1),
+            },
+            fastest: jump.fastest,
+            mend: if unit == "rad" && (jump.by.abs() / core::f64::consts::TAU - 1.0).abs() < 0.02 {
+                "that is a turn: give the angle counted on beyond it"
+            } else {
+                "give recordings that were put together one by one, and check the encoder for lost counts"
+            },
+            unit,
+        });
+    } else if let Some(limits) = &joint.limits {
         let [lower, upper] = limits.position;
         let reach = lower.abs().max(upper.abs());
         let farthest = lowest.abs().max(highest.abs());

@@ -5,11 +5,11 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::consistent::consistent;
+use super::evaluate::Planned;
 use super::factor::TriangularFactor;
 use super::instrumental::instrumental;
 use super::least::least;
 use super::likelihood::likelihood;
-use super::model::each_rows;
 use super::output_error::output_error;
 use super::parts::{LeaveOut, Parts};
 use super::prior::Prior;
@@ -18,8 +18,7 @@ use super::ridge::ridge;
 use super::robust::robust;
 use super::standard::{consistent_fit, quadratic_about};
 use super::total::total;
-use super::{Estimator, IdentifyError, ModelKind};
-use crate::prepare::Recording;
+use super::{Estimator, IdentifyError};
 
 /// p-value below which a difference counts as shown.
 const SHOWN: f64 = 0.01;
@@ -128,7 +127,7 @@ pub(super) fn relative_errors(
 /// Recordings as one factor a joint, torque against motion; none of none.
 pub(super) fn judge(
     problem: &Problem,
-    holdout: &[&dyn Recording],
+    holdout: &[Planned],
 ) -> Result<Option<Vec<TriangularFactor>>, IdentifyError> {
     if holdout.is_empty() {
         return Ok(None);
@@ -136,19 +135,14 @@ pub(super) fn judge(
     let p = problem.base.len();
     let mut factors = vec![TriangularFactor::new(p); problem.robot.joints.len()];
     for recording in holdout {
-        each_rows(
-            *recording,
-            problem.plan,
-            ModelKind::Differential,
-            &mut |rows| {
-                for (factor, equation) in factors.iter_mut().zip(&rows.equations) {
-                    for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
-                    }
+        recording.each_rows(&mut |rows| {
+            for (factor, equation) in factors.iter_mut().zip(&rows.equations) {
+                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                    factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
                 }
-                Ok(())
-            },
-        )?;
+            }
+            Ok(())
+        })?;
     }
     Ok(Some(factors))
 }

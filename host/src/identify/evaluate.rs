@@ -6,10 +6,10 @@ use super::base::Independent;
 use super::covariance::{Estimate, Groups, Memory};
 use super::factor::TriangularFactor;
 use super::linear::{classical, kept_columns, product, spread};
-use super::model::{Plan, each_rows};
+use super::model::{Plan, Rows, each_rows};
 use super::residual::{Ranges, ResidualReport, ResidualStream};
 use super::{IdentifyError, ModelKind, Options};
-use crate::prepare::{Recording, Survey};
+use crate::prepare::{PrepareError, Recording, Survey};
 
 /// The estimate with its covariance, from one pass over the rows that were fitted; `beside` is what the identified
 /// combinations' covariance has besides.
@@ -88,21 +88,47 @@ pub(super) fn covariance(
     ))
 }
 
+/// A recording whose torque is compared with the model's, and how its rows are formed.
+#[derive(Clone, Copy)]
+pub(crate) struct Planned<'a> {
+    /// The recording.
+    pub recording: &'a dyn Recording,
+    /// How its rows are formed.
+    pub plan: &'a Plan<'a>,
+}
+
+impl<'a> Planned<'a> {
+    /// Recordings of one plan.
+    pub(crate) fn all(list: &[&'a dyn Recording], plan: &'a Plan<'a>) -> Vec<Self> {
+        list.iter()
+            .map(|&recording| Self { recording, plan })
+            .collect()
+    }
+
+    /// Its rows, torque against motion.
+    pub(super) fn each_rows(
+        &self,
+        take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
+    ) -> Result<(), IdentifyError> {
+        each_rows(self.recording, self.plan, ModelKind::Differential, take).map(|_| ())
+    }
+}
+
 /// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
 /// can be compared. `by_position` is the torque (of a joint at a position) that was taken off
 /// before the fit without being stated: measured and predicted torque are shown with it. Where effects were taken off
 /// the recordings, `measured` are these as they were: errors are relative to the whole torque.
 pub(crate) fn torque_residuals(
-    recordings: &[&dyn Recording],
+    recordings: &[Planned],
     surveys: &[Survey],
-    plan: &Plan,
     full: &[f64],
     by_position: &dyn Fn(usize, f64) -> f64,
-    measured: Option<&[&dyn Recording]>,
+    measured: Option<&[Planned]>,
 ) -> Result<Vec<ResidualReport>, IdentifyError> {
     let total: u64 = surveys
         .iter()
-        .map(|s| s.rows / plan.treatment.decimation as u64)
+        .zip(recordings)
+        .map(|(s, r)| s.rows / r.plan.treatment.decimation as u64)
         .sum();
     let joints = surveys.first().map_or(0, |s| s.joints.len());
     let extremes = |j: usize, of: &dyn Fn(&crate::prepare::JointSurvey) -> [f64; 2]| {
@@ -117,7 +143,7 @@ pub(crate) fn torque_residuals(
     // The survey's peak speed is that of raw differences, noise included; the filtered one needs a look.
     let mut speed = vec![0.0f64; joints];
     for recording in recordings {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+        recording.each_rows(&mut |rows| {
             for (s, qd) in speed.iter_mut().zip(&rows.qd) {
                 *s = qd.iter().fold(*s, |m, v| m.max(v.abs()));
             }
@@ -138,7 +164,7 @@ pub(crate) fn torque_residuals(
         .collect();
     let mut index = 0u64;
     for recording in recordings {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+        recording.each_rows(&mut |rows| {
             for i in 0..rows.t.len() {
                 for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
                     let known = by_position(j, rows.q[j][i]);
@@ -161,7 +187,7 @@ pub(crate) fn torque_residuals(
     let mut reports: Vec<ResidualReport> =
         streams.into_iter().map(ResidualStream::report).collect();
     if let Some(measured) = measured {
-        for (report, rms) in reports.iter_mut().zip(torque_rms(measured, plan)?) {
+        for (report, rms) in reports.iter_mut().zip(torque_rms(measured, joints)?) {
             report.torque_rms = rms;
             report.relative_error = report.rms / rms.max(f64::MIN_POSITIVE);
         }
@@ -170,10 +196,10 @@ pub(crate) fn torque_residuals(
 }
 
 /// Per joint, RMS of the torque over the rows that count.
-fn torque_rms(recordings: &[&dyn Recording], plan: &Plan) -> Result<Vec<f64>, IdentifyError> {
-    let mut sums = vec![(0u64, 0.0); plan.chain.joint_count()];
+fn torque_rms(recordings: &[Planned], joints: usize) -> Result<Vec<f64>, IdentifyError> {
+    let mut sums = vec![(0u64, 0.0); joints];
     for recording in recordings {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+        recording.each_rows(&mut |rows| {
             for ((count, squares), equation) in sums.iter_mut().zip(&rows.equations) {
                 for (y, _) in equation.y.iter().zip(&equation.keep).filter(|(_, k)| **k) {
                     *count += 1;

@@ -6,15 +6,16 @@ use super::IdentifyError;
 use crate::effects::{Compensated, Effects};
 use crate::prepare::{Recording, Treatment};
 
-/// Each of several recordings, payloads taken off too: what is identified is the robot without them.
+/// Each of several recordings and its treatment, payloads taken off too: what is identified is the robot without them.
 pub(super) fn freed<'a>(
     list: &[&'a dyn Recording],
     effects: &'a Effects,
     chain: &'a Chain<f64>,
-    treatment: &Treatment,
+    treatments: &[Treatment],
 ) -> Result<Vec<Compensated<'a>>, IdentifyError> {
     list.iter()
-        .map(|r| Ok(Compensated::new(*r, effects, chain, treatment, true)?))
+        .zip(treatments)
+        .map(|(r, treatment)| Ok(Compensated::new(*r, effects, chain, treatment, true)?))
         .collect()
 }
 

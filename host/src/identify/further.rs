@@ -8,6 +8,7 @@ use super::compare::{Comparison, compare, fit, judge};
 use super::consistent::consistent;
 use super::covariance::Estimate;
 use super::essential::{EssentialSet, essential};
+use super::evaluate::Planned;
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
 use super::linear::classical;
@@ -16,7 +17,6 @@ use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
 use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
-use crate::prepare::Recording;
 
 /// Weights of recordings: beyond it the other recordings are lost in rounding.
 const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
@@ -135,7 +135,7 @@ pub(super) fn further(
     problem: &Problem,
     own: Option<Own>,
     result: &Outcome,
-    holdout: &[&dyn Recording],
+    holdout: &[Planned],
 ) -> Result<Further, IdentifyError> {
     let Problem { base, data, .. } = *problem;
     let mut further = Further::default();
@@ -187,7 +187,9 @@ pub(super) fn further(
             Ok(found) => {
                 let of_momentum = match problem.options.model {
                     ModelKind::Differential => None,
-                    ModelKind::Integral => judge(problem, problem.training)?,
+                    ModelKind::Integral => {
+                        judge(problem, &Planned::all(problem.training, problem.plan))?
+                    }
                 };
                 further.standard = Some(standard_set(
                     problem,

@@ -74,7 +74,7 @@ pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
 pub(crate) use describe::{Combinations, redistributed};
 pub use essential::{Essential, EssentialSet};
-pub(crate) use evaluate::torque_residuals;
+pub(crate) use evaluate::{Planned, torque_residuals};
 pub use factor::TriangularFactor;
 pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
 pub use grouping::{agree, grouped};

@@ -8,7 +8,7 @@ use super::base::{Base, chain_of, expression, transmission_of};
 use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
-use super::evaluate::{covariance, torque_residuals};
+use super::evaluate::{Planned, covariance, torque_residuals};
 use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
 use super::freed::{freed, plain};
@@ -24,7 +24,9 @@ use super::{
     Options,
 };
 use crate::effects::Effects;
-use crate::prepare::{Choice, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads};
+use crate::prepare::{
+    Choice, PrepareError, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads,
+};
 use crate::robot::Robot;
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
@@ -108,15 +110,21 @@ fn solve(
         .map(|j| j.limits.as_ref().and_then(|l| l.torque))
         .collect();
     let decided = Treatment::decide(&surveys, &options.prepare, &limits)?;
-    for s in &holdout_surveys {
-        decided.admits(s)?;
-    }
+    let at_own_rate = |treatment: &Treatment| -> Result<Vec<Treatment>, PrepareError> {
+        let of = |survey| treatment.at_rate_of(survey);
+        holdout_surveys.iter().map(of).collect()
+    };
     let effects = Effects::of(robot).map_err(|e| IdentifyError::Model(e.to_string()))?;
     let rid = if effects.is_empty() {
         [const { Vec::new() }; 3]
     } else {
-        let free = |list| freed(list, &effects, &chain, &decided);
-        [free(training)?, free(holdout)?, free(sources)?]
+        let free = |list, treatments: &[Treatment]| freed(list, &effects, &chain, treatments);
+        let fitted = vec![decided.clone(); training.len()];
+        [
+            free(training, &fitted)?,
+            free(holdout, &at_own_rate(&decided)?)?,
+            free(sources, &fitted)?,
+        ]
     };
     let [known_training, known_holdout, known_sources] = rid.each_ref().map(|l| plain(l));
     let spooled = [Spooled::all(&known_training), Spooled::all(&known_holdout)];
@@ -346,15 +354,23 @@ fn solve(
             .filter(|t| t.joint == robot.joints[j].name);
         own.map(|t| t.torque(q)).sum()
     };
-    let residuals = |recordings: &[&dyn Recording], surveys: &[Survey], whole| {
-        torque_residuals(recordings, surveys, &plan, &full, &by_position, whole)
+    let residuals = |recordings: &[Planned], surveys: &[Survey], whole: Option<&[Planned]>| {
+        torque_residuals(recordings, surveys, &full, &by_position, whole)
     };
-    let train = residuals(training, &surveys, whole.map(|[training, _]| training))?;
+    let fitted = |list| Planned::all(list, &plan);
+    let train = residuals(
+        &fitted(training),
+        &surveys,
+        whole.map(|[training, _]| fitted(training)).as_deref(),
+    )?;
+    let treatments = at_own_rate(&treatment)?;
+    let plans: Vec<Plan> = treatments.iter().map(|t| plan_with(t, window)).collect();
+    let held = each_planned(holdout, &plans);
     let holdout_residuals = if holdout.is_empty() {
         None
     } else {
-        let whole = whole.map(|[_, holdout]| holdout);
-        Some(residuals(holdout, &holdout_surveys, whole)?)
+        let whole = whole.map(|[_, holdout]| each_planned(holdout, &plans));
+        Some(residuals(&held, &holdout_surveys, whole.as_deref())?)
     };
 
     let combination = &data.combination * &base.combination;
@@ -401,7 +417,7 @@ fn solve(
                 ]
             }),
         },
-        holdout,
+        &held,
     )?;
     not_excited.extend(beyond.hardly_excited);
     let mut warnings = beyond.warnings;
@@ -411,6 +427,14 @@ fn solve(
             .chain(&holdout_surveys)
             .filter_map(|survey| survey.note.clone()),
     );
+    for (survey, own) in holdout_surveys.iter().zip(&treatments) {
+        if own.sample_rate != treatment.sample_rate {
+            warnings.push(format!(
+                "{} is sampled at {} Hz, the training data at {} Hz: its errors are of one row in {} and up to {:.3} Hz, those of the training data up to {:.3} Hz.",
+                survey.label, own.sample_rate, treatment.sample_rate, own.decimation, own.parallel_edge, treatment.parallel_edge
+            ));
+        }
+    }
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -545,6 +569,13 @@ fn not_below_zero(combination: &DMatrix<f64>, row: usize, column: usize) -> bool
             column % COLUMNS,
             column::DRIVE_INERTIA | column::VISCOUS | column::COULOMB
         )
+}
+
+fn each_planned<'a>(list: &[&'a dyn Recording], plans: &'a [Plan<'a>]) -> Vec<Planned<'a>> {
+    let pairs = list.iter().zip(plans);
+    pairs
+        .map(|(&recording, plan)| Planned { recording, plan })
+        .collect()
 }
 
 fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {

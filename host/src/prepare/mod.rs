@@ -13,6 +13,7 @@ mod decimate;
 mod filter;
 mod motion;
 mod pieces;
+mod rate;
 pub(crate) mod record;
 mod resample;
 mod spectrum;
@@ -88,6 +89,20 @@ pub enum PrepareError {
         rate: f64,
         /// Rate of the first, Hz.
         first: f64,
+    },
+    /// A hold-out whose rate cannot hold the band of the fit.
+    #[error(
+        "{label} is sampled at {rate} Hz and can be judged up to {most:.3} Hz only; the fit's band reaches to {band:.3} Hz. Record the hold-out faster, or fit in a lower band with --decimation."
+    )]
+    BandBeyondRate {
+        /// The recording.
+        label: String,
+        /// Its rate, Hz.
+        rate: f64,
+        /// Highest band at that rate, Hz.
+        most: f64,
+        /// Band of the fit, Hz.
+        band: f64,
     },
     /// The number of joints differs.
     #[error("{label} has columns for {found} joints and the robot has {expected}.")]

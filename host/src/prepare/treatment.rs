@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::PrepareError;
 use super::filter::{LowPass, decimator_edge};
+use super::rate::{parallel_pass, same_rate, trimmed_rows};
 use super::spectrum::{NOISE_SHARE, PositionSpectrum};
 use super::survey::Survey;
 
@@ -120,6 +121,9 @@ const LEAST_HEADROOM: f64 = 5.0;
 /// friction have harmonics well above the motion itself, and the residual is to show them.
 const PARALLEL_HEADROOM: f64 = 10.0;
 
+/// Highest cut-off as a share of the Nyquist frequency.
+pub(super) const HIGHEST: f64 = 0.8;
+
 /// Above what rounding leaves of the velocity of a joint that stands still, below what any encoder shows, rad/s or m/s.
 const STILL: f64 = 1e-6;
 
@@ -215,23 +219,8 @@ impl Treatment {
                 if still { speed.max(STILL) } else { speed }
             })
             .collect();
-        let (parallel_edge, parallel_filter) = if decimation > 1 {
-            let edge = decimator_edge(decimation, rate);
-            (
-                edge,
-                format!(
-                    "Chebyshev I, order 8, 0.05 dB ripple up to {edge:.3} Hz, forward and backward, over torque and every regressor column alike"
-                ),
-            )
-        } else {
-            (
-                cutoff,
-                format!(
-                    "Butterworth, order {}, {cutoff:.3} Hz, forward and backward, over torque and every regressor column alike",
-                    options.order
-                ),
-            )
-        };
+        let (parallel_edge, parallel_filter) =
+            parallel_pass(options.order, cutoff, decimation, rate);
         let saturation = speaker
             .joints
             .iter()
@@ -249,7 +238,7 @@ impl Treatment {
                 ]
             })
             .collect();
-        let trimmed = ((3.0 * rate / cutoff).ceil() as usize).max(3 * decimation);
+        let trimmed = trimmed_rows(cutoff, decimation, rate);
         let needed = FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64;
         for survey in surveys {
             if survey.longest < needed {
@@ -320,14 +309,6 @@ impl Treatment {
         Ok(narrow)
     }
 
-    /// Checks that a further recording (a hold-out) can be treated the same way.
-    ///
-    /// # Errors
-    /// [`PrepareError::RateMismatch`].
-    pub fn admits(&self, survey: &Survey) -> Result<(), PrepareError> {
-        same_rate(survey, self.sample_rate)
-    }
-
     /// s
     pub fn dt(&self) -> f64 {
         1.0 / self.sample_rate
@@ -356,17 +337,6 @@ impl Treatment {
 /// Rows that must be left after decimation.
 const FEWEST_KEPT: u64 = 50;
 
-fn same_rate(survey: &Survey, rate: f64) -> Result<(), PrepareError> {
-    if (survey.sample_rate / rate - 1.0).abs() > 0.01 {
-        return Err(PrepareError::RateMismatch {
-            label: survey.label.clone(),
-            rate: survey.sample_rate,
-            first: rate,
-        });
-    }
-    Ok(())
-}
-
 /// The lowest frequency at which some joint's signal sinks into its noise, or less where that still leaves
 /// too much noise in the acceleration.
 fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f64, String) {
@@ -378,7 +348,7 @@ fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f6
         .iter()
         .map(|s| s.clean)
         .fold(f64::INFINITY, f64::min);
-    let most = 0.8 * nyquist;
+    let most = HIGHEST * nyquist;
     let least = (LEAST_HEADROOM * motion).min(most);
     let wish = crossing.min(clean);
     let cutoff = wish.clamp(least, most);

@@ -27,7 +27,7 @@ use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
 use crate::effects::Compensated;
-use crate::identify::{IdentifyError, Plan, ResidualReport, chain_of, torque_residuals};
+use crate::identify::{IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals};
 use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
@@ -279,13 +279,13 @@ pub fn validate(
         } else {
             &free
         };
+        let whole = (!model.effects.is_empty()).then(|| Planned::all(&[*recording], &plan));
         let torque: Vec<TorqueCheck> = torque_residuals(
-            &[compared],
+            &Planned::all(&[compared], &plan),
             std::slice::from_ref(survey),
-            &plan,
             &values,
             &|_, _| 0.0,
-            (!model.effects.is_empty()).then_some(&[*recording]),
+            whole.as_deref(),
         )?
         .into_iter()
         .zip(&robot.joints)

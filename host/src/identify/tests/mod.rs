@@ -7,6 +7,7 @@ mod judged;
 mod lwr4;
 mod made;
 mod position;
+mod rate;
 mod still;
 
 use super::*;
