@@ -240,6 +240,7 @@ pub(super) fn explained() -> Diagnosis {
             file: Some("next.toml".into()),
             separation: Some(7.4),
             duration: Some(24.0),
+            hands: false,
             trajectory: None,
         }),
         waterfall: vec![waterfall(
@@ -326,7 +327,8 @@ pub(super) fn remainder() -> Diagnosis {
         file: None,
         separation: None,
         duration: None,
-            trajectory: None,
+        hands: true,
+        trajectory: None,
     });
     Diagnosis {
         verdict: Verdict::Remainder,
@@ -338,6 +340,7 @@ pub(super) fn remainder() -> Diagnosis {
             ratio: 1.94,
             places: vec![place("position", [0.9, 1.6], "rad", 0.58, "58 % of it lies between 0.9 and 1.6 rad, in both directions.")],
             text: "A torque that depends on the position alone and is sharper than any effect of the catalogue.".into(),
+            doubt: false,
         }),
         waterfall: vec![waterfall(
             &["frozen description", "refitted", "stribeck"],

@@ -57,6 +57,9 @@ pub(crate) struct Args {
     /// integration step
     #[arg(long)]
     pub(crate) controls: bool,
+    /// Record the experiment that is proposed for an open set of names on the same rig, and ask again with it
+    #[arg(long)]
+    pub(crate) follow: bool,
     /// Methods to judge
     #[arg(long, value_enum, value_delimiter = ',', default_value = "diagnose")]
     pub(crate) only: Vec<Judged>,
@@ -112,6 +115,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         combined: args.combined,
         leave_out: args.leave_out,
         controls: args.controls,
+        follow: args.follow,
         seconds: [args.train, args.holdout],
     };
     let cases = plan.cases()?;

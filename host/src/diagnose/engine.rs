@@ -3,6 +3,7 @@
 use super::bench::{Bench, Loaded, library};
 use super::change::{Change, change};
 use super::descent::Descent;
+use super::described::by_description;
 use super::fault::faulty;
 use super::finish::{Drawn, Found, finish};
 use super::floor;
@@ -107,12 +108,13 @@ pub fn diagnose(
     let values = &search.source.values;
     let trial = Replay::of(&bench, &refit, values, loaded);
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
-    let mut judged = judge.judged(found)?;
+    let judged = judge.judged(found)?;
+    let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     // A name that makes the simulated motion worse stands in for something else.
     while let Some(k) = trial.spoiling(&judged.chosen)? {
         let mut stand = judged.chosen;
         refuse(robot, &mut tried, &stand.remove(k));
-        judged = judge.judged(stand)?;
+        judged = judge.judged(search.possible(&refit.base, stand)?)?;
     }
     let said = settled(&windings, &search, &refit.base, &mut judged.chosen)?;
     let replay = match &sealed {

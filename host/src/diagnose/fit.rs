@@ -41,22 +41,12 @@ pub(super) struct Beside {
 impl<'a> Fit<'a> {
     /// Takes the rows in; `memory` is the time in seconds that residuals are correlated over, `scale` one weight a joint.
     pub(super) fn new(rows: &'a Rows, scale: Vec<f64>, memory: f64) -> Self {
-        let length = ((5.0 * memory / rows.period).ceil() as usize)
-            .max(1)
-            .min((rows.count / FEWEST_BLOCKS).max(1));
-        let mut block = Vec::with_capacity(rows.count);
-        let mut next = 0;
-        for pair in rows.starts.windows(2) {
-            let n = pair[1] - pair[0];
-            let parts = (n / length).max(1);
-            block.extend((0..n).map(|k| next + k * parts / n));
-            next += if n == 0 { 0 } else { parts };
-        }
+        let (block, blocks) = blocked(rows, memory);
         let mut fit = Self {
             rows,
             scale,
             block,
-            blocks: next,
+            blocks,
             basis: Vec::new(),
             residual: Vec::new(),
             folded: OnceLock::new(),
@@ -64,6 +54,17 @@ impl<'a> Fit<'a> {
         let torque: Column = rows.torque.iter().cloned().map(Some).collect();
         fit.residual = fit.weighted(&torque);
         fit
+    }
+
+    /// The same with blocks for a residual that is correlated over another time, s.
+    pub(super) fn blocked_anew(&self, memory: f64) -> Self {
+        let (block, blocks) = blocked(self.rows, memory);
+        Self {
+            block,
+            blocks,
+            folded: OnceLock::new(),
+            ..self.clone()
+        }
     }
 
     /// A column as the weighted rows of all joints one after the other; masked rows are zero.
@@ -230,6 +231,28 @@ impl<'a> Fit<'a> {
         Some(own)
     }
 
+    /// What of several columns is their own beside those taken in and each other: orthonormal, weighted.
+    pub(super) fn span(&self, columns: &[Column]) -> Vec<Vec<f64>> {
+        let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+        for column in columns {
+            let weighted = self.weighted(column);
+            let whole = dot_self(&weighted);
+            let mut rest = self.projected(weighted);
+            for _ in 0..2 {
+                for other in &own {
+                    let along = dot(other, &rest);
+                    axpy(-along, other, &mut rest);
+                }
+            }
+            let left = dot_self(&rest);
+            if is_own(left, whole) {
+                rest.iter_mut().for_each(|x| *x /= left.sqrt());
+                own.push(rest);
+            }
+        }
+        own
+    }
+
     /// Covariance of the coefficients of weighted columns from the scores of the blocks (Liang and Zeger 1986, Biometrika
     /// 73): `inverse` of the columns' inner products, and the `rest` that they leave.
     pub(super) fn sandwich(
@@ -249,6 +272,22 @@ impl<'a> Fit<'a> {
         let meat = &scores * scores.transpose() * (g / (g - 1.0).max(1.0));
         inverse * meat * inverse
     }
+}
+
+/// Block of each row of a joint, and their number, for residuals correlated over `memory` seconds.
+fn blocked(rows: &Rows, memory: f64) -> (Vec<usize>, usize) {
+    let length = ((5.0 * memory / rows.period).ceil() as usize)
+        .max(1)
+        .min((rows.count / FEWEST_BLOCKS).max(1));
+    let mut block = Vec::with_capacity(rows.count);
+    let mut next = 0;
+    for pair in rows.starts.windows(2) {
+        let n = pair[1] - pair[0];
+        let parts = (n / length).max(1);
+        block.extend((0..n).map(|k| next + k * parts / n));
+        next += if n == 0 { 0 } else { parts };
+    }
+    (block, next)
 }
 
 /// Whether a column is one of its own: its square, and what of it is left beside the others.

@@ -6,12 +6,14 @@ use super::DiagnoseError;
 use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, locate};
+use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Rows;
 use super::runs::Run;
-use super::search::{Search, with};
+use super::search::{Search, shadow, with};
 use super::testable;
+use crate::report::format_significant;
 use crate::robot::Robot;
 
 /// Share of its gap that a step must close to stand beside a remainder.
@@ -19,8 +21,11 @@ const HALF: f64 = 0.5;
 /// … and at least, where nothing else would close half as much in its place.
 const QUARTER: f64 = 0.25;
 /// What is left counts as more than noise beyond this ratio to a floor known from repeated recordings: the filters'
-/// treatment of a true structure leaves up to a tenth more.
-const BEYOND_FLOOR: f64 = 1.25;
+/// treatment of a true structure leaves up to a tenth more. The difference between a right name's law and the rig's may
+/// leave its shadow besides.
+pub(super) const BEYOND_FLOOR: f64 = 1.12;
+/// … and beyond this it is so much that names are guesses at it.
+const FAR_BEYOND_FLOOR: f64 = 1.25;
 /// … of the data held back, whose motion is another.
 const BEYOND_FLOOR_HELD: f64 = 1.5;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
@@ -56,6 +61,8 @@ pub(super) struct Judged {
     pub(super) floors: Vec<f64>,
     /// What is left beyond it.
     pub(super) left: Option<Remainder>,
+    /// Whether that is so much that names may be guesses at it.
+    much_left: bool,
 }
 
 impl Judge<'_, '_> {
@@ -67,7 +74,7 @@ impl Judge<'_, '_> {
         let mut judged = self.as_found(found);
         // Beside something unknown, a name that closes less of the gap than it leaves is a guess at it, unless nothing else
         // comes near.
-        while judged.left.is_some() {
+        while judged.much_left {
             let Judged { chosen, floors, .. } = &judged;
             let closes = |k: usize| {
                 let j = chosen[k].candidate.joint;
@@ -89,7 +96,7 @@ impl Judge<'_, '_> {
             let Some(guess) = guess else { break };
             let mut stand = judged.chosen;
             stand.remove(guess);
-            judged = self.as_found(stand);
+            judged = self.as_found(self.search.possible(self.base, stand)?);
         }
         Ok(judged)
     }
@@ -112,11 +119,17 @@ impl Judge<'_, '_> {
                     .unwrap_or_else(|| fit.rms(j))
             })
             .collect();
-        let left = self.remainder(&fit, &floors);
+        let left = (0..floors.len())
+            .filter_map(|j| self.remainder_of(&fit, &chosen, j, floors[j]))
+            .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+        let much_left = (left.as_ref())
+            .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
+        let doubted = || (0..floors.len()).find_map(|j| self.doubt(&fit, &chosen, j, floors[j]));
         Judged {
+            left: left.or_else(doubted),
+            much_left,
             chosen,
             floors,
-            left,
         }
     }
 
@@ -140,14 +153,14 @@ impl Judge<'_, '_> {
         )
     }
 
-    /// What is left beyond the floor and goes with the motion, in the joint where it is most.
-    fn remainder(&self, fit: &Fit, floors: &[f64]) -> Option<Remainder> {
-        (0..floors.len())
-            .filter_map(|j| self.remainder_of(fit, j, floors[j]))
-            .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
-    }
-
-    fn remainder_of(&self, fit: &Fit, joint: usize, floor: f64) -> Option<Remainder> {
+    /// What is left of a joint beyond the floor and goes with the motion.
+    fn remainder_of(
+        &self,
+        fit: &Fit,
+        chosen: &[Profile],
+        joint: usize,
+        floor: f64,
+    ) -> Option<Remainder> {
         let repeated = !self.pairs.is_empty();
         let rms = fit.rms(joint);
         let places = self.places_of(fit, joint, if repeated { floor } else { 0.0 });
@@ -161,7 +174,10 @@ impl Judge<'_, '_> {
             shown.map_or(1.0, |p| 1.0 / (1.0 - p.share).max(0.01).sqrt())
         };
         let left = if repeated {
-            ratio > BEYOND_FLOOR
+            let explained = (self.base.rms(joint).powi(2) - rms * rms).max(0.0);
+            let own = chosen.iter().filter(|p| p.candidate.joint == joint);
+            let shadow = own.map(shadow).fold(0.0, f64::max) * explained;
+            rms * rms > (BEYOND_FLOOR * floor).powi(2) + shadow
         } else {
             shown.is_some()
         };
@@ -179,6 +195,46 @@ impl Judge<'_, '_> {
             ratio,
             text,
             places,
+            doubt: false,
+        })
+    }
+
+    /// What the names of a joint leave that right ones would not.
+    fn doubt(&self, fit: &Fit, chosen: &[Profile], joint: usize, floor: f64) -> Option<Remainder> {
+        let mut names: Vec<&str> = (chosen.iter())
+            .filter(|p| p.candidate.joint == joint)
+            .map(|p| p.candidate.kind.about().name)
+            .collect();
+        names.dedup();
+        if names.is_empty() {
+            return None;
+        }
+        let found = misfit(&self.search.source, self.rows, fit, joint)?;
+        let rms = fit.rms(joint);
+        let name = &self.robot.joints[joint].name;
+        let text = format!(
+            "With {} in the model a free function of the {}{} still takes {} % off what is left of joint {name}, on stretches that it was not fitted to. The right name would leave it nothing: {} may stand for an effect that the library does not hold.",
+            names.join(" and "),
+            found.coordinate,
+            if found.friction {
+                ", turned with the direction,"
+            } else {
+                ""
+            },
+            format_significant(100.0 * found.gain, 2),
+            if names.len() == 1 {
+                "this one"
+            } else {
+                "one of these"
+            },
+        );
+        Some(Remainder {
+            joint: name.clone(),
+            rms: rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt(),
+            ratio: rms / floor,
+            text,
+            places: self.places_of(fit, joint, floor),
+            doubt: true,
         })
     }
 }
@@ -198,6 +254,7 @@ pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Optio
             ratio(j)
         ),
         places: Vec::new(),
+        doubt: false,
     })
 }
 
@@ -217,10 +274,7 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
         if names.iter().any(|n| n == name) {
             continue;
         }
-        let equal = rival.candidate.joint == own.candidate.joint
-            && rival.evidence.gain >= AS_GOOD * own.evidence.gain
-            && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE;
-        if equal {
+        if equal(own, rival) {
             names.push(name.to_owned());
         } else if step.runner_up.is_none() {
             step.runner_up = Some(name.to_owned());
@@ -229,6 +283,13 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
         }
     }
     step.set = names;
+}
+
+/// Whether the data support a rival as well as what stands.
+pub(super) fn equal(own: &Profile, rival: &Profile) -> bool {
+    rival.candidate.joint == own.candidate.joint
+        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
 }
 
 /// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.

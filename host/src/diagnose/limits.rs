@@ -220,6 +220,7 @@ pub(super) fn next(
             file: None,
             separation: None,
             duration: None,
+            hands: true,
             trajectory: None,
         }))
 }

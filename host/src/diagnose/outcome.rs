@@ -154,6 +154,9 @@ pub struct NextExperiment {
     pub separation: Option<f64>,
     /// s
     pub duration: Option<f64>,
+    /// Whether more than running [`Self::file`] is asked for: a load, the base turned, another sensor.
+    #[serde(skip)]
+    pub hands: bool,
     /// What [`Self::file`] has to hold, as TOML.
     #[serde(skip)]
     pub trajectory: Option<String>,
@@ -172,6 +175,9 @@ pub struct Remainder {
     pub places: Vec<Place>,
     /// In words.
     pub text: String,
+    /// Whether it is within the noise of a sample and repeats: what the names found leave and right ones would not.
+    #[serde(skip)]
+    pub doubt: bool,
 }
 
 /// Something about a recording that no physics explains.

@@ -56,7 +56,8 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// What they do.
     pub(super) evidence: Evidence,
-    /// A shape that has run to the least of what is searched, where a law is its limit of none.
+    /// A shape that has run to the least of what is searched, where a law is its limit of none; a gain that has left what
+    /// physics allows.
     pub(super) vanished: Option<&'static str>,
 }
 

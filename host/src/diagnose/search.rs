@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rig_shared::effects::{Channel, Kind, SHAPES};
+use rig_shared::effects::{Kind, SHAPES};
 
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
@@ -13,15 +13,19 @@ use super::profile::{LEAST_GAIN, LEAST_SIGMAS, Profile, grid};
 use super::rows::Column;
 use super::runs::resolution;
 
+mod kinds;
+mod shadow;
+
+use kinds::depends_on_model;
+pub(super) use kinds::{is_first_law, is_gear, rivals};
+use shadow::in_the_shadow;
+pub(super) use shadow::shadow;
+
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
-/// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
-/// closes 93 % of the gap leaves so much …
-const SHADOW: f64 = 0.005;
-/// … and 86 % for gears, whose motion is driven by the measured one.
-const SHADOW_OF_A_GEAR: f64 = 0.02;
 /// Most effects.
 const MOST_EFFECTS: usize = 6;
+
 /// The search over a library.
 pub(super) struct Search<'a> {
     /// What columns are formed from.
@@ -150,18 +154,27 @@ impl<'a> Search<'a> {
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let trials = self.trials();
         let mut chosen: Vec<Profile> = Vec::new();
+        let mut impossible: Vec<Candidate> = Vec::new();
         while chosen.len() < MOST_EFFECTS {
             let fit = with(base, &chosen, None);
-            let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
-            let profiles = self.sweep(&fit, &present)?;
+            let present = chosen.iter().map(|p| p.candidate);
+            let without: Vec<Candidate> = present.chain(impossible.iter().copied()).collect();
+            let profiles = self.sweep(&fit, &without)?;
             told(chosen.len(), &profiles);
             let Some(best) = first_to_take(&profiles, trials) else {
                 break;
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
             let before = chosen.clone();
+            let newcomer = best.candidate;
             chosen.push(best);
-            self.settle(base, &mut chosen, trials)?;
+            let vanished = self.settle(base, &mut chosen, trials, &impossible)?;
+            if vanished.contains(&newcomer) && !same(&before, &chosen) {
+                // It has pushed others out that it cannot do without.
+                impossible.push(newcomer);
+                chosen = before;
+                continue;
+            }
             for _ in 0..2 {
                 // Load and inertia as they are with the effects in; the columns that rest on them follow.
                 self.renewed(renew(&chosen)?);
@@ -258,13 +271,16 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Refines all shapes together, drops what no longer stands by itself, exchanges what something else does better.
+    /// Refines all shapes together, drops what no longer stands by itself, exchanges what something else does better. Gives
+    /// what has vanished.
     fn settle(
         &self,
         base: &Fit,
         chosen: &mut Vec<Profile>,
         trials: usize,
-    ) -> Result<(), DiagnoseError> {
+        impossible: &[Candidate],
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
+        let mut vanished = Vec::new();
         for _ in 0..2 {
             self.refine_all(base, chosen)?;
         }
@@ -276,7 +292,8 @@ impl<'a> Search<'a> {
                 e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS;
             let beside_others = chosen.len() > 1 && (weak || in_the_shadow(chosen, i));
             if beside_others || chosen[i].vanished.is_some() {
-                chosen.remove(i);
+                let gone = chosen.remove(i);
+                vanished.extend(gone.vanished.map(|_| gone.candidate));
                 self.refine_all(base, chosen)?;
                 i = 0;
             } else {
@@ -290,6 +307,7 @@ impl<'a> Search<'a> {
                 let others: Vec<Candidate> = (chosen.iter().enumerate())
                     .filter(|(k, _)| *k != i)
                     .map(|(_, p)| p.candidate)
+                    .chain(impossible.iter().copied())
                     .collect();
                 let rival = self
                     .sweep(&fit, &others)?
@@ -304,7 +322,21 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        Ok(())
+        Ok(vanished)
+    }
+
+    /// What of effects is still possible where others have gone, refined.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn possible(
+        &self,
+        base: &Fit,
+        mut chosen: Vec<Profile>,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        self.refine_all(base, &mut chosen)?;
+        chosen.retain(|profile| profile.vanished.is_none());
+        Ok(chosen)
     }
 
     /// Each effect's shapes beside all others; its evidence beside all others.
@@ -316,10 +348,11 @@ impl<'a> Search<'a> {
             if let Some(better) = self.profile(&fit, c, Some(chosen[i].shapes))? {
                 chosen[i] = better;
             } else {
-                // No column of its own any more.
+                // No column of its own any more, or only with signs that cannot be.
                 chosen[i].evidence.gain = 0.0;
                 chosen[i].evidence.joint_gain = 0.0;
                 chosen[i].evidence.p_value = 1.0;
+                chosen[i].vanished = Some("gain");
             }
         }
         Ok(())
@@ -343,23 +376,6 @@ fn first_to_take(profiles: &[Profile], trials: usize) -> Option<Profile> {
     Some(best.clone())
 }
 
-/// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
-fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
-    let squares =
-        |p: &Profile| -> f64 { p.evidence.block_errors.iter().map(|e| e[0] - e[1]).sum() };
-    let own = squares(&chosen[i]);
-    (chosen.iter().enumerate()).any(|(k, other)| {
-        let shadow = if is_gear(other.candidate.kind) {
-            SHADOW_OF_A_GEAR
-        } else {
-            SHADOW
-        };
-        k != i
-            && other.candidate.joint == chosen[i].candidate.joint
-            && own < shadow * squares(other)
-    })
-}
-
 fn same(a: &[Profile], b: &[Profile]) -> bool {
     a.len() == b.len()
         && a.iter()
@@ -378,35 +394,4 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
         }
     }
     fit
-}
-
-/// Whether it acts between motor and link.
-pub(super) fn is_gear(kind: Kind) -> bool {
-    kind.about().channel == Channel::Transmission
-}
-
-/// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
-pub(super) fn rivals(a: &Candidate, b: &Candidate) -> bool {
-    let one = a.kind.about().name == b.kind.about().name || is_gear(a.kind) && is_gear(b.kind);
-    one && a.joint == b.joint && a.other == b.other
-}
-
-/// Whether a kind is the law that its name is searched by; others take its place only where they do better.
-pub(super) fn is_first_law(kind: Kind) -> bool {
-    Kind::named(kind.about().name, None) == Some(kind)
-        // Rings of motor and joint are at different places, not different laws.
-        || kind == Kind::EncoderEccentricityJoint
-        || kind == Kind::ViscousWarmupTemperature
-}
-
-/// Whether an effect's columns depend on what the model predicts.
-fn depends_on_model(kind: Kind) -> bool {
-    let about = kind.about();
-    matches!(
-        about.channel,
-        Channel::Position | Channel::Effort | Channel::Transmission
-    ) || matches!(
-        about.name,
-        "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
-    )
 }

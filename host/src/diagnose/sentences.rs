@@ -61,7 +61,9 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
     words.extend(worse_refitted(d));
     words.extend(motion(d));
-    if let Some(remainder) = &d.remainder {
+    if let Some(doubted) = d.remainder.as_ref().filter(|r| r.doubt) {
+        words.push(doubted.text.clone());
+    } else if let Some(remainder) = &d.remainder {
         words.push(format!(
             "At joint {} an RMS of {} beyond the noise floor stays without a name, {} times the floor.",
             remainder.joint,

@@ -31,6 +31,20 @@ pub struct Answer {
     pub gap_closed: Option<f64>,
     /// Effects that it says the recording cannot show.
     pub not_testable: Vec<String>,
+    /// What it would record next.
+    pub next: Option<Proposed>,
+}
+
+/// An experiment that a method proposes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Proposed {
+    /// Which.
+    pub kind: String,
+    /// Names that it is to separate.
+    pub separates: Vec<String>,
+    /// The motion, where the rig can run it with nothing changed by hand; a [`crate::excite::TrajectoryFile`].
+    #[serde(skip)]
+    pub trajectory: Option<String>,
 }
 
 /// A method to be judged.
@@ -58,6 +72,9 @@ impl Method for Diagnose {
         let mut training: Vec<&dyn crate::prepare::Recording> = vec![&made.train];
         if let Some(repeat) = &made.repeat {
             training.push(repeat);
+        }
+        for more in &made.further {
+            training.push(more);
         }
         let options = crate::diagnose::Options {
             without: without.to_vec(),
@@ -101,6 +118,11 @@ impl Answer {
                 .iter()
                 .map(|n| n.effect.clone())
                 .collect(),
+            next: diagnosis.next_experiment.as_ref().map(|next| Proposed {
+                kind: next.kind.clone(),
+                separates: next.separates.clone(),
+                trajectory: next.trajectory.clone().filter(|_| !next.hands),
+            }),
         }
     }
 }

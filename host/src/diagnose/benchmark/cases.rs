@@ -60,6 +60,8 @@ pub struct Case {
     pub scenario: Scenario,
     /// What the library lacks.
     pub without: Vec<Kind>,
+    /// Whether an experiment that is proposed for an open set of names is recorded and all is asked again.
+    pub follow: bool,
 }
 
 impl Case {
@@ -106,6 +108,8 @@ pub struct Plan {
     pub leave_out: bool,
     /// Whether the negative controls are run.
     pub controls: bool,
+    /// Whether experiments that are proposed for an open set of names are recorded, for a second answer.
+    pub follow: bool,
     /// Length of training and hold-out, s.
     pub seconds: [f64; 2],
 }
@@ -128,6 +132,7 @@ impl Plan {
                     ..scenario
                 },
                 without: Vec::new(),
+                follow: self.follow && group == Group::Single,
             };
             for seed in self.first_seed..self.first_seed + self.nothing {
                 cases.push(case(Group::Nothing, Scenario::new(Vec::new(), seed)));

@@ -4,6 +4,7 @@
 
 mod answer;
 mod cases;
+mod follow;
 mod parameters;
 pub mod peer;
 mod score;
@@ -16,8 +17,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::DiagnoseError;
-pub use answer::{Answer, Diagnose, Method, Named, exact_class, is_right};
+pub use answer::{Answer, Diagnose, Method, Named, Proposed, exact_class, is_right};
 pub use cases::{Case, Group, Plan};
+pub use follow::Followed;
 pub use parameters::{Compared, compare};
 pub use score::{EffectScore, Outcome, Score};
 pub use table::markdown;
@@ -78,6 +80,10 @@ fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseErr
                 Ok(answer) => (Some(answer), None),
                 Err(error) => (None, Some(error.to_string())),
             };
+            let followed = answer
+                .as_ref()
+                .filter(|_| case.follow)
+                .and_then(|answer| follow::follow(case, &made, *method, answer));
             let found = answer.iter().flat_map(|a| &a.named);
             let parameters = found
                 .flat_map(|named| {
@@ -96,6 +102,7 @@ fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseErr
                 sizes: sizes.clone(),
                 answer,
                 failure,
+                followed,
                 parameters,
             }
         })

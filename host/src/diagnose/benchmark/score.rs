@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::answer::{Answer, exact_class, is_right, same_by_voltage};
 use super::cases::Group;
+use super::follow::Followed;
 use super::parameters::Compared;
 use super::wilson::Proportion;
 use crate::diagnose::scenario::{Hidden, Size};
@@ -30,6 +31,8 @@ pub struct Outcome {
     pub answer: Option<Answer>,
     /// Why it failed.
     pub failure: Option<String>,
+    /// What came of the experiment proposed for an open first name, where it was to be followed.
+    pub followed: Option<Followed>,
     /// Parameters under right names.
     pub parameters: Vec<Compared>,
 }
@@ -99,6 +102,26 @@ impl Outcome {
         self.answer.as_ref().is_some_and(|a| a.remainder)
     }
 
+    /// The experiment followed for a first set that holds the one hidden effect.
+    fn experiment(&self) -> Option<&Followed> {
+        let [truth] = self.truth()[..] else {
+            return None;
+        };
+        let first = self.answer.as_ref()?.named.first()?;
+        let held = first.set.iter().any(|name| is_right(name, truth));
+        self.followed.as_ref().filter(|_| held)
+    }
+
+    /// Whether the experiment that the rig could run has left the hidden effect alone in the first set.
+    fn separated(&self) -> Option<bool> {
+        let truth = self.truth().first().copied()?;
+        let after = self.experiment()?.answer.as_ref()?;
+        Some(
+            (after.named.first())
+                .is_some_and(|first| first.set.iter().all(|name| is_right(name, truth))),
+        )
+    }
+
     /// Whether it is one effect with partners that its recording cannot tell from it, and all of them were returned as the
     /// first set.
     fn whole_set(&self) -> Option<bool> {
@@ -132,12 +155,18 @@ pub struct Score {
     pub exact_combination: Proportion,
     /// Median share of the hold-out's gap that is closed under a right first name, by class of effect.
     pub gap_closed: BTreeMap<&'static str, f64>,
+    /// Says that something is left although nothing is hidden or exactly what is hidden, one effect, is named.
+    pub left_wrongly: Proportion,
     /// Effect not in the library: gives a name and does not say that something is left.
     pub invented_silently: Proportion,
     /// Effect not in the library: says that something is left.
     pub remainder_flagged: Proportion,
     /// One of an exactly confounded set: the whole set is returned.
     pub set_returned: Proportion,
+    /// A first set with the hidden effect in it, an experiment proposed: the rig runs it with nothing changed by hand.
+    pub experiment_runs: Proportion,
+    /// Of these: the hidden effect is left alone with its recording.
+    pub set_separated: Proportion,
     /// Median relative error of the parameters under right names.
     pub parameter_error: Option<f64>,
     /// 95 % intervals that hold the truth, laws of one form only.
@@ -209,7 +238,15 @@ impl Score {
             .map(Outcome::false_discoveries)
             .collect();
         let compared = || single().flat_map(|o| &o.parameters);
-        let left_out = || group(Group::LeftOut).filter(|o| o.above());
+        // A value of the description that is wrong is missing in no library: that it has changed is the right verdict.
+        let only_values = |o: &&Outcome| o.sizes.iter().all(|size| size.parameter_change);
+        let left_out = || {
+            let all = group(Group::LeftOut).filter(|o| o.above());
+            all.filter(move |o| !only_values(o))
+        };
+        let complete = (outcomes.iter()).filter(|o| {
+            o.group == Group::Nothing || o.group == Group::Single && o.above() && o.exact()
+        });
         let controls = [
             Group::WrongDescription,
             Group::PhaseRandomised,
@@ -238,9 +275,14 @@ impl Score {
                 .into_iter()
                 .filter_map(|(class, shares)| Some((class, median(shares)?)))
                 .collect(),
+            left_wrongly: Proportion::of(complete.map(Outcome::remainder)),
             invented_silently: Proportion::of(left_out().map(|o| o.alarmed() && !o.remainder())),
             remainder_flagged: Proportion::of(left_out().map(Outcome::remainder)),
             set_returned: Proportion::of(single().filter_map(Outcome::whole_set)),
+            experiment_runs: Proportion::of(
+                (single().filter_map(Outcome::experiment)).map(|f| f.answer.is_some()),
+            ),
+            set_separated: Proportion::of(single().filter_map(Outcome::separated)),
             parameter_error: median(compared().map(Compared::error).collect()),
             coverage: Proportion::of(compared().filter(|c| c.same_form).map(Compared::covered)),
             controls: controls

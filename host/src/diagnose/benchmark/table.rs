@@ -59,6 +59,11 @@ pub fn markdown(scores: &[Score]) -> String {
         );
     }
     row(
+        "something left is said, all named or nothing hidden",
+        "",
+        &p(|s| s.left_wrongly),
+    );
+    row(
         "effect not in the library: invents a name silently",
         "≤ 10 %",
         &p(|s| s.invented_silently),
@@ -72,6 +77,16 @@ pub fn markdown(scores: &[Score]) -> String {
         "confounded names returned as a set",
         "100 %",
         &p(|s| s.set_returned),
+    );
+    row(
+        "open name with the hidden effect in its set: the rig can run the experiment proposed by itself",
+        "",
+        &p(|s| s.experiment_runs),
+    );
+    row(
+        "separated by that one experiment",
+        "≥ 90 %",
+        &p(|s| s.set_separated),
     );
     row("parameter error, median", "≤ 5 %", &|s| {
         percent(s.parameter_error)

@@ -41,6 +41,7 @@ fn plan() -> Plan {
         combined: 2,
         leave_out: true,
         controls: true,
+        follow: false,
         seconds: [20.0, 20.0],
     }
 }
@@ -132,4 +133,25 @@ fn sparse_regression_names_an_eccentric_gear_first() {
         );
         assert!(answer.gap_closed.unwrap() > 0.5, "{}", method.name());
     }
+}
+
+#[test]
+fn a_constant_that_the_library_lacks_is_not_passed_off_as_a_tilt() {
+    let effect = Effect::TorqueOffset { torque: 0.15 };
+    let scenario = Scenario {
+        seconds: [30.0, 20.0],
+        ..Scenario::new(vec![Hidden { joint: 0, effect }], 5)
+    };
+    let made = scenario.make().unwrap();
+    let known = Diagnose.answer(&made, &[]).unwrap();
+    assert!(is_right(&known.named[0].effect, "torque_offset"));
+    assert!(!known.remainder, "{known:?}");
+    let constants = exact_class("torque_offset");
+    let without: Vec<Kind> = (Kind::ALL.iter().copied())
+        .filter(|kind| constants.contains(kind.about().name))
+        .collect();
+    let unknown = Diagnose.answer(&made, &without).unwrap();
+    assert!(unknown.remainder, "{unknown:?}");
+    // A spring that pushes, or none but its preload, is no spring.
+    assert!(unknown.named.iter().all(|named| named.effect != "spring"));
 }

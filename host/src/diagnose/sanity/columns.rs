@@ -13,6 +13,9 @@ const FEWEST: usize = 100;
 /// Share of the moving time at the torque limit that leaves too little to learn from.
 const AT_LIMIT: f64 = 0.2;
 
+/// Kind of a position that jumps.
+pub(super) const JUMP: &str = "jump";
+
 /// The name of the recording.
 pub(super) fn label(runs: &[&Run]) -> String {
     runs.first()
@@ -130,6 +133,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
             let (joint, about) = match &problem {
                 Implausible::Degrees { joint, .. }
                 | Implausible::Position { joint, .. }
+                | Implausible::Jump { joint, .. }
                 | Implausible::Velocity { joint, .. }
                 | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
                 Implausible::EffortTooLarge { joint, .. }
@@ -141,13 +145,17 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 continue;
             }
             let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
+            let kind = match problem {
+                Implausible::Jump { .. } => JUMP,
+                _ => "unit",
+            };
             let mut text = format!("{problem}.");
             if let Some(ratio) = motor_angle(robot, run, joint) {
                 text = format!(
                     "{text} Divided by the gear ratio {ratio} it would fit as well: it may be the motor's angle."
                 );
             }
-            found.push((joint, fault(runs, "unit", about, name, text)));
+            found.push((joint, fault(runs, kind, about, name, text)));
         }
     }
     found

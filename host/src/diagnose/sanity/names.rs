@@ -26,7 +26,7 @@ fn of(factor: f64, tolerance: f64, list: &[Named]) -> Option<String> {
 /// A torque that is recorded `factor` times too large.
 pub(super) fn of_torque(joint: &Joint, factor: f64) -> Option<String> {
     let (small, large) = match joint.kind {
-        JointKind::Revolute => ("N·mm", "kN·m"),
+        JointKind::Revolute => ("mN·m (N·mm)", "kN·m"),
         JointKind::Prismatic => ("mN", "kN"),
     };
     let mut list = vec![

@@ -153,6 +153,17 @@ fn q(runs: &[Run], j: usize, factor: f64) -> Vec<Run> {
     injured(runs, |r| times(&mut r.joints[j].q_raw, factor))
 }
 
+/// A position that jumps by 0.3 rad or m halfway: the joint is named, and nothing that follows from it.
+fn jumps(robot: &Robot, runs: &[Run], joint: usize) {
+    let jumps = injured(runs, |r| {
+        let half = r.len() / 2;
+        r.joints[joint].q_raw[half..]
+            .iter_mut()
+            .for_each(|q| *q += 0.3);
+    });
+    only(robot, &jumps, "jump", joint, "jumps by 0.");
+}
+
 /// A torque that comes late.
 fn late(robot: &Robot, runs: &[Run], joint: usize) {
     let late = injured(runs, |r| {
@@ -185,6 +196,7 @@ fn faults_of_a_real_slide_are_named() {
     only(&robot, &q(&runs, 0, -1.0), "sign", 0, "reverse one");
     only(&robot, &tau(&runs, 0, 1000.0), "unit", 0, "too large");
     only(&robot, &q(&runs, 0, 1000.0), "unit", 0, "outside");
+    jumps(&robot, &runs, 0);
     late(&robot, &runs, 0);
     cut(&robot, &runs, 0);
 }
@@ -202,6 +214,7 @@ fn faults_of_two_real_links_are_named() {
         times(velocity, 9.5493);
     });
     only(&robot, &rpm, "unit", 0, "revolutions per minute");
+    jumps(&robot, &runs, 1);
     late(&robot, &runs, 1);
     cut(&robot, &runs, 1);
 }
@@ -213,6 +226,7 @@ fn faults_of_a_real_arm_with_torque_sensors_are_named() {
     };
     only(&robot, &tau(&runs, 1, -1.0), "sign", 1, "");
     only(&robot, &tau(&runs, 3, 1000.0), "unit", 3, "");
+    jumps(&robot, &runs, 3);
     only(&robot, &q(&runs, 1, 57.296), "unit", 1, "degrees");
     // A late torque is taken up here: a few slow harmonics, shifted, are other sums of the same columns.
     cut(&robot, &runs, 1);
@@ -227,6 +241,7 @@ fn faults_of_a_real_arm_with_geared_motors_are_named() {
         only(&robot, &tau(&runs, j, -1.0), "sign", j, "");
     }
     only(&robot, &q(&runs, 1, 32.0), "unit", 1, "gear ratio");
+    jumps(&robot, &runs, 2);
     late(&robot, &runs, 0);
     cut(&robot, &runs, 0);
 }

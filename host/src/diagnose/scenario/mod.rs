@@ -10,6 +10,7 @@ mod catalogue;
 mod dice;
 mod fault;
 mod hidden;
+mod proposed;
 mod record;
 mod reference;
 mod rig;
@@ -129,6 +130,7 @@ impl Scenario {
             } else {
                 None
             },
+            further: Vec::new(),
             holdout: recording("holdout", &other, 2)?,
             truth: Truth {
                 hidden: self.hidden.clone(),
@@ -279,6 +281,8 @@ pub struct Made {
     pub train: InMemory,
     /// The same reference again.
     pub repeat: Option<InMemory>,
+    /// To learn from besides: what was recorded since.
+    pub further: Vec<InMemory>,
     /// Another reference.
     pub holdout: InMemory,
     /// What is true.

@@ -105,6 +105,7 @@ impl Told<'_> {
                 "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
                 self.thousandths(last), last / self.floor.max(f64::MIN_POSITIVE)
             ),
+            doubt: false,
         });
         Diagnosis {
             schema: "rig-diagnosis/1".into(),

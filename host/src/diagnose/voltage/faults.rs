@@ -45,6 +45,7 @@ pub(super) fn faults(
         found.extend(wrong.into_iter().flatten().map(|what| {
             let kind = match what {
                 Implausible::Milliseconds { .. } => "clock",
+                Implausible::Jump { .. } => "jump",
                 _ => "unit",
             };
             fault(kind, source.label(), format!("{what}."))

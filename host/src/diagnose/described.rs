@@ -1,0 +1,66 @@
+//! Which of names that the data support alike agrees with the description's values.
+//!
+//! A name that stands in for another one fits as well because the nominal parameters move beside it: a constant takes the
+//! place of a spring where gravity takes up its stiffness. With the true name the description's values stand.
+
+use super::DiagnoseError;
+use super::anchor::Anchor;
+use super::judge::{BEYOND_FLOOR, Judge, Judged, equal};
+use super::profile::Profile;
+use super::refit::Refit;
+
+/// Share of what a name leaves beyond the floor, the description's values as they are, that another one leaves at most.
+const MUCH_LESS: f64 = 0.5;
+
+/// Puts names in the place of equal ones where the description's values, as they are, then leave much less.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn by_description(
+    judge: &Judge,
+    refit: &Refit,
+    anchor: &Anchor,
+    judged: Judged,
+) -> Result<Judged, DiagnoseError> {
+    if !anchor.stated {
+        return Ok(judged);
+    }
+    let frozen = refit.frozen(anchor);
+    let left = |list: &[Profile], joint: usize| {
+        let mut fit = frozen.clone();
+        for column in list.iter().flat_map(|p| p.columns.iter()) {
+            fit.push(column);
+        }
+        fit.rms(joint)
+    };
+    let mut chosen = judged.chosen.clone();
+    let mut moved = false;
+    for k in 0..chosen.len() {
+        let joint = chosen[k].candidate.joint;
+        let floor = judged.floors[joint];
+        let own = left(&chosen, joint);
+        if own < BEYOND_FLOOR * floor {
+            continue;
+        }
+        let rivals = judge.search.alternatives(judge.base, &chosen, k)?;
+        let best = (rivals.into_iter())
+            .filter(|rival| equal(&chosen[k], rival))
+            .map(|rival| {
+                let mut list = chosen.clone();
+                list[k] = rival;
+                (left(&list, joint), list)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((less, list)) = best
+            && less - floor < MUCH_LESS * (own - floor)
+        {
+            chosen = list;
+            moved = true;
+        }
+    }
+    if moved {
+        judge.judged(chosen)
+    } else {
+        Ok(judged)
+    }
+}

@@ -1,0 +1,36 @@
+//! What a search asks of kinds and candidates.
+
+use rig_shared::effects::{Channel, Kind};
+
+use crate::diagnose::columns::Candidate;
+
+/// Whether it acts between motor and link.
+pub(in crate::diagnose) fn is_gear(kind: Kind) -> bool {
+    kind.about().channel == Channel::Transmission
+}
+
+/// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
+pub(in crate::diagnose) fn rivals(a: &Candidate, b: &Candidate) -> bool {
+    let one = a.kind.about().name == b.kind.about().name || is_gear(a.kind) && is_gear(b.kind);
+    one && a.joint == b.joint && a.other == b.other
+}
+
+/// Whether a kind is the law that its name is searched by; others take its place only where they do better.
+pub(in crate::diagnose) fn is_first_law(kind: Kind) -> bool {
+    Kind::named(kind.about().name, None) == Some(kind)
+        // Rings of motor and joint are at different places, not different laws.
+        || kind == Kind::EncoderEccentricityJoint
+        || kind == Kind::ViscousWarmupTemperature
+}
+
+/// Whether an effect's columns depend on what the model predicts.
+pub(super) fn depends_on_model(kind: Kind) -> bool {
+    let about = kind.about();
+    matches!(
+        about.channel,
+        Channel::Position | Channel::Effort | Channel::Transmission
+    ) || matches!(
+        about.name,
+        "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
+    )
+}
