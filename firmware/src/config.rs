@@ -9,6 +9,7 @@ use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use rig_shared::safety::monitor::MonitorConfig;
+use rig_shared::safety::voltage::VoltageModel;
 use serde::{Deserialize, Serialize};
 
 use crate::sample::Scaling;
@@ -27,18 +28,20 @@ pub struct Rates {
 }
 
 impl Default for Rates {
-    /// Control at 10 kHz, telemetry and estimator at 1 kHz, the estimate reported at 20 Hz.
     fn default() -> Self {
-        Self {
-            control_hz: 10_000,
-            telemetry_decimation: 10,
-            estimator_decimation: 10,
-            estimate_report_decimation: 50,
-        }
+        Self::TEMPLATE
     }
 }
 
 impl Rates {
+    /// Control at 10 kHz, telemetry and estimator at 1 kHz, the estimate reported at 20 Hz.
+    pub const TEMPLATE: Self = Self {
+        control_hz: 10_000,
+        telemetry_decimation: 10,
+        estimator_decimation: 10,
+        estimate_report_decimation: 50,
+    };
+
     /// Estimator updates per second.
     pub fn estimator_hz(&self) -> f32 {
         self.control_hz as f32 / f32::from(self.estimator_decimation.max(1))
@@ -89,6 +92,43 @@ pub struct Config {
 }
 
 impl Config {
+    /// What follows from the parts, the rates and the limits that the parts were chosen for.
+    pub fn new(rates: Rates, drive: Drive<f32>, encoder: Encoder, limits: &Limits<f32>) -> Self {
+        let rate = rates.control_hz;
+        let counts_per_radian =
+            encoder.counts_per_motor_turn as f32 * drive.gear_ratio.abs() / core::f32::consts::TAU;
+        let period = 1.0 / rate as f32;
+        Self {
+            rates,
+            scaling: Scaling::default(),
+            drive,
+            encoder,
+            monitor: MonitorConfig {
+                period,
+                supply: [18.0, 30.0],
+                temperature: 85.0,
+                current_margin: 1.5,
+                velocity_margin: 1.25,
+                position_margin: 0.1,
+                // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
+                largest_step: libm::ceilf(4.0 * limits.velocity * counts_per_radian * period)
+                    as i32
+                    + 4,
+                persistence: 3,
+                voltage: VoltageModel::new(&drive, encoder.counts_per_motor_turn, period),
+                stuck_ticks: rate / 20,
+                stuck_duty: 0.02,
+                thermal_time: 10.0,
+            },
+            ratings: ratings(limits, 1.0 / counts_per_radian),
+            calibration_ticks: rate / 2,
+            largest_offset: 0.5,
+            host_silent_ticks: rate / 2,
+            wake_ticks: wake_ticks(rate),
+            host_lost_ticks: rate,
+        }
+    }
+
     /// Codes of the current, lower and upper, beyond which comparators switch the bridge off: what the checks call an
     /// over-current at the highest limit that the parts stand.
     pub fn current_thresholds(&self) -> [u16; 2] {

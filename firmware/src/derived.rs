@@ -30,6 +30,8 @@ pub struct Derived {
     pub torque_per_ampere: f32,
     /// Control ticks in a period of the clock that times the encoder's edges.
     pub ticks_per_edge_period: f32,
+    /// Whole ticks of the current loop's lag, and the share of one that is left.
+    pub lag: (u8, f32),
     /// Share of the bridge's loss that is made up for, per wanted ampere, 1/A.
     pub fade_per_ampere: f32,
     /// Velocity observer.
@@ -49,6 +51,10 @@ impl Derived {
         let counts_per_joint_turn =
             config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
         let limits = &settings.limits;
+        let current = current::Config::design(&config.drive, &settings.gains, period, DUTY_LIMIT);
+        // Bandwidths that give more ticks than are remembered are refused (`usable`).
+        let lag = current.lag * rate;
+        let whole = lag as u8;
         Self {
             period,
             estimator_period: f32::from(config.rates.estimator_decimation) * period,
@@ -77,7 +83,8 @@ impl Derived {
                 torque_limit: limits.torque,
                 period,
             },
-            current: current::Config::design(&config.drive, &settings.gains, period, DUTY_LIMIT),
+            lag: (whole, lag - f32::from(whole)),
+            current,
         }
     }
 }

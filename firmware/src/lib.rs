@@ -26,6 +26,7 @@ pub mod speaker;
 pub mod state;
 pub mod step;
 pub mod stored;
+pub mod usable;
 pub mod window;
 
 /// Version of the firmware, as the greeting tells it.

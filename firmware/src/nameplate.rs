@@ -11,15 +11,19 @@ use rig_shared::friction::Friction;
 use rig_shared::link::LinkParameters;
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
-use rig_shared::safety::monitor::MonitorConfig;
-use rig_shared::safety::voltage::VoltageModel;
 
-use crate::config::{Config, Encoder, Rates, Settings, ratings, wake_ticks};
-use crate::sample::Scaling;
+use crate::config::{Config, Encoder, Rates, Settings};
+
+/// How often what is done.
+pub const RATES: Rates = Rates::TEMPLATE;
 
 /// The one-link rig of the template: what is fixed, and what holds until the host says otherwise.
 pub fn one_link() -> (Config, Settings) {
-    let rates = Rates::default();
+    one_link_at(RATES)
+}
+
+/// The same at other rates.
+pub fn one_link_at(rates: Rates) -> (Config, Settings) {
     let rate = rates.control_hz;
     let limits = Limits {
         position_low: -3.1,
@@ -37,38 +41,12 @@ pub fn one_link() -> (Config, Settings) {
         resistance: 0.6,
         inductance: 0.5e-3,
     };
-    let counts_per_motor_turn = 8192;
-    let config = Config {
-        rates,
-        scaling: Scaling::default(),
-        drive,
-        encoder: Encoder {
-            counts_per_motor_turn,
-            observer_bandwidth: 200.0,
-            index_levels: 0b00,
-        },
-        monitor: MonitorConfig {
-            period: 1.0 / rate as f32,
-            supply: [18.0, 30.0],
-            temperature: 85.0,
-            current_margin: 1.5,
-            velocity_margin: 1.25,
-            position_margin: 0.1,
-            // Four times the counts of a tick at 6 rad/s: 39.1.
-            largest_step: 161,
-            persistence: 3,
-            voltage: VoltageModel::new(&drive, counts_per_motor_turn, 1.0 / rate as f32),
-            stuck_ticks: rate / 20,
-            stuck_duty: 0.02,
-            thermal_time: 10.0,
-        },
-        ratings: ratings(&limits, (core::f64::consts::TAU / (8192.0 * 50.0)) as f32),
-        calibration_ticks: rate / 2,
-        largest_offset: 0.5,
-        host_silent_ticks: rate / 2,
-        wake_ticks: wake_ticks(rates.control_hz),
-        host_lost_ticks: rate,
+    let encoder = Encoder {
+        counts_per_motor_turn: 8192,
+        observer_bandwidth: 200.0,
+        index_levels: 0b00,
     };
+    let config = Config::new(rates, drive, encoder, &limits);
     let settings = Settings {
         control: ControlKind::ProportionalDerivative,
         gains: Gains {

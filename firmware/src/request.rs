@@ -1,13 +1,12 @@
 //! What the host may change, when, and what it is refused.
 
 use rig_shared::control::{adaptive, current};
-use rig_shared::link::LinkParameters;
 use rig_shared::safety::{Fault, Limits, Mode};
 use rig_shared::trajectory::{Course, Extremes};
 use rig_shared::wire::message::{Refusal, RequestBody};
 
-use crate::config::{Config, Settings};
-use crate::examined::Examined;
+use crate::config::Config;
+use crate::examined::{Examined, Finding};
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
 
@@ -52,61 +51,48 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         },
         RequestBody::ClearFault => clear_fault(config, state),
         RequestBody::SetPosition(position) => set_position(state, *position),
-        RequestBody::SetTrajectory(trajectory) => {
-            refuse_in_motion(state)?;
-            let (extremes, prepared) = examined.motion.ok_or(Refusal::BadValue)?;
-            fits(&extremes, &state.settings.limits, None)?;
-            state.trajectory = Some((Course::new(trajectory.clone(), prepared), extremes));
-            Ok(())
-        }
-        RequestBody::SetEffects(_) => {
-            refuse_in_motion(state)?;
-            match &examined.effects {
-                Some(Ok(compensation)) => {
-                    state.replace_effects(compensation);
-                    Ok(())
-                }
-                Some(Err(refusal)) => Err(*refusal),
-                None => Err(Refusal::BadValue),
-            }
-        }
+        RequestBody::SetLimits(_) if state.mode.drives() => Err(Refusal::WrongMode),
         _ => {
+            // Checks that act may not be moved, nor laws that drive a motion.
             refuse_in_motion(state)?;
-            // Checks that act may not be moved.
-            if matches!(body, RequestBody::SetLimits(_)) && state.mode.drives() {
-                return Err(Refusal::WrongMode);
-            }
-            let settings = with(&state.settings, body);
-            usable(config, &settings)?;
-            state
-                .apply(config, settings)
-                .map_err(|_| Refusal::BadValue)?;
-            if matches!(body, RequestBody::SetEstimator(_)) {
-                state
-                    .replace_estimator(config)
-                    .map_err(|_| Refusal::BadValue)?;
-            }
-            Ok(())
+            replace(
+                state,
+                body,
+                examined.finding.as_ref().map_err(|refusal| *refusal)?,
+            )
         }
     }
 }
 
-/// The settings as the request wants them.
-fn with(now: &Settings, body: &RequestBody) -> Settings {
-    let mut settings = *now;
-    match body {
-        RequestBody::SetGains(gains) => settings.gains = *gains,
-        RequestBody::SetControl(kind) => settings.control = *kind,
-        RequestBody::SetModel(model) => settings.model = *model,
-        RequestBody::SetFriction(friction) => settings.friction = *friction,
-        RequestBody::SetPrecompensation(precompensation) => {
-            settings.precompensation = *precompensation
+/// Puts what has been examined in the place of what was.
+fn replace(state: &mut State, body: &RequestBody, finding: &Finding) -> Result<(), Refusal> {
+    match (body, finding) {
+        (RequestBody::SetTrajectory(trajectory), Finding::Motion(extremes, prepared)) => {
+            fits(extremes, &state.settings.limits, None)?;
+            state.trajectory = Some((Course::new(trajectory.clone(), *prepared), *extremes));
+            return Ok(());
         }
-        RequestBody::SetLimits(limits) => settings.limits = *limits,
-        RequestBody::SetEstimator(estimator) => settings.estimator = *estimator,
-        _ => {}
+        (RequestBody::SetEffects(_), Finding::Effects(compensation)) => {
+            state.replace_effects(compensation);
+            return Ok(());
+        }
+        (RequestBody::SetEstimator(settings), Finding::Estimator(estimator)) => {
+            state.settings.estimator = *settings;
+            state.replace_estimator(estimator);
+        }
+        (RequestBody::SetGains(gains), _) => state.settings.gains = *gains,
+        (RequestBody::SetControl(kind), _) => state.settings.control = *kind,
+        (RequestBody::SetModel(model), _) => state.settings.model = *model,
+        (RequestBody::SetFriction(friction), _) => state.settings.friction = *friction,
+        (RequestBody::SetPrecompensation(precompensation), _) => {
+            state.settings.precompensation = *precompensation;
+        }
+        (RequestBody::SetLimits(limits), _) => state.settings.limits = *limits,
+        // What was found belongs to another request.
+        _ => return Err(Refusal::BadValue),
     }
-    settings
+    state.stale = true;
+    Ok(())
 }
 
 fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
@@ -214,27 +200,6 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
         state.mode = Mode::Disarmed;
     }
     Ok(())
-}
-
-/// Whether values are physical and within what the rig's parts stand; everything written so that NaN is refused.
-pub(crate) fn usable(config: &Config, settings: &Settings) -> Result<(), Refusal> {
-    let good = settings.limits.is_valid()
-        && settings.limits.is_within(&config.ratings)
-        && settings.gains.usable()
-        && settings.friction.check().is_ok()
-        && model_is_usable(&settings.model)
-        && settings.precompensation.check().is_ok()
-        // The adaptive law smooths its sign by it, whether or not friction is precompensated.
-        && settings.precompensation.velocity_threshold > 0.0
-        && settings.precompensation.velocity_threshold.is_finite();
-    if good { Ok(()) } else { Err(Refusal::BadValue) }
-}
-
-fn model_is_usable(model: &LinkParameters<f32>) -> bool {
-    model.to_array().iter().all(|value| value.is_finite())
-        && model.inertia > 0.0
-        && model.viscous >= 0.0
-        && model.coulomb >= 0.0
 }
 
 /// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known

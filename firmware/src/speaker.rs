@@ -55,7 +55,13 @@ impl Speaker {
             // A damaged frame was counted by the decoder; the host, unanswered, will repeat its request.
             if let Some(Ok(request)) = decoder.push(byte)
                 && clerk
-                    .serve(config, state, capture, &examine(request), &mut notes)
+                    .serve(
+                        config,
+                        state,
+                        capture,
+                        &examine(config, request),
+                        &mut notes,
+                    )
                     .is_some()
             {
                 clerk.stored(state, Err(Refusal::NoStorage), &mut notes);

@@ -3,7 +3,7 @@
 use rig_shared::compensation::{self, Compensation};
 use rig_shared::control::{current, law};
 use rig_shared::encoder;
-use rig_shared::estimation::{OneLinkEstimator, SettingsFault};
+use rig_shared::estimation::{OneLinkEstimator, SettingsFault, one_link};
 use rig_shared::safety::monitor::MonitorState;
 use rig_shared::safety::{FaultLatch, LimitSet, Mode, Snapshot};
 use rig_shared::trajectory::{Course, Extremes, Reference};
@@ -53,6 +53,8 @@ pub struct State {
     pub(crate) stale: bool,
     /// The effects have changed since `settings` was told.
     pub(crate) renewed: bool,
+    /// This tick has time for a request.
+    serves: bool,
     /// The effects of the settings, checked.
     pub(crate) compensation: Compensation<f32>,
     pub(crate) effects: compensation::State<f32>,
@@ -179,6 +181,7 @@ impl State {
             derived,
             stale: false,
             renewed: false,
+            serves: false,
             calibration: Calibration {
                 zero_code: config.scaling.current_zero,
                 ..Calibration::default()
@@ -222,33 +225,40 @@ impl State {
         self.tick - u64::from(self.telemetry.ticks)
     }
 
-    /// Replaces settings; nothing where they cannot be used. What follows from them is worked out at the beginning of
-    /// the next tick: the one that serves a request has enough to do.
-    pub(crate) fn apply(
-        &mut self,
-        config: &Config,
-        settings: Settings,
-    ) -> Result<(), SettingsFault> {
-        settings.estimator.check(config.rates.estimator_hz())?;
-        self.settings = settings;
-        self.stale = true;
-        Ok(())
+    /// Whether the tick has time for what is seldom: it neither turns periodic effects, nor evaluates a law, nor has the
+    /// estimator learn. Where that learns so often that there is no such tick, every one must do.
+    fn is_idle(&self, config: &Config) -> bool {
+        let rates = &config.rates;
+        let learns = self.estimation.ticks + 1 >= rates.estimator_decimation;
+        rates.estimator_decimation < 4 || (self.tick & 1 == 0 && !learns)
     }
 
-    /// Works out what follows from settings that have changed.
+    /// Works out what follows from settings or effects that have changed, in a tick that has time, and says whether a
+    /// request may be served in this one.
     #[inline(always)]
     pub(crate) fn follow(&mut self, config: &Config) {
+        self.serves = false;
+        if !self.is_idle(config) {
+            return;
+        }
         if self.stale {
             self.stale = false;
             self.derived = Derived::new(config, &self.settings);
         } else if self.renewed {
             self.renewed = false;
             self.renew();
+        } else {
+            self.serves = true;
         }
     }
 
-    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain. What follows from
-    /// them is worked out in the next tick, as for [`State::apply`].
+    /// Whether the tick that has just been done has time for a request beside. While what follows from the last one is still
+    /// to be worked out it has not, so that where this is asked each is in force before the next is looked at.
+    pub fn has_time(&self) -> bool {
+        self.serves
+    }
+
+    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain.
     pub(crate) fn replace_effects(&mut self, compensation: &Compensation<f32>) {
         self.compensation = *compensation;
         self.renewed = true;
@@ -273,12 +283,9 @@ impl State {
         self.forget = true;
     }
 
-    /// An estimator of the settings as they are now.
-    pub(crate) fn replace_estimator(&mut self, config: &Config) -> Result<(), SettingsFault> {
-        self.estimator =
-            OneLinkEstimator::new(&self.settings.estimator, config.rates.estimator_hz())?;
-        self.previous = None;
-        self.forget = false;
-        Ok(())
+    /// Replaces the estimator's constants. It forgets in its own time, as with [`State::restart_estimator`].
+    pub(crate) fn replace_estimator(&mut self, config: &one_link::Config<f32>) {
+        self.estimator.reconfigure(config);
+        self.restart_estimator();
     }
 }

@@ -135,8 +135,7 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
         current_code: sample.current.0,
         current_at_rail: sample.current.at_rail(),
         current: (f32::from(sample.current.0) - state.calibration.zero_code)
-            * scaling.current_per_code
-            - state.current_error,
+            * scaling.current_per_code,
         supply: f32::from(sample.supply.0) * scaling.supply_per_code,
         temperature,
         encoder_step: step as i32,
@@ -309,7 +308,7 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
         &mut state.current_loop,
         current::Input {
             reference: wanted,
-            current: now.current,
+            current: now.current - state.current_error,
             back_emf: config.drive.back_emf(state.velocity) + state.regained,
             supply: now.supply,
         },
@@ -339,4 +338,103 @@ fn telemetry(config: &Config, state: &mut State, tick: &Tick) -> Option<(u64, St
         mode: state.mode,
     };
     Some((first_tick, sample))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::examined::examine;
+    use crate::nameplate::one_link;
+    use crate::request::carry_out;
+    use rig_shared::effects::{Effect, Kind};
+    use rig_shared::units::AdcCode;
+    use rig_shared::wire::message::{Request, RequestBody};
+
+    /// 5 A of the sensor are an over-current although an effect says that 0.4 A of them are its error, and 4.6 A are none; what
+    /// is recorded is the sensor's.
+    #[test]
+    fn the_checks_see_the_sensor_s_current() {
+        let (config, settings) = one_link();
+        assert_eq!(
+            settings.limits.peak_current * config.monitor.current_margin,
+            4.8
+        );
+        let mut state = State::new(&config, settings).unwrap();
+        let code =
+            |amperes: f32| AdcCode((2048.0 + amperes / config.scaling.current_per_code) as u16);
+        let sample = |amperes: f32| Sample {
+            current: code(amperes),
+            supply: AdcCode((24.0 / config.scaling.supply_per_code) as u16),
+            temperature: AdcCode(900),
+            ..Sample::default()
+        };
+        while state.mode == Mode::Calibrating {
+            assert_eq!(step(&config, &mut state, sample(0.0)).fault, None);
+        }
+        let torque = config.drive.joint_torque(0.4);
+        let effect = Effect::new(Kind::CurrentOffset, &[torque], &[]);
+        for body in [
+            RequestBody::SetEffects([effect].into_iter().collect()),
+            RequestBody::Arm,
+        ] {
+            let request = Request { id: 1, body };
+            carry_out(&config, &mut state, &examine(&config, request)).unwrap();
+            for _ in 0..20 {
+                step(&config, &mut state, sample(0.0));
+            }
+        }
+        assert!((state.current_error - 0.4).abs() < 1e-6 && state.mode == Mode::Holding);
+        let mut found = None;
+        for _ in 0..3 {
+            let output = step(&config, &mut state, sample(5.0));
+            assert!((output.tick.current - 5.0).abs() < 0.01);
+            found = found.or(output.fault);
+        }
+        assert_eq!(found.map(|record| record.fault), Some(Fault::OverCurrent));
+    }
+
+    /// Effects that replace others begin anew: what is left of a cogging in N·m is never read as radians of an encoder's error,
+    /// whichever tick the request comes in.
+    #[test]
+    fn effects_that_are_replaced_leave_nothing_behind() {
+        let (config, settings) = one_link();
+        let ask = |state: &mut State, body| {
+            let request = Request { id: 1, body };
+            carry_out(&config, state, &examine(&config, request)).unwrap();
+        };
+        let set = |effect| RequestBody::SetEffects([effect].into_iter().collect());
+        let sample = Sample {
+            current: AdcCode(2048),
+            supply: AdcCode((24.0 / config.scaling.supply_per_code) as u16),
+            temperature: AdcCode(900),
+            ..Sample::default()
+        };
+        for phase in 0..20 {
+            let mut state = State::new(&config, settings).unwrap();
+            while state.mode == Mode::Calibrating {
+                step(&config, &mut state, sample);
+            }
+            ask(&mut state, RequestBody::SetPosition(0.2));
+            ask(
+                &mut state,
+                set(Effect::new(Kind::Cogging, &[0.3, 0.2], &[12.0])),
+            );
+            ask(&mut state, RequestBody::Arm);
+            for _ in 0..40 + phase {
+                step(&config, &mut state, sample);
+            }
+            let small = Effect::new(Kind::EncoderEccentricityMotor, &[1e-5, 1e-5], &[1.0]);
+            ask(&mut state, set(small));
+            for _ in 0..40 {
+                step(&config, &mut state, sample);
+                assert!(
+                    state.position_error.abs() < 2e-5,
+                    "{phase}: {}",
+                    state.position_error
+                );
+            }
+            assert_ne!(state.position_error, 0.0);
+        }
+    }
 }

@@ -10,12 +10,11 @@
 
 use crc::{CRC_32_ISCSI, Crc, Table};
 use heapless::Vec;
-use rig_shared::compensation::Compensation;
 use rig_shared::wire::message::SettingsOrigin;
 use rig_shared::wire::schema;
 
 use crate::config::{Config, Settings};
-use crate::request::usable;
+use crate::usable;
 
 /// Bytes that a copy takes at most; a whole number of 64-bit words, which flash is written in.
 pub const IMAGE: usize = 1024;
@@ -114,7 +113,7 @@ pub struct Found {
     pub number: u32,
 }
 
-/// Chooses. Stored settings that cannot be used on this rig are not.
+/// Chooses: the newest copy that is whole and can be used on this rig.
 pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     let number = |copy: &Copy| match copy {
         Copy::Empty | Copy::Damaged => None,
@@ -124,30 +123,30 @@ pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     // None is below every number. A board is not stored to four thousand million times.
     let newer = usize::from(second > first);
     let highest = first.max(second);
+    let good = |copy: &Copy| match copy {
+        Copy::Whole { settings, .. } => usable::settings(config, settings).then_some(*settings),
+        _ => None,
+    };
+    let [newest, older] = [&copies[newer], &copies[1 - newer]];
     let damaged = copies.contains(&Copy::Damaged);
-    let (settings, origin) = match &copies[newer] {
-        Copy::Whole { settings, .. } => {
-            let good = usable(config, settings).is_ok()
-                && Compensation::new(&settings.effects).is_ok()
-                && settings
-                    .estimator
-                    .check(config.rates.estimator_hz())
-                    .is_ok();
-            match (good, damaged) {
-                (false, _) => (None, SettingsOrigin::Unusable),
-                (true, true) => (Some(*settings), SettingsOrigin::OlderCopy),
-                (true, false) => (Some(*settings), SettingsOrigin::Stored),
-            }
-        }
-        Copy::Foreign { .. } => (None, SettingsOrigin::Unusable),
-        Copy::Empty | Copy::Damaged if damaged => (None, SettingsOrigin::Damaged),
-        Copy::Empty | Copy::Damaged => (None, SettingsOrigin::Defaults),
+    let (newest, older) = (good(newest), good(older));
+    let (settings, origin) = match (newest, older) {
+        (Some(settings), _) if damaged => (Some(settings), SettingsOrigin::OlderCopy),
+        (Some(settings), _) => (Some(settings), SettingsOrigin::Stored),
+        (None, Some(settings)) => (Some(settings), SettingsOrigin::OlderCopy),
+        (None, None) if highest.is_some() => (None, SettingsOrigin::Unusable),
+        (None, None) if damaged => (None, SettingsOrigin::Damaged),
+        (None, None) => (None, SettingsOrigin::Defaults),
     };
     Found {
         settings,
         origin,
-        // Over the damaged one, over the empty one, over the older one.
-        place: if highest.is_none() { 0 } else { 1 - newer },
+        // Never over the one that is in force: over the one that cannot be used, the empty one, the older one.
+        place: match (newest, older) {
+            (None, Some(_)) => newer,
+            _ if highest.is_none() => 0,
+            _ => 1 - newer,
+        },
         number: highest.map_or(0, |number| number.wrapping_add(1)),
     }
 }
@@ -245,6 +244,25 @@ mod tests {
             (found.settings, found.origin),
             (None, SettingsOrigin::Damaged)
         );
+    }
+
+    /// Flashed with another firmware, stored by that one, flashed back: what this one stored before still holds.
+    #[test]
+    fn a_newer_copy_of_another_firmware_does_not_hide_an_older_one() {
+        let mut places = Places([[0xff; IMAGE]; 2]);
+        places.store(&settings(1.0), usize::MAX / 8);
+        places.store(&settings(2.0), usize::MAX / 8);
+        let newer = &mut places.0[1];
+        newer[4] ^= 1;
+        let length = HEAD + usize::from(u16::from_le_bytes([newer[16], newer[17]]));
+        let check = CRC.checksum(&newer[..length]);
+        newer[length..length + CHECK].copy_from_slice(&check.to_le_bytes());
+        assert!(matches!(read(newer), Copy::Foreign { number: 1 }));
+        let found = places.find();
+        assert_eq!(found.settings, Some(settings(1.0)));
+        assert_eq!(found.origin, SettingsOrigin::OlderCopy);
+        // Over the one that is of no use to this firmware.
+        assert_eq!((found.place, found.number), (1, 2));
     }
 
     #[test]

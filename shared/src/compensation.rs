@@ -44,6 +44,11 @@ use wave::{Stand, Waves};
 /// Most effects that a rig compensates.
 pub const EFFECTS: usize = 8;
 
+/// Ticks for which it is remembered what periodic effects were given: the most that [`Now::lead_ticks`] may be, and one.
+pub const GIVEN: usize = 64;
+// The place of a tick is its number modulo that of places, and the number wraps at 256.
+const _: () = assert!(GIVEN.is_power_of_two() && GIVEN <= 256);
+
 /// The effects of a rig, from the front.
 pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
 
@@ -79,6 +84,37 @@ pub struct State<T: Real> {
     /// each round, so that no rounding piles up.
     sums: [T; 3],
     turn: u8,
+    given: Given<T>,
+}
+
+/// What periodic effects were given in the ticks before: given ahead of the motor, it is what they explain when the motor is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Given<T> {
+    torques: [T; GIVEN],
+    next: u8,
+}
+
+impl<T: Real> Default for Given<T> {
+    fn default() -> Self {
+        Self {
+            torques: [T::ZERO; GIVEN],
+            next: 0,
+        }
+    }
+}
+
+impl<T: Real> Given<T> {
+    /// Puts down what is given now, and says what was given so many ticks ago.
+    #[inline(always)]
+    fn put(&mut self, torque: T, ticks: u8, share: T) -> T {
+        const LAST: usize = GIVEN - 1;
+        let next = usize::from(self.next);
+        self.torques[next & LAST] = torque;
+        self.next = self.next.wrapping_add(1);
+        let at = |ago: usize| self.torques[next.wrapping_sub(ago) & LAST];
+        let (later, earlier) = (at(usize::from(ticks)), at(usize::from(ticks) + 1));
+        later + share * (earlier - later)
+    }
 }
 
 impl<T: Real> State<T> {
@@ -89,6 +125,7 @@ impl<T: Real> State<T> {
         self.sums = [T::ZERO; 3];
         self.memories = [[Memory::default(); 2]; EFFECTS];
         self.turn = 0;
+        self.given = Given::default();
     }
 
     /// Nobody knows where the link stands: what is periodic stands nowhere. Not inlined: it is seldom.
@@ -198,6 +235,11 @@ impl<T: Scalar> Compensation<T> {
             .fold(T::ZERO, |sum, one| sum + lost(one))
     }
 
+    /// Largest share of the velocity that what the encoder reads too much can make up.
+    pub fn position_slope(&self, gear_ratio: T) -> T {
+        self.waves.position_slope(gear_ratio)
+    }
+
     /// Constant error of the measured current, A, where a torque in N·m is so many per ampere.
     pub fn current_error(&self, torque_per_ampere: T) -> T {
         let mut sum = T::ZERO;
@@ -268,11 +310,9 @@ impl<T: Scalar> Compensation<T> {
         if self.waves.of_torque() {
             let [torque, of_drive] = self.waves.torque(&state.stand, now);
             let drive = finite(now.drive_torque);
-            output.feed += torque.value + drive * of_drive.value;
-            // Given for where the link will be, explained where it is.
-            let way = -now.lead * finite(now.velocity) * now.gear_ratio;
-            let [torque, of_drive] = [torque, of_drive].map(|sum| sum.after(way));
-            output.explained += torque.value + drive * of_drive.value;
+            let given = torque.value + drive * of_drive.value;
+            output.feed += given;
+            output.explained += state.given.put(given, now.lead_ticks, now.lead_share);
         }
         output
     }

@@ -230,6 +230,8 @@ fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
                         gear_ratio: 50.0,
                         period: 1e-4,
                         lead: 3e-4,
+                        lead_ticks: 3,
+                        lead_share: 0.5,
                     };
                     let mut state = State::default();
                     for _ in 0..9 {

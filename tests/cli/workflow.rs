@@ -269,4 +269,17 @@ fn board_commands_on_the_emulated_rig() {
     assert!(no_memory.contains("no memory"), "{no_memory}");
     assert!(refuse(board().arg("store")).contains("no memory"));
     assert!(refuse(board().arg("health")).contains("emulated rig has none"));
+    assert!(succeed(board().arg("fault")).contains("No fault is latched"));
+    assert!(succeed(board().arg("clear")).contains("No fault is latched"));
+    assert!(succeed(board().arg("disarm")).contains("The bridge is off"));
+    let offset = std::fs::read_to_string(&model).unwrap()
+        + "\n[[effect]]\nkind = 'current_offset'\njoint = 'link'\noffset = 3.0\n";
+    let beyond = folder.path().join("beyond.toml");
+    std::fs::write(&beyond, offset).unwrap();
+    let refused = refuse(
+        board()
+            .args(["upload", "--unstored", "--model"])
+            .arg(&beyond),
+    );
+    assert!(refused.contains("0.5 A at most"), "{refused}");
 }

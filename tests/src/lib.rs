@@ -19,7 +19,7 @@ use rig_host::plant::PlantConfig;
 use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::friction::Friction;
-use rig_shared::link::LinkParameters;
+use rig_shared::link::{LinkParameters, PARAMETER_COUNT};
 use rig_shared::safety::FaultRecord;
 use rig_shared::trajectory::{Fourier, Trajectory};
 use rig_shared::wire::message::{Estimate, Refusal, Report, RequestBody};
@@ -90,6 +90,12 @@ pub fn cogging_of(plant: &PlantConfig) -> Effect<f32> {
     let cogging = plant.motor.cogging.unwrap();
     let amplitude = plant.mechanism.ratio * cogging.amplitude;
     periodic(amplitude, cogging.order, cogging.phase)
+}
+
+/// By how many of its own standard deviations each parameter of an on-line estimate is off the plant's.
+pub fn deviations(estimate: &Estimate, plant: &PlantConfig) -> [f64; PARAMETER_COUNT] {
+    let truth = plant.equivalent().to_array();
+    std::array::from_fn(|k| (f64::from(estimate.value[k]) - truth[k]) / f64::from(estimate.std[k]))
 }
 
 /// Waits until the rig has measured its current offset.

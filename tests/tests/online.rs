@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use rig_shared::link::PARAMETER_NAMES;
-use rig_tests::{bench, driven, excitation, in_parallel};
+use rig_tests::{bench, deviations, driven, excitation, in_parallel};
 
 /// Rigs of the coverage study.
 const RIGS: u64 = 200;
@@ -19,11 +19,7 @@ fn intervals_cover_the_truth_as_often_as_they_claim() {
             "seed {seed}"
         );
         let estimate = second.estimate();
-        let truth = plant.equivalent().to_array();
-        let z: [f64; 6] = std::array::from_fn(|k| {
-            (f64::from(estimate.value[k]) - truth[k]) / f64::from(estimate.std[k])
-        });
-        (z, estimate)
+        (deviations(&estimate, &plant), estimate)
     });
     let mut text = String::from("parameter   trusted  covered  mean z  rms z   mean std\n");
     let mut fair = true;

@@ -123,8 +123,11 @@ impl EncoderTimer {
         let flags = timer.sr().read();
         let mut wrong = None;
         if flags.idxif() || flags.terrif() {
-            // Written with zero a flag is cleared; the others are not used.
-            timer.sr().write_value(Default::default());
+            // Written with zero a flag is cleared, with one it is left (rc_w0): one that has risen since it was read is for
+            // the next tick.
+            let mut others = flags;
+            others.0 = !flags.0;
+            timer.sr().write_value(others);
             if flags.terrif() {
                 wrong = Some(0);
             }

@@ -8,7 +8,7 @@ use embassy_stm32::usart::{
     Config as UartConfig, ConfigError, InterruptHandler, RingBufferedUartRx, Uart, UartTx,
 };
 use embassy_stm32::{bind_interrupts, dma, mode};
-use embassy_time::{Duration, Ticker, with_timeout};
+use embassy_time::{Duration, Ticker, Timer, with_timeout};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::config::Config;
@@ -99,28 +99,33 @@ pub(crate) async fn telemetry(
     }
 }
 
-/// Passes a request on to the tick.
-fn hand_over(
+/// Passes a request on to the tick. Others have their turn afterwards: to examine a request may take a fifth of a second, and
+/// as long as bytes wait, reading does not.
+async fn hand_over(
+    config: &Config,
     decoded: Option<Result<Request, DecodeError>>,
     requests: &mut Producer<'static, Examined>,
 ) {
     let taken = match decoded {
-        None => true,
+        None => return,
         // Unanswered, the host repeats it.
         Some(Err(_)) => {
             BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
             true
         }
-        Some(Ok(request)) => requests.enqueue(examine(request)).is_ok(),
+        Some(Ok(request)) => requests.enqueue(examine(config, request)).is_ok(),
     };
     if !taken {
         defmt::warn!("more requests than can be served");
     }
+    report(Part::Commands);
+    Timer::after_ticks(0).await;
 }
 
 /// Takes bytes from the host, makes requests of them and hands these to the tick.
 #[embassy_executor::task]
 pub(crate) async fn commands(
+    config: &'static Config,
     mut line: Receiver,
     mut probe: probe::Incoming,
     mut requests: Producer<'static, Examined>,
@@ -140,11 +145,11 @@ pub(crate) async fn commands(
             Err(_) => 0,
         };
         for &byte in bytes.iter().take(count) {
-            hand_over(from_line.push(byte), &mut requests);
+            hand_over(config, from_line.push(byte), &mut requests).await;
         }
         let count = probe.read(&mut bytes);
         for &byte in bytes.iter().take(count) {
-            hand_over(from_probe.push(byte), &mut requests);
+            hand_over(config, from_probe.push(byte), &mut requests).await;
         }
     }
 }

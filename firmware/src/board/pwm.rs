@@ -15,6 +15,7 @@ use embassy_stm32::pac::timer::vals::{
     Bkinp, Bkp, CcmrOutputCcs, Cms, FilterValue, Mms, Ocm, Ossi, Ossr, Sms, Ts, Urs,
 };
 use embassy_stm32::pac::{PWR, RCC, SYSCFG, TIM1, TIM4};
+use rig_firmware::nameplate;
 use rig_firmware::sample::Command;
 
 use super::adc::LEAD;
@@ -24,6 +25,8 @@ use super::pins::{BridgePins, driver_faults};
 
 /// Pulses a second.
 pub(crate) const PWM_HZ: u32 = 20_000;
+// A whole number of pulses between two ticks: every update is then an underflow.
+const _: () = assert!(PWM_HZ.is_multiple_of(nameplate::RATES.control_hz));
 /// Top of the ramp: up and down are one pulse.
 const TOP: u16 = (CORE_HZ / PWM_HZ / 2) as u16;
 /// Above the top: never low.
@@ -50,8 +53,7 @@ pub(crate) struct Bridge {
 }
 
 impl Bridge {
-    /// Sets TIM1 up with its outputs idle and the bridge disabled. `control_hz` must divide twice the pulse rate;
-    /// `thresholds` are the comparators'.
+    /// Sets TIM1 up with its outputs idle and the bridge disabled; `thresholds` are the comparators'.
     pub(crate) fn new(pins: BridgePins, control_hz: u32, thresholds: [u16; 2]) -> Self {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);

@@ -24,7 +24,7 @@ use super::pwm::Bridge;
 use super::queue::{Inlet, Outlet};
 use super::storage::Storage;
 use super::tick::{NOTES, REQUESTS, Tick};
-use super::watchdog::Watchdog;
+use super::watchdog::{Part, Watchdog, report};
 use super::wires::Wires;
 use super::{cycles, health, heat, link, probe, stack, tick};
 use embassy_stm32::gpio::Output;
@@ -105,7 +105,7 @@ pub(crate) fn run() -> ! {
     let placed = (
         link::telemetry(config, sender, probe_out, note_out),
         indicator(watchdog, pins.led),
-        link::commands(receiver, probe_in, request_in),
+        link::commands(config, receiver, probe_in, request_in),
         keeper(storage, from_tick),
     );
     let (Ok(telemetry), Ok(indicator), Ok(commands), Ok(keeper)) = placed else {
@@ -165,6 +165,7 @@ async fn keeper(mut storage: Storage, mut from_tick: spsc::Consumer<'static, Set
     let mut ticker = Ticker::every(Duration::from_millis(5));
     loop {
         ticker.next().await;
+        report(Part::Keeper);
         if let Some(settings) = from_tick.dequeue() {
             let done = storage.store(&settings).await.is_ok();
             if !done {

@@ -99,7 +99,7 @@ impl Tick {
 }
 
 impl Tick {
-    /// At most one request a tick.
+    /// At most one request, in a tick that has the time.
     #[inline(always)]
     fn serve(&mut self) {
         let outcome = match STORED.load(Ordering::Acquire) {
@@ -111,7 +111,7 @@ impl Tick {
             STORED.store(NOT_YET, Ordering::Relaxed);
             self.clerk.stored(self.state, outcome, &mut self.notes);
         }
-        if !self.notes.roomy() {
+        if !self.state.has_time() || !self.notes.roomy() {
             return;
         }
         let Some(examined) = self.requests.oldest() else {

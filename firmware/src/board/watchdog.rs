@@ -8,9 +8,9 @@ use embassy_stm32::wdg::IndependentWatchdog;
 
 /// Longest silence of the tick or the telemetry, µs: a thousand control ticks.
 const PATIENCE_US: u32 = 100_000;
-/// Feedings in a row that the command task may miss: it examines a trajectory in up to 0.2 s. At 100 a second
-/// they are half a second.
-const COMMANDS_MAY_MISS: u32 = 50;
+/// Feedings in a row that tasks without haste may miss: one examines a trajectory in up to 0.2 s, beside which the other does
+/// not run. At 100 a second they are half a second.
+const MAY_MISS: u32 = 50;
 
 /// Parts that report, one bit each.
 #[derive(Clone, Copy)]
@@ -22,9 +22,12 @@ pub(crate) enum Part {
     Telemetry = 2,
     /// The task that listens.
     Commands = 4,
+    /// The task that stores.
+    Keeper = 8,
 }
 
-const ALL: u8 = Part::Tick as u8 | Part::Telemetry as u8 | Part::Commands as u8;
+const PUNCTUAL: u8 = Part::Tick as u8 | Part::Telemetry as u8;
+const ALL: u8 = PUNCTUAL | Part::Commands as u8 | Part::Keeper as u8;
 
 static REPORTED: AtomicU8 = AtomicU8::new(0);
 
@@ -48,16 +51,16 @@ impl Watchdog {
         Self { missed: 0, inner }
     }
 
-    /// Feeds it if every part has reported.
+    /// Feeds it if every part has reported. Parts without haste may do so within several feedings.
     pub(crate) fn feed(&mut self) {
         let reported = REPORTED.load(Ordering::Relaxed);
-        let commands = reported & Part::Commands as u8 != 0;
-        let all_but_commands = reported | Part::Commands as u8 == ALL;
-        if !all_but_commands || (!commands && self.missed >= COMMANDS_MAY_MISS) {
+        let all = reported & ALL == ALL;
+        if reported & PUNCTUAL != PUNCTUAL || (!all && self.missed >= MAY_MISS) {
             return;
         }
-        REPORTED.store(0, Ordering::Relaxed);
-        self.missed = if commands { 0 } else { self.missed + 1 };
+        let heard = if all { ALL } else { PUNCTUAL };
+        REPORTED.fetch_and(!heard, Ordering::Relaxed);
+        self.missed = if all { 0 } else { self.missed + 1 };
         self.inner.pet();
     }
 }

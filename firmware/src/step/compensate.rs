@@ -41,13 +41,16 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
         warming: state.warming,
         period: EVERY as f32 * state.derived.period,
         lead: state.derived.current.lag,
+        lead_ticks: state.derived.lag.0,
+        lead_share: state.derived.lag.1,
     }
 }
 
 /// Turns periodic effects with the link, and takes the encoder's error off position and velocity.
 #[inline(always)]
 pub(crate) fn correct(config: &Config, state: &mut State) {
-    if !state.compensation.turns() {
+    // Effects that have been replaced and not yet been taken over would run on what those before them remember.
+    if state.renewed || !state.compensation.turns() {
         state.position_error = 0.0;
         return;
     }
@@ -61,7 +64,7 @@ pub(crate) fn correct(config: &Config, state: &mut State) {
 /// What the effects ask for while the rig drives.
 #[inline(always)]
 pub(crate) fn torque(config: &Config, state: &mut State) -> compensation::Output<f32> {
-    if !state.compensation.has_torque() {
+    if state.renewed || !state.compensation.has_torque() {
         return compensation::Output::default();
     }
     let model = &state.settings.model;

@@ -24,8 +24,9 @@ pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Optio
 
 /// Fills a window; updates when it is full.
 fn update(config: &Config, state: &mut State, tick: &Tick) {
-    // Half a window later than the telemetry's, so that not both are made in one tick.
-    if state.tick < u64::from(config.rates.estimator_decimation / 2) {
+    // Half a window later than the telemetry's, so that not both are made in one tick, and from an odd tick on, so that windows
+    // of an even number of ticks end in even ones, in which no effect is turned or evaluated.
+    if state.tick < u64::from((config.rates.estimator_decimation / 2) | 1) {
         return;
     }
     let window = state
@@ -70,7 +71,7 @@ fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
     let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
     // What the effects explain is none of the model's: left in, its parameters would take it for theirs.
     let explained = 0.5 * (window.mean(window.explained) + before.mean(before.explained));
-    let torque = current * state.derived.torque_per_ampere - explained;
+    let torque = (current - state.current_error) * state.derived.torque_per_ampere - explained;
     state.estimator.step(q, qd, torque);
 }
 

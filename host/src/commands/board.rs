@@ -1,10 +1,13 @@
-//! `rig board`: how the board is, what it keeps, and its control ticks one by one.
+//! `rig board`: how the board is, what it keeps, its faults, and its control ticks one by one.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{ArgGroup, Args as ClapArgs, Subcommand};
-use rig_shared::wire::message::{Greeting, Health, Report, RequestBody, SettingsOrigin};
+use rig_shared::safety::{FaultRecord, SnapshotSample};
+use rig_shared::wire::message::{
+    Greeting, Health, Report, RequestBody, SettingsOrigin, SnapshotPart,
+};
 
 use super::error::CommandError;
 use super::record::{emulated, open_probe};
@@ -21,7 +24,7 @@ const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
 /// Longest silence between two parts of a capture, beyond the ticks that are still to be captured.
 const PART_PATIENCE: Duration = Duration::from_secs(2);
 
-/// Talks to the rig's board: its health, its stored settings, its single control ticks.
+/// Talks to the rig's board: its health, its faults, its stored settings, its single control ticks.
 #[derive(Debug, ClapArgs)]
 #[command(group = ArgGroup::new("where").required(true).args(["port", "probe", "emulated"]))]
 pub(crate) struct Args {
@@ -62,6 +65,19 @@ enum Action {
         #[arg(long)]
         out: PathBuf,
     },
+    /// Names the latched fault and, with --out, fetches the control ticks around it as CSV
+    Fault {
+        /// Replace the file if it exists
+        #[arg(long)]
+        force: bool,
+        /// File to write, .csv
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Forgets the latched fault, once its cause has gone
+    Clear,
+    /// Switches the bridge off, at once
+    Disarm,
     /// Sends limits, model, friction and effects of a description, precompensation on, and stores them
     Upload {
         /// Robot description, such as the model.toml of a diagnosis
@@ -92,7 +108,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             }
             upload.requests
         }
-        Action::Capture { out, force, .. } if out.exists() && !force => {
+        Action::Capture { out, force, .. }
+        | Action::Fault {
+            out: Some(out),
+            force,
+        } if out.exists() && !force => {
             return Err(CommandError::Exists { path: out.clone() });
         }
         _ => Vec::new(),
@@ -123,8 +143,54 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
             ui.say("The settings in force are stored; the next power on begins with them.");
         }
         Action::Capture { after, out, .. } => {
-            let ticks = capture(&mut session, *after, out)?;
-            ui.say(&format!("{}: {ticks} control ticks", out.display()));
+            session.request(RequestBody::Capture(*after))?;
+            session.request(RequestBody::GetCapture)?;
+            let rate = f64::from(session.greeting().control_rate_hz);
+            let wait = PART_PATIENCE + Duration::from_secs_f64(f64::from(*after) / rate);
+            let burst = fetch(&mut session, wait, |report| match report {
+                Report::Capture(part) => Some(part),
+                _ => None,
+            })?;
+            write(session.greeting(), &burst.ticks, out)?;
+            ui.say(&format!(
+                "{}: {} control ticks",
+                out.display(),
+                burst.ticks.len()
+            ));
+        }
+        Action::Fault { out, .. } => {
+            session.request(RequestBody::GetSnapshot)?;
+            let kept = fetch(&mut session, PART_PATIENCE, |report| match report {
+                Report::Snapshot(part) => Some(part),
+                _ => None,
+            })?;
+            let Some(record) = kept.fault else {
+                ui.say("No fault is latched.");
+                return Ok(());
+            };
+            ui.say(&format!(
+                "{:?} ({}) at tick {}, {:.4} s after the rig started. docs/firmware.md says of each fault what to do; `rig board clear` forgets it.",
+                record.fault,
+                record.value,
+                record.tick,
+                record.tick as f64 / f64::from(session.greeting().control_rate_hz),
+            ));
+            if let Some(out) = out {
+                write(session.greeting(), &kept.ticks, out)?;
+                ui.say(&format!(
+                    "{}: {} control ticks around it",
+                    out.display(),
+                    kept.ticks.len()
+                ));
+            }
+        }
+        Action::Clear => {
+            session.request(RequestBody::ClearFault)?;
+            ui.say("No fault is latched. After one of the encoder, tell the rig where the link stands (--home).");
+        }
+        Action::Disarm => {
+            session.request(RequestBody::Disarm)?;
+            ui.say("The bridge is off.");
         }
         Action::Upload {
             model, unstored, ..
@@ -166,7 +232,9 @@ fn describe(greeting: &Greeting, health: &Health) -> String {
     let settings = match health.settings {
         SettingsOrigin::Defaults => "the firmware's own; none were ever stored",
         SettingsOrigin::Stored => "as stored",
-        SettingsOrigin::OlderCopy => "the older of two stored copies; the newer one is damaged",
+        SettingsOrigin::OlderCopy => {
+            "one of two stored copies; the other is damaged, another firmware's, or cannot be used"
+        }
         SettingsOrigin::Damaged => "the firmware's own; what is stored is damaged",
         SettingsOrigin::Unusable => {
             "the firmware's own; what is stored is another firmware's, or cannot be used"
@@ -178,7 +246,7 @@ fn describe(greeting: &Greeting, health: &Health) -> String {
         "firmware        {}\n\
          running for     {:.1} s\n\
          started by      {:?}\n\
-         settings        {settings}\n\
+         started with    {settings}\n\
          clock           {:.3} MHz, {}\n\
          control tick    {:.1} % of its time on average, {:.1} % at most in the last second\n\
          stack           {} bytes never used\n\
@@ -200,18 +268,52 @@ fn describe(greeting: &Greeting, health: &Health) -> String {
     )
 }
 
-/// Fetches a capture into a file; gives its ticks.
-fn capture<P: Port>(
+/// Control ticks that the rig has kept, and the fault that they are about.
+#[derive(Default)]
+struct Kept {
+    ticks: Vec<SnapshotSample>,
+    fault: Option<FaultRecord>,
+}
+
+/// Fetches what has been asked for, part by part.
+fn fetch<P: Port>(
     session: &mut Session<P>,
-    after: u16,
-    out: &Path,
-) -> Result<usize, CommandError> {
-    let greeting = session.greeting().clone();
+    patience: Duration,
+    part_of: impl Fn(&Report) -> Option<&SnapshotPart>,
+) -> Result<Kept, CommandError> {
+    let begin = session.port().now();
+    let (mut kept, mut total) = (Kept::default(), usize::MAX);
+    while kept.ticks.len() < total {
+        let left = (begin + patience).saturating_sub(session.port().now());
+        let report = session.next_report(left)?;
+        if let Some(Report::Fault(record)) = &report {
+            kept.fault = Some(*record);
+        }
+        let got = kept.ticks.len();
+        let Some(report) = report else {
+            return Err(CommandError::Sentence(format!(
+                "The rig has sent {got} of the ticks that it keeps and no more; ask again."
+            )));
+        };
+        let Some(part) = part_of(&report) else {
+            continue;
+        };
+        if usize::from(part.first) != got {
+            return Err(CommandError::Sentence(format!(
+                "A part of the ticks that the rig keeps, after tick {got}, was lost on the line; ask again."
+            )));
+        }
+        total = usize::from(part.total);
+        kept.ticks.extend(part.samples.iter().copied());
+    }
+    Ok(kept)
+}
+
+/// Writes control ticks as CSV, in SI units.
+fn write(greeting: &Greeting, ticks: &[SnapshotSample], out: &Path) -> Result<(), CommandError> {
     let rate = f64::from(greeting.control_rate_hz);
     let per_count = core::f64::consts::TAU
         / (f64::from(greeting.counts_per_motor_turn) * f64::from(greeting.gear_ratio));
-    session.request(RequestBody::Capture(after))?;
-    session.request(RequestBody::GetCapture)?;
     let columns = [
         ("t", "s"),
         ("q1", "rad"),
@@ -221,38 +323,16 @@ fn capture<P: Port>(
         ("ref1", "rad"),
     ];
     let mut writer = CsvWriter::create(out, &columns.map(|(name, unit)| Column::new(name, unit)))?;
-    let patience = PART_PATIENCE + Duration::from_secs_f64(f64::from(after) / rate);
-    let begin = session.port().now();
-    let (mut ticks, mut total) = (0, usize::MAX);
-    while ticks < total {
-        let left = (begin + patience).saturating_sub(session.port().now());
-        let part = match session.next_report(left)? {
-            Some(Report::Capture(part)) => part,
-            Some(_) => continue,
-            None => {
-                return Err(CommandError::Sentence(format!(
-                    "The rig has sent {ticks} ticks of its capture and no more; ask again."
-                )));
-            }
-        };
-        if usize::from(part.first) != ticks {
-            return Err(CommandError::Sentence(format!(
-                "A part of the capture after tick {ticks} was lost on the line; ask again."
-            )));
-        }
-        total = usize::from(part.total);
-        ticks += part.samples.len();
-        for sample in &part.samples {
-            writer.push_row(&[
-                sample.tick as f64 / rate,
-                sample.position as f64 * per_count,
-                f64::from(sample.current),
-                f64::from(sample.duty),
-                f64::from(sample.supply),
-                f64::from(sample.reference),
-            ])?;
-        }
+    for sample in ticks {
+        writer.push_row(&[
+            sample.tick as f64 / rate,
+            sample.position as f64 * per_count,
+            f64::from(sample.current),
+            f64::from(sample.duty),
+            f64::from(sample.supply),
+            f64::from(sample.reference),
+        ])?;
     }
     writer.finish()?;
-    Ok(ticks)
+    Ok(())
 }

@@ -117,7 +117,11 @@ impl Inputs {
                     .map(ToString::to_string)
                     .collect();
                 if !found.is_empty() {
-                    wrong.push(format!("{}: {}", source.path().display(), found.join("; ")));
+                    wrong.push(format!(
+                        "{}: {}.",
+                        source.path().display(),
+                        found.join("; ")
+                    ));
                 }
             }
         }

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{ArgGroup, Args as ClapArgs};
 use rig_shared::safety::{Limit, Mode};
@@ -220,8 +222,10 @@ fn record<P: Port>(
     let mut progress = ui.progress("recording", total);
     let mut failed = None;
     let mut fault = None;
+    let mut mode = Mode::Disarmed;
     let mut done = 0;
-    let losses = run_experiment(&mut session, experiment, |event| {
+    let interrupted = interrupts()?;
+    let recorded = run_experiment(&mut session, experiment, |event| {
         match event {
             Event::Samples {
                 first_tick,
@@ -236,27 +240,70 @@ fn record<P: Port>(
                     }
                 }
                 done += samples.len() as u64;
+                mode = samples.last().map_or(mode, |sample| sample.mode);
                 progress.at(done);
             }
             Event::Fault(record) => fault = Some(*record),
             _ => {}
         }
-        ControlFlow::Continue(())
-    })?;
+        if interrupted.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
     if let Some(error) = failed {
         return Err(error.into());
     }
+    let losses = match recorded {
+        Ok(losses) => losses,
+        Err(error) if done == 0 => return Err(error.into()),
+        Err(error) => {
+            writer.finish()?;
+            return Err(CommandError::Sentence(format!(
+                "{error} {} holds the {done} samples that came before; how many were lost is not known.",
+                out.display()
+            )));
+        }
+    };
     writer.finish()?;
     if let Some(record) = fault {
         return Err(CommandError::Sentence(format!(
-            "The rig has stopped with the fault {:?} ({}) at tick {}; {} holds what was recorded until the end.",
+            "The rig has stopped with the fault {:?} ({}) at tick {}; {} holds what was recorded until the end. `rig board fault` fetches the ticks around it, `rig board clear` forgets it.",
             record.fault,
             record.value,
             record.tick,
             out.display()
         )));
     }
+    if mode == Mode::Fault {
+        return Err(CommandError::Sentence(format!(
+            "The rig has a fault latched that was not announced while {} was recorded: `rig board fault` says which, `rig board clear` forgets it.",
+            out.display()
+        )));
+    }
+    if interrupted.load(Ordering::Relaxed) {
+        return Err(CommandError::Sentence(format!(
+            "Broken off: the motion was stopped and the bridge switched off; {} holds the {done} samples until then.",
+            out.display()
+        )));
+    }
     Ok(losses)
+}
+
+/// Whether Ctrl-C has been pressed since: the link is then brought to rest before the program ends. Pressed again it ends at
+/// once, and the rig stops by itself when it no longer hears anything.
+fn interrupts() -> Result<Arc<AtomicBool>, CommandError> {
+    let pressed = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&pressed);
+    ctrlc::set_handler(move || {
+        if told.swap(true, Ordering::Relaxed) {
+            // As a shell says that SIGINT ended it.
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))?;
+    Ok(pressed)
 }
 
 fn names(modes: &[Mode]) -> String {

@@ -2,8 +2,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use rig_firmware::config::{Config, Encoder, Rates, Settings, ratings, wake_ticks};
-use rig_firmware::sample::Scaling;
+use rig_firmware::config::{Config, Encoder, Rates, Settings};
 use rig_shared::compensation::{EFFECTS, Effects};
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
@@ -13,8 +12,6 @@ use rig_shared::link::LinkParameters;
 use rig_shared::multibody::{gravity_vector, inertia_matrix};
 use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
-use rig_shared::safety::monitor::MonitorConfig;
-use rig_shared::safety::voltage::VoltageModel;
 use thiserror::Error;
 
 use crate::robot::{Joint, JointKind, Robot};
@@ -56,6 +53,14 @@ pub enum NameplateError {
         robot: String,
         /// Effects it has.
         effects: usize,
+    },
+    /// An effect that the rig would refuse.
+    #[error("{robot}: the rig does not take an effect: {what}.")]
+    UnusableEffect {
+        /// Name of the robot.
+        robot: String,
+        /// Which, and why.
+        what: String,
     },
     /// Effects that nothing can be done about.
     #[error(
@@ -155,26 +160,12 @@ impl Nameplate {
                 .inductance
                 .ok_or_else(|| missing("drive.inductance"))? as f32,
         };
-        let config = Config {
-            rates,
-            scaling: Scaling::default(),
-            drive: parts,
-            encoder: Encoder {
-                counts_per_motor_turn: counts as u32,
-                observer_bandwidth: OBSERVER_BANDWIDTH,
-                index_levels: 0b00,
-            },
-            monitor: monitor(&rates, &limits, counts, &parts),
-            ratings: ratings(
-                &limits,
-                (core::f64::consts::TAU / (counts * drive.gear_ratio)) as f32,
-            ),
-            calibration_ticks: rates.control_hz / 2,
-            largest_offset: 0.5,
-            host_silent_ticks: rates.control_hz / 2,
-            wake_ticks: wake_ticks(rates.control_hz),
-            host_lost_ticks: rates.control_hz,
+        let encoder = Encoder {
+            counts_per_motor_turn: counts as u32,
+            observer_bandwidth: OBSERVER_BANDWIDTH,
+            index_levels: 0b00,
         };
+        let config = Config::new(rates, parts, encoder, &limits);
         let gains = Gains::design(f64::from(model.inertia), POSITION_BANDWIDTH, 1.0);
         let settings = Settings {
             control: ControlKind::ProportionalDerivative,
@@ -283,28 +274,6 @@ fn friction(joint: &Joint) -> Friction<f32> {
         coulomb: prior.coulomb as f32,
         viscous: prior.viscous as f32,
         ..Friction::default()
-    }
-}
-
-/// Thresholds of the checks, from what the limits allow.
-fn monitor(rates: &Rates, limits: &Limits<f32>, counts: f64, drive: &Drive<f32>) -> MonitorConfig {
-    let rate = rates.control_hz;
-    let counts_per_radian = counts * f64::from(drive.gear_ratio.abs()) / core::f64::consts::TAU;
-    let fastest = f64::from(limits.velocity) * counts_per_radian / f64::from(rate);
-    MonitorConfig {
-        period: 1.0 / rate as f32,
-        supply: [18.0, 30.0],
-        temperature: 85.0,
-        current_margin: 1.5,
-        velocity_margin: 1.25,
-        position_margin: 0.1,
-        // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
-        largest_step: (4.0 * fastest).ceil() as i32 + 4,
-        persistence: 3,
-        voltage: VoltageModel::new(drive, counts as u32, 1.0 / rate as f32),
-        stuck_ticks: rate / 20,
-        stuck_duty: 0.02,
-        thermal_time: 10.0,
     }
 }
 

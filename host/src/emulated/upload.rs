@@ -1,6 +1,7 @@
 //! What a description asks a rig to be told.
 
-use rig_shared::compensation::{EFFECTS, Role};
+use rig_firmware::usable;
+use rig_shared::compensation::{Compensation, EFFECTS, Effects, Role};
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::wire::message::RequestBody;
 
@@ -35,7 +36,7 @@ pub struct Upload {
 /// parameters. Effects that nothing can be done about are left out where that is wanted, and an error where it is not.
 ///
 /// # Errors
-/// A description that is none of a one-link rig, has more effects than a rig compensates, or one that it cannot.
+/// A description that is none of a one-link rig, has more effects than a rig compensates, or one that it cannot or will not.
 pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError> {
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
     for Effect {
@@ -74,7 +75,19 @@ pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError
             effects: count,
         });
     }
-    let mut requests = settings(&Nameplate::from_robot(robot)?, true);
+    let nameplate = Nameplate::from_robot(robot)?;
+    let unusable = |what: String| NameplateError::UnusableEffect {
+        robot: robot.name.clone(),
+        what,
+    };
+    let mut given = Effects::default();
+    for (place, effect) in given.iter_mut().zip(&effects) {
+        *place = Some(*effect);
+    }
+    let compensation = Compensation::new(&given).map_err(|fault| unusable(fault.to_string()))?;
+    usable::effects(&nameplate.config, &compensation)
+        .map_err(|excess| unusable(excess.to_string()))?;
+    let mut requests = settings(&nameplate, true);
     requests.push(RequestBody::SetEffects(effects.into_iter().collect()));
     Ok(Upload { requests, left_out })
 }
@@ -116,6 +129,18 @@ mod tests {
             requests(&many, true),
             Err(NameplateError::TooManyEffects { .. })
         ));
+    }
+
+    /// What the rig would refuse without a reason is named before it is sent.
+    #[test]
+    fn a_correction_beyond_what_a_sensor_can_be_wrong_by_is_named() {
+        let offset = "[[effect]]\nkind = 'current_offset'\njoint = 'link'\noffset = 3.0\n";
+        let error = requests(&with(offset), false).unwrap_err().to_string();
+        assert!(
+            error.contains("current_offset makes 1.2 A of the reading its error")
+                && error.contains("0.5 A at most"),
+            "{error}"
+        );
     }
 
     /// A point mass of 0.5 kg at 0.2 m: 0.02 kg·m² and 0.1 kg·m, 0.981 N·m of gravity.

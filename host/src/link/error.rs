@@ -137,9 +137,11 @@ pub enum LinkError {
 pub fn describe(refusal: Refusal) -> Cow<'static, str> {
     Cow::Borrowed(match refusal {
         Refusal::WrongMode => {
-            "it is not allowed in the present mode (arm before starting, stop before uploading)"
+            "it is not allowed in the present mode (a fault is latched, which `rig board fault` names and `rig board clear` forgets; or the rig moves)"
         }
-        Refusal::FaultLatched => "a fault is latched; clear it first",
+        Refusal::FaultLatched => {
+            "a fault is latched; `rig board fault` says which, `rig board clear` forgets it"
+        }
         Refusal::CauseActing => "the cause of the fault still acts; remove it first",
         Refusal::BadValue => "a value is not finite or outside its physical range",
         Refusal::OutsideLimits => {

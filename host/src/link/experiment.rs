@@ -13,6 +13,11 @@ use super::session::Session;
 
 /// Longest wait for a rig that is still measuring its current offset.
 const CALIBRATION_PATIENCE: Duration = Duration::from_secs(3);
+/// Time for a controlled stop where the experiment states no limits: five times what the template's rig needs, from 6 rad/s at
+/// 60 rad/s².
+const STOP_PATIENCE: Duration = Duration::from_millis(500);
+/// How much more of it than speed over deceleration: the link comes to rest after its reference.
+const STOP_MARGIN: f32 = 1.5;
 /// Pause between two attempts to arm.
 const CALIBRATION_PAUSE: Duration = Duration::from_millis(50);
 
@@ -28,6 +33,18 @@ pub struct Experiment {
 }
 
 impl Experiment {
+    /// How long a controlled stop takes at most.
+    fn stop_time(&self) -> Duration {
+        let limits = self.settings.iter().rev().find_map(|body| match body {
+            RequestBody::SetLimits(limits) => Some(limits),
+            _ => None,
+        });
+        let seconds = limits.map(|l| STOP_MARGIN * l.velocity / l.acceleration);
+        seconds
+            .and_then(|seconds| Duration::try_from_secs_f32(seconds).ok())
+            .map_or(STOP_PATIENCE, |time| time.max(STOP_PATIENCE))
+    }
+
     /// Telemetry samples that the experiment takes.
     pub fn samples(&self, sample_rate: f64) -> u64 {
         let motion = self
@@ -39,14 +56,14 @@ impl Experiment {
 }
 
 /// Runs an experiment; every sample and every hole goes to `on_event`. The rig is disarmed afterwards, also
-/// when the recording was broken off or failed.
+/// when the recording was broken off or failed: a motion under way is brought to rest before.
 ///
 /// # Errors
 /// What the link says: a refused request, a silent rig, a broken line.
 pub fn run<P: Port>(
     session: &mut Session<P>,
     experiment: &Experiment,
-    on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
+    mut on_event: impl FnMut(Event<'_>) -> ControlFlow<()>,
 ) -> Result<LossReport, LinkError> {
     let greeting = session.greeting();
     let rate =
@@ -64,12 +81,36 @@ pub fn run<P: Port>(
         when_calibrated(session, RequestBody::Arm)?;
         settings.at_start = vec![RequestBody::Start];
     }
-    let recorded = record(session, &settings, on_event);
+    let mut broken_off = false;
+    let recorded = record(session, &settings, |event| {
+        let flow = on_event(event);
+        broken_off |= flow.is_break();
+        flow
+    });
+    let stops = (broken_off || recorded.is_err()) && session.request(RequestBody::Stop).is_ok();
+    let rested = if stops {
+        rest(session, experiment.stop_time())
+    } else {
+        Ok(())
+    };
     // Off in any case; the recording's own error comes first, because it says more.
     let off = session.request(RequestBody::Disarm);
     let losses = recorded?;
+    rested?;
     off?;
     Ok(losses)
+}
+
+/// Lets a stop that has been asked for come to its end.
+fn rest<P: Port>(session: &mut Session<P>, time: Duration) -> Result<(), LinkError> {
+    let until = session.port().now() + time;
+    loop {
+        let left = until.saturating_sub(session.port().now());
+        if left.is_zero() {
+            return Ok(());
+        }
+        session.next_report(left)?;
+    }
 }
 
 /// A request that the rig refuses only because it is still calibrating.

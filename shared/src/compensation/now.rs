@@ -38,6 +38,10 @@ pub struct Now<T> {
     pub period: T,
     /// How long a torque that is ordered takes to act, s.
     pub lead: T,
+    /// The same in whole ticks, below [`GIVEN`](super::GIVEN) − 1.
+    pub lead_ticks: u8,
+    /// What is left of it, as a share of a tick.
+    pub lead_share: T,
 }
 
 impl<T: Real> Now<T> {

@@ -146,6 +146,20 @@ impl<T: Scalar> Waves<T> {
         all
     }
 
+    /// Largest slope of what is read too much, motor and joint together: each wave's amplitude by its order.
+    pub(super) fn position_slope(&self, gear_ratio: T) -> T {
+        let waves = self.waves.iter().take(usize::from(self.count));
+        waves.fold(T::ZERO, |sum, wave| {
+            let amplitude = (wave.cosine * wave.cosine + wave.sine * wave.sine).sqrt();
+            let slope = amplitude * wave.order.abs();
+            sum + match wave.sort {
+                Sort::Motor => slope * gear_ratio.abs(),
+                Sort::Joint => slope,
+                Sort::Torque | Sort::OfDrive => T::ZERO,
+            }
+        })
+    }
+
     #[inline(always)]
     pub(super) fn any(&self) -> bool {
         self.count > 0

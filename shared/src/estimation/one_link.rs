@@ -131,6 +131,11 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         })
     }
 
+    /// Replaces the constants. What has been learnt stays: [`restart`](Self::restart) it before the next step.
+    pub fn reconfigure(&mut self, config: &Config<T>) {
+        self.config = *config;
+    }
+
     /// See [`step`].
     #[inline]
     pub fn step(&mut self, q: T, qd: T, tau: T) -> Update {

@@ -210,7 +210,7 @@ impl<T: Scalar> Trajectory<T> {
             Self::Hold(_) => point(0),
             Self::Fourier(m) => {
                 let harmonics = m.sine.len().max(m.cosine.len()).max(1) as u32;
-                let step = u64::from((m.period_us / (SAMPLES * harmonics)).max(1));
+                let step = u64::from(m.period_us.div_ceil(SAMPLES * harmonics).max(1));
                 let (ramp, period) = (u64::from(m.ramp_us), u64::from(m.period_us));
                 // Both ramps and one period: the others repeat it.
                 let end = self.duration_micros();

@@ -250,7 +250,7 @@ pub enum SettingsOrigin {
     Defaults,
     /// As stored.
     Stored,
-    /// One of the two stored copies is damaged: the other.
+    /// One of the two stored copies is damaged, or the newer one is of no use to this firmware: the other.
     OlderCopy,
     /// What is stored is damaged: the firmware's own.
     Damaged,

@@ -53,6 +53,12 @@ pub struct BoardFaults {
     pub logic_supply: Option<f64>,
     /// The crystal does not swing.
     pub crystal_dead: bool,
+    /// The comparators find nothing.
+    pub comparators_dead: bool,
+    /// The converter's trigger does not come.
+    pub trigger_lost: bool,
+    /// The serial line takes no byte.
+    pub line_blocked: bool,
 }
 
 /// The encoder's index has passed.

@@ -156,6 +156,13 @@ impl Image {
             .find(|f| address < f.address + f.size.max(2))
     }
 
+    /// Address and size of the one symbol with this in its name, which compilers put their own marks about.
+    pub fn symbol_with(&self, part: &str) -> Option<(u32, u32)> {
+        let mut found = self.symbols.iter().filter(|(name, _)| name.contains(part));
+        let one = found.next().map(|(_, place)| *place);
+        one.filter(|_| found.next().is_none())
+    }
+
     /// Address and size of a symbol.
     pub fn symbol(&self, name: &str) -> Option<(u32, u32)> {
         self.symbols.get(name).copied()

@@ -108,7 +108,8 @@ impl Chip {
                 memory.store(item.memory, &[byte]);
             }
         }
-        while self.lpuart.wants_byte()
+        while !self.board.faults.line_blocked
+            && self.lpuart.wants_byte()
             && let Some((controller, channel)) = self.dmamux.channel_of(REQUEST_TX)
             && self.dma[usize::from(controller) - 1].armed(channel) == Some(true)
         {
@@ -138,6 +139,9 @@ impl Chip {
         self.board.align(at);
         if self.board.due() <= now {
             self.board.advance(now);
+        }
+        if self.board.faults.trigger_lost {
+            return Ok(());
         }
         self.triggers += 1;
         let (system, kernel) = (self.period, self.rcc.adc_period());

@@ -59,7 +59,8 @@ impl Chip {
     pub(super) fn compare(&mut self) {
         let sense = self.board.sense();
         let wired = |port: usize, pin| {
-            (self.gpio[port].function(pin) == Function::Analogue).then_some(sense)
+            let analogue = self.gpio[port].function(pin) == Function::Analogue;
+            (analogue && !self.board.faults.comparators_dead).then_some(sense)
         };
         let (pc1, pb0) = (wired(2, 1), wired(1, 0));
         let third = self.comp.compare(3, [None, pc1], self.dac.output(0));

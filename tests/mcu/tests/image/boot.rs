@@ -10,7 +10,7 @@ use rig_mcu::rig::{EmulatedBoard, Line};
 use rig_shared::wire::message::{Report, RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, excitation, wait};
 
-use crate::{BoardSession, awaited, bench, board, greeted, health, place, powered};
+use crate::{BoardSession, awaited, bench, board, captured, greeted, health, place, powered};
 
 #[test]
 fn it_boots_samples_at_ten_kilohertz_and_moves_nothing() {
@@ -209,16 +209,11 @@ fn a_capture_holds_every_tick_in_a_row() {
     let mut line = bench(7);
     line.request(RequestBody::Capture(100)).unwrap();
     wait(&mut line, 0.1);
-    line.request(RequestBody::GetCapture).unwrap();
-    let (mut ticks, mut total) = (Vec::new(), usize::MAX);
-    while ticks.len() < total {
-        let report = line.next_report(Duration::from_millis(500)).unwrap();
-        if let Report::Capture(part) = report.unwrap() {
-            assert_eq!(usize::from(part.first), ticks.len());
-            total = usize::from(part.total);
-            ticks.extend(part.samples.iter().map(|sample| sample.tick));
-        }
-    }
-    assert!(total > 400, "{total} ticks");
-    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    let ticks = captured(&mut line);
+    assert!(ticks.len() > 400, "{} ticks", ticks.len());
+    assert!(
+        ticks
+            .windows(2)
+            .all(|pair| pair[1].tick == pair[0].tick + 1)
+    );
 }

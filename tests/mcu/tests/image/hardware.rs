@@ -1,20 +1,20 @@
 //! What the hardware does by itself, and what of it the program finds: comparators, encoder wires and index, lock-up, flash
 //! errors, the bridge's wake-up, the converter's reference, heat across a reset.
 
-use std::time::Duration;
-
 use rig_host::link::LinkError;
 use rig_mcu::chip::Chip;
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::rig::power_on;
 use rig_mcu::time::{NEVER, from_seconds};
-use rig_shared::safety::{Fault, SnapshotSample};
+use rig_shared::safety::Fault;
 use rig_shared::trajectory::{Staircase, Trajectory};
-use rig_shared::wire::message::{Refusal, Report, RequestBody, ResetCause};
+use rig_shared::wire::message::{Refusal, RequestBody, ResetCause};
 use rig_tests::{calibrated, excitation, wait};
 
 use crate::faults::{off_after, refused};
-use crate::{BoardSession, bench, board, greeted, health, image, moving, place, plant, snapshot};
+use crate::{
+    BoardSession, bench, board, captured, greeted, health, image, moving, place, plant, snapshot,
+};
 
 /// Whether TIM1's outputs are on, after so many seconds in which the processor does nothing.
 fn outputs_after(line: &mut BoardSession, seconds: f64, injure: impl FnOnce(&mut Chip)) -> bool {
@@ -25,21 +25,6 @@ fn outputs_after(line: &mut BoardSession, seconds: f64, injure: impl FnOnce(&mut
     });
     board(line).run_until(until).unwrap();
     board(line).with_chip(|chip| chip.timer(1).main_output())
-}
-
-/// The burst over the wire.
-fn captured(line: &mut BoardSession) -> Vec<SnapshotSample> {
-    line.request(RequestBody::GetCapture).unwrap();
-    let (mut ticks, mut total) = (Vec::new(), usize::MAX);
-    while ticks.len() < total {
-        let report = line.next_report(Duration::from_millis(500)).unwrap();
-        if let Report::Capture(part) = report.unwrap() {
-            assert_eq!(usize::from(part.first), ticks.len());
-            total = usize::from(part.total);
-            ticks.extend(part.samples);
-        }
-    }
-    ticks
 }
 
 /// A short in the motor's wires, either way, faster than a tick: off within 5 µs and without the program, told as what it is,

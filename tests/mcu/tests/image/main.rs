@@ -9,6 +9,7 @@ mod circle;
 mod faults;
 mod hardware;
 mod identification;
+mod requests;
 mod storage;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use rig_host::link::{EmulatedPort, Session, SessionSettings};
 use rig_host::plant::PlantConfig;
 use rig_mcu::image::Image;
 use rig_mcu::rig::{EmulatedBoard, Line, power_on};
+use rig_shared::safety::SnapshotSample;
 use rig_shared::wire::message::{Health, Report, RequestBody};
 use rig_tests::{calibrated, excitation, snapshot, wait};
 
@@ -109,4 +111,19 @@ fn health(line: &mut BoardSession) -> Health {
         Report::Health(health) => Some(*health),
         _ => None,
     })
+}
+
+/// The burst over the wire.
+fn captured(line: &mut BoardSession) -> Vec<SnapshotSample> {
+    line.request(RequestBody::GetCapture).unwrap();
+    let (mut ticks, mut total) = (Vec::new(), usize::MAX);
+    while ticks.len() < total {
+        let report = line.next_report(Duration::from_millis(500)).unwrap();
+        if let Report::Capture(part) = report.unwrap() {
+            assert_eq!(usize::from(part.first), ticks.len());
+            total = usize::from(part.total);
+            ticks.extend(part.samples);
+        }
+    }
+    ticks
 }

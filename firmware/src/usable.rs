@@ -1,0 +1,211 @@
+//! Which values are physical and within what the rig's parts stand; everything written so that NaN is refused.
+
+use core::fmt;
+
+use rig_shared::compensation::Compensation;
+use rig_shared::control::Gains;
+use rig_shared::link::LinkParameters;
+use rig_shared::precompensation::PrecompensationSettings;
+use rig_shared::safety::Limits;
+
+use crate::config::{Config, Settings};
+
+/// Slowest current loop, as a share of the control rate: what effects give is ahead by its lag, which the tick remembers
+/// ([`GIVEN`](rig_shared::compensation::GIVEN)). At 10 kHz 39 Hz, enough for a position loop of 4 Hz ([`Gains::design`]).
+const SLOWEST_CURRENT_LOOP: f32 = 1.0 / 256.0;
+/// Fastest: at a tenth the loop's delay of a tick leaves it a damping ratio of 0.45, and above it less (the poles of
+/// z² − z + 1 − exp(−2π·share)).
+const FASTEST_CURRENT_LOOP: f32 = 0.1;
+/// Largest share of the velocity that an eccentric encoder may make up, lest the correction turn its sense round.
+const LARGEST_SLOPE: f32 = 0.5;
+/// Share of the least supply above which no bridge loses voltage: what is said to be lost is hidden from the check of the
+/// encoder.
+const LARGEST_LOSS: f32 = 0.125;
+
+/// All that the host may replace.
+pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
+    limits(config, &settings.limits)
+        && gains(config, &settings.gains)
+        && settings.friction.check().is_ok()
+        && model(&settings.model)
+        && precompensation(&settings.precompensation)
+        && settings
+            .estimator
+            .check(config.rates.estimator_hz())
+            .is_ok()
+        && Compensation::new(&settings.effects).is_ok_and(|found| effects(config, &found).is_ok())
+}
+
+pub(crate) fn limits(config: &Config, limits: &Limits<f32>) -> bool {
+    limits.is_valid() && limits.is_within(&config.ratings)
+}
+
+pub(crate) fn gains(config: &Config, gains: &Gains<f32>) -> bool {
+    let share = gains.current_bandwidth / config.rates.control_hz as f32;
+    gains.usable() && (SLOWEST_CURRENT_LOOP..=FASTEST_CURRENT_LOOP).contains(&share)
+}
+
+pub(crate) fn model(model: &LinkParameters<f32>) -> bool {
+    model.to_array().iter().all(|value| value.is_finite())
+        && model.inertia > 0.0
+        && model.viscous >= 0.0
+        && model.coulomb >= 0.0
+}
+
+pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> bool {
+    settings.check().is_ok()
+        // The adaptive law smooths its sign by it, whether or not friction is precompensated.
+        && settings.velocity_threshold > 0.0
+        && settings.velocity_threshold.is_finite()
+}
+
+/// A correction beyond what a sensor or a bridge can be wrong by: it would hide a fault, or turn a loop round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Excess {
+    /// The current's constant error, A.
+    CurrentOffset {
+        /// By the effects.
+        found: f32,
+        /// At most.
+        most: f32,
+    },
+    /// The voltage that the bridge loses, V.
+    DriveDeadzone {
+        /// By the effects.
+        found: f32,
+        /// At most.
+        most: f32,
+    },
+    /// What the encoder's error makes up of the velocity, as a share of it.
+    EncoderEccentricity {
+        /// By the effects.
+        found: f32,
+        /// At most.
+        most: f32,
+    },
+}
+
+impl fmt::Display for Excess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CurrentOffset { found, most } => write!(
+                f,
+                "current_offset makes {found} A of the reading its error, and the rig takes {most} A at most: mend the sensor"
+            ),
+            Self::DriveDeadzone { found, most } => write!(
+                f,
+                "drive_deadzone says that the bridge loses {found} V, and the rig takes {most} V at most: an eighth of the least supply"
+            ),
+            Self::EncoderEccentricity { found, most } => write!(
+                f,
+                "encoder_eccentricity makes up {found} of the velocity, and the rig takes {most} at most: beyond it the correction could turn the velocity's sense round"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Excess {}
+
+/// Whether corrections of what is measured stay within what sensors and bridge can be wrong by.
+///
+/// # Errors
+/// The first that does not.
+pub fn effects(config: &Config, effects: &Compensation<f32>) -> Result<(), Excess> {
+    // Not so for what is no number, either.
+    let within = |found: f32, most: f32| found <= most;
+    let found = effects.current_error(config.drive.joint_torque(1.0)).abs();
+    let most = config.largest_offset;
+    if !within(found, most) {
+        return Err(Excess::CurrentOffset { found, most });
+    }
+    let (found, most) = (
+        effects.lost_voltage(),
+        LARGEST_LOSS * config.monitor.supply[0],
+    );
+    if !within(found, most) {
+        return Err(Excess::DriveDeadzone { found, most });
+    }
+    let (found, most) = (
+        effects.position_slope(config.drive.gear_ratio),
+        LARGEST_SLOPE,
+    );
+    if !within(found, most) {
+        return Err(Excess::EncoderEccentricity { found, most });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::nameplate::one_link;
+    use rig_shared::compensation::{Effects, GIVEN};
+    use rig_shared::effects::{Effect, Kind};
+
+    #[test]
+    fn the_nameplate_s_own_settings_are_usable() {
+        let (config, own) = one_link();
+        assert!(settings(&config, &own));
+    }
+
+    fn allowed(effect: Effect<f32>) -> bool {
+        let mut all = Effects::default();
+        all[0] = Some(effect);
+        effects(&one_link().0, &Compensation::new(&all).unwrap()).is_ok()
+    }
+
+    #[test]
+    fn corrections_beyond_what_a_sensor_can_be_wrong_by_are_refused() {
+        // As a torque: 2.5 N·m/A.
+        let offset = |torque| allowed(Effect::new(Kind::CurrentOffset, &[torque], &[]));
+        assert!(offset(1.24) && offset(-1.24) && !offset(1.26) && !offset(-8.0));
+        let loss = |volts| allowed(Effect::new(Kind::DriveDeadzone, &[volts], &[]));
+        assert!(loss(2.0) && !loss(3.0) && !loss(24.0));
+        // 0.5 rad of the position by the motor's angle a turn of it: order · 50 · amplitude is the share of the velocity.
+        let of_motor = |order: f32, amplitude: f32| {
+            let gains = [0.6 * amplitude, 0.8 * amplitude];
+            allowed(Effect::new(
+                Kind::EncoderEccentricityMotor,
+                &gains,
+                &[order],
+            ))
+        };
+        assert!(of_motor(1.0, 0.0099) && !of_motor(1.0, 0.0101) && !of_motor(12.0, 0.02));
+        let of_joint = |order| {
+            let gains = [0.02, 0.0];
+            allowed(Effect::new(
+                Kind::EncoderEccentricityJoint,
+                &gains,
+                &[order],
+            ))
+        };
+        assert!(of_joint(1.0) && of_joint(24.0) && !of_joint(26.0));
+    }
+
+    /// Every bandwidth that is allowed has a lag that the tick remembers, and gains that are numbers.
+    #[test]
+    fn current_loops_are_neither_too_slow_nor_too_fast() {
+        let (config, mut settings) = one_link();
+        for (hertz, good) in [
+            (1e-45_f32, false),
+            (0.0, false),
+            (39.0, false),
+            (39.1, true),
+            (500.0, true),
+            (1000.0, true),
+            (1010.0, false),
+            (f32::INFINITY, false),
+            (f32::NAN, false),
+        ] {
+            settings.gains.current_bandwidth = hertz;
+            assert_eq!(gains(&config, &settings.gains), good, "{hertz} Hz");
+            if good {
+                let derived = crate::derived::Derived::new(&config, &settings);
+                let (ticks, share) = derived.lag;
+                assert!(usize::from(ticks) < GIVEN - 1, "{ticks} ticks");
+                assert!((0.0..1.0).contains(&share));
+            }
+        }
+    }
+}
