@@ -1,5 +1,6 @@
 //! What is fixed while the rig runs: rates, nameplate, thresholds; and what the host may replace.
 
+use micromath::F32Ext;
 use rig_shared::compensation::Effects;
 use rig_shared::control::{ControlKind, Gains};
 use rig_shared::drive::Drive;
@@ -111,7 +112,7 @@ impl Config {
                 velocity_margin: 1.25,
                 position_margin: 0.1,
                 // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
-                largest_step: libm::ceilf(4.0 * limits.velocity * counts_per_radian * period)
+                largest_step: F32Ext::ceil(4.0 * limits.velocity * counts_per_radian * period)
                     as i32
                     + 4,
                 persistence: 3,

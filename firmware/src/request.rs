@@ -1,5 +1,6 @@
 //! What the host may change, when, and what it is refused.
 
+use micromath::F32Ext;
 use rig_shared::control::{adaptive, current};
 use rig_shared::safety::{Fault, Limits, Mode};
 use rig_shared::trajectory::{Course, Extremes};
@@ -47,7 +48,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
                 Ok(())
             }
             Mode::Holding | Mode::Stopping => Ok(()),
-            _ => Err(Refusal::WrongMode),
+            _ => Err(wrong_mode(state)),
         },
         RequestBody::ClearFault => clear_fault(config, state),
         RequestBody::SetPosition(position) => set_position(state, *position),
@@ -103,10 +104,18 @@ fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
     }
 }
 
+/// Why the present mode does not allow what is asked: a latched fault has its own remedy.
+fn wrong_mode(state: &State) -> Refusal {
+    match state.mode {
+        Mode::Fault => Refusal::FaultLatched,
+        _ => Refusal::WrongMode,
+    }
+}
+
 /// Only while the bridge is off and nothing moves.
 fn store(state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
-        return Err(Refusal::WrongMode);
+        return Err(wrong_mode(state));
     }
     state.storing = true;
     Ok(())
@@ -126,16 +135,13 @@ fn arm(config: &Config, state: &mut State) -> Result<(), Refusal> {
             state.mode = Mode::Holding;
             Ok(())
         }
-        Mode::Fault => Err(Refusal::FaultLatched),
-        _ => Err(Refusal::WrongMode),
+        _ => Err(wrong_mode(state)),
     }
 }
 
 fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
-    match state.mode {
-        Mode::Holding => {}
-        Mode::Fault => return Err(Refusal::FaultLatched),
-        _ => return Err(Refusal::WrongMode),
+    if state.mode != Mode::Holding {
+        return Err(wrong_mode(state));
     }
     let (trajectory, extremes) = state.trajectory.as_ref().ok_or(Refusal::NoTrajectory)?;
     fits(extremes, &state.settings.limits, Some(state.run.base))?;
@@ -150,14 +156,14 @@ fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
 /// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
 fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
-        return Err(Refusal::WrongMode);
+        return Err(wrong_mode(state));
     }
     let counts = position / state.derived.radians_per_count;
     // Above 2²⁴ counts an f32 no longer names single counts.
     if counts.is_nan() || counts.abs() >= 16_777_216.0 {
         return Err(Refusal::BadValue);
     }
-    let shift = libm::roundf(counts) as i64 - state.counts;
+    let shift = F32Ext::round(counts) as i64 - state.counts;
     state.origin = state.origin.map(|origin| origin - shift);
     state.counts += shift;
     state.position = state.counts as f32 * state.derived.radians_per_count;

@@ -16,7 +16,7 @@
 //! | tanh | −10 to 10 | 1.1·10⁻³ | 8.1·10⁻⁸ | absolute | `hyperbolic.rs` of this crate, 8.1·10⁻⁸: in half the time of libm's (micromath has none; 1 − 2/(exp 2x + 1) with its exp) |
 //! | powf 1.5 | 10⁻³ to 10 | 1.7·10⁻¹ | 6.7·10⁻⁸ | relative | libm |
 //!
-//! micromath is therefore a dependency of the tests alone.
+//! From micromath the firmware therefore takes rounding to whole numbers alone, which is exact there.
 
 use core::fmt::Debug;
 use core::ops::{

@@ -297,6 +297,14 @@ fn an_offset_out_of_band_at_start_is_measured_again_after_clearing() {
         line.port().device().state().latch.first().unwrap().fault,
         Fault::CurrentOffset
     );
+    for body in [
+        RequestBody::Arm,
+        RequestBody::Start,
+        RequestBody::SetPosition(0.0),
+        RequestBody::Store,
+    ] {
+        assert_eq!(refused(&mut line, body), Refusal::FaultLatched);
+    }
     inject(&mut line, |f| *f = Faults::default());
     line.request(RequestBody::ClearFault).unwrap();
     assert_eq!(mode(&line), Mode::Calibrating);

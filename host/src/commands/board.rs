@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{ArgGroup, Args as ClapArgs, Subcommand};
+use clap::{Args as ClapArgs, Subcommand};
 use rig_shared::safety::{FaultRecord, SnapshotSample};
 use rig_shared::wire::message::{
     Greeting, Health, Report, RequestBody, SettingsOrigin, SnapshotPart,
@@ -26,22 +26,21 @@ const PART_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Talks to the rig's board: its health, its faults, its stored settings, its single control ticks.
 #[derive(Debug, ClapArgs)]
-#[command(group = ArgGroup::new("where").required(true).args(["port", "probe", "emulated"]))]
 pub(crate) struct Args {
     /// Serial port of the rig, such as /dev/ttyACM0 or COM3
-    #[arg(long)]
+    #[arg(long, global = true, conflicts_with_all = ["probe", "emulated"])]
     port: Option<String>,
     /// The board's debug probe instead of its serial port
-    #[arg(long)]
+    #[arg(long, global = true, conflicts_with = "emulated")]
     probe: bool,
     /// The emulated rig instead of hardware; it keeps nothing and has no health of its own
-    #[arg(long)]
+    #[arg(long, global = true)]
     emulated: bool,
     /// Speed of the serial port, baud
-    #[arg(long, default_value_t = DEFAULT_BAUD)]
+    #[arg(long, global = true, default_value_t = DEFAULT_BAUD)]
     baud: u32,
     /// Seed of the emulated rig
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, global = true, default_value_t = 1)]
     seed: u64,
     #[command(subcommand)]
     action: Action,
@@ -98,6 +97,12 @@ enum Action {
 /// A sentence: the port, the rig's refusal, the file.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     // What can be wrong with the arguments is said before the rig is disturbed.
+    if args.port.is_none() && !args.probe && !args.emulated {
+        return Err(CommandError::Sentence(
+            "Say where the rig is: --port DEV (such as /dev/ttyACM0), --probe or --emulated."
+                .to_owned(),
+        ));
+    }
     let sent = match &args.action {
         Action::Upload {
             model, leave_out, ..

@@ -53,7 +53,7 @@ pub(crate) struct Args {
     /// Where the link stands at the start, rad: an incremental encoder cannot know
     #[arg(long, allow_negative_numbers = true)]
     home: Option<f32>,
-    /// Compensate friction by the description's parameters
+    /// Compensate friction and effects by the description
     #[arg(long, requires = "robot")]
     precompensation: bool,
     /// Seed of the emulated rig
@@ -90,10 +90,15 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .into_iter()
         .collect();
     if let Some(robot) = &robot {
-        settings.extend(upload::settings(
-            &Nameplate::from_robot(robot)?,
-            args.precompensation,
-        ));
+        settings.extend(if args.precompensation {
+            let upload = upload::requests(robot, true)?;
+            for sentence in &upload.left_out {
+                ui.say(&format!("Left out: {sentence}."));
+            }
+            upload.requests
+        } else {
+            upload::settings(&Nameplate::from_robot(robot)?, false)
+        });
     }
     let trajectory = match &args.trajectory {
         Some(path) => {

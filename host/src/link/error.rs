@@ -137,7 +137,7 @@ pub enum LinkError {
 pub fn describe(refusal: Refusal) -> Cow<'static, str> {
     Cow::Borrowed(match refusal {
         Refusal::WrongMode => {
-            "it is not allowed in the present mode (a fault is latched, which `rig board fault` names and `rig board clear` forgets; or the rig moves)"
+            "the present mode does not allow it: a motion is started on an armed rig that holds, everything else is for a rig that neither moves nor calibrates (`rig board disarm` switches the bridge off)"
         }
         Refusal::FaultLatched => {
             "a fault is latched; `rig board fault` says which, `rig board clear` forgets it"
