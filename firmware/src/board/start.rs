@@ -153,7 +153,8 @@ async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
         if count.is_multiple_of(50) {
             led.toggle();
         }
-        if count.is_multiple_of(100) {
+        // At the first turn too: the first report of health comes after one second.
+        if count % 100 == 1 {
             stack::survey();
         }
     }

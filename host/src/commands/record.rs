@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{ArgGroup, Args as ClapArgs};
@@ -229,7 +229,7 @@ fn record<P: Port>(
     let mut fault = None;
     let mut mode = Mode::Disarmed;
     let mut done = 0;
-    let interrupted = interrupts()?;
+    listen_to_interrupts()?;
     let recorded = run_experiment(&mut session, experiment, |event| {
         match event {
             Event::Samples {
@@ -251,7 +251,7 @@ fn record<P: Port>(
             Event::Fault(record) => fault = Some(*record),
             _ => {}
         }
-        if interrupted.load(Ordering::Relaxed) {
+        if PRESSED.load(Ordering::Relaxed) {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -287,7 +287,7 @@ fn record<P: Port>(
             out.display()
         )));
     }
-    if interrupted.load(Ordering::Relaxed) {
+    if PRESSED.load(Ordering::Relaxed) {
         return Err(CommandError::Sentence(format!(
             "Broken off: the motion was stopped and the bridge switched off; {} holds the {done} samples until then.",
             out.display()
@@ -296,19 +296,26 @@ fn record<P: Port>(
     Ok(losses)
 }
 
-/// Whether Ctrl-C has been pressed since: the link is then brought to rest before the program ends. Pressed again it ends at
-/// once, and the rig stops by itself when it no longer hears anything.
-fn interrupts() -> Result<Arc<AtomicBool>, CommandError> {
-    let pressed = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&pressed);
-    ctrlc::set_handler(move || {
-        if told.swap(true, Ordering::Relaxed) {
-            // As a shell says that SIGINT ended it.
-            std::process::exit(130);
-        }
-    })
-    .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))?;
-    Ok(pressed)
+/// Whether Ctrl-C has been pressed since the recording began.
+static PRESSED: AtomicBool = AtomicBool::new(false);
+
+/// Listens to Ctrl-C from now on: the link is then brought to rest before the program ends. Pressed again it ends at once,
+/// and the rig stops by itself when it no longer hears anything.
+fn listen_to_interrupts() -> Result<(), CommandError> {
+    // A process has one handler; the program as a library records more than once.
+    static LISTENING: OnceLock<Result<(), String>> = OnceLock::new();
+    let listening = LISTENING.get_or_init(|| {
+        ctrlc::set_handler(|| {
+            if PRESSED.swap(true, Ordering::Relaxed) {
+                // As a shell says that SIGINT ended it.
+                std::process::exit(130);
+            }
+        })
+        .map_err(|error| error.to_string())
+    });
+    PRESSED.store(false, Ordering::Relaxed);
+    (listening.clone())
+        .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))
 }
 
 fn names(modes: &[Mode]) -> String {
