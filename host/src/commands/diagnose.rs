@@ -10,7 +10,7 @@ use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
 use crate::diagnose::voltage::diagnose_voltage;
-use crate::diagnose::{DiagnoseError, Options, diagnose};
+use crate::diagnose::{DiagnoseError, Options, diagnose, sensor_zeros};
 use crate::files::{folder, write_whole};
 use crate::pages::{self, Context};
 use crate::prepare::Recording;
@@ -43,6 +43,9 @@ pub(crate) struct Args {
     /// Recording to judge by, of another motion, not used in any fit; may be given several times
     #[arg(long)]
     holdout: Vec<PathBuf>,
+    /// Recording made with the drive off: what the sensor of the current reads there is its own offset, and no torque
+    #[arg(long)]
+    drive_off: Option<PathBuf>,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -65,6 +68,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     let options = Options {
         seed: args.seed,
+        sensor_zeros: zeros(&robot, args, ui)?,
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);
@@ -120,6 +124,22 @@ fn read(robot: &Robot, args: &Args) -> Result<(Inputs, Inputs, Workflow), Comman
     let training = Inputs::read(robot, &args.data)?;
     let holdout = Inputs::read(robot, &args.holdout)?;
     Ok((training, holdout, diagnose))
+}
+
+/// What the sensors read with the drive off, where that was recorded.
+fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandError> {
+    let Some(path) = &args.drive_off else {
+        return Ok(Vec::new());
+    };
+    let log = Inputs::read(robot, std::slice::from_ref(path))?;
+    let mut zeros = Vec::new();
+    for recording in log.recordings() {
+        zeros = sensor_zeros(recording)?;
+    }
+    for warning in log.warnings() {
+        ui.remark(&warning);
+    }
+    Ok(zeros)
 }
 
 /// The result at a glance.

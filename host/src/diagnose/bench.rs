@@ -104,6 +104,7 @@ impl<'a> Bench<'a> {
             predicted,
             values: values.to_vec(),
             driven: Mutex::default(),
+            slopes: Mutex::default(),
         })
     }
 

@@ -10,11 +10,11 @@ use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::profile::Profile;
-use super::rows::{Column, Nominal, Thinning, motion_of};
+use super::rows::{Column, Nominal, Thinning};
 use super::runs::Run;
 use super::search::is_gear;
+use super::slopes::Slopes;
 use super::transmission::{ABREAST, Driven, Load};
-use crate::prepare::{central_difference, second_difference};
 use crate::robot::{Robot, unit_of};
 
 /// What columns are formed from.
@@ -33,6 +33,8 @@ pub(super) struct Source<'a> {
     pub(super) values: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
+    /// Slopes of the torque, likewise.
+    pub(super) slopes: Mutex<HashMap<(usize, usize), Arc<Slopes>>>,
 }
 
 /// An effect on a joint.
@@ -48,8 +50,6 @@ pub(super) struct Candidate {
 
 /// Reference delay at which the column of a delay is taken, s: first order would be 2 % off at 3 Hz and 10 ms.
 const DELAY: f64 = 0.002;
-/// Error of the reading at which its column is taken, of the gains' unit: small against every wave of the motion.
-const NUDGE: f64 = 1e-5;
 
 /// Effects whose torque acts on the link: a gear between motor and link transmits it.
 const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
@@ -225,10 +225,11 @@ impl Source<'_> {
             }
             (Kind::GravityTilt, _) => self.tilted(run),
             (_, Channel::Position) => {
+                let slopes = self.slopes(candidate.joint, r)?;
                 let errors = self.terms(candidate, shapes, run, predicted);
-                (errors.iter().take(gains))
-                    .map(|error| self.misread(candidate.joint, error, run))
-                    .collect()
+                Ok((errors.iter().take(gains))
+                    .map(|error| slopes.misread(error, 1.0 / run.rate))
+                    .collect())
             }
             _ => {
                 let terms = self.terms(candidate, shapes, run, predicted);
@@ -293,29 +294,14 @@ impl Source<'_> {
         out
     }
 
-    /// What a reading that is off by a unit of `error` does to the torque of all joints: the true position is less.
-    fn misread(&self, joint: usize, error: &[f64], run: &Run) -> Result<Column, DiagnoseError> {
-        let period = 1.0 / run.rate;
-        let mut motion = motion_of(run);
-        let rate = central_difference(error, period);
-        let second = second_difference(error, period);
-        for (to, change) in motion.iter_mut().zip([error, &rate, &second]) {
-            for (x, e) in to[joint].iter_mut().zip(change) {
-                *x -= NUDGE * e;
-            }
+    fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {
+        let mut known = self.slopes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(slopes) = known.get(&(r, joint)) {
+            return Ok(slopes.clone());
         }
-        let moved = self.torque_of([&motion[0], &motion[1], &motion[2]])?;
-        let still = motion_of(run);
-        let before = self.torque_of([&still[0], &still[1], &still[2]])?;
-        Ok((moved.into_iter().zip(before))
-            .map(|(moved, before)| {
-                Some(
-                    (moved.iter().zip(&before))
-                        .map(|(m, b)| (m - b) / NUDGE)
-                        .collect(),
-                )
-            })
-            .collect())
+        let slopes = Arc::new(Slopes::of(self, joint, &self.runs[r])?);
+        known.insert((r, joint), slopes.clone());
+        Ok(slopes)
     }
 
     fn driven(&self, joint: usize, r: usize) -> Result<Arc<Driven>, DiagnoseError> {
@@ -364,22 +350,6 @@ impl Source<'_> {
             return 0.0;
         }
         self.robot.standard_parameters()[joint][column::DRIVE_INERTIA]
-    }
-
-    /// Torque of the smooth part of the nominal model for a motion.
-    fn torque_of(&self, motion: [&[Vec<f64>]; 3]) -> Result<Vec<Vec<f64>>, DiagnoseError> {
-        let samples = motion[0].first().map_or(0, Vec::len);
-        let mut torque = vec![vec![0.0; samples]; self.nominal.joints()];
-        self.nominal.columns(motion, &mut |k, j, column| {
-            // The direction does not change with a small error of the reading; its jump would.
-            if self.nominal.is_coulomb(k) {
-                return;
-            }
-            for (to, y) in torque[j].iter_mut().zip(column) {
-                *to += self.values[k] * y;
-            }
-        })?;
-        Ok(torque)
     }
 
     /// What a tilt of the base by a unit angle does to the torque: one column a horizontal axis that matters.

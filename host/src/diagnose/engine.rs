@@ -16,7 +16,7 @@ use super::profile::Profile;
 use super::refit::{Joint, Refit, open};
 use super::sanity::faults;
 use super::search::{Search, with};
-use super::winding::{contradict, name_something, settled, tell, windings};
+use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::robot::{Robot, title_of};
@@ -116,7 +116,12 @@ pub fn diagnose(
         refuse(robot, &mut tried, &stand.remove(k));
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
     }
-    let said = settled(&windings, &search, &refit.base, &mut judged.chosen)?;
+    let said = settled(
+        &zeros(&options.sensor_zeros, &windings, robot.joints.len()),
+        &search,
+        &refit.base,
+        &mut judged.chosen,
+    )?;
     let replay = match &sealed {
         Some(sealed) => Replay::of(&bench, &refit, values, sealed),
         None => trial,

@@ -10,6 +10,7 @@ mod change;
 mod columns;
 mod descent;
 mod described;
+mod drive_off;
 mod engine;
 pub mod experiment;
 mod fault;
@@ -35,12 +36,14 @@ pub mod scenario;
 mod search;
 mod sentences;
 mod simplex;
+mod slopes;
 mod solve;
 pub mod testable;
 mod transmission;
 pub mod voltage;
 mod winding;
 
+pub use drive_off::sensor_zeros;
 pub use engine::diagnose;
 pub use outcome::Diagnosis;
 pub use runs::{JointRun, Run};
@@ -58,6 +61,8 @@ pub struct Options {
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
+    /// What the sensors read with the drive off, by [`sensor_zeros`]; empty where it was not recorded.
+    pub sensor_zeros: Vec<[f64; 2]>,
 }
 
 /// Why a diagnosis is not possible.
@@ -72,6 +77,16 @@ pub enum DiagnoseError {
     /// The robot has no valid model.
     #[error("The robot's model cannot be built: {0}")]
     Model(String),
+    /// A recording that says nothing of the drive at rest.
+    #[error(
+        "{label} cannot be taken as recorded with the drive off: {what}; record a few seconds with the rig disarmed."
+    )]
+    DriveOff {
+        /// Name of the recording.
+        label: String,
+        /// Why, a clause.
+        what: String,
+    },
     /// A recording without a voltage.
     #[error(
         "{0} has no motor voltage; record u1, or duty1 with supply, or give recordings with torque or current."

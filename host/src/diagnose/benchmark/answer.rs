@@ -80,6 +80,10 @@ impl Method for Diagnose {
             without: without.to_vec(),
             threads: 1,
             seed: made.truth.seed,
+            sensor_zeros: (made.drive_off.as_ref())
+                .map(|log| crate::diagnose::sensor_zeros(log))
+                .transpose()?
+                .unwrap_or_default(),
         };
         let (diagnosis, _) = crate::diagnose::diagnose(
             &made.robot,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::answer::{Answer, Method};
 use super::cases::Case;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::experiment::FILE;
+use crate::diagnose::experiment::{FILE, OFF_LOG};
 use crate::diagnose::scenario::Made;
 use crate::excite::TrajectoryFile;
 
@@ -36,24 +36,32 @@ pub(super) fn follow(
         answer: None,
         failure: None,
     };
-    if let Some(trajectory) = &next.trajectory {
-        match again(case, made, method, trajectory) {
-            Ok(answer) => followed.answer = Some(answer),
-            Err(error) => followed.failure = Some(error.to_string()),
-        }
+    let more = match &next.trajectory {
+        Some(trajectory) => Some(moved(case, made, trajectory)),
+        None if next.kind == OFF_LOG => Some(at_rest(case, made)),
+        None => None,
+    };
+    match more.map(|more| method.answer(&more?, &case.without)) {
+        Some(Ok(answer)) => followed.answer = Some(answer),
+        Some(Err(error)) => followed.failure = Some(error.to_string()),
+        None => {}
     }
     Some(followed)
 }
 
-fn again(
-    case: &Case,
-    made: &Made,
-    method: &dyn Method,
-    trajectory: &str,
-) -> Result<Answer, DiagnoseError> {
+/// The recordings with that of the proposed motion.
+fn moved(case: &Case, made: &Made, trajectory: &str) -> Result<Made, DiagnoseError> {
     let file = TrajectoryFile::from_toml(trajectory, Path::new(FILE))
         .map_err(|error| DiagnoseError::Scenario(error.to_string()))?;
     let mut more = made.clone();
     more.further.push(case.scenario.proposed(made, &file)?);
-    method.answer(&more, &case.without)
+    Ok(more)
+}
+
+/// The recordings with that of the drive off.
+fn at_rest(case: &Case, made: &Made) -> Result<Made, DiagnoseError> {
+    Ok(Made {
+        drive_off: Some(case.scenario.drive_off(made)?),
+        ..made.clone()
+    })
 }

@@ -1,6 +1,6 @@
 //! Pairs that no motion splits by its torque, and what does.
 
-use rig_shared::effects::Kind;
+use rig_shared::effects::{Confusion, Kind};
 
 use super::primitives::Family;
 
@@ -13,9 +13,14 @@ pub(super) struct Split {
     pub(super) text: String,
     /// The motion to run for it, where there is one.
     pub(super) motion: Option<Family>,
+    /// Whether it asks for more than the rig does by itself: a load, the base turned, another sensor.
+    pub(super) hands: bool,
 }
 
-const DRIVE_OFF: &str = "Record two seconds with the drive off: `rig record` without a trajectory leaves the rig disarmed. The mean of tau{k} (or i{k}) there is the sensor's own offset, because no current flows: about the size in question, it is current_offset; about zero, it is not. With u{k} recorded in motion the same shows as R times the offset between the voltage and what current and speed account for.";
+/// What the log with the drive off is called in results.
+pub const OFF_LOG: &str = "drive-off-log";
+
+const DRIVE_OFF: &str = "Record two seconds with the drive off (`rig record` without a trajectory leaves the rig disarmed) and give them with --drive-off. The mean of tau{k} (or i{k}) there is the sensor's own offset, because no current flows: about the size in question, it is current_offset; about zero, it is not. With u{k} recorded in motion the same shows as R times the offset between the voltage and what current and speed account for.";
 const TAKE_OFF: &str = "Take off what can pull on the joint (hoses, cables, a counterweight) or fix the link to its shaft half a turn further, and run the same motion again; record t, q{k} and tau{k}. A torque from outside goes or changes with it, friction that differs by direction stays. No motion alone tells the two apart: while the joint moves both are the same constant, and at rest they widen the same band.";
 const TURNED: &str = "Run the motion twice: as the robot stands, and with its base turned by 180 degrees about the vertical or, better, laid on its side so that gravity does nothing. Record t, q{k} and tau{k} each time and give both recordings. What belongs to gravity changes with the base; what belongs to the encoder, the gear or a cable stays.";
 const GRAVITY_CLOSES: &str = "Run the reversals where gravity is strongest, and again about a position where it does nothing; record t, q{k} and tau{k}. Gravity keeps the teeth together, so lost motion from backlash shows at the second place only; what winds up by friction or twist shows at both. A second encoder on the link would show it directly.";
@@ -30,8 +35,17 @@ const WIDE: &str = "Run the sine over the whole range; record t, q{k} and tau{k}
 const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What depends on the speed shows at constant speed, what remembers the last reversal has died out there.";
 const LOAD_OR_SPEED: &str = "Run the constant speeds; record t, q{k} and tau{k}. At constant speed no acceleration asks for torque, so that what is left belongs to the speed; what belongs to load or current shows where gravity is lifted slowly.";
 
-/// What splits `a` from `b`, names from the registry.
-pub(super) fn split(a: Kind, b: Kind) -> Split {
+/// What the registry says of the two.
+pub(super) fn confused([a, b]: [Kind; 2]) -> Option<&'static Confusion> {
+    let of = |x: Kind, y: Kind| {
+        let mut all = x.about().confused.iter();
+        all.find(|c| c.with == y.about().name)
+    };
+    of(a, b).or_else(|| of(b, a))
+}
+
+/// What splits the two, names from the registry.
+pub(super) fn split([a, b]: [Kind; 2]) -> Split {
     let [a_name, b_name] = [a.about().name, b.about().name];
     let is = |x: &str, y: &str| (a_name == x && b_name == y) || (a_name == y && b_name == x);
     let has = |x: &str| a_name == x || b_name == x;
@@ -39,13 +53,18 @@ pub(super) fn split(a: Kind, b: Kind) -> Split {
         kind,
         text: text.to_owned(),
         motion,
+        hands: false,
+    };
+    let by_hand = |kind, text: &str, motion| Split {
+        hands: true,
+        ..made(kind, text, motion)
     };
     if has("current_offset") {
-        made("drive-off-log", DRIVE_OFF, None)
+        made(OFF_LOG, DRIVE_OFF, None)
     } else if is("asymmetric_coulomb", "torque_offset") {
-        made("load-taken-off", TAKE_OFF, Some(Family::ConstantSpeeds))
+        by_hand("load-taken-off", TAKE_OFF, Some(Family::ConstantSpeeds))
     } else if has("drive_deadzone") {
-        made(
+        by_hand(
             "current-and-voltage",
             CURRENT_TOO,
             Some(Family::NestedReversals),
@@ -67,7 +86,7 @@ pub(super) fn split(a: Kind, b: Kind) -> Split {
     } else if has("encoder_eccentricity") && !has("gravity_tilt") {
         made("fast-and-slow", FAST_AND_SLOW, Some(Family::Sine))
     } else if has("gravity_tilt") {
-        made("base-turned", TURNED, Some(Family::Sine))
+        by_hand("base-turned", TURNED, Some(Family::Sine))
     } else if has("viscous_warmup") {
         made("warm-up", COLD_AND_WARM, Some(Family::WarmUp))
     } else if has("quadratic_drag") {
@@ -85,7 +104,7 @@ pub(super) fn split(a: Kind, b: Kind) -> Split {
     .into_iter()
     .any(has)
     {
-        made("payload-swap", TWO_LOADS, Some(Family::ConstantSpeeds))
+        by_hand("payload-swap", TWO_LOADS, Some(Family::ConstantSpeeds))
     } else if has("stribeck") || has("presliding") {
         made(
             Family::ConstantSpeeds.name(),
@@ -93,8 +112,7 @@ pub(super) fn split(a: Kind, b: Kind) -> Split {
             Some(Family::ConstantSpeeds),
         )
     } else {
-        let known = a.about().confused.iter().find(|c| c.with == b_name);
-        let known = known.or_else(|| b.about().confused.iter().find(|c| c.with == a_name));
+        let known = confused([a, b]);
         Split {
             kind: Family::ConstantSpeeds.name(),
             text: format!(
@@ -105,6 +123,7 @@ pub(super) fn split(a: Kind, b: Kind) -> Split {
                 )
             ),
             motion: Some(Family::ConstantSpeeds),
+            hands: false,
         }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! From a library of safe motions, each over amplitudes and speeds within the robot's limits, the one along which the
 //! rivals' predictions lie farthest apart, the loser refitted each time (T-optimality: Atkinson and Fedorov 1975,
-//! Biometrika 62). Pairs that are the same function of torque and motion go by what splits them instead: another
-//! channel, another load, another direction of gravity.
+//! Biometrika 62). Pairs that are the same function of torque and motion stand together there; what splits them is another
+//! channel, another load, another direction of gravity, and is asked for once nothing else is left.
 //!
 //! Leaves out: ranges of cranks and regions of the workspace; the posteriors of the rivals' parameters, of which the
 //! estimates stand for all; the other joints, which stand in the middle of their ranges.
@@ -20,6 +20,7 @@ use rig_shared::effects::{Effect, Kind};
 use rig_shared::trajectory::Trajectory;
 
 pub use criterion::FLOOR_RATE;
+pub use lookup::OFF_LOG;
 pub use place::Nominal;
 pub use primitives::{Family, Hands};
 
@@ -29,7 +30,7 @@ use crate::excite::{JointTrajectory, TrajectoryFile};
 use crate::robot::Robot;
 
 use criterion::{Course, predictable};
-use lookup::split;
+use lookup::{confused, split};
 use place::Place;
 use primitives::{Primitive, of_family};
 
@@ -67,39 +68,40 @@ pub fn next(
         return Ok(None);
     };
     let place = Place::of(robot, joint, *nominal)?;
-    let pairs = || {
-        let each = rivals.iter().enumerate();
-        each.flat_map(|(i, a)| rivals[..i].iter().map(move |b| (b, a)))
-    };
-    let hopeless = pairs().find(|(a, b)| exact(a.0.kind, b.0.kind));
-    let hidden = pairs().find(|(a, b)| !predictable(a.0.kind) || !predictable(b.0.kind));
-    if let Some((a, b)) = hopeless.or(hidden) {
-        let names = names(rivals);
-        return Ok(Some(by_lookup(
-            robot,
-            joint,
-            place.as_ref(),
-            a.0.kind,
-            b.0.kind,
-            names,
-        )));
+    let kinds = |[a, b]: Pair| [rivals[a].0.kind, rivals[b].0.kind];
+    let lookup = |pair: Pair| by_lookup(robot, joint, place.as_ref(), kinds(pair), names(rivals));
+    let (same, apart): (Vec<Pair>, Vec<Pair>) = pairs(rivals.len()).partition(|p| exact(kinds(*p)));
+    let hidden = (apart.iter()).find(|p| !kinds(**p).into_iter().all(predictable));
+    if let Some(pair) = hidden {
+        return Ok(Some(lookup(*pair)));
+    }
+    // What the rig does by itself comes first.
+    let alone = same.iter().find(|p| !split(kinds(**p)).hands);
+    if apart.is_empty() {
+        return Ok(alone.or(same.first()).map(|p| lookup(*p)));
     }
     let found = place.as_ref().and_then(|place| best(place, rivals, floor));
-    let Some((primitive, apart)) = found.filter(|(_, apart)| *apart >= DECIDES) else {
-        let closest = pairs().next();
-        return Ok(closest.map(|(a, b)| {
-            by_lookup(
-                robot,
-                joint,
-                place.as_ref(),
-                a.0.kind,
-                b.0.kind,
-                names(rivals),
-            )
-        }));
+    let Some((primitive, apart)) = found.as_ref().filter(|(_, apart)| *apart >= DECIDES) else {
+        let nearest = found
+            .zip(place.as_ref())
+            .and_then(|((primitive, _), place)| {
+                let course = Course::of(place, &primitive);
+                nearest(&course, rivals, place.revolute, floor).map(|(_, pair)| pair)
+            });
+        // Partners of the nearest pair lie as near; the registry may speak of theirs.
+        let told = nearest.and_then(|pair| {
+            let like = |a: Kind, b: Kind| a == b || exact([a, b]);
+            apart.iter().find(|p| {
+                let ([a, b], [c, d]) = (kinds(**p), kinds(pair));
+                confused(kinds(**p)).is_some()
+                    && ((like(a, c) && like(b, d)) || (like(a, d) && like(b, c)))
+            })
+        });
+        let pair = alone.or(told).copied().or(nearest);
+        return Ok(pair.or(apart.first().copied()).map(lookup));
     };
-    let stand = place.map_or_else(Vec::new, |p| p.stand);
-    let mut text = running(robot, &primitive);
+    let stand = place.as_ref().map_or_else(Vec::new, |p| p.stand.clone());
+    let mut text = running(robot, primitive);
     if primitive.hands != Hands::None {
         text.push(' ');
         text.push_str(primitive.hands.text());
@@ -107,6 +109,16 @@ pub fn next(
     text.push_str(&format!(
         " Give what it records with --data beside the others: the predictions of the rivals lie {apart:.0} standard deviations of the noise apart along it."
     ));
+    if !same.is_empty() {
+        let mut left: Vec<usize> = same.iter().copied().flatten().collect();
+        left.sort_unstable();
+        left.dedup();
+        let left: Vec<_> = left.into_iter().map(|k| rivals[k]).collect();
+        text.push_str(&format!(
+            " Of {} no motion tells one from another: should they be left, the next diagnosis says what does.",
+            names(&left).join(" and ")
+        ));
+    }
     let kind = match primitive.hands {
         Hands::None => primitive.family.name().to_owned(),
         Hands::Payload => format!("payload-swap: {}", primitive.family.name()),
@@ -118,12 +130,12 @@ pub fn next(
             separates: names(rivals),
             text,
             file: Some(FILE.to_owned()),
-            separation: Some(apart),
+            separation: Some(*apart),
             duration: Some(primitive.hands.passes().len() as f64 * primitive.trajectory.duration()),
             hands: primitive.hands != Hands::None,
             trajectory: None,
         },
-        trajectory: Some(file_of(robot, joint, &stand, &primitive)),
+        trajectory: Some(file_of(robot, joint, &stand, primitive)),
     }))
 }
 
@@ -143,13 +155,22 @@ fn names(rivals: &[(Effect<f64>, Nominal)]) -> Vec<String> {
     list
 }
 
+/// Two rivals by their places.
+type Pair = [usize; 2];
+
+/// Every pair of so many once.
+fn pairs(count: usize) -> impl Iterator<Item = Pair> {
+    (0..count).flat_map(|b| (0..b).map(move |a| [a, b]))
+}
+
 /// Whether the registry has the two as the same function of torque and motion.
-fn exact(a: Kind, b: Kind) -> bool {
-    let says = |x: Kind, y: Kind| {
-        let all = x.about().confused.iter();
-        all.clone().any(|c| c.exact && c.with == y.about().name)
-    };
-    says(a, b) || says(b, a)
+fn exact(pair: [Kind; 2]) -> bool {
+    confused(pair).is_some_and(|c| c.exact)
+}
+
+/// Whether an effect is one constant torque as long as the joint moves.
+fn constant(kind: Kind) -> bool {
+    kind == Kind::TorqueOffset || exact([kind, Kind::TorqueOffset])
 }
 
 /// A motion and how far apart the closest rivals lie along it, standard deviations.
@@ -197,17 +218,31 @@ fn best(place: &Place, rivals: &[(Effect<f64>, Nominal)], floor: f64) -> Option<
     chosen
 }
 
-/// Standard deviations between the closest two rivals, whichever of them is true.
+/// Standard deviations between the closest two rivals that a motion can tell apart, whichever of them is true.
 fn closest(course: &Course, rivals: &[(Effect<f64>, Nominal)], revolute: bool, floor: f64) -> f64 {
-    let mut least = f64::INFINITY;
-    for (i, truth) in rivals.iter().enumerate() {
-        for (j, (rival, _)) in rivals.iter().enumerate() {
-            if i != j {
-                least = least.min(course.separation(truth, rival, revolute, floor));
+    nearest(course, rivals, revolute, floor).map_or(0.0, |(apart, _)| apart)
+}
+
+/// The same with the pair; none where no motion tells any apart.
+fn nearest(
+    course: &Course,
+    rivals: &[(Effect<f64>, Nominal)],
+    revolute: bool,
+    floor: f64,
+) -> Option<(f64, Pair)> {
+    let told = pairs(rivals.len()).filter(|[a, b]| !exact([rivals[*a].0.kind, rivals[*b].0.kind]));
+    told.map(|[a, b]| {
+        // A constant torque is in the standard model already: no motion shows it, but what is more than a constant shows.
+        let between = |truth: usize, rival: usize| {
+            if constant(rivals[truth].0.kind) {
+                f64::INFINITY
+            } else {
+                course.separation(&rivals[truth], &rivals[rival].0, revolute, floor)
             }
-        }
-    }
-    least.max(0.0).sqrt()
+        };
+        (between(a, b).min(between(b, a)).max(0.0).sqrt(), [a, b])
+    })
+    .min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
 /// How the motion is run, sentences.
@@ -261,11 +296,10 @@ fn by_lookup(
     robot: &Robot,
     joint: usize,
     place: Option<&Place>,
-    a: Kind,
-    b: Kind,
+    pair: [Kind; 2],
     separates: Vec<String>,
 ) -> Proposal {
-    let found = split(a, b);
+    let found = split(pair);
     let mut text = found.text.replace("{k}", &(joint + 1).to_string());
     let motion = found.motion.zip(place).and_then(|(family, place)| {
         let list = of_family(place, family, Hands::None);
@@ -282,7 +316,7 @@ fn by_lookup(
             file: motion.as_ref().map(|_| FILE.to_owned()),
             separation: None,
             duration: motion.as_ref().map(|(p, _)| p.trajectory.duration()),
-            hands: true,
+            hands: found.hands,
             trajectory: None,
         },
         trajectory: motion.map(|(primitive, stand)| file_of(robot, joint, &stand, &primitive)),

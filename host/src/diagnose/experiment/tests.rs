@@ -251,6 +251,53 @@ fn exact_pairs_ask_for_another_channel_or_another_load() {
     assert!(best(&place, &rivals, 0.05).is_none_or(|(_, apart)| apart < 1e-3));
 }
 
+/// A third name is told from exact partners by a motion, which the partners must not keep from being proposed.
+#[test]
+fn exact_partners_stand_together_against_what_a_motion_tells_apart() {
+    let constants = [
+        effect(Kind::AsymmetricCoulomb, &[0.2], &[]),
+        effect(Kind::TorqueOffset, &[0.2], &[]),
+    ];
+    let with = |third| {
+        next(&robot(), 0, &[constants[0], constants[1], third], 0.05)
+            .unwrap()
+            .unwrap()
+    };
+    let found = with(effect(Kind::Spring, &[0.5, 0.2], &[]));
+    let e = &found.experiment;
+    println!("{} {:?}: {}", e.kind, e.separation, e.text);
+    assert!(!e.hands && found.trajectory.is_some());
+    assert!(e.separation.unwrap() > DECIDES);
+    assert!(
+        e.text
+            .contains("asymmetric_coulomb and torque_offset no motion tells"),
+        "{}",
+        e.text
+    );
+    // Among exact partners alone the rig does first what it can do by itself.
+    let found = with(effect(Kind::CurrentOffset, &[0.2], &[]));
+    assert_eq!(found.experiment.kind, OFF_LOG);
+    assert!(!found.experiment.hands);
+}
+
+/// Where nothing decides, the pair that is least told apart is looked up, in whatever order the rivals come.
+#[test]
+fn what_is_looked_up_is_the_closest_pair() {
+    let rivals = [
+        effect(Kind::Stribeck, &[2.0], &[0.05]),
+        effect(Kind::LoadFriction, &[0.3], &[]),
+        effect(Kind::ViscousWarmupTime, &[0.02], &[300.0]),
+    ];
+    let asked = |order: [usize; 3]| {
+        let list = order.map(|k| rivals[k]);
+        next(&robot(), 0, &list, 1e3).unwrap().unwrap().experiment
+    };
+    let first = asked([0, 1, 2]);
+    for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1]] {
+        assert_eq!(asked(order).text, first.text);
+    }
+}
+
 #[test]
 fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
     assert_eq!(

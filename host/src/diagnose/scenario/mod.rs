@@ -36,7 +36,7 @@ use crate::data::{Block, Column, RecordingWriter};
 use crate::files::write_whole;
 use crate::plant::PlantConfig;
 use crate::prepare::InMemory;
-use crate::robot::Robot;
+use crate::robot::{Drive, Robot};
 use record::{Nominal, record};
 use size::{Equation, Problem, beyond};
 
@@ -131,6 +131,7 @@ impl Scenario {
                 None
             },
             further: Vec::new(),
+            drive_off: None,
             holdout: recording("holdout", &other, 2)?,
             truth: Truth {
                 hidden: self.hidden.clone(),
@@ -190,27 +191,46 @@ impl Scenario {
         motion: &[f64],
         run: u64,
     ) -> Result<Block, DiagnoseError> {
-        let drive = robot.joints.first().and_then(|j| j.drive.as_ref());
-        let drive =
-            drive.ok_or_else(|| DiagnoseError::Scenario("the description has no drive".into()))?;
-        let mut config = healthy.clone();
-        if let Some(substeps) = self.substeps {
-            config.substeps = substeps;
-        }
         // The controller is tuned to the rig as it was before anything was hidden in it.
-        let equivalent = config.equivalent();
-        for hidden in &self.hidden {
-            hidden.effect.hide(&mut config);
-        }
+        let equivalent = healthy.equivalent();
+        let config = self.hiding(healthy);
         let nominal = Nominal {
             inertia: equivalent.inertia,
             gravity: equivalent.gravity_cos.hypot(equivalent.gravity_sin),
         };
         let intrusion = self.intrusion.filter(|_| run == 0);
-        // Seeds of runs far apart from those of the rigs.
-        let seed = self.seed.wrapping_mul(8).wrapping_add(run);
-        Ok(record(config, drive, nominal, motion, seed, intrusion))
+        let seed = self.seed_of(run);
+        Ok(record(
+            config,
+            drive_of(robot)?,
+            nominal,
+            motion,
+            seed,
+            intrusion,
+        ))
     }
+
+    /// The rig with all that is hidden in it.
+    fn hiding(&self, healthy: &PlantConfig) -> PlantConfig {
+        let mut config = healthy.clone();
+        if let Some(substeps) = self.substeps {
+            config.substeps = substeps;
+        }
+        for hidden in &self.hidden {
+            hidden.effect.hide(&mut config);
+        }
+        config
+    }
+
+    /// Seeds of runs far apart from those of the rigs.
+    fn seed_of(&self, run: u64) -> u64 {
+        self.seed.wrapping_mul(8).wrapping_add(run)
+    }
+}
+
+fn drive_of(robot: &Robot) -> Result<&Drive, DiagnoseError> {
+    let drive = robot.joints.first().and_then(|j| j.drive.as_ref());
+    drive.ok_or_else(|| DiagnoseError::Scenario("the description has no drive".into()))
 }
 
 /// J, m·g·l, fv and fc of the rig before anything was hidden in it.
@@ -283,6 +303,8 @@ pub struct Made {
     pub repeat: Option<InMemory>,
     /// To learn from besides: what was recorded since.
     pub further: Vec<InMemory>,
+    /// The rig with its drive off; none unless asked for.
+    pub drive_off: Option<InMemory>,
     /// Another reference.
     pub holdout: InMemory,
     /// What is true.

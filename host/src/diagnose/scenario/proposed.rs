@@ -1,7 +1,8 @@
 //! A proposed motion on the rig of a scenario.
 
+use super::record::drive_off;
 use super::reference::RATE;
-use super::{Made, Scenario, rig};
+use super::{Made, Scenario, drive_of, rig};
 use crate::diagnose::DiagnoseError;
 use crate::excite::TrajectoryFile;
 use crate::prepare::InMemory;
@@ -10,6 +11,8 @@ use crate::prepare::InMemory;
 const APPROACH: f64 = 2.0;
 /// Number of the run; the scenario's own come before it.
 const RUN: u64 = 3;
+/// … and of the log with the drive off, which lasts so long, s.
+const OFF: (u64, f64) = (4, 2.0);
 
 impl Scenario {
     /// Records a motion on the rig that `made` was recorded on, from rest where it hangs and back.
@@ -36,6 +39,25 @@ impl Scenario {
         Ok(InMemory {
             label: "proposed".into(),
             blocks: vec![self.run(&healthy, &made.robot, &reference, RUN)?],
+        })
+    }
+
+    /// Records the rig that `made` was recorded on with its drive off.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Scenario`] where the description has no drive.
+    pub fn drive_off(&self, made: &Made) -> Result<InMemory, DiagnoseError> {
+        let (run, seconds) = OFF;
+        let config = self.hiding(&rig::healthy(self.seed, &self.noise));
+        let samples = (seconds * RATE) as usize;
+        Ok(InMemory {
+            label: "drive off".into(),
+            blocks: vec![drive_off(
+                config,
+                drive_of(&made.robot)?,
+                samples,
+                self.seed_of(run),
+            )],
         })
     }
 }

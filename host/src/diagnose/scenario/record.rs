@@ -158,3 +158,32 @@ pub(super) fn record(
     block.joints.push(joint);
     block
 }
+
+/// The rig hanging with its drive off, recorded for so many samples: no reference, no voltage.
+pub(super) fn drive_off(config: PlantConfig, drive: &Drive, samples: usize, seed: u64) -> Block {
+    let scaling = config.sensors.scaling;
+    let ticks = (TICK_RATE / RATE).round() as usize;
+    let constant = drive.torque_constant * drive.gear_ratio;
+    let mut plant = Plant::new(config, seed);
+    let off = Command {
+        duty: Duty(0.0),
+        bridge: false,
+    };
+    let mut block = Block::default();
+    let mut joint = JointColumns::default();
+    for k in 0..samples {
+        let mut sample = plant.advance(off);
+        for _ in 1..ticks {
+            sample = plant.advance(off);
+        }
+        let code = f64::from(sample.current.0) - f64::from(scaling.current_zero);
+        block.t.push(k as f64 / RATE);
+        // It hangs where it was switched on.
+        joint.q.push(0.0);
+        joint
+            .tau
+            .push(constant * code * f64::from(scaling.current_per_code));
+    }
+    block.joints.push(joint);
+    block
+}

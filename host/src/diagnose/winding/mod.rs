@@ -33,7 +33,7 @@ use super::{DiagnoseError, Options};
 use crate::report::{format_significant, format_value};
 use crate::robot::{Robot, RobotEffect};
 
-pub(super) use self::settle::settled;
+pub(super) use self::settle::{settled, zeros};
 
 /// A winding that leaves more than this share of the voltage's squares is not the one that was recorded.
 const EXPLAINED: f64 = 0.1;

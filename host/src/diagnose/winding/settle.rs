@@ -1,4 +1,4 @@
-//! A constant torque or a constant error of its sensor: the voltage tells.
+//! A constant torque or a constant error of its sensor: the voltage tells, or what the sensor reads with the drive off.
 
 use rig_shared::effects::Kind;
 
@@ -15,12 +15,12 @@ const CONSTANTS: [Kind; 3] = [
     Kind::TorqueOffset,
     Kind::CurrentOffset,
 ];
-/// What the voltage says of the sensor counts as the torque's constant, or as nothing, within so many standard deviations …
+/// What the sensor reads without a current counts as the torque's constant, or as nothing, within so many standard deviations …
 const WITHIN: f64 = 3.0;
 /// … and this share of the constant.
 const SHARE: f64 = 0.2;
 
-/// What the voltage says of a constant.
+/// What is said of a constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::diagnose) enum Word {
     /// The sensor reads it without a current.
@@ -31,24 +31,37 @@ pub(in crate::diagnose) enum Word {
     Open,
 }
 
-impl Winding {
-    fn word(&self, constant: f64, std: f64) -> Word {
-        let [offset, own] = self.offset;
+/// What the sensors read without a current and its standard deviation, joint by joint, N·m or N: as recorded with the drive
+/// off (`given`), else as the voltage says.
+pub(in crate::diagnose) fn zeros(
+    given: &[[f64; 2]],
+    windings: &[Winding],
+    joints: usize,
+) -> Vec<Option<[f64; 2]>> {
+    let of = |joint: usize| {
+        let winding = windings.iter().find(|w| w.joint == joint);
+        given.get(joint).copied().or(winding.map(|w| w.offset))
+    };
+    (0..joints).map(of).collect()
+}
+
+impl Word {
+    fn of([offset, own]: [f64; 2], constant: f64, std: f64) -> Self {
         let room = WITHIN * std.hypot(own) + SHARE * constant.abs();
         match ((offset - constant).abs() < room, offset.abs() < room) {
-            (true, false) => Word::Sensor,
-            (false, true) => Word::Torque,
-            _ => Word::Open,
+            (true, false) => Self::Sensor,
+            (false, true) => Self::Torque,
+            _ => Self::Open,
         }
     }
 }
 
-/// For each effect what the voltage says of it; a constant that is the sensor's gets that name.
+/// For each effect what is said of it; a constant that is the sensor's gets that name.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(in crate::diagnose) fn settled(
-    windings: &[Winding],
+    zeros: &[Option<[f64; 2]>],
     search: &Search,
     base: &Fit,
     chosen: &mut [Profile],
@@ -56,8 +69,8 @@ pub(in crate::diagnose) fn settled(
     let mut words = vec![Word::Open; chosen.len()];
     for k in 0..chosen.len() {
         let candidate = chosen[k].candidate;
-        let winding = windings.iter().find(|w| w.joint == candidate.joint);
-        let Some(winding) = winding.filter(|_| CONSTANTS.contains(&candidate.kind)) else {
+        let zero = zeros.get(candidate.joint).copied().flatten();
+        let Some(zero) = zero.filter(|_| CONSTANTS.contains(&candidate.kind)) else {
             continue;
         };
         let (Some([gain]), Some([std]), Some(column)) = (
@@ -68,7 +81,7 @@ pub(in crate::diagnose) fn settled(
             continue;
         };
         let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
-        words[k] = winding.word(gain * mean, std * mean.abs());
+        words[k] = Word::of(zero, gain * mean, std * mean.abs());
         let sensor =
             |c: &&super::Candidate| c.kind == Kind::CurrentOffset && c.joint == candidate.joint;
         if words[k] == Word::Sensor
@@ -82,7 +95,7 @@ pub(in crate::diagnose) fn settled(
 }
 
 impl Word {
-    /// Takes the names that the voltage excludes out of a step.
+    /// Takes the names that are excluded out of a step.
     pub(in crate::diagnose) fn applied(self, step: &mut Step) {
         let sensor = Kind::CurrentOffset.about().name;
         match self {

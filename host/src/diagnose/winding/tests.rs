@@ -5,7 +5,7 @@
 
 use crate::diagnose::outcome::{Diagnosis, Verdict};
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
-use crate::diagnose::{Options, diagnose};
+use crate::diagnose::{Options, diagnose, sensor_zeros};
 use crate::robot::Robot;
 use rig_shared::effects::Kind;
 
@@ -89,6 +89,61 @@ fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
     let set = &found.steps[0].set;
     assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
     assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
+}
+
+/// Without the voltage the three constants stand together, until the drive has been recorded off.
+#[test]
+fn with_the_drive_off_a_sensor_s_constant_is_told_from_a_torque() {
+    for (hidden, seed, sensor) in [
+        (Effect::CurrentOffset { current: 0.12 }, 17, true),
+        (Effect::TorqueOffset { torque: 0.3 }, 18, false),
+    ] {
+        let scenario = Scenario {
+            seconds: [30.0, 15.0],
+            ..Scenario::new(
+                vec![Hidden {
+                    joint: 0,
+                    effect: hidden,
+                }],
+                seed,
+            )
+        };
+        let mut made = scenario.make().unwrap();
+        for recording in [
+            &mut made.train,
+            made.repeat.as_mut().unwrap(),
+            &mut made.holdout,
+        ] {
+            for block in &mut recording.blocks {
+                block.joints[0].voltage = None;
+            }
+        }
+        let (before, _) = asked(&made, &made.robot);
+        let set = &before.steps[0].set;
+        assert!(set.iter().any(|n| n == "current_offset"), "{set:?}");
+        assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
+        let next = before.next_experiment.unwrap();
+        assert_eq!((next.kind.as_str(), next.hands), ("drive-off-log", false));
+        let log = scenario.drive_off(&made).unwrap();
+        let (after, _) = diagnose(
+            &made.robot,
+            &[&made.train, made.repeat.as_ref().unwrap()],
+            &[&made.holdout],
+            &Options {
+                sensor_zeros: sensor_zeros(&log).unwrap(),
+                ..Options::default()
+            },
+            &mut |_| (),
+        )
+        .unwrap();
+        let set = &after.steps[0].set;
+        if sensor {
+            assert_eq!(set, &["current_offset"]);
+        } else {
+            assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
+            assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
+        }
+    }
 }
 
 /// The torque column alone would scale with the constant; the back-EMF does not.
