@@ -161,9 +161,10 @@ fn the_turn_of_a_slide_is_an_angle_between_axes() {
     }
     // Of a revolute joint it is an offset of the position.
     let mut offset = ur5(&all);
-    offset[1].3 = "1.5708".into();
+    offset[1].3 = DIGITS[0].into();
     let found = read(&toml(&offset), "toml");
-    assert_eq!(found.robot.joints[1].theta, 1.5708);
+    let written: f64 = DIGITS[0].parse().unwrap();
+    assert_eq!(found.robot.joints[1].theta, written);
     assert_eq!(found.remarks, Vec::<String>::new());
 }
 
