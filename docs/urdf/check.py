@@ -5,11 +5,13 @@
 ROBOT.urdf is what `rig urdf --robot ROBOT.toml --out ROBOT.urdf` (or `rig identify`) writes. Pinocchio reads it with urdfdom,
 the standard parser; beside it the same library's model is built joint by joint from the modified Denavit-Hartenberg
 parameters, first moments and inertias of ROBOT.toml. Printed is the largest difference of the torques of both over
-random positions, velocities and accelerations, over the largest torque. Needs numpy and pin (pip).
+random positions, velocities and accelerations, over the largest torque; more than --most of it is a failure. Needs numpy
+and pin (pip). `cargo test -p rig-tests --test other_engine` runs it.
 """
 
 import argparse
 import math
+import sys
 import tomllib
 
 import numpy as np
@@ -46,9 +48,12 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("description")
     arguments.add_argument("urdf")
+    arguments.add_argument("--most", type=float, default=1e-9)
     chosen = arguments.parse_args()
     ours = from_description(chosen.description)
     theirs = pin.buildModelFromUrdf(chosen.urdf)
+    if list(ours.names) != list(theirs.names):
+        sys.exit(f"{chosen.urdf}: joints {list(theirs.names)}, in {chosen.description} {list(ours.names)}")
     size = np.linalg.norm(ours.gravity.linear)
     # URDF states no gravity: Pinocchio takes 9.81 m/s^2 along -z of the root.
     theirs.gravity.linear = np.array([0.0, 0.0, -size])
@@ -64,6 +69,8 @@ def main() -> None:
         worst = max(worst, np.abs(one - other).max())
         largest = max(largest, np.abs(one).max())
     print(f"{theirs.name}: {theirs.nv} joints, torques differ by {worst / largest:.1e} of {largest:.1f}")
+    if not worst <= chosen.most * largest:
+        sys.exit(f"{chosen.urdf} and {chosen.description} are not the same robot")
 
 
 if __name__ == "__main__":

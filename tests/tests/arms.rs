@@ -65,8 +65,8 @@ fn errors(found: &Identification) -> Vec<f64> {
         .collect()
 }
 
-/// No joint worse than `published` (to the digit that is published), and most of them better; `excepted` are joints with a
-/// bound of their own (docs/arms.md). One better of two counts as most.
+/// No joint worse than `published` (to the digit that is published), and more than half of them better; `excepted` are joints
+/// with a bound of their own (docs/arms.md). Of two joints one better is enough.
 fn no_worse(what: &str, found: &[f64], published: &[f64], excepted: &[(usize, f64)]) {
     println!("{what}: {found:.1?} %, published {published:?} %");
     let mut better = 0;
@@ -82,10 +82,131 @@ fn no_worse(what: &str, found: &[f64], published: &[f64], excepted: &[(usize, f6
             j + 1
         );
     }
-    assert!(
-        2 * better >= found.len(),
-        "{what}: only {better} are better"
-    );
+    let enough = 2 * better > found.len() || found.len() == 2 && better == 1;
+    assert!(enough, "{what}: only {better} are better");
+}
+
+/// What it costs that every link be a body that can exist, in percent of each joint's error: in training against the weighted
+/// fit of the same equations, which is free to give links that cannot exist, and on the hold-out against the weighted fit of the
+/// description as it is; no more than the two bounds. `excepted` are joints with a bound of their own on the hold-out.
+fn costs_little(
+    what: &str,
+    robot: &Robot,
+    training: &[PathBuf],
+    holdout: &[PathBuf],
+    [in_training, on_holdout]: [f64; 2],
+    excepted: &[(usize, f64)],
+) {
+    let of = |estimator| fit(robot, training, holdout, ModelKind::Differential, estimator);
+    let (bodies, free) = (of(Estimator::Consistent), of(Estimator::Weighted));
+    let set = bodies.standard_parameters.as_ref().unwrap();
+    assert!(set.least_eigenvalue.iter().all(|e| *e > 0.0));
+    let trained = &set.residual_increase_percent;
+    let held: Vec<f64> = (errors(&bodies).iter().zip(errors(&free)))
+        .map(|(bodies, free)| 100.0 * (bodies / free - 1.0))
+        .collect();
+    println!("{what}: bodies leave {trained:.1?} % more in training, {held:.1?} % on the hold-out");
+    for (j, found) in trained.iter().zip(&held).enumerate() {
+        let own = excepted.iter().find(|(joint, _)| *joint == j + 1);
+        let on_holdout = own.map_or(on_holdout, |(_, most)| *most);
+        let (trained, held) = found;
+        assert!(
+            *trained < in_training && *held < on_holdout,
+            "{what}: joint {} costs {trained:.1} and {held:.1} %",
+            j + 1
+        );
+    }
+}
+
+#[test]
+fn links_that_can_exist_cost_a_few_per_cent() {
+    if let Some(data) = folder("staubli_tx40") {
+        let place = tempfile::tempdir().unwrap();
+        let train = tx40_part(&data, place.path(), "train.csv", 0..5250);
+        let rest = tx40_part(&data, place.path(), "rest.csv", 5250..7500);
+        let robot = described("tx40.toml");
+        costs_little("TX40", &robot, &[train], &[rest], [5.0, 3.0], &[]);
+    }
+    if let Some((robot, data)) = lwr() {
+        // One slow motion, which the free fit follows a third better, with values that no arm has, and worse when it is
+        // repeated. Joint 5 alone is better left free (docs/arms.md).
+        let [train, rest] = ["run1.csv", "run2.csv"].map(|name| data.join(name));
+        costs_little(
+            "LWR4+",
+            &robot,
+            &[train],
+            &[rest],
+            [36.0, 3.0],
+            &[(5, 17.0)],
+        );
+    }
+    if let Some(data) = folder("dfki_double_pendulum") {
+        let [train, rest] = ["train.csv", "test.csv"].map(|name| data.join(name));
+        let robot = described("double-pendulum.toml");
+        costs_little(
+            "double pendulum",
+            &robot,
+            &[train],
+            &[rest],
+            [5.0, 3.0],
+            &[],
+        );
+    }
+}
+
+/// Runs 1 and 2 are slow: of which combinations they say less than is plausible without them. Joint 1 turns about the vertical
+/// and carries no weight; the rest are inertias, and of joint 7, which is accelerated most, none.
+#[test]
+fn lwr_names_what_its_slow_runs_leave_open() {
+    let Some((robot, data)) = lwr() else { return };
+    let both = [
+        "mx1",
+        "my1 + mz2",
+        "Ixy2",
+        "Ixz2",
+        "Iyz2",
+        "Ixx3 - Iyy3 + Iyy4",
+        "Ixy3",
+        "Iyz3",
+        "Izz3 + Iyy4",
+        "Ixz4",
+        "Iyz4",
+        "Ixx5 - Iyy5 + Iyy6",
+        "Ixz5",
+        "Iyz5",
+        "Izz5 + Iyy6",
+        "Ixy6",
+        "Ixz6",
+        "Iyz6",
+    ];
+    let first_alone = [
+        "Ixz3",
+        "Izz4 + 0.1521 m5 + 0.78 mz5 + Iyy5 + 0.1521 m6 + 0.1521 m7",
+        "Ixx6 - Iyy6 + Iyy7",
+    ];
+    for (runs, more) in [
+        (&["run1.csv"][..], &first_alone[..]),
+        (&["run1.csv", "run2.csv"], &[]),
+    ] {
+        let training: Vec<PathBuf> = runs.iter().map(|run| data.join(run)).collect();
+        let found = fit(
+            &robot,
+            &training,
+            &[],
+            ModelKind::Differential,
+            Estimator::for_robot(&robot),
+        );
+        let mut named: Vec<&str> = (found.not_excited.iter())
+            .map(|open| open.combination.as_str())
+            .collect();
+        let mut expected: Vec<&str> = both.iter().chain(more).copied().collect();
+        named.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(named, expected, "{runs:?}");
+        for open in &found.not_excited {
+            assert!(open.motion.contains("joint"), "{open:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Arms recorded by another dynamics engine (MuJoCo, Pinocchio): identified, they must predict another motion to the
-//! noise that was put in, or as near to it as that noise lets least squares with the exact regressor come.
+//! noise that was put in, or as near to it as that noise lets least squares with the exact regressor come. And URDF files as
+//! they are written, read by the parser of another.
 //!
 //! The recordings are made by `tests/other_engine/record.py`. It needs a Python with the packages of
 //! `tests/other_engine/requirements.txt`: the one named in RIG_PYTHON, `python3`, or else one that these tests furnish with
@@ -10,10 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use rig_host::data::Source;
-use rig_host::identify::{Estimator, ModelKind, Options, identify};
+use rig_host::data::{Source, data_dir};
+use rig_host::identify::{Estimator, ModelKind, Options, identified_robot, identify};
 use rig_host::prepare::Recording;
-use rig_host::robot::Robot;
+use rig_host::robot::{Description, IRP6_TEMPLATE, Robot};
 
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("other_engine")
@@ -62,10 +63,8 @@ fn python() -> Option<&'static PathBuf> {
     found
 }
 
-/// Identifies one arm in both models and compares the hold-out's residual with the noise, joint by joint.
-fn at_the_noise(arm: &str, engine: &str, seed: u64) {
-    let Some(python) = python() else { return };
-    let place = tempfile::tempdir().unwrap();
+/// robot.urdf, train.csv, holdout.csv and truth.json of an arm, made in `place`.
+fn record(python: &Path, place: &Path, arm: &str, engine: &str, seed: u64) {
     let made = Command::new(python)
         .arg(scripts().join("record.py"))
         .args([
@@ -77,7 +76,7 @@ fn at_the_noise(arm: &str, engine: &str, seed: u64) {
             &seed.to_string(),
             "--out",
         ])
-        .arg(place.path())
+        .arg(place)
         .output()
         .unwrap();
     assert!(
@@ -85,6 +84,13 @@ fn at_the_noise(arm: &str, engine: &str, seed: u64) {
         "{}",
         String::from_utf8_lossy(&made.stderr)
     );
+}
+
+/// Identifies one arm in both models and compares the hold-out's residual with the noise, joint by joint.
+fn at_the_noise(arm: &str, engine: &str, seed: u64) {
+    let Some(python) = python() else { return };
+    let place = tempfile::tempdir().unwrap();
+    record(python, place.path(), arm, engine, seed);
     let truth: serde_json::Value =
         serde_json::from_slice(&std::fs::read(place.path().join("truth.json")).unwrap()).unwrap();
     let robot = Robot::load(&place.path().join("robot.urdf")).unwrap();
@@ -149,4 +155,78 @@ fn panda_likeness_by_mujoco() {
 fn random_arm_with_prismatic_joints_by_both() {
     at_the_noise("random", "mujoco", 6);
     at_the_noise("random", "pinocchio", 7);
+}
+
+/// Pinocchio reads the text with urdfdom; its torques must be those of its own model of the description.
+fn reads_as(python: &Path, robot: &Robot, urdf: &str) {
+    let place = tempfile::tempdir().unwrap();
+    let [description, file] = ["robot.toml", "robot.urdf"].map(|name| place.path().join(name));
+    std::fs::write(&description, robot.to_toml().unwrap()).unwrap();
+    std::fs::write(&file, urdf).unwrap();
+    let checked = Command::new(python)
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/urdf/check.py"))
+        .args([&description, &file])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&checked.stdout);
+    println!("{}", said.trim());
+    assert!(
+        checked.status.success() && said.contains("torques differ by"),
+        "{}: {}",
+        robot.name,
+        String::from_utf8_lossy(&checked.stderr)
+    );
+}
+
+#[test]
+fn urdf_written_from_a_description_loads_in_a_standard_parser() {
+    let Some(python) = python() else { return };
+    let irp6 = Robot::from_toml(IRP6_TEMPLATE, Path::new("irp6.toml")).unwrap();
+    let mut robots = vec![irp6];
+    for file in ["staubli_tx40/tx40.urdf", "kuka_lwr4/kuka_lwr4.urdf"] {
+        let Some(path) = data_dir().map(|d| d.join(file)).filter(|p| p.is_file()) else {
+            println!("SKIPPED: {file} is not there; set RIG_DATA to the folder of the recordings.");
+            continue;
+        };
+        let read = Description::load(&path).unwrap();
+        // The file as its author wrote it says the same as what was read from it.
+        reads_as(
+            python,
+            &read.robot,
+            &std::fs::read_to_string(&path).unwrap(),
+        );
+        robots.push(read.robot);
+    }
+    for robot in robots {
+        reads_as(python, &robot, &robot.to_urdf().unwrap().text);
+        // On a base that leans.
+        let mut leaning = robot.clone();
+        leaning.gravity = [1.0, -2.0, -(9.81f64.powi(2) - 5.0).sqrt()];
+        reads_as(python, &leaning, &leaning.to_urdf().unwrap().text);
+    }
+}
+
+/// An arm with prismatic joints, identified: a file of its own, and the arm's file with other values.
+#[test]
+fn urdf_of_an_identified_arm_loads_in_a_standard_parser() {
+    let Some(python) = python() else { return };
+    let place = tempfile::tempdir().unwrap();
+    record(python, place.path(), "random", "pinocchio", 7);
+    let described = Description::load(&place.path().join("robot.urdf")).unwrap();
+    let robot = &described.robot;
+    let train = Source::open(&place.path().join("train.csv"), robot).unwrap();
+    let options = Options {
+        estimator: Estimator::for_robot(robot),
+        ..Default::default()
+    };
+    let found = identify(robot, &[&train as &dyn Recording], &[], &options).unwrap();
+    let (identified, _) = identified_robot(robot, &found);
+    assert_ne!(&identified, robot);
+    reads_as(python, &identified, &identified.to_urdf().unwrap().text);
+    let original = described.urdf.as_ref().unwrap();
+    reads_as(
+        python,
+        &identified,
+        &original.with_values(&identified).unwrap().text,
+    );
 }

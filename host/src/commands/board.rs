@@ -10,6 +10,7 @@ use rig_shared::wire::message::{
 };
 
 use super::error::CommandError;
+use super::input::described;
 use super::record::{emulated, open_probe};
 use super::ui::Ui;
 use crate::data::{Column, CsvWriter};
@@ -17,7 +18,6 @@ use crate::emulated::upload::requests;
 use crate::link::experiment::when_calibrated;
 use crate::link::serial::DEFAULT_BAUD;
 use crate::link::{EmulatedPort, Port, SerialLine, Session, SessionSettings};
-use crate::robot::Robot;
 
 /// Health comes once a second.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
@@ -107,7 +107,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Action::Upload {
             model, leave_out, ..
         } => {
-            let upload = requests(&Robot::load(model)?, *leave_out)?;
+            let upload = requests(&described(model, ui)?.robot, *leave_out)?;
             for sentence in &upload.left_out {
                 ui.say(&format!("Left out: {sentence}."));
             }

@@ -25,7 +25,8 @@ use crate::robot::Robot;
 pub(crate) enum Model {
     /// Torque against acceleration, velocity and position
     Differential,
-    /// Work against change of energy over windows; needs no acceleration
+    /// Over windows, without acceleration: of one joint work against change of energy, of several impulse against change of
+    /// momentum, one equation a joint
     Integral,
 }
 

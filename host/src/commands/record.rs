@@ -12,6 +12,7 @@ use rig_shared::trajectory::Trajectory;
 use rig_shared::wire::message::RequestBody;
 
 use super::error::CommandError;
+use super::input::described;
 use super::ui::Ui;
 use crate::data::{Column, RecordingWriter};
 use crate::emulated::{EmulatedRig, Nameplate, upload};
@@ -83,7 +84,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             path: args.out.clone(),
         });
     }
-    let robot = args.robot.as_deref().map(Robot::load).transpose()?;
+    let robot = match &args.robot {
+        Some(path) => Some(described(path, ui)?.robot),
+        None => None,
+    };
     let mut settings: Vec<RequestBody> = args
         .home
         .map(RequestBody::SetPosition)

@@ -1,23 +1,21 @@
 //! Base (canonical) parameters: the combinations of parameters that the torque depends on.
 
 use nalgebra::DMatrix;
-use rand::{RngExt, SeedableRng};
-use rig_shared::multibody::{
-    COLUMN_NAMES, COLUMNS, Chain, MAX_JOINTS, column, differential_regressor, energy_regressor,
-    friction_power_regressor,
-};
+use rig_shared::multibody::{COLUMN_NAMES, COLUMNS, Chain, MAX_JOINTS, column};
 use rig_shared::transmission::{
     DriveKind, MOTOR_COLUMN_NAMES, MOTOR_COLUMNS, Transmission, motor_column,
 };
 
+use super::states::States;
 use super::{IdentifyError, ModelKind};
 use crate::robot::{self, Robot};
 
 /// A column counts as dependent when, scaled to length one, less than this is left of it after the columns
 /// before it are taken away; rounding leaves about 1e-14 of a column at random states.
 const DEPENDENT: f64 = 1e-10;
-/// … and as independent when more than this is left. Between the two lies nothing for a real geometry;
-/// something there means link lengths or angles that are zero only by intention, and is an error.
+/// … and as independent when more than this is left. Between the two lies nothing for a real geometry, whose right angles
+/// are exact once it is read; something there means link lengths or angles that are zero only by intention, and is an
+/// error.
 const INDEPENDENT: f64 = 1e-7;
 
 /// The chain of a robot description.
@@ -172,19 +170,36 @@ pub fn preference(kinds: &[robot::JointKind]) -> Vec<usize> {
 }
 
 impl Base {
-    /// Finds the base parameters of `robot` for a model from random states of it.
+    /// Finds the base parameters of `robot` for a model from random states of it: of the equations that are fitted
+    /// ([`ModelKind`]). Momentum and torque have the same ones: a combination that no torque shows changes no momentum (the
+    /// momentum is what multiplies the accelerations in the torque, with the velocities in their place) and, the torque being
+    /// its change and the rest, none of the rest.
     ///
     /// # Errors
     /// [`IdentifyError::Model`] for an impossible geometry, [`IdentifyError::Undecided`] where a column is
     /// neither clearly dependent nor clearly independent.
     pub fn structural(robot: &Robot, model: ModelKind, seed: u64) -> Result<Self, IdentifyError> {
         let kinds: Vec<robot::JointKind> = robot.joints.iter().map(|j| j.kind).collect();
-        let matrix = Regressors::of(robot)?.random(model, seed)?;
+        let matrix = States::of(robot)?.rows(model, seed)?;
         let mut order = preference(&kinds);
         order.extend(order.len()..matrix.ncols());
         let found = independent_columns(&matrix, &order, DEPENDENT);
         if found.remainders.0 < INDEPENDENT {
+            let left = |c: &usize| found.remainder[*c];
+            let doubtful = found
+                .kept
+                .iter()
+                .copied()
+                .min_by(|a, b| left(a).total_cmp(&left(b)))
+                .unwrap_or(0);
+            let n = kinds.len();
+            let joint = match doubtful.checked_sub(n * COLUMNS) {
+                None => doubtful / COLUMNS,
+                Some(motor) => motor / MOTOR_COLUMNS,
+            };
             return Err(IdentifyError::Undecided {
+                column: column_name(doubtful, n),
+                joint: robot.joints[joint].name.clone(),
                 least: found.remainders.0,
                 robot: robot.name.clone(),
             });
@@ -239,151 +254,6 @@ impl Base {
     /// Unit of a column, ASCII.
     pub fn column_unit(&self, c: usize) -> &'static str {
         unit(c, &self.kinds, &self.drives)
-    }
-}
-
-/// The regressors of a robot with its drives.
-struct Regressors {
-    chain: Chain<f64>,
-    transmission: Transmission<f64>,
-    /// About where the joints move: the middle of their ranges, and how far random states go from there.
-    middle: Vec<f64>,
-    reach: f64,
-}
-
-impl Regressors {
-    fn of(robot: &Robot) -> Result<Self, IdentifyError> {
-        let chain = chain_of(robot)?;
-        let transmission = robot
-            .transmission()
-            .map_err(|e| IdentifyError::Model(e.to_string()))?;
-        let n = robot.joints.len();
-        let (middle, reach) = if transmission.is_constant() {
-            (vec![0.0; n], 3.0)
-        } else {
-            // A screw has no length beyond its reach; its ratio changes enough within this, rad or m.
-            (robot.middle_position(), 0.3)
-        };
-        Ok(Self {
-            chain,
-            transmission,
-            middle,
-            reach,
-        })
-    }
-
-    /// Three times as many rows at random states as there are columns: a chance dependence has probability zero.
-    fn random(&self, model: ModelKind, seed: u64) -> Result<DMatrix<f64>, IdentifyError> {
-        let failed = |e: &dyn std::fmt::Display| IdentifyError::Model(e.to_string());
-        let n = self.middle.len();
-        let links = n * COLUMNS;
-        let motors = if self.transmission.is_simple() {
-            0
-        } else {
-            n * MOTOR_COLUMNS
-        };
-        let width = links + motors;
-        let mut generator = rand_pcg::Pcg64::seed_from_u64(seed);
-        let mut symmetric = |scale: f64| scale * (2.0 * generator.random::<f64>() - 1.0);
-        let mut state = || {
-            let q: Vec<f64> = self
-                .middle
-                .iter()
-                .map(|m| m + symmetric(self.reach))
-                .collect();
-            let qd: Vec<f64> = (0..n).map(|_| symmetric(2.0)).collect();
-            let qdd: Vec<f64> = (0..n).map(|_| symmetric(5.0)).collect();
-            (q, qd, qdd)
-        };
-        let mut matrix;
-        match model {
-            ModelKind::Differential => {
-                let states = (3 * width).div_ceil(n);
-                matrix = DMatrix::zeros(states * n, width);
-                let mut out = vec![0.0; n * links];
-                let mut more = vec![0.0; n * n * MOTOR_COLUMNS];
-                for s in 0..states {
-                    let (q, qd, qdd) = state();
-                    differential_regressor(&self.chain, &q, &qd, &qdd, &mut out)
-                        .map_err(|e| failed(&e))?;
-                    self.transmission
-                        .motor_columns(&q, &qd, &qdd, &mut more)
-                        .map_err(|e| failed(&e))?;
-                    for j in 0..n {
-                        for c in 0..links {
-                            matrix[(s * n + j, c)] = out[j * links + c];
-                        }
-                        for c in 0..motors {
-                            matrix[(s * n + j, links + c)] = more[j * motors + c];
-                        }
-                    }
-                }
-            }
-            ModelKind::Integral => {
-                matrix = DMatrix::zeros(3 * width, width);
-                for row in 0..3 * width {
-                    let (start, end) = (state(), state());
-                    // What friction takes over a window depends on the whole way, not on its ends: a few states of it.
-                    let way: Vec<_> = (0..n + 3).map(|_| state()).collect();
-                    for (sign, (q, qd, _)) in [(-1.0, &start), (1.0, &end)] {
-                        let energy = self.energy(q, qd, motors).map_err(|e| failed(&e))?;
-                        for (c, value) in energy.into_iter().enumerate() {
-                            matrix[(row, c)] += sign * value;
-                        }
-                    }
-                    for (q, qd, _) in &way {
-                        let power = self.power(q, qd, motors).map_err(|e| failed(&e))?;
-                        for (c, value) in power.into_iter().enumerate() {
-                            matrix[(row, c)] += value;
-                        }
-                    }
-                    for j in 0..n {
-                        // A constant torque does its work over the distance between the ends.
-                        matrix[(row, j * COLUMNS + column::OFFSET)] = end.0[j] - start.0[j];
-                    }
-                }
-            }
-        }
-        for j in 0..n {
-            if !self.transmission.has_joint_inertia(j) {
-                matrix
-                    .column_mut(j * COLUMNS + column::DRIVE_INERTIA)
-                    .fill(0.0);
-            }
-        }
-        Ok(matrix)
-    }
-
-    fn energy(
-        &self,
-        q: &[f64],
-        qd: &[f64],
-        motors: usize,
-    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
-        let mut row = vec![0.0; self.chain.parameter_count()];
-        energy_regressor(&self.chain, q, qd, &mut row)?;
-        if motors > 0 {
-            let mut more = vec![0.0; motors];
-            self.transmission.motor_energy_columns(q, qd, &mut more)?;
-            row.append(&mut more);
-        }
-        Ok(row)
-    }
-
-    fn power(
-        &self,
-        q: &[f64],
-        qd: &[f64],
-        motors: usize,
-    ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
-        let mut row = vec![0.0; self.chain.parameter_count()];
-        friction_power_regressor(&self.chain, qd, &mut row)?;
-        if motors > 0 {
-            let mut more = vec![0.0; motors];
-            self.transmission.motor_power_columns(q, qd, &mut more)?;
-            row.append(&mut more);
-        }
-        Ok(row)
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::Base;
 use crate::identify::ModelKind;
-use crate::robot::{IRP6_TEMPLATE, Robot, TX40};
+use crate::robot::{EDDA_TEMPLATE, IRP6_TEMPLATE, Robot, TX40};
 
 /// The terms of an expression, names as ours.
 pub(super) fn terms(text: &str) -> BTreeMap<String, f64> {
@@ -84,5 +84,18 @@ fn motor_columns_carry_their_names_and_units() {
             (0..base.len()).all(|k| base.combination[(k, c)] == 0.0),
             "{name}"
         );
+    }
+}
+
+#[test]
+fn an_angle_that_no_motion_decides_is_named() {
+    let mut robot = Robot::from_toml(EDDA_TEMPLATE, Path::new("edda.toml")).unwrap();
+    // Not read from a file, where it would be taken as a half turn.
+    robot.joints[1].alpha = 1e-8;
+    let said = Base::structural(&robot, ModelKind::Differential, 1)
+        .unwrap_err()
+        .to_string();
+    for part in ["EDDA", "2 of joint `", &robot.joints[1].name, "right angle"] {
+        assert!(said.contains(part), "`{part}` is not in: {said}");
     }
 }

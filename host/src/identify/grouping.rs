@@ -18,9 +18,10 @@
 //! ones before it, is the mass it moves less what moves along, but for gravity, which its constant torque `off` states.
 //!
 //! No rules are published for motors of coupled drives. Here: the inertia of one of constant ratios is a fixed quadratic form
-//! in the joint velocities. It joins what has such a form too (`Ia`, and `Izz` of links whose turning about their own axis
-//! is a fixed sum of joint velocities: those that turn about one direction, and those that turn about a second one
-//! perpendicular to it), where the forms add up to it. Everything else of the motors is taken as independent.
+//! in the joint velocities. It joins what has such a form too, where the forms add up to it: `Ia`; `Izz` of links whose turning
+//! about their own axis is a fixed sum of joint velocities (those that turn about one direction or about a second one); and of a prismatic joint of fixed direction the mass it moves less the same mass resting on
+//! the link before, in whose form the joint's velocity stands squared and times those of the prismatic ones before it.
+//! Everything else of the motors is taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind, column};
@@ -62,7 +63,7 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
     for j in 0..n {
         walk.link(j);
     }
-    let spins = walk.spins;
+    let (spins, moved) = (walk.spins, walk.moved);
     let mut columns = walk.columns;
     for j in 0..n {
         if !transmission.has_joint_inertia(j) {
@@ -75,7 +76,7 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
         columns.push(unit(width, c, if simple { 0.0 } else { 1.0 }));
     }
     if motors > 0 {
-        join_motors(&transmission, &spins, &mut columns)?;
+        join_motors(&transmission, &spins, moved, &mut columns)?;
     }
     let kept: Vec<usize> = (0..width).filter(|&c| columns[c][c] == 1.0).collect();
     let combination = DMatrix::from_fn(kept.len(), width, |row, c| columns[c][kept[row]]);
@@ -91,20 +92,22 @@ pub fn grouped(robot: &Robot) -> Result<Base, IdentifyError> {
 fn join_motors(
     transmission: &Transmission<f64>,
     spins: &[Option<Vec<f64>>],
+    moved: Vec<(Combination, DMatrix<f64>)>,
     columns: &mut [Combination],
 ) -> Result<(), IdentifyError> {
     let n = spins.len();
     let square = |v: &[f64]| DMatrix::from_fn(n, n, |i, j| v[i] * v[j]);
-    // Columns of constant form, with their forms.
-    let mut forms: Vec<(usize, DMatrix<f64>)> = Vec::new();
+    // What has a constant form, with that form.
+    let mut forms = moved;
     for (j, spin) in spins.iter().enumerate() {
         if let Some(spin) = spin {
-            forms.push((j * COLUMNS + ZZ, square(spin)));
+            forms.push((columns[j * COLUMNS + ZZ].clone(), square(spin)));
         }
         if transmission.has_joint_inertia(j) {
             let mut own = vec![0.0; n];
             own[j] = 1.0;
-            forms.push((j * COLUMNS + column::DRIVE_INERTIA, square(&own)));
+            let column = &columns[j * COLUMNS + column::DRIVE_INERTIA];
+            forms.push((column.clone(), square(&own)));
         }
     }
     let mut directions = vec![0.0; n * n];
@@ -123,11 +126,12 @@ fn join_motors(
         join(own, form, &mut forms, columns);
     }
     // Viscous friction is such a form too, of the joints' its squares.
-    let mut forms: Vec<(usize, DMatrix<f64>)> = Vec::new();
+    let mut forms: Vec<(Combination, DMatrix<f64>)> = Vec::new();
     for j in 0..n {
         let mut own = vec![0.0; n];
         own[j] = 1.0;
-        forms.push((j * COLUMNS + column::VISCOUS, square(&own)));
+        let column = &columns[j * COLUMNS + column::VISCOUS];
+        forms.push((column.clone(), square(&own)));
     }
     for k in (0..n).filter(|k| coupled(*k)) {
         let mut form = square(ratios(k));
@@ -144,7 +148,7 @@ fn join_motors(
 fn join(
     own: usize,
     form: DMatrix<f64>,
-    forms: &mut Vec<(usize, DMatrix<f64>)>,
+    forms: &mut Vec<(Combination, DMatrix<f64>)>,
     columns: &mut [Combination],
 ) {
     let entries = form.len();
@@ -157,16 +161,15 @@ fn join(
     match found.filter(|x| (&there * x - &wanted).amax() < EXACT * scale) {
         Some(factors) => {
             let mut combination = vec![0.0; columns[own].len()];
-            for ((c, _), factor) in forms.iter().zip(factors.iter()) {
+            for ((from, _), factor) in forms.iter().zip(factors.iter()) {
                 // Rounding of the solution.
                 if factor.abs() > EXACT {
-                    let from = columns[*c].clone();
-                    add(&mut combination, *factor, &from);
+                    add(&mut combination, *factor, from);
                 }
             }
             columns[own] = combination;
         }
-        None => forms.push((own, form)),
+        None => forms.push((columns[own].clone(), form)),
     }
 }
 
@@ -215,6 +218,11 @@ struct Walk<'a> {
     pose: Isometry3<f64>,
     /// Directions, in the base at q = 0, of the prismatic joints so far.
     slides: Vec<Vector3<f64>>,
+    /// These joints.
+    sliders: Vec<usize>,
+    /// Of prismatic joints of fixed direction, what the mass they move adds to the same mass resting on the link before,
+    /// gravity taken away: a quadratic form in the joint velocities.
+    moved: Vec<(Combination, DMatrix<f64>)>,
     /// Axes of the revolute joints so far: point and direction in the base at q = 0.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// Joints of these axes.
@@ -235,6 +243,8 @@ impl<'a> Walk<'a> {
             turning: Turning::Nothing,
             pose: Isometry3::identity(),
             slides: Vec::new(),
+            sliders: Vec::new(),
+            moved: Vec::new(),
             axes: Vec::new(),
             turners: Vec::new(),
             second: None,
@@ -355,14 +365,24 @@ impl<'a> Walk<'a> {
             }
             Turning::Many => {}
         }
-        if fixed_direction && self.slides.iter().all(|s| s.dot(&z).abs() < EXACT) {
+        if fixed_direction {
             let mut combination = own[column::MASS].clone();
             let resting = self.carried(j, step, &[(column::MASS, 1.0)]);
             add(&mut combination, -1.0, &resting);
             add(&mut combination, self.gravity.dot(&z), &own[column::OFFSET]);
-            own[column::DRIVE_INERTIA] = combination;
+            if self.slides.iter().all(|s| s.dot(&z).abs() < EXACT) {
+                own[column::DRIVE_INERTIA] = combination.clone();
+            }
+            let n = self.geometry.len();
+            let mut form = DMatrix::zeros(n, n);
+            form[(j, j)] = 1.0;
+            for (&i, slide) in self.sliders.iter().zip(&self.slides) {
+                (form[(i, j)], form[(j, i)]) = (slide.dot(&z), slide.dot(&z));
+            }
+            self.moved.push((combination, form));
         }
         self.slides.push(z);
+        self.sliders.push(j);
         self.spins.push(None);
         own
     }
@@ -391,16 +411,14 @@ impl<'a> Walk<'a> {
     fn spin(&mut self, j: usize, before: &Turning, z: Vector3<f64>) -> Option<Vec<f64>> {
         let first = match (&self.turning, before) {
             (Turning::Nothing | Turning::One(_), _) => 0,
-            (Turning::Many, Turning::One(a)) if a.dot(&z).abs() < EXACT => j,
+            (Turning::Many, Turning::One(_)) => j,
             (Turning::Many, Turning::Many) => self.second?,
-            (Turning::Many, _) => return None,
+            (Turning::Many, Turning::Nothing) => return None,
         };
         let mut factors = vec![0.0; self.geometry.len()];
         for (&i, (_, axis)) in self.turners.iter().zip(&self.axes) {
-            if i < first {
-                continue;
-            }
-            if axis.cross(&z).norm() > EXACT {
+            // The first direction is fixed in the base, and keeps its angle to the second.
+            if i >= first && axis.cross(&z).norm() > EXACT {
                 self.second = None;
                 return None;
             }

@@ -1,6 +1,7 @@
 //! The rules against the numeric method, and both against published counts.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use super::{agree, grouped};
 use crate::identify::{Base, ModelKind};
-use crate::robot::{EDDA_TEMPLATE, IRP6_TEMPLATE, Joint, JointKind, Robot, TX40};
+use crate::robot::{Drive, EDDA_TEMPLATE, IRP6_TEMPLATE, Joint, JointKind, Robot, TX40};
 
 fn joint(number: usize, kind: JointKind, [alpha, a, theta, d]: [f64; 4]) -> Joint {
     Joint {
@@ -176,6 +177,7 @@ fn the_rules_print_the_published_expressions_too() {
 #[test]
 fn rules_and_rank_agree_on_random_chains_with_special_angles() {
     let mut rng = Pcg64::seed_from_u64(41);
+    let (mut coupled, mut refused) = (0, 0);
     for draw in 0..180 {
         let n = 1 + draw % 12;
         // The first joints decide over the special rules: there, slides and special angles are likely.
@@ -186,7 +188,7 @@ fn rules_and_rank_agree_on_random_chains_with_special_angles() {
                 rng.random_range(-range..range)
             }
         };
-        let joints = (0..n)
+        let mut joints: Vec<Joint> = (0..n)
             .map(|k| {
                 let kind = if rng.random_bool(0.35) {
                     JointKind::Prismatic
@@ -205,12 +207,39 @@ fn rules_and_rank_agree_on_random_chains_with_special_angles() {
                 )
             })
             .collect();
+        // Every other chain has coupled drives, at ratios of bevels and belts or at any.
+        if draw % 2 == 0 && n > 1 {
+            for k in 0..n {
+                let couples: BTreeMap<String, f64> = (0..n)
+                    .filter_map(|j| {
+                        let moved = j != k && rng.random_bool(0.3);
+                        let ratio = 40.0 * special(&mut rng, 0.5, &[1.0, -1.0, 0.5], 2.0);
+                        moved.then(|| (format!("joint_{}", j + 1), ratio))
+                    })
+                    .collect();
+                coupled += usize::from(!couples.is_empty());
+                joints[k].drive = Some(Drive {
+                    gear_ratio: 40.0,
+                    couples,
+                    ..Default::default()
+                });
+            }
+        }
         let gravity = match draw % 5 {
             0 => [0.0, 9.81, 0.0],
             1 => [3.0, -4.0, 7.0],
             2 => [0.0; 3],
             _ => DOWN,
         };
-        counts(&robot(gravity, joints));
+        let robot = robot(gravity, joints);
+        let text = robot.to_toml().unwrap();
+        if Robot::from_toml(&text, Path::new("chain.toml")).is_err() {
+            // Two motors that turn alike move no two joints.
+            refused += 1;
+            continue;
+        }
+        counts(&robot);
     }
+    println!("{coupled} coupled drives, {refused} chains refused");
+    assert!(coupled > 200 && refused < 10, "{coupled} {refused}");
 }

@@ -52,6 +52,7 @@ mod slow;
 mod solve;
 mod speed;
 mod standard;
+mod states;
 mod terms;
 mod tilt;
 mod total;
@@ -270,9 +271,13 @@ pub enum IdentifyError {
     Model(String),
     /// Base parameters cannot be decided.
     #[error(
-        "The base parameters of {robot} cannot be decided: a column of its regressor is independent of the others by only {least:e} of its length; write lengths and angles that are meant to be zero, or multiples of a right angle, exactly."
+        "The base parameters of {robot} cannot be decided: column {column} of joint `{joint}` is independent of the others by only {least:.1e} of its length; write lengths and angles of that joint and the one before it that are meant to be zero, or multiples of a right angle, exactly."
     )]
     Undecided {
+        /// Name of the doubtful column.
+        column: String,
+        /// Its joint.
+        joint: String,
         /// Remainder of the doubtful column.
         least: f64,
         /// Name of the robot.

@@ -13,11 +13,55 @@ use std::collections::VecDeque;
 
 use rig_shared::multibody::{COLUMNS, column, momentum_loss_regressor, momentum_regressor};
 use rig_shared::scalar::Real;
-use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError, motor_column};
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use super::slow::slow_motors;
 use crate::prepare::{LowPass, Motion, PrepareError};
+
+/// What the motors add to momentum and loss, each joint × motor column (3 a motor). With q̇ in place of the acceleration and
+/// at rest their columns are those of the momentum; of Jᵢ·(J·q̈ + J̇·q̇) the derivative of Jᵢ·(J·q̇) leaves −J̇ᵢ·(J·q̇), zero
+/// where the ratios are constant.
+pub(super) struct MotorMomentum {
+    pub momentum: Vec<f64>,
+    pub loss: Vec<f64>,
+    rates: Vec<f64>,
+    speeds: Vec<f64>,
+    still: Vec<f64>,
+}
+
+impl MotorMomentum {
+    pub(super) fn new(n: usize) -> Self {
+        Self {
+            momentum: vec![0.0; n * n * MOTOR_COLUMNS],
+            loss: vec![0.0; n * n * MOTOR_COLUMNS],
+            rates: vec![0.0; n * n],
+            speeds: vec![0.0; n],
+            still: vec![0.0; n],
+        }
+    }
+
+    /// At position `q` and velocity `qd`.
+    pub(super) fn at(
+        &mut self,
+        drives: &Transmission<f64>,
+        q: &[f64],
+        qd: &[f64],
+    ) -> Result<(), TransmissionError> {
+        let n = q.len();
+        drives.motor_columns(q, &self.still, qd, &mut self.momentum)?;
+        drives.motor_columns(q, qd, &self.still, &mut self.loss)?;
+        drives.motor_velocity(q, qd, &mut self.speeds)?;
+        drives.jacobian_rate(q, qd, &mut self.rates)?;
+        for j in 0..n {
+            for k in 0..n {
+                let inertia = (j * n + k) * MOTOR_COLUMNS + motor_column::INERTIA;
+                self.loss[inertia] = -self.rates[k * n + j] * self.speeds[k];
+            }
+        }
+        Ok(())
+    }
+}
 
 /// Regressors at one instant: momentum P and loss R, each joint × wanted column.
 struct Instant {
@@ -29,10 +73,8 @@ struct Instant {
 struct Maker<'a> {
     plan: &'a Plan<'a>,
     wide: Vec<f64>,
-    motors: Vec<f64>,
+    motors: MotorMomentum,
     directions: Vec<f64>,
-    rates: Vec<f64>,
-    speeds: Vec<f64>,
 }
 
 impl<'a> Maker<'a> {
@@ -40,10 +82,8 @@ impl<'a> Maker<'a> {
         Self {
             plan,
             wide: vec![0.0; n * n * COLUMNS],
-            motors: vec![0.0; n * n * MOTOR_COLUMNS],
+            motors: MotorMomentum::new(n),
             directions: vec![0.0; n * n],
-            rates: vec![0.0; n * n],
-            speeds: vec![0.0; n],
         }
     }
 
@@ -89,8 +129,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// The motors' part. With q̇ in place of the acceleration and at rest their columns are those of the momentum; of
-    /// Jᵢ·(J·q̈ + J̇·q̇) the derivative of Jᵢ·(J·q̇) leaves −J̇ᵢ·(J·q̇), zero where the ratios are constant.
+    /// The motors' part, with the filtered signs of their speeds.
     fn motors_at(
         &mut self,
         q: &[f64],
@@ -100,22 +139,9 @@ impl<'a> Maker<'a> {
     ) -> Result<(), PrepareError> {
         let (n, plan, drives) = (q.len(), self.plan, self.plan.transmission);
         let (p, width) = (plan.columns.len(), n * MOTOR_COLUMNS);
-        let still = vec![0.0; n];
-        drives
-            .motor_columns(q, &still, qd, &mut self.motors)
-            .map_err(failed)?;
-        let momentum = self.motors.clone();
-        drives
-            .motor_columns(q, qd, &still, &mut self.motors)
-            .map_err(failed)?;
+        self.motors.at(drives, q, qd).map_err(failed)?;
         drives
             .motor_directions(q, &mut self.directions)
-            .map_err(failed)?;
-        drives
-            .motor_velocity(q, qd, &mut self.speeds)
-            .map_err(failed)?;
-        drives
-            .jacobian_rate(q, qd, &mut self.rates)
             .map_err(failed)?;
         for (place, &c) in plan.columns.iter().enumerate() {
             let Belongs::Motor(k, which) = plan.belongs(c) else {
@@ -124,16 +150,11 @@ impl<'a> Maker<'a> {
             for j in 0..n {
                 let entry = j * width + k * MOTOR_COLUMNS + which;
                 let at = j * p + place;
-                match which {
-                    motor_column::INERTIA => {
-                        out.momentum[at] = momentum[entry];
-                        out.loss[at] = -self.rates[k * n + j] * self.speeds[k];
-                    }
-                    motor_column::COULOMB => {
-                        out.loss[at] = self.directions[k * n + j] * signs[k];
-                    }
-                    _ => out.loss[at] = self.motors[entry],
-                }
+                out.momentum[at] = self.motors.momentum[entry];
+                out.loss[at] = match which {
+                    motor_column::COULOMB => self.directions[k * n + j] * signs[k],
+                    _ => self.motors.loss[entry],
+                };
             }
         }
         Ok(())

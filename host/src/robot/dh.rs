@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 #[cfg(test)]
 use super::JointKind;
+use super::angles::{ROUNDING, squared_poses};
 use super::urdf::{Body, Chain};
 use super::{Drive, Joint, Robot};
 
@@ -15,12 +16,9 @@ use super::{Drive, Joint, Robot};
 /// base link, the customary rounded value that robot descriptions and simulators are used with.
 pub(super) const GRAVITY: f64 = 9.81;
 
-/// Axes closer to parallel than this are parallel, rad. Files give π/2 with about 11 digits, and
-/// common normals of axes that meet at a smaller angle lie meaninglessly far away.
+/// Axes closer to parallel than this are parallel, rad: between this and the angles that [`squared_poses`] leaves there is
+/// nothing.
 const PARALLEL: f64 = 1e-6;
-
-/// Angles (rad) and lengths (m) closer than this to a multiple of π/2 or to zero are rounding of the file.
-const ROUNDING: f64 = 1e-10;
 
 /// The converted robot and where its frames lie, for whoever must relate it to the URDF's frames.
 pub(super) struct Converted {
@@ -29,6 +27,8 @@ pub(super) struct Converted {
     pub base: Isometry3<f64>,
     /// Each body's own frame (that of the link its joint moves) in frame i.
     pub links: Vec<Isometry3<f64>>,
+    /// Angles that are taken as others, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// Modified DH step without the joint's own motion.
@@ -101,12 +101,7 @@ fn angle_about(from: Vector3<f64>, to: Vector3<f64>, about: Vector3<f64>) -> f64
 
 /// Converts a URDF chain; never fails, as every chain of axes has such frames.
 pub(super) fn convert(chain: &Chain) -> Converted {
-    let mut poses = Vec::new();
-    let mut pose = Isometry3::identity();
-    for body in &chain.bodies {
-        pose *= body.origin;
-        poses.push(pose);
-    }
+    let (poses, remarks) = squared_poses(chain);
     let axis_of = |i: usize| Line {
         point: poses[i].translation.vector,
         direction: poses[i].rotation * chain.bodies[i].axis,
@@ -163,7 +158,12 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         identified: None,
         effects: Vec::new(),
     };
-    Converted { robot, base, links }
+    Converted {
+        robot,
+        base,
+        links,
+        remarks,
+    }
 }
 
 fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {

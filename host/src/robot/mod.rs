@@ -6,6 +6,7 @@
 //! eq. 3.6; Khalil & Dombre 2002, sec. 3.2): frame i−1 → i is
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
+mod angles;
 mod band;
 mod bodies;
 mod check;
@@ -272,9 +273,9 @@ impl Robot {
         Ok(Description::load(path)?.robot)
     }
 
-    /// Reads TOML text; `path` only names the source in messages.
+    /// Reads TOML text; `path` only names the source in messages. What the user should know of it [`Description::load`] says.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, RobotError> {
-        text::read(text, path)
+        Ok(text::read(text, path)?.0)
     }
 
     /// Reads URDF text (serial chain; fixed joints are merged) and converts it to modified
@@ -325,9 +326,10 @@ impl Description {
             _ => text.trim_start().starts_with('<'),
         };
         if !urdf {
-            let robot = Robot::from_toml(&text, path)?;
+            let (robot, mut remarks) = text::read(&text, path)?;
+            remarks.extend(robot.implausible_bodies(None));
             return Ok(Self {
-                remarks: robot.implausible_bodies(None),
+                remarks,
                 robot,
                 urdf: None,
             });

@@ -5,12 +5,14 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::angles::square;
 use super::check::{Fault, Step, check};
 use super::effects::check_tables;
 use super::error::{Place, RobotError};
 use super::{Drive, Robot};
 
-pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
+/// The robot, and what the user should know of the text, one sentence each.
+pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), RobotError> {
     let refused = |f: Fault| RobotError::Value {
         path: path.into(),
         place: Place::of(text, offset(text, &f.way)),
@@ -24,7 +26,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
     {
         check_tables(effects).map_err(refused)?;
     }
-    let robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
+    let mut robot: Robot = toml::from_str(text).map_err(|e| RobotError::Toml {
         path: path.into(),
         place: Place::of(text, e.span().map_or(0, |s| s.start)),
         message: sentence(&e),
@@ -50,7 +52,17 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Robot, RobotError> {
             });
         }
     }
-    Ok(robot)
+    let remarks = square(&mut robot).into_iter().map(|squared| {
+        let way = [
+            Step::Key("joint"),
+            Step::At(squared.joint),
+            Step::Key(squared.key),
+        ];
+        let place = Place::of(text, offset(text, &way));
+        format!("{}:{place}: {}", path.display(), squared.said)
+    });
+    let remarks = remarks.collect();
+    Ok((robot, remarks))
 }
 
 /// Every drive has a ratio, unless a screw takes its place.

@@ -28,7 +28,10 @@
 //! something there ([`Transmission::has_joint_inertia`]).
 //!
 //! Leaves out: more or fewer motors than joints, play and elasticity of gears, mass of the screws and rods (which turn
-//! with the links they lie along), friction of the screws that grows with the load, the gyroscopic torque of rotors.
+//! with the links they lie along), friction of the screws that grows with the load, the gyroscopic torque of rotors; and
+//! the first moment of a crank that turns with a sum of joint angles about the shoulder of a parallelogram (the IRp-6's
+//! with φ₃ = q₂ + q₃): it has the weight of a first moment of the outer link, without the coupling of the two links that
+//! one at the elbow has, so that the serial chain states its weight or its lack of coupling, not both.
 
 mod columns;
 mod dynamics;

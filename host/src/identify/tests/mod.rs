@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod arms;
+mod chains;
 mod emps;
 mod exact;
 mod judged;

@@ -30,6 +30,8 @@ pub use write::Urdf;
 #[derive(Debug)]
 pub(in crate::robot) struct Body {
     pub joint: String,
+    /// File, line and column of the joint.
+    pub place: String,
     /// The link that the joint moves.
     pub link: String,
     /// Links of this body that have an `<inertial>`: the one that the joint moves, and what is fixed to it.

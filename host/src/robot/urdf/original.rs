@@ -42,8 +42,9 @@ impl Original {
     /// # Errors
     /// [`RobotError`], as [`Robot::from_urdf`].
     pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
-        let chain = super::read(&text, path)?;
+        let mut chain = super::read(&text, path)?;
         let converted = convert(&chain);
+        chain.remarks.extend(converted.remarks);
         Ok(Self {
             text,
             chain,

@@ -207,6 +207,7 @@ impl<'a> Reader<'a> {
         })?;
         let body = Body {
             joint: name.to_owned(),
+            place: format!("{}:{}", self.path.display(), self.place(node)),
             link: link.to_owned(),
             heavy: rigid.heavy,
             kind,
