@@ -36,6 +36,7 @@ mod search;
 mod sentences;
 mod simplex;
 mod solve;
+mod stated;
 pub mod testable;
 mod transmission;
 pub mod voltage;
