@@ -1,21 +1,24 @@
 //! The workflow from recordings to a verdict.
 
+mod steps;
+
 use rig_shared::effects::Periodic;
 
+use self::steps::{change_step, refuse, steps};
 use super::bench::{Bench, Loaded, library};
-use super::change::{Change, change};
+use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
 use super::fault::faulty;
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, closed, left_of_held, rank};
+use super::judge::{Judge, Judged, left_of_held};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
-use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
+use super::outcome::{Diagnosis, Residual, Tried, Verdict};
 use super::profile::Profile;
-use super::refit::{Joint, Refit, open};
+use super::refit::{Refit, open};
 use super::sanity::faults;
 use super::search::{Search, with};
 use super::stated::{Now, Stated};
@@ -383,84 +386,6 @@ fn searched<'a>(
         }
     })?;
     Ok((found, tried))
-}
-
-/// One step an effect that the description does not state, with the names that may stand in its place.
-fn steps(
-    search: &Search,
-    refit: &Refit,
-    judged: &Judged,
-    described: usize,
-    joint: &Joint,
-    descent: &Descent,
-    motion: &[Option<f64>],
-) -> Result<Vec<Step>, DiagnoseError> {
-    let Judged { chosen, floors, .. } = judged;
-    let trials = search.trials();
-    let source = &search.source;
-    let mut steps = Vec::new();
-    for (k, profile) in chosen.iter().enumerate().skip(described) {
-        let j = profile.candidate.joint;
-        let at = k - described;
-        let train = descent.train.step(j, at);
-        let unseen = descent.holdout.as_ref().map(|fall| fall.step(j, at));
-        let about = profile.candidate.kind.about();
-        let mut step = Step {
-            effect: about.name.to_owned(),
-            law: about.law.map(str::to_owned),
-            joint: source.robot.joints[j].name.clone(),
-            set: Vec::new(),
-            parameters: joint.parameters(source, chosen, refit.free.len(), k),
-            p_value: profile.evidence.corrected(trials),
-            runner_up: None,
-            runner_up_gap_closed: None,
-            rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
-            train_rms: train,
-            holdout_rms: unseen,
-            motion_rms: motion[at].zip(motion[at + 1]).map(|(a, b)| [a, b]),
-            gap_closed: closed(unseen.unwrap_or(train), floors[j]),
-            why: String::new(),
-        };
-        let rivals = search.alternatives(&refit.base, chosen, k)?;
-        rank(&mut step, profile, &rivals, source.runs);
-        steps.push(step);
-    }
-    Ok(steps)
-}
-
-/// Says of an effect that was taken why it does not stand.
-fn refuse(robot: &Robot, tried: &mut [Tried], spoilt: &Profile) {
-    let title = title_of(spoilt.candidate.kind);
-    let joint = &robot.joints[spoilt.candidate.joint].name;
-    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
-    if let Some(taken) = tried.iter_mut().find(own) {
-        taken.refused = "explains torque, but the simulated motion gets worse with it".into();
-    }
-}
-
-/// The step of a change that has an effect's name.
-fn change_step(robot: &Robot, change: &Change, descent: &Descent, floors: &[f64]) -> Option<Step> {
-    let about = change.effect?.about();
-    let j = robot.joints.len() - 1;
-    let [refitted, last] = descent.train.whole(j);
-    let train = [descent.train.frozen[j].max(refitted), last];
-    let unseen = (descent.holdout.as_ref()).map(|fall| [fall.frozen[j], fall.whole(j)[1]]);
-    Some(Step {
-        effect: about.name.to_owned(),
-        law: None,
-        joint: robot.joints[j].name.clone(),
-        set: vec![about.name.to_owned()],
-        parameters: change.parameters.clone(),
-        p_value: change.p_value,
-        runner_up: None,
-        runner_up_gap_closed: None,
-        rms_unit: robot.joints[j].kind.units().1.to_owned(),
-        train_rms: train,
-        holdout_rms: unseen,
-        motion_rms: None,
-        gap_closed: closed(unseen.unwrap_or(train), floors[j]),
-        why: change.words.clone(),
-    })
 }
 
 /// `named`: whether there is an effect that the description does not state.

@@ -21,12 +21,11 @@ const RATE: f64 = 250.0;
 const SECONDS: f64 = 24.0;
 /// Drag that is hidden, N·m·s²/rad².
 const DRAG: f64 = 0.12;
-/// A spring that no candidate of the fit has, as the law of a rig is never quite the library's, N·m/rad³.
-const UNKNOWN: f64 = 0.004;
 const SEEDS: u64 = 80;
 
-/// Two runs of one motion with noise that is correlated over a tenth of a second.
-fn recorded(seed: u64) -> [InMemory; 2] {
+/// Two runs of one motion with noise that is correlated over a tenth of a second. `unknown` is a torque with the cube of the
+/// position that no parameter of the fit has, N·m/rad³: the law of a rig is never quite the library's.
+fn recorded(seed: u64, unknown: f64) -> [InMemory; 2] {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
     let turn = std::f64::consts::TAU;
     let waves: Vec<[f64; 3]> = (0..6)
@@ -49,11 +48,11 @@ fn recorded(seed: u64) -> [InMemory; 2] {
             }
             // Six uniform numbers are nearly normal.
             let white = (0..6).map(|_| rng.random::<f64>() - 0.5).sum::<f64>();
-            slow = decay * slow + 0.01 * white;
+            slow = decay * slow + 0.005 * white;
             let model = 0.17 * a + 0.3 * v + 0.4 * f64::signum(v) + 0.3 * 9.81 * f64::cos(x);
             t.push(now);
             q.push(x);
-            tau.push(model + DRAG * v * v.abs() + UNKNOWN * x.powi(3) + slow);
+            tau.push(model + DRAG * v * v.abs() + unknown * x.powi(3) + slow);
         }
         InMemory {
             label: format!("run {run}"),
@@ -73,8 +72,8 @@ fn recorded(seed: u64) -> [InMemory; 2] {
 
 /// Error of the drag and of the viscous friction in standard deviations, by the intervals of a result and by those of a
 /// sandwich over the blocks of the nominal residual.
-fn errors(robot: &Robot, seed: u64) -> [[f64; 2]; 2] {
-    let runs = recorded(seed);
+fn errors(robot: &Robot, seed: u64, unknown: f64) -> [[f64; 2]; 2] {
+    let runs = recorded(seed, unknown);
     let training: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
     let stated = Stated::of(robot);
     let bench = Bench::of(&stated, &training).unwrap();
@@ -110,19 +109,29 @@ fn errors(robot: &Robot, seed: u64) -> [[f64; 2]; 2] {
     })
 }
 
-#[test]
-fn nineteen_of_twenty_intervals_hold_the_truth() {
+/// Share of the intervals that hold the truth, the same two ways.
+fn held(unknown: f64) -> [f64; 2] {
     let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
-    let all: Vec<[[f64; 2]; 2]> = (0..SEEDS).map(|seed| errors(&robot, seed)).collect();
-    let held = |way: usize| {
+    let all: Vec<[[f64; 2]; 2]> = (0..SEEDS)
+        .map(|seed| errors(&robot, seed, unknown))
+        .collect();
+    [0, 1].map(|way| {
         let of = all.iter().flat_map(|e| e[way]);
         of.filter(|e| e.abs() <= 1.96).count() as f64 / (2 * SEEDS) as f64
-    };
-    println!(
-        "held: {} by the result, {} by the nominal blocks",
-        held(0),
-        held(1)
-    );
-    assert!((0.90..=0.98).contains(&held(0)), "{}", held(0));
-    assert!(held(1) < held(0), "{} {}", held(1), held(0));
+    })
+}
+
+#[test]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    let [own, _] = held(0.0);
+    println!("held {own}");
+    assert!((0.90..=0.98).contains(&own), "{own}");
+}
+
+#[test]
+fn what_repeats_with_the_motion_counts_once() {
+    let [own, blocks] = held(0.03);
+    println!("held {own}, {blocks} by the blocks of the nominal residual");
+    // Twelve clusters of a torque that no parameter has: nine of ten, where each run by itself had given eight.
+    assert!(own >= 0.86 && own > blocks + 0.03, "{own} {blocks}");
 }
