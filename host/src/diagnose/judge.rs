@@ -304,3 +304,6 @@ pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
         0.0
     }
 }
+
+#[cfg(test)]
+mod tests;
