@@ -20,6 +20,7 @@ fn empty(verdict: Verdict, words: &[&str]) -> Diagnosis {
         noise_floor_how: String::new(),
         torque_lead: Vec::new(),
         places: Vec::new(),
+        described: Vec::new(),
         steps: Vec::new(),
         gap_closed: None,
         absorbed: Vec::new(),

@@ -1,16 +1,20 @@
 //! What stays the same during a diagnosis: the robot, its nominal model, how recordings are treated.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use rig_shared::effects::{Channel, Kind};
+use rig_shared::multibody::Chain;
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
 use super::columns::{Candidate, Source};
+use super::fit::Evidence;
 use super::predicted::{Predicted, predict};
 use super::profile::Profile;
 use super::rows::{Column, Nominal, Rows, combined};
 use super::runs::{Run, runs_of};
+use super::stated::{Stated, candidate, gains};
+use crate::effects::{Compensated, Effects};
 use crate::prepare::{Choice, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 
@@ -27,8 +31,12 @@ pub(super) struct Loaded {
 
 /// Everything that stays the same during a diagnosis.
 pub(super) struct Bench<'a> {
-    /// As it was given.
+    /// As it was given, without its effects.
     pub(super) robot: &'a Robot,
+    /// The effects that it was given with.
+    pub(super) stated: &'a Stated,
+    /// What recordings are freed of.
+    held: Option<(Effects, Chain<f64>)>,
     /// Its base parameters.
     pub(super) nominal: Nominal,
     /// Which of them are free.
@@ -41,18 +49,24 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// [`DiagnoseError`].
-    pub(super) fn of(robot: &'a Robot, training: &[&dyn Recording]) -> Result<Self, DiagnoseError> {
+    pub(super) fn of(
+        stated: &'a Stated,
+        training: &[&dyn Recording],
+    ) -> Result<Self, DiagnoseError> {
+        let robot = &stated.robot;
         let nominal = Nominal::of(robot)?;
         let anchor = Anchor::of(robot, &nominal);
         Ok(Self {
             robot,
+            stated,
+            held: stated.taken_off()?,
             anchor,
             nominal,
             treatment: treatment_of(training, robot)?,
         })
     }
 
-    /// Reads recordings and takes off what the held parameters contribute.
+    /// Reads recordings and takes off what the held effects and parameters contribute.
     ///
     /// # Errors
     /// [`DiagnoseError`].
@@ -62,13 +76,16 @@ impl<'a> Bench<'a> {
             .position_filter()
             .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))?;
         let mut runs = Vec::new();
-        for (k, recording) in recordings.iter().enumerate() {
-            runs.extend(runs_of(
-                *recording,
-                k,
-                self.treatment.sample_rate,
-                &position,
-            )?);
+        for (k, &recording) in recordings.iter().enumerate() {
+            let rate = self.treatment.sample_rate;
+            runs.extend(match &self.held {
+                Some((effects, chain)) => {
+                    let freed =
+                        Compensated::new(recording, effects, chain, &self.treatment, false)?;
+                    runs_of(&freed, k, rate, &position)?
+                }
+                None => runs_of(recording, k, rate, &position)?,
+            });
         }
         self.rows(runs)
     }
@@ -134,6 +151,28 @@ impl<'a> Bench<'a> {
             &combined(rows.joints(), columns.iter().zip(factors)),
         );
         Ok(residual)
+    }
+
+    /// RMS per joint of what the description as it stands leaves, its effects among it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn frozen(&self, loaded: &Loaded) -> Result<Vec<f64>, DiagnoseError> {
+        let mut coefficients = self.anchor.prior_coefficients();
+        let mut effects = Vec::new();
+        for placed in self.stated.free() {
+            let gains = gains(&placed);
+            effects.push(Profile {
+                candidate: candidate(&placed),
+                shapes: placed.effect.shapes,
+                // As many as gains; they are formed along these recordings.
+                columns: Arc::new(vec![Column::new(); gains.len()]),
+                evidence: Evidence::default(),
+                vanished: None,
+            });
+            coefficients.extend(gains);
+        }
+        self.unseen(loaded, &coefficients, &effects)
     }
 
     /// RMS per joint of what a model leaves on the rows used.

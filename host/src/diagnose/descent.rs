@@ -17,7 +17,7 @@ pub(super) struct Fall {
 }
 
 impl Fall {
-    /// Before and after the `k`-th effect.
+    /// Before and after the `k`-th effect found.
     pub(super) fn step(&self, joint: usize, k: usize) -> [f64; 2] {
         [self.models[joint][k], self.models[joint][k + 1]]
     }
@@ -43,7 +43,7 @@ pub(super) struct Descent {
 }
 
 impl Descent {
-    /// Through the effects in the order that they were found in.
+    /// Through the effects in the order that they were found in; the first `described` are the description's.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -51,15 +51,16 @@ impl Descent {
         bench: &Bench,
         refit: &Refit,
         chosen: &[Profile],
+        described: usize,
+        loaded: &Loaded,
         sealed: Option<&Loaded>,
     ) -> Result<Self, DiagnoseError> {
         let n = bench.robot.joints.len();
-        let frozen = refit.frozen(&bench.anchor);
         let mut train = Fall {
-            frozen: (0..n).map(|j| frozen.rms(j)).collect(),
+            frozen: bench.frozen(loaded)?,
             models: vec![Vec::new(); n],
         };
-        for count in 0..=chosen.len() {
+        for count in described..=chosen.len() {
             let fit = with(&refit.base, &chosen[..count], None);
             for (j, list) in train.models.iter_mut().enumerate() {
                 list.push(fit.rms(j));
@@ -70,10 +71,10 @@ impl Descent {
             return Ok(Self { train, holdout });
         };
         let mut holdout = Fall {
-            frozen: bench.unseen(sealed, &bench.anchor.prior_coefficients(), &[])?,
+            frozen: bench.frozen(sealed)?,
             models: vec![Vec::new(); n],
         };
-        for count in 0..=chosen.len() {
+        for count in described..=chosen.len() {
             let part = &chosen[..count];
             let found = bench.unseen(sealed, &refit.solution(part)?.values, part)?;
             for (list, rms) in holdout.models.iter_mut().zip(found) {
@@ -104,16 +105,16 @@ impl Descent {
         closed / gap
     }
 
-    /// As a result has it.
+    /// As a result has it; `found` are the effects that the description does not state.
     pub(super) fn waterfall(
         &self,
         robot: &Robot,
-        chosen: &[Profile],
+        found: &[Profile],
         floors: &[f64],
     ) -> Vec<Waterfall> {
         let models: Vec<String> = (["frozen description", "refitted"].map(str::to_owned))
             .into_iter()
-            .chain(chosen.iter().map(|p| title_of(p.candidate.kind)))
+            .chain(found.iter().map(|p| title_of(p.candidate.kind)))
             .collect();
         let list = |fall: &Fall, j: usize| {
             let mut list = vec![fall.frozen[j]];

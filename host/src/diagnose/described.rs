@@ -36,6 +36,10 @@ pub(super) fn by_description(
     let mut chosen = judged.chosen.clone();
     let mut moved = false;
     for k in 0..chosen.len() {
+        // Its name is the description's own.
+        if judge.search.is_described(&chosen[k].candidate) {
+            continue;
+        }
         let joint = chosen[k].candidate.joint;
         let floor = judged.floors[joint];
         let own = left(&chosen, joint);

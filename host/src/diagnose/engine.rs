@@ -1,21 +1,27 @@
 //! The workflow from recordings to a verdict.
 
+mod steps;
+
+use rig_shared::effects::Periodic;
+
+use self::steps::{change_step, refuse, steps};
 use super::bench::{Bench, Loaded, library};
-use super::change::{Change, change};
+use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
 use super::fault::faulty;
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, closed, left_of_held, rank};
+use super::judge::{Judge, Judged, left_of_held};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
-use super::outcome::{Diagnosis, Residual, Step, Tried, Verdict};
+use super::outcome::{Diagnosis, Residual, Tried, Verdict};
 use super::profile::Profile;
-use super::refit::{Joint, Refit, open};
+use super::refit::{Refit, open};
 use super::sanity::faults;
 use super::search::{Search, with};
+use super::stated::{Now, Stated};
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
@@ -36,7 +42,32 @@ pub fn diagnose(
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
-    let mut bench = Bench::of(robot, training)?;
+    let mut stated = Stated::of(robot);
+    loop {
+        // Each time around one more of the description's effects is held.
+        match attempt(robot, &stated, training, holdout, options, progress)? {
+            Attempt::Done(result) => return Ok(*result),
+            Attempt::Hold(more) => stated = more,
+        }
+    }
+}
+
+/// What came of one way to treat the description's effects.
+enum Attempt {
+    Done(Box<(Diagnosis, Robot)>),
+    /// The same with more of them held.
+    Hold(Stated),
+}
+
+fn attempt(
+    robot: &Robot,
+    stated: &Stated,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Attempt, DiagnoseError> {
+    let mut bench = Bench::of(stated, training)?;
     let mut loaded = bench.load(training)?;
     let mut sealed = if holdout.is_empty() {
         None
@@ -46,8 +77,13 @@ pub fn diagnose(
     for recordings in std::iter::once(&loaded).chain(&sealed) {
         let wrong = faults(robot, &recordings.runs)?;
         if !wrong.is_empty() {
-            return Ok((faulty(robot, wrong), robot.clone()));
+            let fault = (faulty(robot, wrong), robot.clone());
+            return Ok(Attempt::Done(Box::new(fault)));
         }
+    }
+    let mut more = stated.clone();
+    if more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without)) {
+        return Ok(Attempt::Hold(more));
     }
     let open = open(&bench, &loaded.rows);
     if !open.is_empty() {
@@ -79,6 +115,9 @@ pub fn diagnose(
     } else {
         (&loaded, lead, first)
     };
+    if more.hold_what_is_not_refuted(&pass.search.source, &pass.refit.base, &pass.found)? {
+        return Ok(Attempt::Hold(more));
+    }
     let sealed = sealed
         .map(|sealed| moved(&bench, sealed, &lead))
         .transpose()?;
@@ -89,10 +128,18 @@ pub fn diagnose(
         mut tried,
     } = pass;
     progress(0.85);
+    let robot = bench.robot;
     let coordinates: Vec<_> = (0..robot.joints.len())
         .map(|j| {
             let predicted = &search.source.predicted;
-            coordinates(&loaded.rows, &loaded.runs, predicted, robot, j)
+            coordinates(
+                &loaded.rows,
+                &loaded.runs,
+                predicted,
+                robot,
+                j,
+                &waves(&found, j),
+            )
         })
         .collect();
     let judge = Judge {
@@ -111,7 +158,7 @@ pub fn diagnose(
     let judged = judge.judged(found)?;
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     // A name that makes the simulated motion worse stands in for something else.
-    while let Some(k) = trial.spoiling(&judged.chosen)? {
+    while let Some(k) = trial.spoiling(&judged.chosen, search.count_described(&judged.chosen))? {
         let mut stand = judged.chosen;
         refuse(robot, &mut tried, &stand.remove(k));
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
@@ -122,30 +169,46 @@ pub fn diagnose(
         &refit.base,
         &mut judged.chosen,
     )?;
+    // What the voltage has given another name is the description's no longer.
+    let mut named: Vec<_> = judged.chosen.drain(..).zip(said).collect();
+    named.sort_by_key(|(profile, _)| !search.is_described(&profile.candidate));
+    let (chosen, said): (Vec<_>, Vec<_>) = named.into_iter().unzip();
+    judged.chosen = chosen;
+    let described = search.count_described(&judged.chosen);
     let replay = match &sealed {
         Some(sealed) => Replay::of(&bench, &refit, values, sealed),
         None => trial,
     };
-    let descent = Descent::of(&bench, &refit, &judged.chosen, sealed.as_ref())?;
+    let descent = Descent::of(
+        &bench,
+        &refit,
+        &judged.chosen,
+        described,
+        loaded,
+        sealed.as_ref(),
+    )?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
         judged.left = left_of_held(robot, &held.last(), &judged.floors);
     }
     let Judged { chosen, floors, .. } = &judged;
-    let joint = refit.joint(&search.source, chosen)?;
+    let joint = refit.joint(&search.source, chosen, &judge.pairs)?;
     let after = &joint.solution;
+    let before = refit.solution(&chosen[..described])?;
     progress(0.95);
-    let motion = (0..=chosen.len())
+    let motion = (described..=chosen.len())
         .map(|count| Ok(replay.errors(&chosen[..count])?.map(|errors| errors.rms())))
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
-    let mut steps = steps(&search, &refit, &judged, &joint, &descent, &motion)?;
-    for (step, word) in steps.iter_mut().zip(said) {
+    let mut steps = steps(
+        &search, &refit, &judged, described, &joint, &descent, &motion,
+    )?;
+    for (step, word) in steps.iter_mut().zip(said.into_iter().skip(described)) {
         word.applied(step);
     }
     let explained = refit.explained(chosen, after);
     let change = change(&bench, &refit, &explained, after, &options.without);
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
     {
-        let given = replay.errors_of(robot).map(|errors| errors.rms());
+        let given = (replay.errors_of(&stated.moving())).map(|errors| errors.rms());
         step.motion_rms = (given.zip(motion.last().copied().flatten())).map(|(a, b)| [a, b]);
         steps.push(step);
     }
@@ -154,25 +217,35 @@ pub fn diagnose(
         robot: robot.name.clone(),
         verdict: verdict(
             &judged,
-            name_something(&windings),
+            chosen.len() > described || name_something(&windings),
             change.is_some() || contradict(&windings),
         ),
         residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
-        motion_how: replay.told(chosen)?,
+        motion_how: replay.told(chosen, described)?,
         torque_lead: lead,
-        places: judge.places(floors),
+        places: judge.places(floors, &chosen[..described]),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
+        described: stated.told(
+            (stated.matched(chosen).into_iter())
+                .map(|place| {
+                    place.map(|k| Now {
+                        kind: chosen[k].candidate.kind,
+                        parameters: joint.parameters(&search.source, chosen, refit.free.len(), k),
+                    })
+                })
+                .collect(),
+        ),
         steps,
-        absorbed: refit.absorbed(&bench, after),
+        absorbed: refit.absorbed(&bench, &before, after),
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
         remainder: judged.left.clone(),
         data_faults: Vec::new(),
-        waterfall: descent.waterfall(robot, chosen, floors),
+        waterfall: descent.waterfall(robot, &chosen[described..], floors),
         tried,
         maps: Vec::new(),
         curves: Vec::new(),
@@ -187,6 +260,7 @@ pub fn diagnose(
         base: &refit.base,
         after,
         chosen,
+        described,
         coordinates: &coordinates,
         floors,
         seed: options.seed,
@@ -194,19 +268,32 @@ pub fn diagnose(
             runs: &drawn.runs,
             rows: &drawn.rows,
             left: [
-                bench.remaining(drawn, &refit.before.values, &[])?,
+                bench.remaining(drawn, &before.values, &chosen[..described])?,
                 bench.remaining(drawn, &after.values, chosen)?,
             ],
-            motion: replay.drawn(chosen)?,
+            motion: replay.drawn(chosen, described)?,
         },
     };
     let mut model = finish(&found, &mut diagnosis)?;
+    model.effects.extend(stated.held().cloned());
     tell(windings, &mut diagnosis, &mut model);
+    let told = diagnosis.described.iter().map(|d| d.text.clone());
+    diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
     diagnosis.words.extend(held(&bench, &open));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
-    Ok((diagnosis, model))
+    Ok(Attempt::Done(Box::new((diagnosis, model))))
+}
+
+/// Orders over the motor's turn of the waves among effects of a joint.
+fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
+    let wave = |p: &Profile| {
+        let about = p.candidate.kind.periodic();
+        let motor = matches!(about, Some(Periodic::Motor | Periodic::MotorTimesDrive));
+        (p.candidate.joint == joint && motor).then_some(p.shapes[0])
+    };
+    found.iter().filter_map(wave).collect()
 }
 
 /// What was left as the description has it.
@@ -249,6 +336,7 @@ impl<'a> Pass<'a> {
         let mut search = Search::new(
             bench.source(loaded, &bench.anchor.values(&refit.before.values))?,
             library(bench.robot, &loaded.runs, &options.without),
+            bench.stated.free(),
             crate::prepare::threads(options.threads),
         );
         let (found, tried) = searched(bench, loaded, &refit, &mut search, progress)?;
@@ -305,87 +393,11 @@ fn searched<'a>(
     Ok((found, tried))
 }
 
-/// One step an effect, with the names that may stand in its place.
-fn steps(
-    search: &Search,
-    refit: &Refit,
-    judged: &Judged,
-    joint: &Joint,
-    descent: &Descent,
-    motion: &[Option<f64>],
-) -> Result<Vec<Step>, DiagnoseError> {
-    let Judged { chosen, floors, .. } = judged;
-    let trials = search.trials();
-    let source = &search.source;
-    let mut steps = Vec::new();
-    for (k, profile) in chosen.iter().enumerate() {
-        let j = profile.candidate.joint;
-        let train = descent.train.step(j, k);
-        let unseen = descent.holdout.as_ref().map(|fall| fall.step(j, k));
-        let about = profile.candidate.kind.about();
-        let mut step = Step {
-            effect: about.name.to_owned(),
-            law: about.law.map(str::to_owned),
-            joint: source.robot.joints[j].name.clone(),
-            set: Vec::new(),
-            parameters: joint.parameters(source, chosen, refit.free.len(), k),
-            p_value: profile.evidence.corrected(trials),
-            runner_up: None,
-            runner_up_gap_closed: None,
-            rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
-            train_rms: train,
-            holdout_rms: unseen,
-            motion_rms: motion[k].zip(motion[k + 1]).map(|(a, b)| [a, b]),
-            gap_closed: closed(unseen.unwrap_or(train), floors[j]),
-            why: String::new(),
-        };
-        let rivals = search.alternatives(&refit.base, chosen, k)?;
-        rank(&mut step, profile, &rivals, source.runs);
-        steps.push(step);
-    }
-    Ok(steps)
-}
-
-/// Says of an effect that was taken why it does not stand.
-fn refuse(robot: &Robot, tried: &mut [Tried], spoilt: &Profile) {
-    let title = title_of(spoilt.candidate.kind);
-    let joint = &robot.joints[spoilt.candidate.joint].name;
-    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
-    if let Some(taken) = tried.iter_mut().find(own) {
-        taken.refused = "explains torque, but the simulated motion gets worse with it".into();
-    }
-}
-
-/// The step of a change that has an effect's name.
-fn change_step(robot: &Robot, change: &Change, descent: &Descent, floors: &[f64]) -> Option<Step> {
-    let about = change.effect?.about();
-    let j = robot.joints.len() - 1;
-    let [refitted, last] = descent.train.whole(j);
-    let train = [descent.train.frozen[j].max(refitted), last];
-    let unseen = (descent.holdout.as_ref()).map(|fall| [fall.frozen[j], fall.whole(j)[1]]);
-    Some(Step {
-        effect: about.name.to_owned(),
-        law: None,
-        joint: robot.joints[j].name.clone(),
-        set: vec![about.name.to_owned()],
-        parameters: change.parameters.clone(),
-        p_value: change.p_value,
-        runner_up: None,
-        runner_up_gap_closed: None,
-        rms_unit: robot.joints[j].kind.units().1.to_owned(),
-        train_rms: train,
-        holdout_rms: unseen,
-        motion_rms: None,
-        gap_closed: closed(unseen.unwrap_or(train), floors[j]),
-        why: change.words.clone(),
-    })
-}
-
-/// `by_voltage`: whether the voltage has named something.
-fn verdict(judged: &Judged, by_voltage: bool, changed: bool) -> Verdict {
+/// `named`: whether there is an effect that the description does not state.
+fn verdict(judged: &Judged, named: bool, changed: bool) -> Verdict {
     if judged.left.is_some() {
         Verdict::Remainder
-    } else if !judged.chosen.is_empty() || by_voltage {
+    } else if named {
         Verdict::Explained
     } else if changed {
         Verdict::ParameterChange

@@ -17,6 +17,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         motion_how: String::new(),
         torque_lead: Vec::new(),
         places: Vec::new(),
+        described: Vec::new(),
         steps: Vec::new(),
         gap_closed: None,
         absorbed: Vec::new(),

@@ -29,8 +29,10 @@ pub(super) struct Found<'a, 'r> {
     pub(super) base: &'a Fit<'r>,
     /// Everything fitted together.
     pub(super) after: &'a Solution,
-    /// The effects.
+    /// The effects, those of the description first.
     pub(super) chosen: &'a [Profile],
+    /// How many of them are the description's.
+    pub(super) described: usize,
     /// Coordinates of the training data, joint by joint.
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Noise floor, joint by joint.
@@ -41,13 +43,20 @@ pub(super) struct Found<'a, 'r> {
     pub(super) drawn: Drawn<'a>,
 }
 
+impl<'a> Found<'a, '_> {
+    /// The effects that the description does not state.
+    pub(super) fn found(&self) -> &'a [Profile] {
+        &self.chosen[self.described..]
+    }
+}
+
 /// Recordings with what the models leave of their torque, joint by joint over the rows.
 pub(super) struct Drawn<'a> {
     /// In the order of the rows.
     pub(super) runs: &'a [Run],
     /// Where the rows are.
     pub(super) rows: &'a Rows,
-    /// Left by the refitted nominal model and by the one with all effects.
+    /// Left by the refitted description and by the model with all effects.
     pub(super) left: [Vec<Vec<f64>>; 2],
     /// Positions that the same models give when simulated, run by run; empty where they are not.
     pub(super) motion: [Vec<Vec<f64>>; 2],
@@ -68,7 +77,7 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<Robot, 
     );
     diagnosis.maps = pictures::maps(found);
     diagnosis.curves = pictures::curves(found);
-    for (step, profile) in diagnosis.steps.iter_mut().zip(found.chosen) {
+    for (step, profile) in diagnosis.steps.iter_mut().zip(found.found()) {
         step.why = sentences::why(found, step, profile);
     }
     diagnosis.noise_floor_how = sentences::floor_how(found);

@@ -8,12 +8,18 @@ use super::rows::{Column, Rows};
 
 mod evidence;
 mod folds;
+mod jackknife;
 
 pub(super) use evidence::Evidence;
 use folds::Folded;
 
-/// Blocks that evidence is counted in: long enough that the residual has forgotten, at least so many.
+/// Blocks that evidence is counted in: so many times the residual's memory long …
+const MEMORIES: f64 = 5.0;
+/// … and at least so many.
 const FEWEST_BLOCKS: usize = 12;
+/// Least length of a cluster, s: what a law is off by goes with the motion, whose own times are seconds, however short the
+/// noise that it is hidden in.
+const LEAST_CLUSTER: f64 = 1.0;
 /// A column of which less than this share of its length is left beside the others is one of them in disguise.
 const DISTINCT: f64 = 0.02;
 
@@ -62,6 +68,41 @@ impl<'a> Fit<'a> {
         Self {
             block,
             blocks,
+            folded: OnceLock::new(),
+            ..self.clone()
+        }
+    }
+
+    /// The same with blocks for what a last model leaves, correlated over `memory` s; of `pairs` of runs that repeat each
+    /// other equal times are in one block, as what the model lacks is the same in both.
+    pub(super) fn clustered(&self, memory: f64, pairs: &[(usize, usize)]) -> Self {
+        let starts = &self.rows.starts;
+        let length = |run: usize| starts[run + 1] - starts[run];
+        let again = |run: &usize| pairs.iter().any(|(_, second)| second == run);
+        let distinct = (0..starts.len().saturating_sub(1)).filter(|run| !again(run));
+        let (mut block, blocks) = in_blocks(
+            self.rows,
+            memory.max(LEAST_CLUSTER / MEMORIES),
+            distinct.map(length).sum(),
+        );
+        for &(first, second) in pairs {
+            for k in 0..length(second) {
+                let like = k.min(length(first).saturating_sub(1));
+                block[starts[second] + k] = block[starts[first] + like];
+            }
+        }
+        // Those of the repeats are free again.
+        let mut number = vec![None; blocks];
+        let mut next = 0;
+        for b in &mut block {
+            *b = *number[*b].get_or_insert_with(|| {
+                next += 1;
+                next - 1
+            });
+        }
+        Self {
+            block,
+            blocks: next,
             folded: OnceLock::new(),
             ..self.clone()
         }
@@ -140,6 +181,11 @@ impl<'a> Fit<'a> {
     /// The weighted residual of all joints.
     pub(super) fn left(&self) -> &[f64] {
         &self.residual
+    }
+
+    /// The rows.
+    pub(super) fn rows(&self) -> &'a Rows {
+        self.rows
     }
 
     /// Number of blocks.
@@ -276,9 +322,14 @@ impl<'a> Fit<'a> {
 
 /// Block of each row of a joint, and their number, for residuals correlated over `memory` seconds.
 fn blocked(rows: &Rows, memory: f64) -> (Vec<usize>, usize) {
-    let length = ((5.0 * memory / rows.period).ceil() as usize)
+    in_blocks(rows, memory, rows.count)
+}
+
+/// The same with the fewest blocks in `distinct` rows.
+fn in_blocks(rows: &Rows, memory: f64, distinct: usize) -> (Vec<usize>, usize) {
+    let length = ((MEMORIES * memory / rows.period).ceil() as usize)
         .max(1)
-        .min((rows.count / FEWEST_BLOCKS).max(1));
+        .min((distinct / FEWEST_BLOCKS).max(1));
     let mut block = Vec::with_capacity(rows.count);
     let mut next = 0;
     for pair in rows.starts.windows(2) {

@@ -81,7 +81,9 @@ impl Judge<'_, '_> {
                 let rms = |but| with(self.base, chosen, but).rms(j);
                 closed([rms(Some(k)), rms(None)], floors[j])
             };
-            let mut doubtful: Vec<(usize, f64)> = (0..chosen.len())
+            // What the description states is no guess of the search.
+            let mut doubtful: Vec<(usize, f64)> = (self.search.count_described(chosen)
+                ..chosen.len())
                 .map(|k| (k, closes(k)))
                 .filter(|(_, share)| *share < HALF)
                 .collect();
@@ -133,10 +135,11 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// Where the residual of the refitted nominal model sits.
-    pub(super) fn places(&self, floors: &[f64]) -> Vec<Place> {
+    /// Where the residual of the refitted description sits; `described` are its effects.
+    pub(super) fn places(&self, floors: &[f64], described: &[Profile]) -> Vec<Place> {
+        let fit = with(self.base, described, None);
         (0..self.rows.joints())
-            .flat_map(|j| self.places_of(self.base, j, floors[j]))
+            .flat_map(|j| self.places_of(&fit, j, floors[j]))
             .collect()
     }
 
@@ -258,7 +261,8 @@ pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Optio
     })
 }
 
-/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first.
+/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first; one on another joint
+/// takes away something else.
 pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
     let mut names = vec![step.effect.clone()];
     let mut exact = |kind: Kind| {
@@ -276,7 +280,7 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
         }
         if equal(own, rival) {
             names.push(name.to_owned());
-        } else if step.runner_up.is_none() {
+        } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
             step.runner_up = Some(name.to_owned());
             step.runner_up_gap_closed =
                 Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
@@ -300,3 +304,6 @@ pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
         0.0
     }
 }
+
+#[cfg(test)]
+mod tests;

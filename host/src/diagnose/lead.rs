@@ -3,7 +3,7 @@
 //! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
 //! after it (Franklin, Powell and Workman 1998, section 4.3). Fast motion shows it as a residual that goes with the torque's
 //! rate of change, larger than many effects. It is a property of the recording, not of the rig, and taken out before anything
-//! is searched for. Torque that comes later than the instants of sampling explain is an effect: `measurement_delay`.
+//! is searched for. Torque that comes later than the mean over one sample does is an effect: `measurement_delay`.
 //!
 //! Leaves out: holds longer than the recording's period (a slower controller recorded faster).
 
@@ -21,12 +21,16 @@ const SEEN: f64 = 4.0;
 const LEAST: f64 = 0.05;
 /// Share of a sample by which a lead must have changed for another search.
 const WORTH_A_SEARCH: f64 = 0.2;
-/// Most that a torque may come late without being late, s: sensors of one board are read within it.
-const LATE: f64 = 0.001;
+/// Share of a sample that a torque may come late without being late: a reading that is the mean over the last sample, as of
+/// a current that is summed over it, is half a sample old; a tenth is for what the estimate is off by.
+const LATE: f64 = 0.6;
+/// … and no more than this, s: a board reads its sensors within it, however slowly they are recorded.
+const LATEST: f64 = 0.001;
 
-/// What the instants of sampling alone may differ by, s: a sample, but no more than a board needs.
+/// What the instants of sampling alone may make a torque late by, s.
 pub(super) fn slack(runs: &[Run]) -> f64 {
-    runs.first().map_or(0.0, |run| (1.0 / run.rate).min(LATE))
+    runs.first()
+        .map_or(0.0, |run| (LATE / run.rate).min(LATEST))
 }
 
 /// How long before it acts (negative: after) each joint's torque was recorded, s: the `present` lead with what `fit` still
@@ -119,6 +123,20 @@ fn later(signal: &[f64], samples: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_more_than_half_a_sample_late_is_sampling() {
+        let late = |rate: f64| {
+            slack(&[Run {
+                rate,
+                ..Run::default()
+            }])
+        };
+        // Half a sample at 1 kHz is sampling; the three quarters that a filter of the current adds are not.
+        assert!(late(1000.0) > 0.0005 && late(1000.0) < 0.00075);
+        assert_eq!(late(100.0), LATEST);
+        assert_eq!(slack(&[]), 0.0);
+    }
 
     #[test]
     fn a_moved_wave_is_the_wave_later() {

@@ -181,7 +181,7 @@ pub(super) fn next(
     diagnosis: &Diagnosis,
     model: &Robot,
 ) -> Result<Option<NextExperiment>, DiagnoseError> {
-    for (k, (step, profile)) in diagnosis.steps.iter().zip(found.chosen).enumerate() {
+    for (k, (step, profile)) in diagnosis.steps.iter().zip(found.found()).enumerate() {
         if step.set.len() < 2 {
             continue;
         }
@@ -189,7 +189,7 @@ pub(super) fn next(
         let Some(nominal) = nominal_of(model, joint)? else {
             continue;
         };
-        let fit = with(found.base, found.chosen, Some(k));
+        let fit = with(found.base, found.chosen, Some(found.described + k));
         let mut list: Vec<(Effect<f64>, Nominal)> = vec![(effect(profile), nominal)];
         for name in step.set.iter().filter(|name| **name != step.effect) {
             let of_name = |c: &Candidate| c.joint == joint && c.kind.about().name == *name;

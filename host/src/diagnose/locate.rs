@@ -8,15 +8,20 @@ use rand::{RngExt, SeedableRng};
 
 use super::outcome::Place;
 use super::predicted::Predicted;
+use super::profile::SIGNIFICANT;
 use super::rows::Rows;
 use super::runs::Run;
 use crate::prepare::central_difference;
+use crate::report::format_significant;
 use crate::robot::{JointKind, Robot};
 
 /// Bins of equal numbers of rows.
 pub(super) const BINS: usize = 24;
-/// Draws of the bootstrap.
+/// Draws of the bootstrap …
 const DRAWS: usize = 999;
+/// … and for a coordinate that none of them reaches, where the correction for the number of coordinates asks for more: one
+/// alone among fifteen has to be at 0.0002.
+const MOST_DRAWS: usize = 19_999;
 /// Share of the explained squares that the interval has to hold.
 const MOST_OF_IT: f64 = 0.75;
 
@@ -24,29 +29,35 @@ const MOST_OF_IT: f64 = 0.75;
 #[derive(Clone)]
 pub(super) struct Coordinate {
     /// In words.
-    pub(super) name: &'static str,
+    pub(super) name: String,
     /// ASCII
     pub(super) unit: &'static str,
     /// One a row.
     pub(super) values: Vec<f64>,
 }
 
-/// All coordinates of a joint.
+/// All coordinates of a joint. `waves` are orders over the motor's turn that effects of it have: bins of a turn average a
+/// high one out.
 pub(super) fn coordinates(
     rows: &Rows,
     runs: &[Run],
     predicted: &[Predicted],
     robot: &Robot,
     joint: usize,
+    waves: &[f64],
 ) -> Vec<Coordinate> {
     let ratio = robot.joints[joint].gear_ratio();
     let mut list: Vec<Coordinate> = Vec::new();
-    let mut add = |name: &'static str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
+    let mut add = |name: &str, unit: &'static str, of: &dyn Fn(usize, &Run) -> Vec<f64>| {
         let mut values = Vec::with_capacity(rows.count);
         for (r, run) in runs.iter().enumerate() {
             rows.thinning.pick(&of(r, run), &mut values);
         }
-        list.push(Coordinate { name, unit, values });
+        list.push(Coordinate {
+            name: name.to_owned(),
+            unit,
+            values,
+        });
     };
     let (p, f) = robot.joints[joint].kind.units();
     let (v, a, rate) = match robot.joints[joint].kind {
@@ -56,13 +67,23 @@ pub(super) fn coordinates(
     add("velocity", v, &|_, run| run.joints[joint].qd.clone());
     add("position", p, &|_, run| run.joints[joint].q.clone());
     add("acceleration", a, &|_, run| run.joints[joint].qdd.clone());
-    if ratio.abs() > 1.0 {
-        add("motor angle within a turn", "rad", &|_, run| {
-            let turn = std::f64::consts::TAU;
+    let angle = |order: f64| {
+        let within = std::f64::consts::TAU;
+        move |_: usize, run: &Run| -> Vec<f64> {
             (run.joints[joint].q.iter())
-                .map(|q| (ratio * q).rem_euclid(turn))
+                .map(|q| (order * ratio * q).rem_euclid(within))
                 .collect()
-        });
+        }
+    };
+    if ratio.abs() > 1.0 {
+        add("motor angle within a turn", "rad", &angle(1.0));
+    }
+    for order in waves {
+        let name = format!(
+            "motor angle within one wave, {} to a turn",
+            format_significant(*order, 3)
+        );
+        add(&name, "rad", &angle(*order));
     }
     add("torque on the gear along the motion", f, &|r, run| {
         (predicted[r].load[joint].iter().zip(&run.joints[joint].qd))
@@ -94,8 +115,11 @@ pub(super) fn coordinates(
     for other in 0..robot.joints.len() {
         if other != joint {
             list.push(Coordinate {
-                name: "velocity of another joint",
-                unit: v,
+                name: velocity_of(&robot.joints[other].name),
+                unit: match robot.joints[other].kind {
+                    JointKind::Revolute => "rad/s",
+                    JointKind::Prismatic => "m/s",
+                },
                 values: runs.iter().fold(Vec::new(), |mut values, run| {
                     rows.thinning.pick(&run.joints[other].qd, &mut values);
                     values
@@ -104,6 +128,11 @@ pub(super) fn coordinates(
         }
     }
     list
+}
+
+/// Name of the coordinate that is another joint's velocity.
+pub(super) fn velocity_of(joint: &str) -> String {
+    format!("velocity of joint {joint}")
 }
 
 /// Way and time since the last reversal, with the sign of the direction.
@@ -160,6 +189,7 @@ pub(super) fn locate(
     let excess = (squares - used * floor * floor).max(0.0);
     let blocks = block.iter().max().map_or(0, |b| b + 1);
     let mut places: Vec<Place> = Vec::new();
+    let mut processes = Vec::new();
     for coordinate in coordinates {
         let (place, edges) = bins(&coordinate.values, keep, BINS);
         let mut count = [0.0; BINS];
@@ -171,7 +201,6 @@ pub(super) fn locate(
             }
         }
         let total: [f64; BINS] = std::array::from_fn(|b| sums.iter().map(|s| s[b]).sum());
-        let p = process_p(&sums, seed);
         // Squares that the bins' means explain, less what noise would by the blocks' spread.
         let explained: [f64; BINS] = std::array::from_fn(|b| {
             let noise: f64 = sums.iter().map(|s| s[b] * s[b]).sum();
@@ -197,29 +226,58 @@ pub(super) fn locate(
         });
         places.push(Place {
             joint: joint_name.to_owned(),
-            coordinate: coordinate.name.to_owned(),
+            coordinate: coordinate.name.clone(),
             interval: [edges[low], edges[high + 1]],
             unit: coordinate.unit.to_owned(),
             share,
-            p_value: p,
+            p_value: 1.0,
             text: sentence(coordinate, share, &edges, low, high, &mean, &count),
         });
+        processes.push(sums);
     }
-    // Benjamini–Yekutieli.
-    let m = places.len();
-    let harmonic: f64 = (1..=m).map(|k| 1.0 / k as f64).sum();
-    places.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    let mut least = 1.0_f64;
-    for (rank, place) in places.iter_mut().enumerate().rev() {
-        least = least.min(place.p_value * harmonic * m as f64 / (rank + 1) as f64);
-        place.p_value = least.min(1.0);
+    for (place, p) in places.iter_mut().zip(probabilities(&processes, seed)) {
+        place.p_value = p;
     }
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }
 
+/// Sums of the residual by blocks and bins, one coordinate.
+type Process = Vec<[f64; BINS]>;
+
+/// Probability of each process, corrected for their number. Those that no draw reaches get more of them where the
+/// correction asks for it: so few draws could not say more, whatever the process.
+fn probabilities(processes: &[Process], seed: u64) -> Vec<f64> {
+    let mut list: Vec<f64> = (processes.iter())
+        .map(|sums| process_p(sums, DRAWS, seed))
+        .collect();
+    if corrected(&list).iter().all(|p| *p >= SIGNIFICANT) {
+        for (p, sums) in list.iter_mut().zip(processes) {
+            if *p <= 1.0 / (DRAWS + 1) as f64 {
+                *p = process_p(sums, MOST_DRAWS, seed);
+            }
+        }
+    }
+    corrected(&list)
+}
+
+/// Probabilities corrected for their number under any dependence (Benjamini & Yekutieli 2001).
+fn corrected(list: &[f64]) -> Vec<f64> {
+    let m = list.len();
+    let harmonic: f64 = (1..=m).map(|k| 1.0 / k as f64).sum();
+    let mut order: Vec<usize> = (0..m).collect();
+    order.sort_by(|a, b| list[*a].total_cmp(&list[*b]));
+    let mut result = vec![1.0; m];
+    let mut least = 1.0_f64;
+    for (rank, &k) in order.iter().enumerate().rev() {
+        least = least.min(list[k] * harmonic * m as f64 / (rank + 1) as f64);
+        result[k] = least;
+    }
+    result
+}
+
 /// Probability of the largest excursion of the cumulated residual, by the wild block bootstrap.
-fn process_p(sums: &[[f64; BINS]], seed: u64) -> f64 {
+fn process_p(sums: &[[f64; BINS]], draws: usize, seed: u64) -> f64 {
     let excursion = |sign: &mut dyn FnMut() -> f64| {
         let mut total = [0.0; BINS];
         for s in sums {
@@ -237,10 +295,10 @@ fn process_p(sums: &[[f64; BINS]], seed: u64) -> f64 {
     };
     let found = excursion(&mut || 1.0);
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
-    let beyond = (0..DRAWS)
+    let beyond = (0..draws)
         .filter(|_| excursion(&mut || if rng.random::<bool>() { 1.0 } else { -1.0 }) >= found)
         .count();
-    (beyond + 1) as f64 / (DRAWS + 1) as f64
+    (beyond + 1) as f64 / (draws + 1) as f64
 }
 
 /// The shortest run of bins that holds most of what is explained.
@@ -270,7 +328,7 @@ fn sentence(
     mean: &[f64; BINS],
     count: &[f64; BINS],
 ) -> String {
-    let digits = crate::report::format_significant;
+    let digits = format_significant;
     let unit = coordinate.unit;
     let whole = low == 0 && high == BINS - 1;
     let place = if whole {
@@ -308,4 +366,47 @@ fn sentence(
         100.0 * share,
         coordinate.name
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fourteen coordinates that nothing goes with, and one that something does in every block.
+    fn processes(found: f64) -> Vec<Process> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+        let mut noise = || rng.random::<f64>() - 0.5;
+        (0..15)
+            .map(|c| {
+                let one = |_| -> [f64; BINS] {
+                    let place = |b: usize| if b < BINS / 2 { found } else { -found };
+                    std::array::from_fn(|b| noise() + if c == 3 { place(b) } else { 0.0 })
+                };
+                (0..60).map(one).collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_gap_along_one_coordinate_alone_reaches_the_level() {
+        let list = probabilities(&processes(0.2), 1);
+        assert!(list[3] < SIGNIFICANT, "{list:?}");
+        assert!(
+            list.iter().enumerate().all(|(c, p)| c == 3 || *p > 0.05),
+            "{list:?}"
+        );
+        let none = probabilities(&processes(0.0), 1);
+        assert!(none.iter().all(|p| *p > SIGNIFICANT), "{none:?}");
+    }
+
+    #[test]
+    fn the_correction_is_that_of_benjamini_and_yekutieli() {
+        // 1 + 1/2 + 1/3 + 1/4 = 25/12; each times 4 over its rank, no more than the next.
+        let got = corrected(&[0.04, 0.001, 0.03, 0.5]);
+        let wanted = [1.0 / 9.0, 1.0 / 120.0, 1.0 / 9.0, 1.0];
+        assert!(
+            got.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{got:?}"
+        );
+    }
 }

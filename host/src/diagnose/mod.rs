@@ -38,6 +38,7 @@ mod sentences;
 mod simplex;
 mod slopes;
 mod solve;
+mod stated;
 pub mod testable;
 mod transmission;
 pub mod voltage;

@@ -163,15 +163,20 @@ impl<'a> Replay<'a> {
         all.map_err(|e| e.to_string())
     }
 
-    /// How the motion was simulated, and why not from the first model on that could not be, sentences.
+    /// How the motion was simulated, and why not from the first model on that could not be, sentences. The first `described`
+    /// effects are the description's.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn told(&self, chosen: &[Profile]) -> Result<String, DiagnoseError> {
+    pub(super) fn told(
+        &self,
+        chosen: &[Profile],
+        described: usize,
+    ) -> Result<String, DiagnoseError> {
         if self.controller.is_none() {
             return Ok(self.how.clone());
         }
-        for count in 0..=chosen.len() {
+        for count in described..=chosen.len() {
             if let Err(why) = self.simulated(&self.model(&chosen[..count])?) {
                 let whose = match count.checked_sub(1).map(|k| chosen[k].candidate.kind) {
                     Some(kind) => format!("The model with {} among its effects", title_of(kind)),
@@ -211,11 +216,16 @@ impl<'a> Replay<'a> {
         Ok(self.errors_of(&self.model(chosen)?))
     }
 
-    /// Simulated positions with none and with all of `chosen`, run by run; empty where they cannot be simulated.
+    /// Simulated positions with the `described` first and with all of `chosen`, run by run; empty where they cannot be
+    /// simulated.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn drawn(&self, chosen: &[Profile]) -> Result<[Vec<Vec<f64>>; 2], DiagnoseError> {
+    pub(super) fn drawn(
+        &self,
+        chosen: &[Profile],
+        described: usize,
+    ) -> Result<[Vec<Vec<f64>>; 2], DiagnoseError> {
         if self.controller.is_none() {
             return Ok(Default::default());
         }
@@ -223,8 +233,8 @@ impl<'a> Replay<'a> {
             Ok(self.simulated(&self.model(part)?).unwrap_or_default())
         };
         Ok([
-            of(&[])?,
-            if chosen.is_empty() {
+            of(&chosen[..described])?,
+            if chosen.len() == described {
                 Vec::new()
             } else {
                 of(chosen)?
@@ -232,13 +242,18 @@ impl<'a> Replay<'a> {
         ])
     }
 
-    /// The first effect that makes the motion worse where it came in, and among all as far as these can be simulated.
+    /// The first effect beyond the `described` first that makes the motion worse where it came in, and among all as far as
+    /// these can be simulated.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn spoiling(&self, chosen: &[Profile]) -> Result<Option<usize>, DiagnoseError> {
-        let mut before = self.errors(&[])?;
-        for k in 0..chosen.len() {
+    pub(super) fn spoiling(
+        &self,
+        chosen: &[Profile],
+        described: usize,
+    ) -> Result<Option<usize>, DiagnoseError> {
+        let mut before = self.errors(&chosen[..described])?;
+        for k in described..chosen.len() {
             let after = self.errors(&chosen[..=k])?;
             let worse = |[a, b]: [&Option<Errors>; 2]| match (a, b) {
                 (Some(a), Some(b)) => Some(a.worse_than(b)),

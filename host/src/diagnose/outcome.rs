@@ -96,6 +96,38 @@ pub struct Step {
     pub why: String,
 }
 
+/// What became of an effect that the description states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fate {
+    /// It stays, its parameters fitted together with everything else.
+    FittedAgain,
+    /// It stays with the parameters that it was described with.
+    Held,
+    /// The recordings contradict it: the new description does not have it.
+    Dropped,
+    /// It counts as part of its link.
+    InTheLink,
+}
+
+/// An effect that the description states.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Described {
+    /// Its name.
+    pub effect: String,
+    /// Which of several laws under that name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<String>,
+    /// Name of the joint.
+    pub joint: String,
+    /// What became of it.
+    pub fate: Fate,
+    /// Its parameters where they were fitted again.
+    pub parameters: BTreeMap<String, Value>,
+    /// The same in words, one sentence.
+    pub text: String,
+}
+
 /// A nominal parameter that moved when the effects came in.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Absorbed {
@@ -307,7 +339,9 @@ pub struct Diagnosis {
     /// Where the gap sits, most of it first.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
-    /// What was found, in that order.
+    /// The description's own effects, in its order.
+    pub described: Vec<Described>,
+    /// What was found beside them, in that order.
     pub steps: Vec<Step>,
     /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found.
     pub gap_closed: Option<f64>,

@@ -3,9 +3,10 @@
 use rig_shared::effects::Kind;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::columns::Candidate;
 use super::finish::Found;
 use super::fit::Fit;
-use super::locate::{BINS, Coordinate, bins, locate};
+use super::locate::{BINS, Coordinate, bins, locate, velocity_of};
 use super::outcome::{Curves, Map};
 use super::profile::Profile;
 use super::rows::Rows;
@@ -22,16 +23,18 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
     let rows = found.rows;
     let joints = &found.robot.joints;
     let mut list = Vec::new();
-    for (k, profile) in found.chosen.iter().enumerate() {
+    for (k, profile) in found.found().iter().enumerate() {
         let j = profile.candidate.joint;
-        let before = with(found.base, &found.chosen[..k], None);
-        let after = with(found.base, &found.chosen[..=k], None);
-        let coordinate = telling(profile, &found.coordinates[j], &joints[j]);
+        let at = found.described + k;
+        let before = with(found.base, &found.chosen[..at], None);
+        let after = with(found.base, &found.chosen[..=at], None);
+        let coordinate = telling(profile, &found.coordinates[j], joints);
         list.extend(coordinate.map(|c| Map {
             step: Some(k),
             ..map(rows, &c, [&before, &after], j).of(&joints[j])
         }));
     }
+    let first = with(found.base, &found.chosen[..found.described], None);
     let last = with(found.base, found.chosen, None);
     for (j, joint) in joints.iter().enumerate() {
         let all = &found.coordinates[j];
@@ -46,11 +49,11 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
             found.seed,
         );
         let most = places.first().map(|p| p.coordinate.clone());
-        let coordinate = (all.iter()).find(|c| Some(c.name) == most.as_deref());
+        let coordinate = (all.iter()).find(|c| Some(&c.name) == most.as_ref());
         list.extend(coordinate.map(|c| Map {
             // Without a step its law would be the sum of all.
             law: Vec::new(),
-            ..map(rows, c, [found.base, &last], j).of(joint)
+            ..map(rows, c, [&first, &last], j).of(joint)
         }));
     }
     list
@@ -68,20 +71,21 @@ impl Map {
 }
 
 /// The coordinate over which an effect shows.
-fn telling(profile: &Profile, all: &[Coordinate], joint: &Joint) -> Option<Coordinate> {
+fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Coordinate> {
+    let Candidate { kind, joint, other } = profile.candidate;
     let wave = |order: f64| {
-        let ratio = joint.gear_ratio();
+        let ratio = joints[joint].gear_ratio();
         let position = all.iter().find(|c| c.name == "position")?;
         let turn = std::f64::consts::TAU;
         Some(Coordinate {
-            name: "motor angle within one wave",
+            name: "motor angle within one wave".to_owned(),
             unit: "rad",
             values: (position.values.iter())
                 .map(|q| (order * ratio * q).rem_euclid(turn))
                 .collect(),
         })
     };
-    let name = match profile.candidate.kind {
+    let name = match kind {
         Kind::Cogging
         | Kind::TorqueRipple
         | Kind::GearEccentricity
@@ -100,7 +104,10 @@ fn telling(profile: &Profile, all: &[Coordinate], joint: &Joint) -> Option<Coord
         Kind::LoadFriction => "torque on the gear along the motion",
         Kind::TorqueSaturation => "torque of the drive",
         Kind::MeasurementDelay => "change of the drive's torque",
-        Kind::InertiaCoupling => "velocity of another joint",
+        Kind::InertiaCoupling => {
+            let name = velocity_of(&joints[other?].name);
+            return all.iter().find(|c| c.name == name).cloned();
+        }
         Kind::Stribeck
         | Kind::AsymmetricCoulomb
         | Kind::QuadraticDrag
@@ -120,7 +127,7 @@ pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize)
         means(&place, &residual, fit.block_of_rows())
     });
     let mut map = Map {
-        coordinate: over.name.to_owned(),
+        coordinate: over.name.clone(),
         unit: over.unit.to_owned(),
         ..Map::default()
     };
@@ -168,7 +175,7 @@ fn means(place: &[Option<usize>], residual: &[f64], block: &[usize]) -> Vec<Opti
 /// For each joint with an effect (else the one that leaves the most over its floor) the stretch of a recording where the
 /// effects change the prediction most.
 pub(super) fn curves(found: &Found) -> Vec<Curves> {
-    let mut joints: Vec<usize> = found.chosen.iter().map(|p| p.candidate.joint).collect();
+    let mut joints: Vec<usize> = found.found().iter().map(|p| p.candidate.joint).collect();
     joints.sort_unstable();
     joints.dedup();
     if joints.is_empty() {
@@ -191,7 +198,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let weight = |k: usize| {
         if !keep[k] {
             0.0
-        } else if found.chosen.is_empty() {
+        } else if found.found().is_empty() {
             without[k].powi(2)
         } else {
             (without[k] - with[k]).powi(2)
@@ -255,7 +262,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
         torque: [
             measured.clone(),
             predicted(without),
-            if found.chosen.is_empty() {
+            if found.found().is_empty() {
                 Vec::new()
             } else {
                 predicted(with)

@@ -16,12 +16,14 @@ use super::outcome::{Absorbed, Value};
 use super::profile::Profile;
 use super::rows::{Column, Rows, combined};
 use super::search::with;
-use super::solve::{Solution, solve};
+use super::solve::{Solution, jackknifed, solve};
 
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
 const DIFFERENCE: f64 = 0.01;
 /// Relative uncertainty of what a description states, as in an identification of several joints.
 const RIGHT_TO: f64 = 2.0;
+/// What gravity's direction of a single link stands for, as a result names it.
+const GRAVITY: &str = "m*g*l (gravity's largest torque)";
 /// Share of the description's variance from which on data have added hardly anything.
 const HARDLY_BETTER: f64 = 0.5;
 
@@ -79,7 +81,10 @@ impl<'r> Refit<'r> {
         })
     }
 
-    /// Nominal parameters, gains and shapes together.
+    /// Nominal parameters, gains and shapes together; `pairs` are runs that repeat each other.
+    ///
+    /// Uncertain by what the last model leaves: its memory, not that of what the effects have taken away, and what repeats
+    /// with the motion counts once.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -87,10 +92,15 @@ impl<'r> Refit<'r> {
         &self,
         source: &Source,
         chosen: &[Profile],
+        pairs: &[(usize, usize)],
     ) -> Result<Joint, DiagnoseError> {
-        let solution = self.solution(chosen)?;
-        let mut stds = vec![[0.0; SHAPES]; chosen.len()];
         let mut beside = with(&self.base, chosen, None);
+        let residuals: Vec<Vec<f64>> = (0..self.joints).map(|j| beside.residual(j)).collect();
+        let plain = (self.plain).clustered(floor::memory(self.plain.rows(), &residuals), pairs);
+        let failed =
+            || DiagnoseError::Model("its parameters with the effects are not all excited.".into());
+        let solution = jackknifed(&plain, &self.columns(chosen), &[]).ok_or_else(failed)?;
+        let mut stds = vec![[0.0; SHAPES]; chosen.len()];
         let mut slopes = Vec::new();
         let mut places = Vec::new();
         let mut at = self.free.len();
@@ -110,7 +120,7 @@ impl<'r> Refit<'r> {
                 }
             }
         }
-        let Some(linearised) = solve(&self.plain, &self.columns(chosen), &slopes) else {
+        let Some(linearised) = jackknifed(&plain, &self.columns(chosen), &slopes) else {
             return Ok(Joint { solution, stds });
         };
         for (s, (k, place)) in places.into_iter().enumerate() {
@@ -139,21 +149,29 @@ impl<'r> Refit<'r> {
     }
 
     /// What moved among the nominal parameters when the effects came in, the surest first.
-    pub(super) fn absorbed(&self, bench: &Bench, after: &Solution) -> Vec<Absorbed> {
+    /// `before` are the coefficients without them.
+    pub(super) fn absorbed(
+        &self,
+        bench: &Bench,
+        before: &Solution,
+        after: &Solution,
+    ) -> Vec<Absorbed> {
         let base = &bench.nominal.base;
         let mut list: Vec<Absorbed> = (bench.anchor.free.iter().enumerate())
-            .filter_map(|(k, direction)| {
-                let [(b, _)] = direction.as_slice() else {
-                    return None;
+            .map(|(k, direction)| {
+                let (parameter, unit, scale) = match direction.as_slice() {
+                    [(b, _)] => (base.expression(*b), base.unit(*b).to_owned(), 1.0),
+                    // The one direction of several parameters is that of gravity, along the first moment as described.
+                    _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
                 };
-                let (before, now) = (self.before.values[k], after.values[k]);
-                Some(Absorbed {
-                    parameter: base.expression(*b),
-                    unit: base.unit(*b).to_owned(),
+                let (before, now) = (scale * before.values[k], scale * after.values[k]);
+                Absorbed {
+                    parameter,
+                    unit,
                     before,
                     after: now,
-                    sigmas: (now - before).abs() / after.std(k).max(f64::MIN_POSITIVE),
-                })
+                    sigmas: (now - before).abs() / (scale * after.std(k)).max(f64::MIN_POSITIVE),
+                }
             })
             .collect();
         list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
@@ -297,3 +315,6 @@ impl Joint {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -187,6 +187,13 @@ impl Nominal {
         vec![first.into(), second.into()]
     }
 
+    /// Gravity across the first joint's axis, m/s²: its torque per kg·m of first moment where that pulls most.
+    pub(super) fn pull(&self) -> f64 {
+        let alpha = self.robot.joints.first().map_or(0.0, |joint| joint.alpha);
+        let axis = Vector3::new(0.0, -alpha.sin(), alpha.cos());
+        axis.cross(&Vector3::from(self.robot.gravity)).norm()
+    }
+
     /// Whether a base parameter is Coulomb friction.
     pub(super) fn is_coulomb(&self, k: usize) -> bool {
         self.place(k).is_ok_and(|c| c == column::COULOMB)

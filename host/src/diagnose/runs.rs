@@ -9,7 +9,8 @@ use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 pub struct JointRun {
     /// Position as recorded, rad or m.
     pub q_raw: Vec<f64>,
-    /// Torque as recorded, joint-side, N·m or N; empty where there is none.
+    /// Torque as recorded, joint-side, N·m or N, less that of effects that the recording was freed of; empty where there is
+    /// none.
     pub tau: Vec<f64>,
     /// Filtered position.
     pub q: Vec<f64>,
@@ -159,7 +160,12 @@ fn append(run: &mut Run, block: Block) {
     run.t.extend(block.t);
     for (to, from) in run.joints.iter_mut().zip(block.joints) {
         to.q_raw.extend(from.q);
-        to.tau.extend(from.tau);
+        match from.effects {
+            Some(known) => {
+                (to.tau).extend(from.tau.iter().zip(known).map(|(all, held)| all - held))
+            }
+            None => to.tau.extend(from.tau),
+        }
         join(&mut to.measured_velocity, from.qd, before);
         join(&mut to.reference, from.reference, before);
         join(&mut to.voltage, from.voltage, before);

@@ -4,17 +4,21 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rig_shared::effects::{Kind, SHAPES};
+use rig_shared::effects::SHAPES;
 
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::Fit;
-use super::profile::{LEAST_GAIN, LEAST_SIGMAS, Profile, grid};
+use super::judge::equal;
+use super::profile::{LEAST_GAIN, Profile, grid};
 use super::rows::Column;
 use super::runs::resolution;
+use crate::robot::Placed;
 
+mod begin;
 mod kinds;
 mod shadow;
+mod simplest;
 
 use kinds::depends_on_model;
 pub(super) use kinds::{is_first_law, is_gear, rivals};
@@ -23,7 +27,7 @@ pub(super) use shadow::shadow;
 
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
-/// Most effects.
+/// Most effects beside those of the description.
 const MOST_EFFECTS: usize = 6;
 
 /// The search over a library.
@@ -32,6 +36,8 @@ pub(super) struct Search<'a> {
     pub(super) source: Source<'a>,
     /// Candidates.
     pub(super) library: Vec<Candidate>,
+    /// What the description states of them: the search begins with it.
+    pub(super) described: Vec<Placed>,
     /// Threads.
     pub(super) threads: usize,
     /// Joint by joint.
@@ -41,13 +47,19 @@ pub(super) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// A search.
-    pub(super) fn new(source: Source<'a>, library: Vec<Candidate>, threads: usize) -> Self {
+    pub(super) fn new(
+        source: Source<'a>,
+        library: Vec<Candidate>,
+        described: Vec<Placed>,
+        threads: usize,
+    ) -> Self {
         Self {
             resolution: (0..source.nominal.joints())
                 .map(|joint| resolution(source.runs, joint))
                 .collect(),
             source,
             library,
+            described,
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -141,8 +153,9 @@ impl<'a> Search<'a> {
             .sum()
     }
 
-    /// Finds effects one by one. `base` holds the nominal columns; `told` hears of every sweep and of the number of effects
-    /// in the model at that time; `renew` gives what columns are formed from once they are in.
+    /// Finds effects one by one, after those of the description, which stand first. `base` holds the nominal columns; `told`
+    /// hears of every sweep and of the number of effects found by then; `renew` gives what columns are formed from once they
+    /// are in.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -153,15 +166,17 @@ impl<'a> Search<'a> {
         told: &mut dyn FnMut(usize, &[Profile]),
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let trials = self.trials();
-        let mut chosen: Vec<Profile> = Vec::new();
+        let mut chosen = self.begun(base, renew)?;
+        let most = chosen.len() + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();
-        while chosen.len() < MOST_EFFECTS {
+        while chosen.len() < most {
             let fit = with(base, &chosen, None);
             let present = chosen.iter().map(|p| p.candidate);
             let without: Vec<Candidate> = present.chain(impossible.iter().copied()).collect();
             let profiles = self.sweep(&fit, &without)?;
-            told(chosen.len(), &profiles);
-            let Some(best) = first_to_take(&profiles, trials) else {
+            let found = |p: &&Profile| !self.is_described(&p.candidate);
+            told(chosen.iter().filter(found).count(), &profiles);
+            let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
                 break;
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
@@ -181,11 +196,20 @@ impl<'a> Search<'a> {
                 self.refine_all(base, &mut chosen)?;
             }
             chosen.retain(|profile| profile.vanished.is_none());
+            let place = chosen.iter().position(|p| p.candidate == newcomer);
+            if let Some(i) = place
+                && let Some(smaller) = self.smaller(base, &chosen, i, &profiles, trials)?
+            {
+                chosen[i] = smaller;
+                self.refine_all(base, &mut chosen)?;
+                chosen.retain(|profile| profile.vanished.is_none());
+            }
             if same(&before, &chosen) {
                 break;
             }
         }
         self.other_laws(base, &mut chosen)?;
+        chosen.sort_by_key(|profile| !self.is_described(&profile.candidate));
         Ok(chosen)
     }
 
@@ -262,7 +286,7 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 if let Some(rival) = self.profile(&fit, c, None)?
-                    && rival.evidence.joint_gain > chosen[i].evidence.joint_gain + LEAST_GAIN
+                    && rival.evidence.beyond(&chosen[i].evidence) > LEAST_GAIN
                 {
                     chosen[i] = rival;
                 }
@@ -280,26 +304,11 @@ impl<'a> Search<'a> {
         trials: usize,
         impossible: &[Candidate],
     ) -> Result<Vec<Candidate>, DiagnoseError> {
-        let mut vanished = Vec::new();
         for _ in 0..2 {
             self.refine_all(base, chosen)?;
         }
         // Stand-ins go once the true effect is in.
-        let mut i = 0;
-        while i < chosen.len() {
-            let e = &chosen[i].evidence;
-            let weak =
-                e.p_value > STAYS || e.joint_gain < LEAST_GAIN || e.gain_sigmas < LEAST_SIGMAS;
-            let beside_others = chosen.len() > 1 && (weak || in_the_shadow(chosen, i));
-            if beside_others || chosen[i].vanished.is_some() {
-                let gone = chosen.remove(i);
-                vanished.extend(gone.vanished.map(|_| gone.candidate));
-                self.refine_all(base, chosen)?;
-                i = 0;
-            } else {
-                i += 1;
-            }
-        }
+        let vanished = self.standing(base, chosen)?;
         // Something else in the place of an effect that was taken before the last.
         if chosen.len() > 1 {
             for i in 0..chosen.len() - 1 {
@@ -316,6 +325,8 @@ impl<'a> Search<'a> {
                 if let Some(rival) = rival
                     && rival.candidate != chosen[i].candidate
                     && rival.evidence.gain > chosen[i].evidence.gain
+                    // A name that a description gave goes for a better one, not for another that does as well.
+                    && !(self.is_described(&chosen[i].candidate) && equal(&chosen[i], &rival))
                 {
                     chosen[i] = rival;
                     self.refine_all(base, chosen)?;
@@ -359,23 +370,6 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The best that passes; of two transmissions the one without play unless play takes away clearly more.
-fn first_to_take(profiles: &[Profile], trials: usize) -> Option<Profile> {
-    let mut passing = profiles.iter().filter(|p| p.refused(trials).is_none());
-    let best = passing.next()?;
-    if best.candidate.kind == Kind::Backlash {
-        let simpler = passing.find(|p| {
-            p.candidate.kind == Kind::JointElasticity && p.candidate.joint == best.candidate.joint
-        });
-        if let Some(simpler) = simpler
-            && simpler.evidence.joint_gain + LEAST_GAIN > best.evidence.joint_gain
-        {
-            return Some(simpler.clone());
-        }
-    }
-    Some(best.clone())
-}
-
 fn same(a: &[Profile], b: &[Profile]) -> bool {
     a.len() == b.len()
         && a.iter()
@@ -395,3 +389,6 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
     }
     fit
 }
+
+#[cfg(test)]
+mod tests;

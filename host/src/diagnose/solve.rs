@@ -24,6 +24,27 @@ impl Solution {
 /// Fits `columns` to the torque; `slopes` are derivatives with respect to parameters that do not enter linearly: they take
 /// part in the covariance alone, behind the columns. None where the columns are not independent.
 pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
+    solved(columns, slopes, plain, &|all, inverse, rest| {
+        Some(plain.sandwich(all, inverse, rest))
+    })
+}
+
+/// [`solve`] with the covariance of the jackknife over the blocks of `plain`.
+pub(super) fn jackknifed(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
+    solved(columns, slopes, plain, &|all, _, rest| {
+        plain.jackknife(all, rest)
+    })
+}
+
+/// Covariance from weighted columns, the inverse of their inner products, and what they leave.
+type Covariance<'f> = dyn Fn(&[Vec<f64>], &DMatrix<f64>, &[f64]) -> Option<DMatrix<f64>> + 'f;
+
+fn solved(
+    columns: &[&Column],
+    slopes: &[Column],
+    plain: &Fit,
+    covariance: &Covariance,
+) -> Option<Solution> {
     let weighted: Vec<Vec<f64>> = columns.iter().map(|c| plain.weighted(c)).collect();
     let torque = plain.left();
     let (values, inverse) = normal(&weighted, torque)?;
@@ -34,13 +55,13 @@ pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Opti
         }
     }
     if slopes.is_empty() {
-        let covariance = plain.sandwich(&weighted, &inverse, &rest);
+        let covariance = covariance(&weighted, &inverse, &rest)?;
         return Some(Solution { values, covariance });
     }
     let mut all = weighted;
     all.extend(slopes.iter().map(|c| plain.weighted(c)));
     let (_, inverse) = normal(&all, torque)?;
-    let covariance = plain.sandwich(&all, &inverse, &rest);
+    let covariance = covariance(&all, &inverse, &rest)?;
     Some(Solution { values, covariance })
 }
 

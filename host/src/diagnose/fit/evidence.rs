@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::{Beside, Fit, axpy, dot};
 
 /// What candidates' columns would do.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::diagnose) struct Evidence {
     /// Coefficients of the columns.
     pub(in crate::diagnose) gains: Vec<f64>,
@@ -30,6 +30,11 @@ impl Evidence {
     /// p-value corrected for `tried` trials (Bonferroni).
     pub(in crate::diagnose) fn corrected(&self, tried: usize) -> f64 {
         (self.p_value * tried as f64).min(1.0)
+    }
+
+    /// Share of the RMS that `simpler` leaves, which this takes away besides, in the joint that gains most.
+    pub(in crate::diagnose) fn beyond(&self, simpler: &Self) -> f64 {
+        1.0 - (1.0 - self.joint_gain) / (1.0 - simpler.joint_gain).max(f64::MIN_POSITIVE)
     }
 
     /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
@@ -107,5 +112,21 @@ impl Fit<'_> {
             p_value,
             block_errors,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gain_beside_another_counts_by_what_that_one_leaves() {
+        let of = |joint_gain| Evidence {
+            joint_gain,
+            ..Evidence::default()
+        };
+        // Of ten per cent that are left, one more is a tenth; of ninety it is hardly anything.
+        assert!((of(0.91).beyond(&of(0.90)) - 0.1).abs() < 1e-12);
+        assert!((of(0.11).beyond(&of(0.10)) - 1.0 / 90.0).abs() < 1e-12);
     }
 }

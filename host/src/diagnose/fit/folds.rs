@@ -131,7 +131,7 @@ impl Fit<'_> {
     }
 
     /// Ranges of the weighted rows that lie in one fold, with it.
-    fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(Range<usize>, usize)> {
+    pub(super) fn stretches(&self, fold_of: &dyn Fn(usize) -> usize) -> Vec<(Range<usize>, usize)> {
         let n = self.rows.count;
         let mut list: Vec<(Range<usize>, usize)> = Vec::new();
         for j in 0..self.rows.joints() {

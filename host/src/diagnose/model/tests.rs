@@ -92,6 +92,11 @@ fn a_tilted_base_is_gravity_turned() {
     };
     let angle = turned(model.gravity, made.robot.gravity);
     assert!((angle - 0.08).abs() < 0.01, "{angle}");
+    let pull = (diagnosis.absorbed.iter()).find(|a| a.parameter.starts_with("m*g*l"));
+    let pull = pull.unwrap();
+    assert_eq!(pull.unit, "N*m");
+    let truth = made.truth.nominal["gravity"];
+    assert!((pull.after / truth - 1.0).abs() < 0.03, "{pull:?} {truth}");
     let [_, after] = diagnosis.steps[0].train_rms;
     let own = left(&model, &made);
     assert!((own / after - 1.0).abs() < 0.05, "{own} {after}");

@@ -6,8 +6,10 @@ use super::plant::{NAMES, NOMINAL, Plant};
 use super::search::{Model, Trial, on_the_voltage};
 use crate::diagnose::judge::closed;
 use crate::diagnose::outcome::{
-    Absorbed, Curves, Diagnosis, Remainder, Residual, Step, Tried, Value, Verdict, Waterfall,
+    Absorbed, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value, Verdict,
+    Waterfall,
 };
+use crate::diagnose::stated::{Now, Stated};
 use crate::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
 use rig_shared::effects::Effect;
 
@@ -18,7 +20,8 @@ const EQUAL: f64 = 0.03;
 
 /// Everything that was found.
 pub(super) struct Told<'a> {
-    pub robot: &'a Robot,
+    /// The description, and what became of its effects.
+    pub stated: &'a Stated,
     /// To draw.
     pub curves: Vec<Curves>,
     /// rad or m
@@ -39,12 +42,34 @@ pub(super) struct Told<'a> {
 
 impl Told<'_> {
     fn joint(&self) -> String {
-        self.robot.joints[0].name.clone()
+        self.stated.robot.joints[0].name.clone()
+    }
+
+    /// How many effects every model has: those of the description.
+    fn described(&self) -> usize {
+        self.models.first().map_or(0, |model| model.effects.len())
+    }
+
+    /// What the description's effects are in the last model.
+    fn told(&self) -> Vec<Described> {
+        let last = self.models.len() - 1;
+        let effects = &self.models[last].effects[..self.described()];
+        // Of several under one name in their order.
+        let mut next = vec![true; effects.len()];
+        let now = self.stated.fitted().map(|kind| {
+            let place = (0..effects.len()).find(|k| next[*k] && Some(effects[*k]) == kind)?;
+            next[place] = false;
+            Some(Now {
+                kind: effects[place],
+                parameters: self.parameters(last, place),
+            })
+        });
+        self.stated.told(now.collect())
     }
 
     /// A position error as printed.
     fn thousandths(&self, error: f64) -> String {
-        let unit = self.robot.joints[0].kind.units().0;
+        let unit = self.stated.robot.joints[0].kind.units().0;
         format!("{:.2} m{unit}", 1e3 * error)
     }
 
@@ -96,6 +121,8 @@ impl Told<'_> {
         if !last.is_finite() {
             words.push("With the effects the recordings held back cannot be simulated: they ask more of the drive than the effects were fitted to. Give a recording of such voltages to learn from.".into());
         }
+        let described = self.told();
+        words.extend(described.iter().map(|d| d.text.clone()));
         let remainder = left.then(|| Remainder {
             joint: self.joint(),
             rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),
@@ -109,7 +136,7 @@ impl Told<'_> {
         });
         Diagnosis {
             schema: "rig-diagnosis/1".into(),
-            robot: self.robot.name.clone(),
+            robot: self.stated.robot.name.clone(),
             verdict,
             residual: Residual::Position,
             words,
@@ -122,6 +149,7 @@ impl Told<'_> {
             torque_lead: Vec::new(),
             places: Vec::new(),
             gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
+            described,
             steps,
             absorbed: self.absorbed(),
             not_testable: Vec::new(),
@@ -131,9 +159,9 @@ impl Told<'_> {
             data_faults: Vec::new(),
             waterfall: vec![Waterfall {
                 joint: self.joint(),
-                unit: self.robot.joints[0].kind.units().0.into(),
+                unit: self.stated.robot.joints[0].kind.units().0.into(),
                 models: std::iter::once("refitted".to_owned())
-                    .chain(self.models.last().into_iter().flat_map(|m| m.effects.iter().map(|k| title_of(*k))))
+                    .chain(self.models.last().into_iter().flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k))))
                     .collect(),
                 train: self.train.clone(),
                 holdout: self.holdout.clone(),
@@ -147,7 +175,8 @@ impl Told<'_> {
 
     fn step(&self, k: usize) -> Step {
         let model = &self.models[k];
-        let kind = model.effects[k - 1];
+        let place = self.described() + k - 1;
+        let kind = model.effects[place];
         let round = &self.rounds[k - 1];
         let own = round.iter().find(|t| t.kind == kind);
         let best = own.and_then(|t| t.unseen).unwrap_or(self.train[k]);
@@ -174,12 +203,12 @@ impl Told<'_> {
             law: kind.about().law.map(str::to_owned),
             joint: self.joint(),
             set,
-            parameters: self.parameters(last, k - 1),
+            parameters: self.parameters(last, place),
             p_value: own.map_or(1.0, |t| t.p_value),
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
-            rms_unit: self.robot.joints[0].kind.units().0.to_owned(),
+            rms_unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
             train_rms: pair(&self.train),
             holdout_rms: holdout,
             motion_rms: Some(judged),
@@ -251,7 +280,8 @@ impl Told<'_> {
 
     /// The description with what was found.
     pub(super) fn robot(&self, plant: &Plant) -> Robot {
-        let mut robot = self.robot.clone();
+        let mut robot = self.stated.robot.clone();
+        robot.effects = self.stated.undriven();
         // What its values were identified from before says nothing about the new ones.
         robot.identified = None;
         let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {

@@ -32,6 +32,7 @@ use self::plant::Plant;
 use self::search::{Model, Search, library};
 use super::fault::faulty;
 use super::outcome::{Curves, Diagnosis};
+use super::stated::Stated;
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::robot::{JointKind, Robot};
@@ -59,7 +60,8 @@ pub fn diagnose_voltage(
     if training.is_empty() {
         return Err(DiagnoseError::NoRecording);
     }
-    let plant = plant(robot)?;
+    let mut stated = Stated::of(robot);
+    let plant = plant(&stated.robot)?;
     let train = logs(training)?;
     let sealed = logs(holdout)?;
     let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &sealed])?;
@@ -73,9 +75,15 @@ pub fn diagnose_voltage(
         threads: crate::prepare::threads(options.threads),
     };
     let bench = search(&train);
+    let parts = stated.driven(&bench.library);
     let nominal = bench.nominal().ok_or_else(|| {
         DiagnoseError::Model(
             "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion.".into(),
+        )
+    })?;
+    let nominal = bench.with_described(nominal, &parts, &stated.robot).ok_or_else(|| {
+        DiagnoseError::Model(
+            "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables.".into(),
         )
     })?;
     progress(0.2);
@@ -112,7 +120,7 @@ pub fn diagnose_voltage(
     let drawn = if sealed.is_empty() { &bench } else { &judge };
     let found = Told {
         curves: curves(&robot.joints[0].name, drawn, &models),
-        robot,
+        stated: &stated,
         floor: floor(&train),
         train: models.iter().map(|m| bench.freely(m)).collect(),
         holdout,

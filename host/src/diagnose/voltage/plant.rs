@@ -10,6 +10,7 @@
 use rig_shared::effects::{Channel, Direction, GAINS, Instant, Kind, MEMORY, SHAPES};
 
 use super::log::{Log, Segment};
+use crate::robot::Robot;
 
 /// Longest step, s.
 const STEP: f64 = 1.0e-3;
@@ -87,6 +88,22 @@ impl Part {
 }
 
 impl Plant {
+    /// The nominal parameters of a description, where it states all of them.
+    pub(super) fn described(&self, robot: &Robot) -> Option<[f64; NOMINAL]> {
+        let joint = robot.joints.first()?;
+        let (drive, friction) = (joint.drive.as_ref()?, joint.friction.as_ref()?);
+        let emf = drive.torque_constant * self.ratio.abs();
+        let gain = emf / drive.resistance?;
+        (gain.is_finite() && gain > 0.0).then_some([
+            drive.joint_inertia + self.ratio * self.ratio * drive.rotor_inertia,
+            gain,
+            emf,
+            friction.coulomb,
+            friction.viscous,
+            friction.offset,
+        ])
+    }
+
     /// Torque against gravity, N·m or N.
     pub(super) fn weight(&self, q: f64) -> f64 {
         wave(&self.gravity, q)

@@ -1,13 +1,14 @@
 //! Which effects a voltage-driven joint lacks: one at a time, by what the free-running motion of recordings not fitted to
 //! gains.
 
-use rig_shared::effects::{Channel, Kind, Parameter, Scale};
+use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
 
 use super::LONGEST;
 use super::fit::{Problem, WINDOW, segments, start};
 use super::log::{Log, Segment};
 use super::plant::{NOMINAL, Plant};
 use crate::prepare::each_of;
+use crate::robot::Robot;
 
 /// Folds of the cross-validation at most.
 const FOLDS: usize = 4;
@@ -166,6 +167,53 @@ impl Search<'_> {
             );
         });
         starts.into_iter().reduce(|a, b| self.better(a, b))
+    }
+
+    /// `nominal` with the effects of a description, those that are marked fitted again; none where that cannot be simulated.
+    pub(super) fn with_described(
+        &self,
+        nominal: Model,
+        parts: &[(Effect<f64>, bool)],
+        robot: &Robot,
+    ) -> Option<Model> {
+        if parts.is_empty() {
+            return Some(nominal);
+        }
+        let mut model = nominal;
+        for (effect, fitted) in parts {
+            let about = effect.kind.about();
+            let from = model.theta.len();
+            model.effects.push(effect.kind);
+            for (gain, value) in about.gains.iter().zip(effect.gains) {
+                model.theta.push(value);
+                model.bounds.push(gain.bounds);
+            }
+            for (shape, value) in about.shapes.iter().zip(effect.shapes) {
+                let [low, high] = shape.range;
+                model.theta.push(value);
+                // What is described stands, however far from what rigs have.
+                model
+                    .bounds
+                    .push([value.min(0.1 * low), value.max(10.0 * high)]);
+            }
+            if *fitted {
+                model.free.extend(from..model.theta.len());
+            }
+        }
+        // The nominal values may have been bent by what was not in the model: those of the description are tried as well.
+        let mut starts = vec![model.clone()];
+        if let Some(own) = self.plant.described(robot) {
+            model.theta[..NOMINAL].copy_from_slice(&own);
+            starts.push(model);
+        }
+        let fitted = starts.into_iter().map(|start| {
+            let near = self.fitted(&start, segments(self.logs, |_| true, WINDOW));
+            self.better(
+                self.fitted(&start, self.blocks()),
+                self.fitted(&near, self.blocks()),
+            )
+        });
+        (fitted.reduce(|a, b| self.better(a, b))).filter(|model| self.rms(model).is_finite())
     }
 
     fn better(&self, a: Model, b: Model) -> Model {

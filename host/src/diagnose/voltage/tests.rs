@@ -1,8 +1,11 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 use std::path::Path;
 
+use rig_shared::effects::Kind;
+
 use super::*;
 use crate::data::{Block, JointColumns};
+use crate::diagnose::outcome::Fate;
 use crate::prepare::InMemory;
 use crate::robot::XL330;
 
@@ -78,6 +81,34 @@ fn a_load_friction_under_voltage_is_found() {
     assert_eq!(names.first(), Some(&"load_friction"));
     let coefficient = found.steps[0].parameters["coefficient"].value;
     assert!((coefficient - 0.25).abs() < 0.05, "{coefficient}");
+}
+
+#[test]
+fn an_effect_of_the_description_is_fitted_again_and_stands_once() {
+    let runs: Vec<InMemory> = (0..10).map(|k| pendulum(k, 0.25)).collect();
+    let (_, model) = found(&list(&runs[..4]), &list(&runs[4..6]));
+    let count = |robot: &Robot| {
+        let of = |e: &&crate::robot::RobotEffect| e.effect.kind == Kind::LoadFriction;
+        robot.effects.iter().filter(of).count()
+    };
+    assert_eq!(count(&model), 1);
+    let (again, next) = diagnose_voltage(
+        &model,
+        &list(&runs[6..9]),
+        &list(&runs[9..]),
+        &Options::default(),
+        &mut |_| (),
+    )
+    .unwrap();
+    println!("{:?} {:?}", again.described, again.waterfall);
+    assert_eq!(count(&next), 1);
+    assert!(again.steps.iter().all(|s| s.effect != "load_friction"));
+    let own = (again.described.iter()).find(|d| d.effect == "load_friction");
+    let own = own.unwrap();
+    assert_eq!(own.fate, Fate::FittedAgain);
+    let coefficient = own.parameters["coefficient"].value;
+    assert!((coefficient - 0.25).abs() < 0.05, "{coefficient}");
+    assert!(again.words.contains(&own.text));
 }
 
 #[test]

@@ -122,8 +122,8 @@ impl Equation {
 
     /// What the voltage may depend on; the current stands at [`ACROSS`].
     pub(super) fn coordinates(&self) -> Vec<Coordinate> {
-        let of = |name, unit, values: &[f64]| Coordinate {
-            name,
+        let of = |name: &str, unit, values: &[f64]| Coordinate {
+            name: name.to_owned(),
             unit,
             values: values.to_vec(),
         };

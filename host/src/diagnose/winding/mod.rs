@@ -24,11 +24,11 @@ use super::floor;
 use super::judge::closed;
 use super::limits::smallest;
 use super::locate::locate;
-use super::outcome::{Absorbed, Detectable, Diagnosis, Map, Place, Step, Tried, Value};
+use super::outcome::{Absorbed, Detectable, Diagnosis, Fate, Map, Place, Step, Tried, Value};
 use super::pictures::map;
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Column;
-use super::solve::{Solution, solve};
+use super::solve::{Solution, jackknifed, solve};
 use super::{DiagnoseError, Options};
 use crate::report::{format_significant, format_value};
 use crate::robot::{Robot, RobotEffect};
@@ -61,6 +61,8 @@ pub(super) struct Winding {
 }
 
 struct DeadZone {
+    /// Whether the description states it.
+    described: bool,
     volts: f64,
     step: Step,
     places: Vec<Place>,
@@ -87,14 +89,7 @@ pub(super) fn windings(
             Some(sealed) => Equation::of(bench.robot, joint, sealed)?,
             None => None,
         };
-        match winding(
-            bench.robot,
-            joint,
-            loaded,
-            &training,
-            held.as_ref(),
-            options,
-        ) {
+        match winding(bench, joint, loaded, &training, held.as_ref(), options) {
             Ok(winding) => found.push(winding),
             Err(why) => silent.push(format!(
                 "Nothing is concluded from the motor voltage of joint {}: {why}.",
@@ -106,7 +101,7 @@ pub(super) fn windings(
 }
 
 fn winding(
-    robot: &Robot,
+    bench: &Bench,
     joint: usize,
     loaded: &Loaded,
     training: &Equation,
@@ -137,6 +132,7 @@ fn winding(
             return Err(format!("by it the {name} would not be positive"));
         }
     }
+    let robot = bench.robot;
     let own = &robot.joints[joint];
     let candidate = Candidate {
         kind: Kind::DriveDeadzone,
@@ -177,14 +173,18 @@ fn winding(
     };
     let all: Vec<_> = columns.iter().copied().chain(dead(fade)).collect();
     let stands = refused.is_none();
-    let after = match stands {
-        true => solve(&plain, &all, &training.fading(fade)).ok_or_else(lacking)?,
-        false => before.clone(),
-    };
     let mut last = base.clone();
     if stands {
         last.push(&training.dead_zones[fade]);
     }
+    let pairs = floor::repeats(&loaded.runs);
+    let after = match stands {
+        true => {
+            let plain = plain.clustered(floor::memory(rows, &[last.residual(0)]), &pairs);
+            jackknifed(&plain, &all, &training.fading(fade)).ok_or_else(lacking)?
+        }
+        false => before.clone(),
+    };
     let detectable = (!stands)
         .then(|| base.distinct(dead(fade))?.first().cloned())
         .flatten()
@@ -197,7 +197,6 @@ fn winding(
             unit: about.gains[0].unit.to_owned(),
         });
     let dead_zone = profile.filter(|_| stands).map(|profile| {
-        let pairs = floor::repeats(&loaded.runs);
         let floor =
             floor::from_repeats(rows, &pairs, &last.residual(0), 0).unwrap_or_else(|| last.rms(0));
         let unseen = held.map(|held| {
@@ -219,6 +218,7 @@ fn winding(
         let at = before.values.len();
         let volts = after.values[at];
         DeadZone {
+            described: bench.stated.holds(Kind::DriveDeadzone, joint),
             volts,
             step: Step {
                 effect: about.name.to_owned(),
@@ -371,9 +371,10 @@ fn differs(seen: f64, std: f64, stated: f64, least: f64) -> bool {
     off > least * stated.abs() && off > SURE * std
 }
 
-/// Whether the voltages name something.
+/// Whether the voltages name something that the description does not state.
 pub(super) fn name_something(windings: &[Winding]) -> bool {
-    windings.iter().any(|w| w.dead_zone.is_some())
+    let found = |w: &Winding| w.dead_zone.as_ref().is_some_and(|dead| !dead.described);
+    windings.iter().any(found)
 }
 
 /// Whether they contradict the description's values.
@@ -403,25 +404,45 @@ pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mu
                 format_significant(before, 3),
                 format_significant(after, 3)
             ));
-            diagnosis.places.extend(dead.places);
-            diagnosis.places.sort_by(|a, b| b.share.total_cmp(&a.share));
-            diagnosis.absorbed.extend(dead.absorbed);
-            diagnosis
-                .absorbed
-                .sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
-            diagnosis.maps.push(Map {
-                step: Some(diagnosis.steps.len()),
-                ..dead.map
-            });
-            if diagnosis.steps.is_empty() {
-                diagnosis.gap_closed = Some(dead.step.gap_closed);
-            }
-            diagnosis.steps.push(dead.step);
+            let name = &model.joints[winding.joint].name;
+            // What the description states of it is not held any more.
+            let placed = model.placed_effects();
+            let mut stated = placed
+                .iter()
+                .map(|p| p.joint == winding.joint && p.effect.kind == Kind::DriveDeadzone);
+            model.effects.retain(|_| stated.next() != Some(true));
             model.effects.push(RobotEffect {
-                joint: Some(model.joints[winding.joint].name.clone()),
+                joint: Some(name.clone()),
                 other: None,
                 effect: Effect::new(Kind::DriveDeadzone, &[dead.volts], &[]),
             });
+            let known = diagnosis
+                .described
+                .iter_mut()
+                .find(|d| d.joint == *name && d.effect == dead.step.effect);
+            if let Some(known) = known {
+                known.fate = Fate::FittedAgain;
+                known.parameters = dead.step.parameters;
+                known.text = format!(
+                    "The description's {} of joint {name} stays, fitted again to the motor's voltage.",
+                    known.effect
+                );
+            } else {
+                diagnosis.places.extend(dead.places);
+                diagnosis.places.sort_by(|a, b| b.share.total_cmp(&a.share));
+                diagnosis.absorbed.extend(dead.absorbed);
+                diagnosis
+                    .absorbed
+                    .sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+                diagnosis.maps.push(Map {
+                    step: Some(diagnosis.steps.len()),
+                    ..dead.map
+                });
+                if diagnosis.steps.is_empty() {
+                    diagnosis.gap_closed = Some(dead.step.gap_closed);
+                }
+                diagnosis.steps.push(dead.step);
+            }
         }
         diagnosis.words.extend(winding.constant);
         diagnosis.words.extend(winding.remarks);

@@ -1,0 +1,94 @@
+//! The steps of a result: what each effect is worth, which other names it may have.
+
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::change::Change;
+use crate::diagnose::descent::Descent;
+use crate::diagnose::judge::{Judged, closed, rank};
+use crate::diagnose::outcome::{Step, Tried};
+use crate::diagnose::profile::Profile;
+use crate::diagnose::refit::{Joint, Refit};
+use crate::diagnose::search::Search;
+use crate::robot::{Robot, title_of};
+
+/// One step an effect that the description does not state, with the names that may stand in its place.
+pub(super) fn steps(
+    search: &Search,
+    refit: &Refit,
+    judged: &Judged,
+    described: usize,
+    joint: &Joint,
+    descent: &Descent,
+    motion: &[Option<f64>],
+) -> Result<Vec<Step>, DiagnoseError> {
+    let Judged { chosen, floors, .. } = judged;
+    let trials = search.trials();
+    let source = &search.source;
+    let mut steps = Vec::new();
+    for (k, profile) in chosen.iter().enumerate().skip(described) {
+        let j = profile.candidate.joint;
+        let at = k - described;
+        let train = descent.train.step(j, at);
+        let unseen = descent.holdout.as_ref().map(|fall| fall.step(j, at));
+        let about = profile.candidate.kind.about();
+        let mut step = Step {
+            effect: about.name.to_owned(),
+            law: about.law.map(str::to_owned),
+            joint: source.robot.joints[j].name.clone(),
+            set: Vec::new(),
+            parameters: joint.parameters(source, chosen, refit.free.len(), k),
+            p_value: profile.evidence.corrected(trials),
+            runner_up: None,
+            runner_up_gap_closed: None,
+            rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
+            train_rms: train,
+            holdout_rms: unseen,
+            motion_rms: motion[at].zip(motion[at + 1]).map(|(a, b)| [a, b]),
+            gap_closed: closed(unseen.unwrap_or(train), floors[j]),
+            why: String::new(),
+        };
+        let rivals = search.alternatives(&refit.base, chosen, k)?;
+        rank(&mut step, profile, &rivals, source.runs);
+        steps.push(step);
+    }
+    Ok(steps)
+}
+
+/// Says of an effect that was taken why it does not stand.
+pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], spoilt: &Profile) {
+    let title = title_of(spoilt.candidate.kind);
+    let joint = &robot.joints[spoilt.candidate.joint].name;
+    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
+    if let Some(taken) = tried.iter_mut().find(own) {
+        taken.refused = "explains torque, but the simulated motion gets worse with it".into();
+    }
+}
+
+/// The step of a change that has an effect's name.
+pub(super) fn change_step(
+    robot: &Robot,
+    change: &Change,
+    descent: &Descent,
+    floors: &[f64],
+) -> Option<Step> {
+    let about = change.effect?.about();
+    let j = robot.joints.len() - 1;
+    let [refitted, last] = descent.train.whole(j);
+    let train = [descent.train.frozen[j].max(refitted), last];
+    let unseen = (descent.holdout.as_ref()).map(|fall| [fall.frozen[j], fall.whole(j)[1]]);
+    Some(Step {
+        effect: about.name.to_owned(),
+        law: None,
+        joint: robot.joints[j].name.clone(),
+        set: vec![about.name.to_owned()],
+        parameters: change.parameters.clone(),
+        p_value: change.p_value,
+        runner_up: None,
+        runner_up_gap_closed: None,
+        rms_unit: robot.joints[j].kind.units().1.to_owned(),
+        train_rms: train,
+        holdout_rms: unseen,
+        motion_rms: None,
+        gap_closed: closed(unseen.unwrap_or(train), floors[j]),
+        why: change.words.clone(),
+    })
+}
