@@ -159,8 +159,8 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
         return Err(wrong_mode(state));
     }
     let counts = position / state.derived.radians_per_count;
-    // Above 2²⁴ counts an f32 no longer names single counts.
-    if counts.is_nan() || counts.abs() >= 16_777_216.0 {
+    // From 2²³ counts on x ± ½, by which it is rounded, is no f32.
+    if counts.is_nan() || counts.abs() >= 8_388_608.0 {
         return Err(Refusal::BadValue);
     }
     let shift = F32Ext::round(counts) as i64 - state.counts;

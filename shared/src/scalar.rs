@@ -16,7 +16,7 @@
 //! | tanh | −10 to 10 | 1.1·10⁻³ | 8.1·10⁻⁸ | absolute | `hyperbolic.rs` of this crate, 8.1·10⁻⁸: in half the time of libm's (micromath has none; 1 − 2/(exp 2x + 1) with its exp) |
 //! | powf 1.5 | 10⁻³ to 10 | 1.7·10⁻¹ | 6.7·10⁻⁸ | relative | libm |
 //!
-//! From micromath the firmware therefore takes rounding to whole numbers alone, which is exact there.
+//! From micromath the firmware therefore takes rounding to whole numbers alone, which is exact below 2²³ (test `micromath_rounds_exactly`).
 
 use core::fmt::Debug;
 use core::ops::{
@@ -283,6 +283,24 @@ mod tests {
             measured <= stated && measured > 0.9 * stated,
             "{name}: stated {stated:e}, measured {measured:e}"
         );
+    }
+
+    #[test]
+    fn micromath_rounds_exactly() {
+        for k in (0..4000).chain(8_388_607 - 4000..=8_388_607) {
+            for whole in [k as f32, -(k as f32)] {
+                assert_eq!(F32Ext::round(whole), whole);
+                assert_eq!(F32Ext::ceil(whole), whole);
+            }
+        }
+        for (x, rounded, up) in [
+            (1.4, 1.0, 2.0),
+            (-1.4, -1.0, -1.0),
+            (2.6, 3.0, 3.0),
+            (-2.6, -3.0, -2.0),
+        ] {
+            assert_eq!((F32Ext::round(x), F32Ext::ceil(x)), (rounded, up));
+        }
     }
 
     #[test]

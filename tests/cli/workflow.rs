@@ -250,6 +250,9 @@ fn board_commands_on_the_emulated_rig() {
         command.args(["board", "--emulated"]);
         command
     };
+    let mut twice = rig();
+    twice.args(["board", "--emulated", "disarm", "--port", "/dev/none"]);
+    assert!(refuse(&mut twice).contains("one of --port"));
     let told = succeed(
         board()
             .args(["capture", "--after", "50", "--out"])

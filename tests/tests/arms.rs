@@ -119,7 +119,7 @@ fn costs_little(
 }
 
 #[test]
-fn links_that_can_exist_cost_a_few_per_cent() {
+fn what_links_that_can_exist_cost() {
     if let Some(data) = folder("staubli_tx40") {
         let place = tempfile::tempdir().unwrap();
         let train = tx40_part(&data, place.path(), "train.csv", 0..5250);

@@ -166,6 +166,7 @@ fn reads_as(python: &Path, robot: &Robot, urdf: &str) {
     let checked = Command::new(python)
         .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/urdf/check.py"))
         .args([&description, &file])
+        .args(["--most", "1e-11"])
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&checked.stdout);

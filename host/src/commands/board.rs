@@ -97,9 +97,12 @@ enum Action {
 /// A sentence: the port, the rig's refusal, the file.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     // What can be wrong with the arguments is said before the rig is disturbed.
-    if args.port.is_none() && !args.probe && !args.emulated {
+    // Options before and after the action are not seen to exclude each other while they are read.
+    let places =
+        usize::from(args.port.is_some()) + usize::from(args.probe) + usize::from(args.emulated);
+    if places != 1 {
         return Err(CommandError::Sentence(
-            "Say where the rig is: --port DEV (such as /dev/ttyACM0), --probe or --emulated."
+            "Say where the rig is, by one of --port DEV (such as /dev/ttyACM0), --probe and --emulated."
                 .to_owned(),
         ));
     }

@@ -43,7 +43,7 @@ pub(crate) struct Args {
     /// Recording to judge by, of another motion, not used in any fit; may be given several times
     #[arg(long)]
     holdout: Vec<PathBuf>,
-    /// Recording made with the drive off: what the sensor of the current reads there is its own offset, and no torque
+    /// Recording made with the drive off, where torque is measured by the motor's current: what the sensor reads there is its own
     #[arg(long)]
     drive_off: Option<PathBuf>,
     /// Folder for the results
@@ -63,6 +63,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_shared(&args.data, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
+    if let (Some(path), false) = (&args.drive_off, training.any_effort()) {
+        return Err(CommandError::Sentence(format!(
+            "--drive-off {} says nothing where a joint goes by its voltage alone; leave it out, or record tau1 or i1 in motion too.",
+            path.display()
+        )));
+    }
     for warning in training.warnings().chain(holdout.warnings()) {
         ui.remark(&warning);
     }

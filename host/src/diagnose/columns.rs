@@ -295,12 +295,13 @@ impl Source<'_> {
     }
 
     fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {
-        let mut known = self.slopes.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(slopes) = known.get(&(r, joint)) {
+        let known = || self.slopes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(slopes) = known().get(&(r, joint)) {
             return Ok(slopes.clone());
         }
+        // Others go on meanwhile.
         let slopes = Arc::new(Slopes::of(self, joint, &self.runs[r])?);
-        known.insert((r, joint), slopes.clone());
+        known().insert((r, joint), slopes.clone());
         Ok(slopes)
     }
 

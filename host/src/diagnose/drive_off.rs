@@ -35,14 +35,16 @@ pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, Diagnose
             seconds += last - first;
         }
         let modes = (block.extra.iter()).filter(|(name, _)| name == "mode");
-        let off = f64::from(Mode::Disarmed as u8);
-        let mut on = modes.flat_map(|(_, values)| values).filter(|m| **m != off);
+        let drives = [Mode::Holding, Mode::Running, Mode::Stopping].map(|m| f64::from(m as u8));
+        let mut on = modes
+            .flat_map(|(_, values)| values)
+            .filter(|m| drives.contains(m));
         driven = driven.or(on.next().copied());
         Ok(())
     })?;
     if let Some(mode) = driven {
         return Err(wrong(format!(
-            "its column mode holds {mode}, which is not {} (disarmed)",
+            "its column mode holds {mode}, in which the rig drives; disarmed is {}",
             Mode::Disarmed as u8
         )));
     }

@@ -13,7 +13,7 @@ use super::fault::faulty;
 use super::finish::{Drawn, Found, finish};
 use super::floor;
 use super::judge::{Judge, Judged, left_of_held};
-use super::lead::{differ, leads, moved};
+use super::lead::{differ, leads, moved, slack};
 use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Tried, Verdict};
@@ -25,6 +25,7 @@ use super::stated::{Now, Stated};
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
+use crate::report::{format_unit, format_value};
 use crate::robot::{Robot, title_of};
 
 /// Finds what the model lacks. The second result is the description with the effects and the parameters identified
@@ -44,7 +45,7 @@ pub fn diagnose(
     }
     let mut stated = Stated::of(robot);
     loop {
-        // Each time around one more of the description's effects is held.
+        // Each time around more of the description's effects are held.
         match attempt(robot, &stated, training, holdout, options, progress)? {
             Attempt::Done(result) => return Ok(*result),
             Attempt::Hold(more) => stated = more,
@@ -75,13 +76,16 @@ fn attempt(
         Some(bench.load(holdout)?)
     };
     for recordings in std::iter::once(&loaded).chain(&sealed) {
-        let wrong = faults(robot, &recordings.runs)?;
+        let wrong = faults(&stated.robot, &recordings.runs)?;
         if !wrong.is_empty() {
             let fault = (faulty(robot, wrong), robot.clone());
             return Ok(Attempt::Done(Box::new(fault)));
         }
     }
     let mut more = stated.clone();
+    if more.hold_delays(slack(&loaded.runs)) {
+        return Ok(Attempt::Hold(more));
+    }
     if more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without)) {
         return Ok(Attempt::Hold(more));
     }
@@ -212,13 +216,23 @@ fn attempt(
         step.motion_rms = (given.zip(motion.last().copied().flatten())).map(|(a, b)| [a, b]);
         steps.push(step);
     }
+    let stood = stated.told(
+        (stated.matched(chosen).into_iter())
+            .map(|place| {
+                place.map(|k| Now {
+                    kind: chosen[k].candidate.kind,
+                    parameters: joint.parameters(&search.source, chosen, refit.free.len(), k),
+                })
+            })
+            .collect(),
+    );
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
         verdict: verdict(
             &judged,
             chosen.len() > described || name_something(&windings),
-            change.is_some() || contradict(&windings),
+            change.is_some() || contradict(&windings) || stated.changed(&stood),
         ),
         residual: Residual::Torque,
         words: Vec::new(),
@@ -228,16 +242,7 @@ fn attempt(
         torque_lead: lead,
         places: judge.places(floors, &chosen[..described]),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
-        described: stated.told(
-            (stated.matched(chosen).into_iter())
-                .map(|place| {
-                    place.map(|k| Now {
-                        kind: chosen[k].candidate.kind,
-                        parameters: joint.parameters(&search.source, chosen, refit.free.len(), k),
-                    })
-                })
-                .collect(),
-        ),
+        described: stood,
         steps,
         absorbed: refit.absorbed(&bench, &before, after),
         not_testable: Vec::new(),
@@ -280,6 +285,9 @@ fn attempt(
     let told = diagnosis.described.iter().map(|d| d.text.clone());
     diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
+    diagnosis
+        .words
+        .extend(read_off(robot, &options.sensor_zeros));
     diagnosis.words.extend(held(&bench, &open));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
@@ -294,6 +302,20 @@ fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
         (p.candidate.joint == joint && motor).then_some(p.shapes[0])
     };
     found.iter().filter_map(wave).collect()
+}
+
+/// What the sensors read with the drive off.
+fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
+    (robot.joints.iter().zip(zeros))
+        .map(|(joint, [value, std])| {
+            format!(
+                "With the drive off the sensor of joint {} reads {} {}.",
+                joint.name,
+                format_value(*value, *std),
+                format_unit(joint.kind.units().1)
+            )
+        })
+        .collect()
 }
 
 /// What was left as the description has it.

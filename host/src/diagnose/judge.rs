@@ -16,6 +16,9 @@ use super::testable;
 use crate::report::format_significant;
 use crate::robot::Robot;
 
+/// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
+/// what stands in for another leaves more of it.
+const NOT_QUITE: f64 = 0.02;
 /// Share of its gap that a step must close to stand beside a remainder.
 const HALF: f64 = 0.5;
 /// … and at least, where nothing else would close half as much in its place.
@@ -214,6 +217,11 @@ impl Judge<'_, '_> {
         }
         let found = misfit(&self.search.source, self.rows, fit, joint)?;
         let rms = fit.rms(joint);
+        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
+        let taken = (self.base.rms(joint).powi(2) - rms * rms).max(0.0).sqrt();
+        if left < NOT_QUITE * taken {
+            return None;
+        }
         let name = &self.robot.joints[joint].name;
         let text = format!(
             "With {} in the model a free function of the {}{} still takes {} % off what is left of joint {name}, on stretches that it was not fitted to. The right name would leave it nothing: {} may stand for an effect that the library does not hold.",
@@ -233,7 +241,7 @@ impl Judge<'_, '_> {
         );
         Some(Remainder {
             joint: name.clone(),
-            rms: rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt(),
+            rms: left,
             ratio: rms / floor,
             text,
             places: self.places_of(fit, joint, floor),

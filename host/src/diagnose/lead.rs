@@ -89,6 +89,7 @@ pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded,
         let rate = run.rate;
         for (joint, lead) in run.joints.iter_mut().zip(by) {
             joint.tau = later(&joint.tau, lead * rate);
+            joint.taken_off = joint.taken_off.take().map(|held| later(&held, lead * rate));
         }
     }
     bench.rows(runs)

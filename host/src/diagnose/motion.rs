@@ -335,6 +335,7 @@ fn regressed(runs: &[Run]) -> Option<Controller> {
     for run in runs {
         let joint = &run.joints[0];
         let r = joint.reference.as_ref()?;
+        let torque = joint.recorded();
         let mut integral = 0.0;
         for k in 1..run.len().saturating_sub(1) {
             let e = r[k] - joint.q[k];
@@ -356,13 +357,13 @@ fn regressed(runs: &[Run]) -> Option<Controller> {
                 1.0,
             ];
             for (i, a) in row.iter().enumerate() {
-                right[i] += a * joint.tau[k];
+                right[i] += a * torque[k];
                 for (j, b) in row.iter().enumerate() {
                     normal[(i, j)] += a * b;
                 }
             }
-            power += joint.tau[k].powi(2);
-            mean += joint.tau[k];
+            power += torque[k].powi(2);
+            mean += torque[k];
             count += 1.0;
         }
     }

@@ -333,7 +333,7 @@ impl Rows {
                 thinning.push(&joint.tau, &mut torque[j]);
                 let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
                 let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
-                let spoilt: Vec<f64> = (joint.qd.iter().zip(&joint.tau))
+                let spoilt: Vec<f64> = (joint.qd.iter().zip(joint.recorded().iter()))
                     .map(|(v, tau)| {
                         let limited =
                             low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h);

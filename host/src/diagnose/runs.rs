@@ -1,5 +1,7 @@
 //! Recordings as the diagnosis works on them: whole stretches in memory, filtered and differentiated.
 
+use std::borrow::Cow;
+
 use super::DiagnoseError;
 use crate::data::Block;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
@@ -9,9 +11,10 @@ use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 pub struct JointRun {
     /// Position as recorded, rad or m.
     pub q_raw: Vec<f64>,
-    /// Torque as recorded, joint-side, N·m or N, less that of effects that the recording was freed of; empty where there is
-    /// none.
+    /// Torque, joint-side, N·m or N, less [`Self::taken_off`]; empty where there is none.
     pub tau: Vec<f64>,
+    /// What of the recorded torque is that of effects that the recording was freed of, where there are any.
+    pub taken_off: Option<Vec<f64>>,
     /// Filtered position.
     pub q: Vec<f64>,
     /// Velocity, rad/s or m/s.
@@ -41,6 +44,16 @@ pub struct Run {
     pub t: Vec<f64>,
     /// Joint by joint.
     pub joints: Vec<JointRun>,
+}
+
+impl JointRun {
+    /// Torque as recorded, whatever it was freed of.
+    pub fn recorded(&self) -> Cow<'_, [f64]> {
+        match &self.taken_off {
+            None => Cow::Borrowed(&self.tau),
+            Some(held) => Cow::Owned((self.tau.iter().zip(held)).map(|(t, h)| t + h).collect()),
+        }
+    }
 }
 
 impl Run {
@@ -160,12 +173,13 @@ fn append(run: &mut Run, block: Block) {
     run.t.extend(block.t);
     for (to, from) in run.joints.iter_mut().zip(block.joints) {
         to.q_raw.extend(from.q);
-        match from.effects {
+        match &from.effects {
             Some(known) => {
                 (to.tau).extend(from.tau.iter().zip(known).map(|(all, held)| all - held))
             }
             None => to.tau.extend(from.tau),
         }
+        join(&mut to.taken_off, from.effects, before);
         join(&mut to.measured_velocity, from.qd, before);
         join(&mut to.reference, from.reference, before);
         join(&mut to.voltage, from.voltage, before);

@@ -23,6 +23,10 @@ use crate::robot::{Placed, Robot, RobotEffect, title_of, unit_of};
 
 /// Standard deviations within which the recordings do not contradict a described gain.
 const AGREES: f64 = 3.0;
+/// A described value is another where it differs by this share …
+const CHANGED: f64 = 0.1;
+/// … and so many standard deviations.
+const SURE: f64 = 5.0;
 
 /// What happens to a described effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,9 +140,7 @@ impl Stated {
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
             if !library.contains(&candidate(placed)) {
                 let why = match placed.effect.kind {
-                    Kind::ViscousWarmupTemperature => {
-                        "no temperature was recorded, so that it does nothing here"
-                    }
+                    Kind::ViscousWarmupTemperature => "the temperature was not recorded throughout",
                     _ => "it was left out of the search",
                 };
                 *way = Way::held(placed.effect.kind, why);
@@ -146,6 +148,36 @@ impl Stated {
             }
         }
         changed
+    }
+
+    /// Holds delays of up to `slack`, s, which are taken for the instants of sampling where nothing states them; whether
+    /// there was one.
+    pub(super) fn hold_delays(&mut self, slack: f64) -> bool {
+        let mut changed = false;
+        for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
+            let kind = placed.effect.kind;
+            if kind == Kind::MeasurementDelay && placed.effect.gains[0] <= slack {
+                let why = "it is no longer than what the instants of sampling may make of it";
+                *way = Way::held(kind, why);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Whether what was fitted is not what the description states: an effect that is gone, or a value that is another by
+    /// more than noise and rounding.
+    pub(super) fn changed(&self, told: &[Described]) -> bool {
+        (self.effects.iter().zip(told)).any(|((effect, ..), now)| match now.fate {
+            Fate::Dropped => true,
+            Fate::FittedAgain => effect.values().any(|(p, stated)| {
+                now.parameters.get(p.name).is_some_and(|value| {
+                    let off = (value.value - stated).abs();
+                    off > CHANGED * stated.abs() && off > SURE * value.std
+                })
+            }),
+            Fate::Held | Fate::InTheLink => false,
+        })
     }
 
     /// Holds free effects that are not among those found and that the recordings do not contradict; whether there was one.
@@ -162,7 +194,11 @@ impl Stated {
         let fit = with(base, found, None);
         let mut changed = false;
         for ((_, placed, way), stays) in self.effects.iter_mut().zip(stays) {
-            if *way != Way::Free || stays.is_some() {
+            // Of two gears on a joint the one that was found stands for both.
+            let replaced = is_gear(placed.effect.kind)
+                && (found.iter())
+                    .any(|p| p.candidate.joint == placed.joint && is_gear(p.candidate.kind));
+            if *way != Way::Free || stays.is_some() || replaced {
                 continue;
             }
             let columns = source.columns(&candidate(placed), &placed.effect.shapes)?;
@@ -186,13 +222,16 @@ impl Stated {
         Ok(changed)
     }
 
-    /// For each effect the place of what it has become among those found; of several under one name in their order.
+    /// For each effect the place of what it has become among those found; of several under one name the nearest in shape.
     pub(super) fn matched(&self, found: &[Profile]) -> Vec<Option<usize>> {
         let mut taken = vec![false; found.len()];
         (self.effects.iter())
             .map(|(_, placed, way)| {
-                let of = |k: &usize| !taken[*k] && is_one(placed, &found[*k].candidate);
-                let place = (0..found.len()).filter(|_| *way == Way::Free).find(of)?;
+                let off = |k: &usize| (found[*k].shapes[0] - placed.effect.shapes[0]).abs();
+                let place = (0..found.len())
+                    .filter(|k| *way == Way::Free && !taken[*k])
+                    .filter(|k| is_one(placed, &found[*k].candidate))
+                    .min_by(|a, b| off(a).total_cmp(&off(b)))?;
                 taken[place] = true;
                 Some(place)
             })
@@ -231,7 +270,7 @@ impl Stated {
                         let values: Vec<String> = values.collect();
                         (
                             Fate::Dropped,
-                            format!("The description's {what} ({}) is not in model.toml: beside everything else these recordings contradict it.", values.join(", ")),
+                            format!("The description's {what} ({}) is not in model.toml: beside everything else that these recordings show it does not stand as stated.", values.join(", ")),
                         )
                     }
                 };

@@ -19,8 +19,8 @@
 //!
 //! No rules are published for motors of coupled drives. Here: the inertia of one of constant ratios is a fixed quadratic form
 //! in the joint velocities. It joins what has such a form too, where the forms add up to it: `Ia`; `Izz` of links whose turning
-//! about their own axis is a fixed sum of joint velocities (those that turn about one direction or about a second one); and of a prismatic joint of fixed direction the mass it moves less the same mass resting on
-//! the link before, in whose form the joint's velocity stands squared and times those of the prismatic ones before it.
+//! about their own axis is a fixed sum of joint velocities (those that turn about one direction or about a second one); and of a
+//! prismatic joint of fixed direction the mass it moves less the same mass resting on the link before, in whose form the joint's velocity stands squared and times those of the prismatic ones before it.
 //! Everything else of the motors is taken as independent.
 
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};

@@ -137,7 +137,7 @@ pub enum LinkError {
 pub fn describe(refusal: Refusal) -> Cow<'static, str> {
     Cow::Borrowed(match refusal {
         Refusal::WrongMode => {
-            "the present mode does not allow it: a motion is started on an armed rig that holds, everything else is for a rig that neither moves nor calibrates (`rig board disarm` switches the bridge off)"
+            "the present mode does not allow it: a motion is started on an armed rig that holds and stopped while it runs; the rest is for a disarmed rig (`rig board disarm`) that has calibrated"
         }
         Refusal::FaultLatched => {
             "a fault is latched; `rig board fault` says which, `rig board clear` forgets it"

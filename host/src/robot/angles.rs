@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::urdf::Chain;
+use super::urdf::{Body, Chain};
 use super::{JointKind, Robot};
 use crate::report::format_significant;
 
@@ -137,6 +137,21 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
         poses.push(pose);
     }
     (poses, said)
+}
+
+/// The multiple of π/2 that theta of a prismatic joint stands for, as TOML takes it, with a sentence where it is another.
+pub(super) fn squared_theta(body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
+    let exact = meant(theta)?;
+    let off = (theta - exact).abs();
+    let said = (off > ROUNDING).then(|| {
+        format!(
+            "{}: theta of prismatic joint `{}` is {theta} rad, {}.",
+            body.place,
+            body.joint,
+            taken(off, exact)
+        )
+    });
+    Some((exact, said))
 }
 
 /// Where the last joint of `axes` slides: its axis, and the last one before that stands at a fixed angle to what follows

@@ -3,9 +3,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::identify::{Base, ModelKind, agree, grouped};
-use crate::robot::{Description, JointKind};
+use crate::robot::{Description, JointKind, Original};
 
 /// One joint: kind, alpha as text, a, theta as text, d.
 type Row = (JointKind, String, f64, String, f64);
@@ -191,6 +192,60 @@ fn a_twist_that_was_calibrated_stays() {
                     right + twist
                 );
             }
+        }
+    }
+}
+
+/// A joint and the link that it moves, as URDF.
+fn moved(n: usize, kind: &str, xyz: &str, rpy: &str) -> String {
+    format!(
+        r#"<joint name="j{n}" type="{kind}"><parent link="l{}"/><child link="l{n}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="100" velocity="1"/></joint>
+<link name="l{n}"><inertial><origin xyz="0.1 0 0"/><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+"#,
+        n - 1
+    )
+}
+
+fn chain(joints: &[String]) -> String {
+    format!(
+        "<robot name=\"r\"><link name=\"l0\"/>\n{}</robot>\n",
+        joints.concat()
+    )
+}
+
+/// A lift whose turn stands against no axis: nothing is before it.
+#[test]
+fn what_is_written_of_a_slide_goes_back_into_its_urdf() {
+    let right = "1.5707963267948966 0 0";
+    let text = chain(&[
+        moved(1, "prismatic", "0 0 0.5", "0 0 1.5708"),
+        moved(2, "revolute", "0 0 0.2", right),
+    ]);
+    let original = Original::read(text.clone(), Path::new("lift.urdf")).unwrap();
+    let written = original.robot().to_toml().unwrap();
+    let back = read(&written, "toml");
+    assert_eq!(back.remarks, Vec::<String>::new());
+    assert_eq!(back.robot.joints, original.robot().joints);
+    assert_eq!(original.with_values(&back.robot).unwrap().text, text);
+}
+
+/// Parallel axes but for a twist across the 0.4 m between them: their common normal lies 400 or 4000 m away. The links are
+/// what they were.
+#[test]
+fn a_common_normal_far_away_is_said_and_no_link_is_taken_for_a_point() {
+    let arm = |twist: &str| {
+        chain(&[
+            moved(1, "revolute", "0 0 0", "0 0 0"),
+            moved(2, "revolute", "0 0 0.3", "1.5707963267948966 0 0"),
+            moved(3, "revolute", "0.4 0 0", &format!("0 {twist} 0")),
+        ])
+    };
+    assert_eq!(read(&arm("0"), "urdf").remarks, Vec::<String>::new());
+    for twist in ["0.001", "0.0001"] {
+        let found = read(&arm(twist), "urdf");
+        assert!(!found.remarks.is_empty());
+        for remark in &found.remarks {
+            assert!(remark.contains("common normal lies"), "{remark}");
         }
     }
 }

@@ -75,7 +75,7 @@ fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     let (_, inertia) = body.about_centre()?;
     let unit = |value: f64| format!("{} kg·m²", format_significant(value, 4));
     // Against what rounding leaves of the difference between both inertias.
-    let rounding = 1e-9 * body.inertia.amax();
+    let rounding = 1e-13 * body.inertia.amax();
     match shown {
         Shown::Mass => None,
         Shown::About(direction) => {

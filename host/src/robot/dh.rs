@@ -6,11 +6,10 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-#[cfg(test)]
-use super::JointKind;
-use super::angles::{ROUNDING, squared_poses};
+use super::angles::{ROUNDING, squared_poses, squared_theta};
 use super::urdf::{Body, Chain};
-use super::{Drive, Joint, Robot};
+use super::{Drive, Joint, JointKind, Robot};
+use crate::report::format_significant;
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
 /// base link, the customary rounded value that robot descriptions and simulators are used with.
@@ -19,6 +18,9 @@ pub(super) const GRAVITY: f64 = 9.81;
 /// Axes closer to parallel than this are parallel, rad: between this and the angles that [`squared_poses`] leaves there is
 /// nothing.
 const PARALLEL: f64 = 1e-6;
+
+/// A frame this many times further away than all links together reach stands where no mass is.
+const FAR: f64 = 30.0;
 
 /// The converted robot and where its frames lie, for whoever must relate it to the URDF's frames.
 pub(super) struct Converted {
@@ -101,7 +103,12 @@ fn angle_about(from: Vector3<f64>, to: Vector3<f64>, about: Vector3<f64>) -> f64
 
 /// Converts a URDF chain; never fails, as every chain of axes has such frames.
 pub(super) fn convert(chain: &Chain) -> Converted {
-    let (poses, remarks) = squared_poses(chain);
+    let (poses, mut remarks) = squared_poses(chain);
+    let reach: f64 = chain
+        .bodies
+        .iter()
+        .map(|b| b.origin.translation.vector.norm())
+        .sum();
     let axis_of = |i: usize| Line {
         point: poses[i].translation.vector,
         direction: poses[i].rotation * chain.bodies[i].axis,
@@ -143,8 +150,22 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         } else {
             (foot, x_before)
         };
-        let theta = snap_angle(angle_about(x_before, x, z));
+        let mut theta = snap_angle(angle_about(x_before, x, z));
+        if body.kind == JointKind::Prismatic
+            && let Some((exact, said)) = squared_theta(body, theta)
+        {
+            theta = exact;
+            remarks.extend(said);
+        }
         let d = snap_length((origin - foot).dot(&z));
+        if a.abs().max(d.abs()) > FAR * reach {
+            remarks.push(format!(
+                "{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
+                body.place,
+                body.joint,
+                format_significant(a.abs().max(d.abs()), 3)
+            ));
+        }
         frame = bent * step(0.0, 0.0, theta, d);
         let link = frame.inverse() * poses[i];
         joints.push(joint(body, [alpha, a, theta, d], &link));

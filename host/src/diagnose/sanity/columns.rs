@@ -123,7 +123,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 .iter()
                 .map(|joint| JointColumns {
                     q: joint.q_raw.clone(),
-                    tau: joint.tau.clone(),
+                    tau: joint.recorded().into_owned(),
                     ..JointColumns::default()
                 })
                 .collect(),
@@ -231,13 +231,14 @@ pub(super) fn at_limit(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
     let fastest = own()
         .flat_map(|j| &j.qd)
         .fold(0.0f64, |most, v| most.max(v.abs()));
-    let moving = own()
-        .flat_map(|j| j.qd.iter().zip(&j.tau))
-        .filter(|(qd, _)| qd.abs() > 0.05 * fastest);
-    let (count, at) = moving.fold((0usize, 0usize), |(count, at), (_, tau)| {
-        let share = tau.abs() / limit;
-        (count + 1, at + usize::from((0.98..1.02).contains(&share)))
-    });
+    let (mut count, mut at) = (0_usize, 0_usize);
+    for joint in own() {
+        let rows = joint.qd.iter().zip(joint.recorded().into_owned());
+        for (_, tau) in rows.filter(|(qd, _)| qd.abs() > 0.05 * fastest) {
+            count += 1;
+            at += usize::from((0.98..1.02).contains(&(tau.abs() / limit)));
+        }
+    }
     let share = at as f64 / count.max(1) as f64;
     (share > AT_LIMIT).then(|| {
         fault(

@@ -99,7 +99,7 @@ fn an_effect_that_the_recordings_contradict_goes_and_is_told() {
     let made = recorded(&[], 5, 30.0);
     let robot = described(&made.robot, wave(0.3));
     let (found, model) = diagnosed(&robot, &made, without_gears());
-    assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::ParameterChange, "{:?}", found.words);
     assert!(model.effects.is_empty());
     assert_eq!(found.described[0].fate, Fate::Dropped);
     let told = "cogging of joint link (cosine 0.300 N*m, sine 0 N*m, order 9.00 1)";

@@ -322,7 +322,12 @@ impl Search<'_> {
                 break;
             };
             let mut trials: Vec<Trial> = (self.library.iter())
-                .filter(|kind| !model.effects.contains(kind))
+                .filter(|kind| {
+                    !model
+                        .effects
+                        .iter()
+                        .any(|e| e.about().name == kind.about().name)
+                })
                 .map(|kind| Trial {
                     kind: *kind,
                     model: None,

@@ -68,7 +68,9 @@ impl Equation {
         for run in &loaded.runs {
             let joint = &run.joints[joint];
             let Some(u) = &joint.voltage else { continue };
-            let i: Vec<f64> = joint.tau.iter().map(|t| t / torque_per_ampere).collect();
+            let i: Vec<f64> = (joint.recorded().iter())
+                .map(|t| t / torque_per_ampere)
+                .collect();
             let scaled = |signal: &[f64]| -> Vec<f64> {
                 signal.iter().map(|x| drive.gear_ratio * x).collect()
             };

@@ -4,6 +4,7 @@ use rig_shared::effects::Kind;
 
 use super::Winding;
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::Step;
 use crate::diagnose::profile::Profile;
@@ -56,7 +57,7 @@ impl Word {
     }
 }
 
-/// For each effect what is said of it; a constant that is the sensor's gets that name.
+/// For each effect what is said of it; a constant that is the sensor's gets that name, and one that is not loses it.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -82,10 +83,14 @@ pub(in crate::diagnose) fn settled(
         };
         let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
         words[k] = Word::of(zero, gain * mean, std * mean.abs());
-        let sensor =
-            |c: &&super::Candidate| c.kind == Kind::CurrentOffset && c.joint == candidate.joint;
-        if words[k] == Word::Sensor
-            && let Some(c) = search.library.iter().position(|c| sensor(&c))
+        let sensor = Kind::CurrentOffset;
+        let name = match words[k] {
+            Word::Sensor => sensor,
+            Word::Torque if candidate.kind == sensor => Kind::TorqueOffset,
+            _ => continue,
+        };
+        let own = |c: &Candidate| c.kind == name && c.joint == candidate.joint;
+        if let Some(c) = search.library.iter().position(own)
             && let Some(profile) = search.profile(&with(base, chosen, Some(k)), c, None)?
         {
             chosen[k] = profile;
@@ -101,7 +106,8 @@ impl Word {
         match self {
             Self::Sensor => step.set.retain(|name| *name == step.effect),
             Self::Torque => {
-                step.set.retain(|name| name != sensor);
+                step.set
+                    .retain(|name| name != sensor || *name == step.effect);
                 if step.runner_up.as_deref() == Some(sensor) {
                     (step.runner_up, step.runner_up_gap_closed) = (None, None);
                 }
