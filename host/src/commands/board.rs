@@ -11,10 +11,9 @@ use rig_shared::wire::message::{
 
 use super::error::CommandError;
 use super::input::described;
-use super::record::{emulated, open_probe};
+use super::record::{emulated, open_probe, uploaded};
 use super::ui::Ui;
 use crate::data::{Column, CsvWriter};
-use crate::emulated::upload::requests;
 use crate::link::experiment::when_calibrated;
 use crate::link::serial::DEFAULT_BAUD;
 use crate::link::{EmulatedPort, Port, SerialLine, Session, SessionSettings};
@@ -109,13 +108,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let sent = match &args.action {
         Action::Upload {
             model, leave_out, ..
-        } => {
-            let upload = requests(&described(model, ui)?.robot, *leave_out)?;
-            for sentence in &upload.left_out {
-                ui.say(&format!("Left out: {sentence}."));
-            }
-            upload.requests
-        }
+        } => uploaded(&described(model, ui)?.robot, *leave_out, ui)?,
         Action::Capture { out, force, .. }
         | Action::Fault {
             out: Some(out),

@@ -138,10 +138,10 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
         return Ok(Vec::new());
     };
     let log = Inputs::read(robot, std::slice::from_ref(path))?;
-    let mut zeros = Vec::new();
-    for recording in log.recordings() {
-        zeros = sensor_zeros(recording)?;
-    }
+    let zeros = (log.recordings().into_iter())
+        .map(sensor_zeros)
+        .collect::<Result<Vec<_>, _>>()?
+        .concat();
     for warning in log.warnings() {
         ui.remark(&warning);
     }

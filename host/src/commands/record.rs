@@ -95,11 +95,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .collect();
     if let Some(robot) = &robot {
         settings.extend(if args.precompensation {
-            let upload = upload::requests(robot, true)?;
-            for sentence in &upload.left_out {
-                ui.say(&format!("Left out: {sentence}."));
-            }
-            upload.requests
+            uploaded(robot, true, ui)?
         } else {
             upload::settings(&Nameplate::from_robot(robot)?, false)
         });
@@ -134,6 +130,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     };
     ui.say(&format!("{}: {losses}", args.out.display()));
     Ok(())
+}
+
+/// What a description asks the rig to be told, effects included; what is left out of it is said.
+pub(crate) fn uploaded(
+    robot: &Robot,
+    leave_out: bool,
+    ui: &Ui,
+) -> Result<Vec<RequestBody>, CommandError> {
+    let upload = upload::requests(robot, leave_out)?;
+    for sentence in &upload.left_out {
+        ui.say(&format!("Left out: {sentence}."));
+    }
+    Ok(upload.requests)
 }
 
 /// The emulated rig: a laboratory's, with the nameplate of this description or of the template.

@@ -21,10 +21,15 @@ pub(super) const WRITTEN: f64 = 5e-5;
 pub(super) const ROUNDING: f64 = 1e-10;
 
 /// The multiple of π/2 that `angle` stands for, where it stands for one.
-pub(super) fn meant(angle: f64) -> Option<f64> {
+fn meant(angle: f64) -> Option<f64> {
+    right_angle(angle, WRITTEN)
+}
+
+/// The multiple of π/2 that lies closer to `angle` than `tolerance`, rad.
+pub(super) fn right_angle(angle: f64, tolerance: f64) -> Option<f64> {
     let exact = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     // Without the sign of a zero.
-    ((angle - exact).abs() < WRITTEN).then_some(exact + 0.0)
+    ((angle - exact).abs() < tolerance).then_some(exact + 0.0)
 }
 
 /// How far `angle` is from the multiple that it is taken as, as the end of a sentence.
@@ -117,7 +122,7 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
         if let Some((about, from)) = slid(chain, &axes) {
             let across = |v: &Vector3<f64>| v - about * v.dot(&about);
             let (from, to) = (across(&from), across(&axis));
-            let angle = from.cross(&to).dot(&about).atan2(from.dot(&to));
+            let angle = angle_about(from, to, about);
             if to.norm() > WRITTEN
                 && let Some(exact) = meant(angle)
                 && (angle - exact).abs() > ROUNDING
@@ -177,6 +182,11 @@ fn slid(chain: &Chain, axes: &[Vector3<f64>]) -> Option<(Vector3<f64>, Vector3<f
         .into_iter()
         .find(|axis| axis.cross(about).norm() > WRITTEN)?;
     Some((*about, *from))
+}
+
+/// Angle from `from` to `to` about `about`, rad.
+pub(super) fn angle_about(from: Vector3<f64>, to: Vector3<f64>, about: Vector3<f64>) -> f64 {
+    from.cross(&to).dot(&about).atan2(from.dot(&to))
 }
 
 /// Angle between two directions, rad, exact where it is small.

@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::angles::{ROUNDING, squared_poses, squared_theta};
+use super::angles::{ROUNDING, angle_about, right_angle, squared_poses, squared_theta};
 use super::urdf::{Body, Chain};
 use super::{Drive, Joint, JointKind, Robot};
 use crate::report::format_significant;
@@ -83,22 +83,11 @@ fn common_normal(
 }
 
 fn snap_angle(angle: f64) -> f64 {
-    let quarter = (angle / std::f64::consts::FRAC_PI_2).round();
-    let exact = quarter * std::f64::consts::FRAC_PI_2;
-    if (angle - exact).abs() < ROUNDING {
-        exact + 0.0
-    } else {
-        angle
-    }
+    right_angle(angle, ROUNDING).unwrap_or(angle)
 }
 
 fn snap_length(length: f64) -> f64 {
     if length.abs() < ROUNDING { 0.0 } else { length }
-}
-
-/// Angle from `from` to `to` about `about`.
-fn angle_about(from: Vector3<f64>, to: Vector3<f64>, about: Vector3<f64>) -> f64 {
-    from.cross(&to).dot(&about).atan2(from.dot(&to))
 }
 
 /// Converts a URDF chain; never fails, as every chain of axes has such frames.
