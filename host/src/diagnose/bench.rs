@@ -7,7 +7,7 @@ use rig_shared::multibody::Chain;
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
-use super::columns::{Candidate, Source};
+use super::columns::{Candidate, DELAY, Source};
 use super::fit::Evidence;
 use super::predicted::{Predicted, predict};
 use super::profile::Profile;
@@ -120,6 +120,7 @@ impl<'a> Bench<'a> {
             thinning: &loaded.rows.thinning,
             predicted,
             values: values.to_vec(),
+            delays: vec![DELAY; self.robot.joints.len()],
             driven: Mutex::default(),
             slopes: Mutex::default(),
         })

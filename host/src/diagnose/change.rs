@@ -127,6 +127,9 @@ pub(super) fn change(
         .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
         .map(name)
         .collect();
+    if moved.is_empty() {
+        return None;
+    }
     Some(Change {
         words: format!(
             "Several nominal parameters differ from the description: {}.",

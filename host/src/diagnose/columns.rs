@@ -31,6 +31,8 @@ pub(super) struct Source<'a> {
     pub(super) predicted: Vec<Predicted>,
     /// Identified base parameters.
     pub(super) values: Vec<f64>,
+    /// Delay at which the column of each joint's delay is taken, s.
+    pub(super) delays: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// Slopes of the torque, likewise.
@@ -48,15 +50,20 @@ pub(super) struct Candidate {
     pub(super) other: Option<usize>,
 }
 
-/// Reference delay at which the column of a delay is taken, s: first order would be 2 % off at 3 Hz and 10 ms.
-const DELAY: f64 = 0.002;
+/// Delay at which the column of a delay is taken until one is known, s: first order would be 2 % off at 3 Hz and 10 ms.
+pub(super) const DELAY: f64 = 0.002;
 
 /// Effects whose torque acts on the link: a gear between motor and link transmits it.
 const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
 
+/// Effects that are laws of the torque that the current stands for.
+const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::TorqueRipple];
+/// Rounds in which such a law meets the torque that it makes: what is missing falls by its share of the torque in each.
+const OWN_ROUNDS: usize = 4;
+
 impl Source<'_> {
-    /// The same with the gears' load as effects make it that are in the model; `gains` are those of their columns, one
-    /// effect after the other.
+    /// The same with the gears' load and the drives' torque as effects make them that are in the model; `gains` are those of
+    /// their columns, one effect after the other.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -65,26 +72,64 @@ impl Source<'_> {
         chosen: &[Profile],
         gains: &[f64],
     ) -> Result<Self, DiagnoseError> {
+        let of_the_drive = |kind: Kind| OF_THE_DRIVE.contains(&kind);
+        let mut at = 0;
+        for profile in chosen {
+            let Candidate { kind, joint, .. } = profile.candidate;
+            if kind == Kind::MeasurementDelay {
+                self.delays[joint] = gains[at].max(DELAY);
+            }
+            at += profile.columns.len();
+        }
+        for r in 0..self.runs.len() {
+            let load = self.sum(r, chosen, gains, &|kind| ON_THE_LINK.contains(&kind))?;
+            add(&mut self.predicted[r].load, &load);
+            // A late reading is no torque.
+            let torque = self.sum(r, chosen, gains, &|kind| {
+                kind != Kind::MeasurementDelay && !of_the_drive(kind)
+            })?;
+            add(&mut self.predicted[r].torque, &torque);
+            if !chosen.iter().any(|p| of_the_drive(p.candidate.kind)) {
+                continue;
+            }
+            // Laws of what the current says, in which their own part is.
+            let rest = self.predicted[r].torque.clone();
+            for _ in 0..OWN_ROUNDS {
+                let own = self.sum(r, chosen, gains, &of_the_drive)?;
+                self.predicted[r].torque.clone_from(&rest);
+                add(&mut self.predicted[r].torque, &own);
+            }
+        }
+        Ok(self)
+    }
+
+    /// Torque over a run, joint by joint, of the effects of some kinds.
+    fn sum(
+        &self,
+        r: usize,
+        chosen: &[Profile],
+        gains: &[f64],
+        counts: &dyn Fn(Kind) -> bool,
+    ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+        let mut sum = vec![vec![0.0; self.runs[r].len()]; self.nominal.joints()];
         let mut at = 0;
         for profile in chosen {
             let own = &gains[at..at + profile.columns.len()];
             at += own.len();
-            if !ON_THE_LINK.contains(&profile.candidate.kind) {
+            if !counts(profile.candidate.kind) {
                 continue;
             }
-            for r in 0..self.runs.len() {
-                let shapes = std::slice::from_ref(&profile.shapes);
-                let columns = self.at_full_rate(&profile.candidate, shapes, r)?;
-                for (column, gain) in columns.into_iter().flatten().zip(own) {
-                    for (load, signal) in self.predicted[r].load.iter_mut().zip(column) {
-                        for (to, x) in load.iter_mut().zip(signal.iter().flatten()) {
-                            *to += gain * x;
-                        }
+            let shapes = std::slice::from_ref(&profile.shapes);
+            let columns = self.at_full_rate(&profile.candidate, shapes, r)?;
+            for (column, gain) in columns.into_iter().flatten().zip(own) {
+                for (to, signal) in sum.iter_mut().zip(column) {
+                    for (to, x) in to.iter_mut().zip(signal.iter().flatten()) {
+                        *to += gain * x;
                     }
                 }
             }
         }
-        Ok(self)
+        Ok(sum)
     }
 
     /// One column a gain.
@@ -218,8 +263,9 @@ impl Source<'_> {
         {
             (Kind::MeasurementDelay, _) => {
                 let torque = &predicted.torque[candidate.joint];
-                let change = (late(torque, DELAY * run.rate).iter().zip(torque))
-                    .map(|(late, now)| (late - now) / DELAY)
+                let delay = self.delays[candidate.joint];
+                let change = (late(torque, delay * run.rate).iter().zip(torque))
+                    .map(|(late, now)| (late - now) / delay)
                     .collect();
                 Ok(vec![own(change)])
             }
@@ -275,7 +321,7 @@ impl Source<'_> {
                 motor_angle: ratio * joint.q[k],
                 drive_torque: drive[k],
                 load: load[k],
-                time: run.t[k] - run.t[0],
+                time: run.t[k] - run.began,
                 warming: joint
                     .temperature
                     .as_ref()
@@ -393,6 +439,14 @@ impl Source<'_> {
             columns.push(signals.into_iter().map(Some).collect());
         }
         Ok(columns)
+    }
+}
+
+fn add(to: &mut [Vec<f64>], from: &[Vec<f64>]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        for (to, x) in to.iter_mut().zip(from) {
+            *to += x;
+        }
     }
 }
 

@@ -2,24 +2,25 @@
 
 mod steps;
 
-use rig_shared::effects::Periodic;
+use rig_shared::effects::{Kind, Periodic};
 
 use self::steps::{change_step, refuse, steps};
 use super::bench::{Bench, Loaded, library};
 use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
-use super::fault::faulty;
+use super::fault::{faulty, of_preparing};
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, left_of_held};
+use super::judge::{Judge, Judged, left_of_held, not_carried_over};
 use super::lead::{differ, leads, moved, slack};
 use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Tried, Verdict};
 use super::profile::Profile;
 use super::refit::{Refit, open};
-use super::sanity::faults;
+use super::runs::in_sessions;
+use super::sanity::{faults, too_short_to_learn};
 use super::search::{Search, with};
 use super::stated::{Now, Stated};
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
@@ -46,9 +47,16 @@ pub fn diagnose(
     let mut stated = Stated::of(robot);
     loop {
         // Each time around more of the description's effects are held.
-        match attempt(robot, &stated, training, holdout, options, progress)? {
-            Attempt::Done(result) => return Ok(*result),
-            Attempt::Hold(more) => stated = more,
+        match attempt(robot, &stated, training, holdout, options, progress) {
+            Ok(Attempt::Done(result)) => return Ok(*result),
+            Ok(Attempt::Hold(more)) => stated = more,
+            Err(DiagnoseError::Prepare(error)) => {
+                let Some(fault) = of_preparing(&error) else {
+                    return Err(error.into());
+                };
+                return Ok((faulty(robot, vec![fault]), robot.clone()));
+            }
+            Err(error) => return Err(error),
         }
     }
 }
@@ -75,8 +83,15 @@ fn attempt(
     } else {
         Some(bench.load(holdout)?)
     };
+    in_sessions(&mut loaded.runs, &[]);
+    if let Some(sealed) = &mut sealed {
+        in_sessions(&mut sealed.runs, &loaded.runs);
+    }
     for recordings in std::iter::once(&loaded).chain(&sealed) {
-        let wrong = faults(&stated.robot, &recordings.runs)?;
+        let mut wrong = faults(&stated.robot, &recordings.runs)?;
+        if wrong.is_empty() && std::ptr::eq(recordings, &loaded) {
+            wrong.extend(too_short_to_learn(&loaded.runs));
+        }
         if !wrong.is_empty() {
             let fault = (faulty(robot, wrong), robot.clone());
             return Ok(Attempt::Done(Box::new(fault)));
@@ -104,8 +119,12 @@ fn attempt(
     };
     let loaded = moved(&bench, loaded, &lead)?;
     let first = Pass::over(&bench, &loaded, options, progress)?;
-    let beside = with(&first.refit.base, &first.found, None);
-    // What was missing may have looked like a lead, or hidden one.
+    // What was missing may have looked like a lead, or hidden one; a delay found beside a wrong lead is its other half.
+    let found: Vec<Profile> = (first.found.iter())
+        .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
+        .cloned()
+        .collect();
+    let beside = with(&first.refit.base, &found, None);
     let better = leads(&first.search.source, &beside, &lead)?;
     let again;
     let (loaded, lead, pass) = if differ(&better, &lead, &loaded.runs) {
@@ -192,10 +211,15 @@ fn attempt(
         sealed.as_ref(),
     )?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
-        judged.left = left_of_held(robot, &held.last(), &judged.floors);
+        let mut named: Vec<(usize, [f64; 2])> = (judged.chosen[described..].iter())
+            .map(|p| (p.candidate.joint, held.whole(p.candidate.joint)))
+            .collect();
+        named.dedup_by_key(|(joint, _)| *joint);
+        judged.left = left_of_held(robot, &held.last(), &judged.floors)
+            .or_else(|| not_carried_over(robot, &named, &judged.floors));
     }
     let Judged { chosen, floors, .. } = &judged;
-    let joint = refit.joint(&search.source, chosen, &judge.pairs)?;
+    let joint = refit.joint(&search.source, chosen, &judge.pairs, &coordinates)?;
     let after = &joint.solution;
     let before = refit.solution(&chosen[..described])?;
     progress(0.95);

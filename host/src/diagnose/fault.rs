@@ -1,8 +1,28 @@
 //! The diagnosis of recordings that cannot be what they say.
 
-use super::outcome::{DataFault, Diagnosis, Residual, Verdict};
+use super::outcome::{About, DataFault, Diagnosis, Residual, Verdict};
 use super::sentences;
+use crate::prepare::PrepareError;
 use crate::robot::Robot;
+
+/// What keeps a recording from being prepared, where that is a fault of the recording.
+pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
+    let (kind, label) = match error {
+        PrepareError::TooShort { label, .. } => ("too-short", label),
+        PrepareError::NotMoving { label, .. } => ("not-moving", label),
+        PrepareError::Broken { label, .. } | PrepareError::Irregular { label, .. } => {
+            ("clock", label)
+        }
+        _ => return None,
+    };
+    Some(DataFault {
+        kind: kind.into(),
+        about: About::Recording,
+        recording: label.clone(),
+        joint: String::new(),
+        text: error.to_string(),
+    })
+}
 
 /// Says what is wrong and nothing else: no model means anything on such data.
 pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {

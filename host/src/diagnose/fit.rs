@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::locate::bins;
 use super::rows::{Column, Rows};
 
 mod evidence;
@@ -20,6 +21,8 @@ const FEWEST_BLOCKS: usize = 12;
 /// Least length of a cluster, s: what a law is off by goes with the motion, whose own times are seconds, however short the
 /// noise that it is hidden in.
 const LEAST_CLUSTER: f64 = 1.0;
+/// Strata of a coordinate: few, so that what a law is off by has one sign in each.
+const STRATA: usize = 12;
 /// A column of which less than this share of its length is left beside the others is one of them in disguise.
 const DISTINCT: f64 = 0.02;
 
@@ -103,6 +106,18 @@ impl<'a> Fit<'a> {
         Self {
             block,
             blocks: next,
+            folded: OnceLock::new(),
+            ..self.clone()
+        }
+    }
+
+    /// The same with blocks of rows that are alike in a coordinate instead of near in time: `values` one a row, in strata of
+    /// equal numbers.
+    pub(super) fn stratified(&self, values: &[f64]) -> Self {
+        let (place, _) = bins(values, &vec![true; values.len()], STRATA);
+        Self {
+            block: place.into_iter().flatten().collect(),
+            blocks: STRATA,
             folded: OnceLock::new(),
             ..self.clone()
         }

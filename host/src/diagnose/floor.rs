@@ -3,6 +3,10 @@
 use super::rows::Rows;
 use super::runs::Run;
 
+/// Share of the band of thinned rows that the low-pass before the thinning passes.
+const PASSED: f64 = 0.8;
+/// Squares of third differences over those of second ones from which a reading counts as white, where it would be 10/3.
+const STILL_WHITE: f64 = 2.5;
 /// Two recordings repeat each other when their references (else their positions) differ by less than this share of their
 /// spread.
 const ALIKE: f64 = 0.02;
@@ -65,6 +69,26 @@ pub(super) fn from_repeats(
     (count > 0).then(|| (squares / count as f64).sqrt())
 }
 
+/// RMS on rows `period` s apart of what a joint's torque reading varies by from sample to sample: less noise than that there
+/// cannot be. None where the reading is no longer white, because something has filtered it before.
+///
+/// By third differences, in which a smooth torque leaves nothing: of white noise they have 20 times its variance, and second
+/// ones 6 times.
+pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
+    let (mut second, mut third, mut count) = (0.0, 0.0, 0_u64);
+    for run in runs {
+        for w in run.joints[joint].recorded().windows(4) {
+            second += (w[0] - 2.0 * w[1] + w[2]).powi(2);
+            third += (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2);
+            count += 1;
+        }
+    }
+    let rate = runs.first()?.rate;
+    let passed = (PASSED / (period * rate)).min(1.0);
+    let white = third > STILL_WHITE * second && count > 0;
+    white.then(|| (third / 20.0 / count as f64 * passed).sqrt())
+}
+
 /// Time over which a joint's residual is correlated, s: the integral of its autocorrelation up to the first zero, the
 /// longest over the joints.
 pub(super) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
@@ -88,4 +112,41 @@ pub(super) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {
         2.0 * sum * rows.period
     };
     residuals.iter().map(of).fold(rows.period, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::diagnose::JointRun;
+
+    fn reading(tau: Vec<f64>) -> Option<f64> {
+        let joint = JointRun {
+            tau,
+            ..JointRun::default()
+        };
+        let run = Run {
+            rate: 1000.0,
+            joints: vec![joint],
+            ..Run::default()
+        };
+        of_reading(&[run], 0, 0.01)
+    }
+
+    #[test]
+    fn a_reading_says_its_own_noise_unless_it_was_filtered() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        let smooth = |k: usize| 3.0 * (0.02 * k as f64).sin();
+        // Uniform from −1 to 1: variance a third.
+        let white: Vec<f64> = (0..20_000)
+            .map(|k| smooth(k) + 2.0 * rng.random::<f64>() - 1.0)
+            .collect();
+        let expected = (PASSED / 10.0 / 3.0_f64).sqrt();
+        let found = reading(white.clone()).unwrap_or(f64::NAN);
+        assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
+        let filtered = white.windows(4).map(|w| w.iter().sum::<f64>() / 4.0);
+        assert_eq!(reading(filtered.collect()), None);
+        assert_eq!(reading((0..20_000).map(smooth).collect()), None);
+    }
 }

@@ -3,6 +3,7 @@
 use rig_shared::effects::Kind;
 
 use super::DiagnoseError;
+use super::burst::{Burst, burst};
 use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, locate};
@@ -13,12 +14,14 @@ use super::rows::Rows;
 use super::runs::Run;
 use super::search::{Search, shadow, with};
 use super::testable;
-use crate::report::format_significant;
-use crate::robot::Robot;
+use crate::report::{format_significant, format_unit};
+use crate::robot::{Joint, Robot};
 
 /// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
 /// what stands in for another leaves more of it.
 const NOT_QUITE: f64 = 0.02;
+/// Share of the RMS that a free function takes away where no effect was found, from which on something is missing.
+const UNNAMED: f64 = 0.15;
 /// Share of its gap that a step must close to stand beside a remainder.
 const HALF: f64 = 0.5;
 /// … and at least, where nothing else would close half as much in its place.
@@ -31,6 +34,9 @@ pub(super) const BEYOND_FLOOR: f64 = 1.12;
 const FAR_BEYOND_FLOOR: f64 = 1.25;
 /// … of the data held back, whose motion is another.
 const BEYOND_FLOOR_HELD: f64 = 1.5;
+/// Times the noise of a torque's reading from which on what names leave is not passed off as noise without a repeat: a drive's
+/// own unrest is as much again, or twice.
+const FAR_BEYOND_READING: f64 = 3.0;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
@@ -121,7 +127,7 @@ impl Judge<'_, '_> {
         let floors: Vec<f64> = (0..self.rows.joints())
             .map(|j| {
                 floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), j)
-                    .unwrap_or_else(|| fit.rms(j))
+                    .unwrap_or_else(|| fit.rms(j) * self.quiet(&fit, j))
             })
             .collect();
         let left = (0..floors.len())
@@ -131,7 +137,9 @@ impl Judge<'_, '_> {
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
         let doubted = || (0..floors.len()).find_map(|j| self.doubt(&fit, &chosen, j, floors[j]));
         Judged {
-            left: left.or_else(doubted),
+            left: left
+                .or_else(doubted)
+                .or_else(|| (0..floors.len()).find_map(|j| self.unproven(&fit, &chosen, j))),
             much_left,
             chosen,
             floors,
@@ -159,7 +167,30 @@ impl Judge<'_, '_> {
         )
     }
 
-    /// What is left of a joint beyond the floor and goes with the motion.
+    /// What a few stretches of a joint's residual hold; where a motion was repeated, that is in the floor.
+    fn burst(&self, fit: &Fit, joint: usize) -> Option<Burst> {
+        let rows = self.rows;
+        (self.pairs.is_empty())
+            .then(|| {
+                let residual = fit.residual(joint);
+                let runs = self.search.source.runs;
+                burst(
+                    &residual,
+                    &rows.keep[joint],
+                    &rows.starts,
+                    rows.period,
+                    runs,
+                )
+            })
+            .flatten()
+    }
+
+    /// Share of a joint's RMS without its bursts.
+    fn quiet(&self, fit: &Fit, joint: usize) -> f64 {
+        (self.burst(fit, joint)).map_or(1.0, |burst| (1.0 - burst.share).max(0.0).sqrt())
+    }
+
+    /// What is left of a joint beyond the floor and goes with the motion, or came and went.
     fn remainder_of(
         &self,
         fit: &Fit,
@@ -173,6 +204,9 @@ impl Judge<'_, '_> {
         let shown = (places.iter())
             .find(|p| p.p_value < SIGNIFICANT)
             .filter(|p| repeated || p.share > SHARE_LEFT);
+        if let Some(burst) = self.burst(fit, joint) {
+            return Some(self.knocked(&burst, rms, joint, places));
+        }
         // Without a repeat the floor is what no coordinate of the motion explains.
         let ratio = if repeated {
             rms / floor
@@ -205,6 +239,54 @@ impl Judge<'_, '_> {
         })
     }
 
+    fn knocked(&self, burst: &Burst, rms: f64, joint: usize, places: Vec<Place>) -> Remainder {
+        let name = &self.robot.joints[joint].name;
+        let Burst {
+            share,
+            count,
+            label,
+            time: [from, to],
+            times,
+        } = burst;
+        Remainder {
+            joint: name.clone(),
+            rms: rms * share.sqrt(),
+            ratio: 1.0 / (1.0 - share).max(1e-6).sqrt(),
+            text: format!(
+                "{:.0} % of the squares that are left of joint {name} lie in {count} stretch{} of half a second, the loudest from {from:.1} to {to:.1} s of {label} with {} times the RMS of the others: something touched the joint or held it there, or that piece of the recording is damaged. Look at it, or record the motion again.",
+                100.0 * share,
+                if *count == 1 { "" } else { "es" },
+                format_significant(*times, 2),
+            ),
+            places,
+            doubt: true,
+        }
+    }
+
+    /// What names leave of a joint that is far more than its reading's own noise, where no repeat says how much of it is noise.
+    fn unproven(&self, fit: &Fit, chosen: &[Profile], joint: usize) -> Option<Remainder> {
+        let named = chosen.iter().any(|p| p.candidate.joint == joint);
+        if !named || !self.pairs.is_empty() {
+            return None;
+        }
+        let own = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
+        let rms = fit.rms(joint);
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
+        (rms > FAR_BEYOND_READING * own).then(|| Remainder {
+            joint: name.clone(),
+            rms: (rms * rms - own * own).sqrt(),
+            ratio: rms / own,
+            text: format!(
+                "Of joint {name} {} {} are left, {} times what its reading varies by from sample to sample. No motion was recorded twice, so nobody knows how much of that is noise: record the training motion again and give both.",
+                format_significant(rms, 3),
+                format_unit(kind.units().1),
+                format_significant(rms / own, 2)
+            ),
+            places: self.places_of(fit, joint, own),
+            doubt: true,
+        })
+    }
+
     /// What the names of a joint leave that right ones would not.
     fn doubt(&self, fit: &Fit, chosen: &[Profile], joint: usize, floor: f64) -> Option<Remainder> {
         let mut names: Vec<&str> = (chosen.iter())
@@ -212,27 +294,40 @@ impl Judge<'_, '_> {
             .map(|p| p.candidate.kind.about().name)
             .collect();
         names.dedup();
-        if names.is_empty() {
-            return None;
-        }
         let found = misfit(&self.search.source, self.rows, fit, joint)?;
         let rms = fit.rms(joint);
-        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
-        let taken = (self.base.rms(joint).powi(2) - rms * rms).max(0.0).sqrt();
-        if left < NOT_QUITE * taken {
-            return None;
-        }
-        let name = &self.robot.joints[joint].name;
-        let text = format!(
-            "With {} in the model a free function of the {}{} still takes {} % off what is left of joint {name}, on stretches that it was not fitted to. The right name would leave it nothing: {} may stand for an effect that the library does not hold.",
-            names.join(" and "),
+        let what = format!(
+            "a free function of the {}{}",
             found.coordinate,
             if found.friction {
                 ", turned with the direction,"
             } else {
                 ""
-            },
-            format_significant(100.0 * found.gain, 2),
+            }
+        );
+        let name = &self.robot.joints[joint].name;
+        let percent = format_significant(100.0 * found.gain, 2);
+        if names.is_empty() {
+            // The description's own friction and filters leave a little of that.
+            return (found.gain > UNNAMED).then(|| Remainder {
+                joint: name.clone(),
+                rms: rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt(),
+                ratio: rms / floor,
+                text: format!(
+                    "No effect of the library explains what is left of joint {name}, but {what} takes {percent} % off it, on stretches that it was not fitted to: something is missing that has no name here."
+                ),
+                places: self.places_of(fit, joint, floor),
+                doubt: true,
+            });
+        }
+        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
+        let taken = (self.base.rms(joint).powi(2) - rms * rms).max(0.0).sqrt();
+        if left < NOT_QUITE * taken {
+            return None;
+        }
+        let text = format!(
+            "With {} in the model {what} still takes {percent} % off what is left of joint {name}, on stretches that it was not fitted to. The right name would leave it nothing: {} may stand for an effect that the library does not hold.",
+            names.join(" and "),
             if names.len() == 1 {
                 "this one"
             } else {
@@ -266,6 +361,29 @@ pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Optio
         ),
         places: Vec::new(),
         doubt: false,
+    })
+}
+
+/// Names that take something off the training data and nothing off those held back: in the joint where these gain least.
+/// `steps` are each named joint's RMS held back before and after all of them.
+pub(super) fn not_carried_over(
+    robot: &Robot,
+    steps: &[(usize, [f64; 2])],
+    floors: &[f64],
+) -> Option<Remainder> {
+    let grown = |(_, [before, after]): &&(usize, [f64; 2])| after / before;
+    let worst = steps.iter().max_by(|a, b| grown(a).total_cmp(&grown(b)))?;
+    let (joint, [before, after]) = *worst;
+    let name = &robot.joints[joint].name;
+    (after >= before).then(|| Remainder {
+        joint: name.clone(),
+        rms: (after.powi(2) - floors[joint].powi(2)).max(0.0).sqrt(),
+        ratio: after / floors[joint],
+        text: format!(
+            "Of the data held back the names take nothing off in joint {name}: they explain the training data alone, and are no more than guesses. Record more to learn from.",
+        ),
+        places: Vec::new(),
+        doubt: true,
     })
 }
 

@@ -22,6 +22,12 @@ const DRAWS: usize = 999;
 /// … and for a coordinate that none of them reaches, where the correction for the number of coordinates asks for more: one
 /// alone among fifteen has to be at 0.0002.
 const MOST_DRAWS: usize = 19_999;
+/// Coordinates that most laws are functions of.
+const OF_LAWS: [&str; 4] = [VELOCITY, POSITION, ACCELERATION, DRIVE];
+const VELOCITY: &str = "velocity";
+const POSITION: &str = "position";
+const ACCELERATION: &str = "acceleration";
+const DRIVE: &str = "torque of the drive";
 /// Share of the explained squares that the interval has to hold.
 const MOST_OF_IT: f64 = 0.75;
 
@@ -34,6 +40,13 @@ pub(super) struct Coordinate {
     pub(super) unit: &'static str,
     /// One a row.
     pub(super) values: Vec<f64>,
+}
+
+impl Coordinate {
+    /// Whether laws of the library are functions of it, so that one that is not quite right errs along it.
+    pub(super) fn is_of_a_law(&self) -> bool {
+        OF_LAWS.contains(&self.name.as_str())
+    }
 }
 
 /// All coordinates of a joint. `waves` are orders over the motor's turn that effects of it have: bins of a turn average a
@@ -64,9 +77,9 @@ pub(super) fn coordinates(
         JointKind::Revolute => ("rad/s", "rad/s^2", "N*m/s"),
         JointKind::Prismatic => ("m/s", "m/s^2", "N/s"),
     };
-    add("velocity", v, &|_, run| run.joints[joint].qd.clone());
-    add("position", p, &|_, run| run.joints[joint].q.clone());
-    add("acceleration", a, &|_, run| run.joints[joint].qdd.clone());
+    add(VELOCITY, v, &|_, run| run.joints[joint].qd.clone());
+    add(POSITION, p, &|_, run| run.joints[joint].q.clone());
+    add(ACCELERATION, a, &|_, run| run.joints[joint].qdd.clone());
     let angle = |order: f64| {
         let within = std::f64::consts::TAU;
         move |_: usize, run: &Run| -> Vec<f64> {
@@ -90,11 +103,9 @@ pub(super) fn coordinates(
             .map(|(l, v)| l * v.signum())
             .collect()
     });
-    add("torque of the drive", f, &|r, _| {
-        predicted[r].torque[joint].clone()
-    });
+    add(DRIVE, f, &|r, _| predicted[r].torque[joint].clone());
     add("time since the start", "s", &|_, run| {
-        run.t.iter().map(|t| t - run.t[0]).collect()
+        run.t.iter().map(|t| t - run.began).collect()
     });
     add("way since the last reversal, by direction", p, &|_, run| {
         since_reversal(run, joint).0

@@ -6,6 +6,7 @@ mod anchor;
 mod arm_tests;
 mod bench;
 pub mod benchmark;
+mod burst;
 mod change;
 mod columns;
 mod descent;

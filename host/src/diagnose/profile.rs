@@ -176,7 +176,7 @@ fn searched(shape: &Parameter, resolution: f64) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
         Scale::Logarithmic => {
-            let told = if shape.unit == "rad" {
+            let told = if is_distance(shape) {
                 (STEPS_OF_A_DISTANCE * resolution).min(most)
             } else {
                 0.0
@@ -187,14 +187,18 @@ fn searched(shape: &Parameter, resolution: f64) -> [f64; 2] {
     }
 }
 
-/// The shape that stands at the least of what is searched.
+/// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a
+/// gear only play is one.
 fn vanished(kind: Kind, shapes: &[f64; SHAPES], resolution: f64) -> Option<&'static str> {
-    (kind.about().shapes.iter().zip(shapes))
-        .find(|(shape, value)| {
-            shape.scale == Scale::Logarithmic
-                && **value < (1.0 + AT_THE_END) * searched(shape, resolution)[0]
-        })
-        .map(|(shape, _)| shape.name)
+    let shape = kind.about().shapes.first()?;
+    let least = (1.0 + AT_THE_END) * searched(shape, resolution)[0];
+    let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
+    (counts && shapes[0] < least).then_some(shape.name)
+}
+
+/// Whether a shape is a way that the position shows.
+fn is_distance(shape: &Parameter) -> bool {
+    shape.unit == "rad"
 }
 
 /// The value there, within what physics allows.
@@ -299,11 +303,7 @@ impl Search<'_> {
         let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
             return Ok(None);
         };
-        let vanished = if gear {
-            None
-        } else {
-            vanished(kind, &best.1, self.resolution[self.library[c].joint])
-        };
+        let vanished = vanished(kind, &best.1, self.resolution[self.library[c].joint]);
         Ok(Some(Profile {
             candidate: self.library[c],
             shapes: best.1,

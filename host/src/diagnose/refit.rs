@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use rig_shared::effects::{Parameter, SHAPES, Scale};
+use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
@@ -11,6 +11,7 @@ use super::bench::Bench;
 use super::columns::Source;
 use super::fit::{Fit, dot};
 use super::floor;
+use super::locate::Coordinate;
 use super::model::weights;
 use super::outcome::{Absorbed, Value};
 use super::profile::Profile;
@@ -93,13 +94,20 @@ impl<'r> Refit<'r> {
         source: &Source,
         chosen: &[Profile],
         pairs: &[(usize, usize)],
+        coordinates: &[Vec<Coordinate>],
     ) -> Result<Joint, DiagnoseError> {
         let mut beside = with(&self.base, chosen, None);
         let residuals: Vec<Vec<f64>> = (0..self.joints).map(|j| beside.residual(j)).collect();
         let plain = (self.plain).clustered(floor::memory(self.plain.rows(), &residuals), pairs);
+        let strata: Vec<Fit> = (coordinates.iter().enumerate())
+            .filter(|(j, _)| self.joints == 1 || chosen.iter().any(|p| p.candidate.joint == *j))
+            .flat_map(|(_, of_joint)| of_joint.iter().filter(|c| c.is_of_a_law()))
+            .map(|coordinate| plain.stratified(&coordinate.values))
+            .collect();
         let failed =
             || DiagnoseError::Model("its parameters with the effects are not all excited.".into());
-        let solution = jackknifed(&plain, &self.columns(chosen), &[]).ok_or_else(failed)?;
+        let solution =
+            jackknifed(&plain, &strata, &self.columns(chosen), &[]).ok_or_else(failed)?;
         let mut stds = vec![[0.0; SHAPES]; chosen.len()];
         let mut slopes = Vec::new();
         let mut places = Vec::new();
@@ -120,11 +128,13 @@ impl<'r> Refit<'r> {
                 }
             }
         }
-        let Some(linearised) = jackknifed(&plain, &self.columns(chosen), &slopes) else {
+        let Some(linearised) = jackknifed(&plain, &strata, &self.columns(chosen), &slopes) else {
             return Ok(Joint { solution, stds });
         };
         for (s, (k, place)) in places.into_iter().enumerate() {
-            stds[k][place] = linearised.std(solution.values.len() + s);
+            if !is_of_contact(chosen[k].candidate.kind, place) {
+                stds[k][place] = linearised.std(solution.values.len() + s);
+            }
         }
         Ok(Joint {
             solution: linearised,
@@ -238,6 +248,13 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
             _ => None,
         })
         .collect()
+}
+
+/// Whether a shape is of teeth while they touch: the motor's motion shows their play, and of the contact itself no more than
+/// that it is there. The fit needs values, which are no measurements.
+fn is_of_contact(kind: Kind, place: usize) -> bool {
+    let name = kind.about().shapes[place].name;
+    kind == Kind::Backlash && matches!(name, "stiffness" | "damping")
 }
 
 /// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics

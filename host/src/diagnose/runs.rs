@@ -6,6 +6,9 @@ use super::DiagnoseError;
 use crate::data::Block;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 
+/// Longest pause within a session, s: a gear keeps its warmth for some minutes.
+const ONE_SESSION: f64 = 60.0;
+
 /// One joint over a stretch, at the recording's own rate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointRun {
@@ -40,6 +43,8 @@ pub struct Run {
     pub recording: usize,
     /// Hz
     pub rate: f64,
+    /// When the joints began to run, on the clock of `t`, s: the recording's first row, or that of the one it goes on from.
+    pub began: f64,
     /// s
     pub t: Vec<f64>,
     /// Joint by joint.
@@ -79,6 +84,24 @@ pub(super) fn resolution(runs: &[Run], joint: usize) -> f64 {
         .filter(|step| *step > 0.0)
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() { least } else { 0.0 }
+}
+
+/// Lets recordings go on from those of `runs` and `before` that they were made after, by one clock and within
+/// [`ONE_SESSION`]: what has warmed up is warm. Clocks that begin anew with each recording say nothing of that.
+pub(super) fn in_sessions(runs: &mut [Run], before: &[Run]) {
+    let span = |run: &Run| [run.began, run.t.last().copied().unwrap_or(run.began)];
+    let mut spans: Vec<[f64; 2]> = before.iter().map(span).collect();
+    let mut order: Vec<usize> = (0..runs.len()).collect();
+    order.sort_by(|a, b| runs[*a].began.total_cmp(&runs[*b].began));
+    for k in order {
+        let run = &mut runs[k];
+        let first = run.began;
+        run.began = (spans.iter())
+            .filter(|[began, end]| *began < first && (*end..=end + ONE_SESSION).contains(&first))
+            .map(|[began, _]| *began)
+            .fold(first, f64::min);
+        spans.push(span(run));
+    }
 }
 
 /// Reads `recording` stretch by stretch; positions are filtered by `position` (zero phase) and differentiated.
@@ -137,6 +160,9 @@ impl Gathered {
     }
 
     fn push(&mut self, block: Block) {
+        if let (true, Some(first)) = (self.runs.is_empty(), block.t.first()) {
+            self.empty.began = *first;
+        }
         if !block.continues || self.runs.is_empty() {
             self.runs.push(Run {
                 joints: vec![JointRun::default(); block.joints.len()],
@@ -184,5 +210,35 @@ fn append(run: &mut Run, block: Block) {
         join(&mut to.reference, from.reference, before);
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(first: f64, last: f64) -> Run {
+        Run {
+            began: first,
+            t: vec![first, last],
+            ..Run::default()
+        }
+    }
+
+    #[test]
+    fn what_goes_on_by_one_clock_is_one_session() {
+        // A pause of 5 s, a stretch of the same recording behind a gap, a clock that begins anew, an hour's rest.
+        let mut runs = vec![run(100.0, 190.0), run(195.0, 280.0), run(0.0, 60.0)];
+        runs.push(Run {
+            t: vec![230.0, 280.0],
+            ..run(195.0, 280.0)
+        });
+        runs.push(run(4000.0, 4060.0));
+        in_sessions(&mut runs, &[]);
+        let began: Vec<f64> = runs.iter().map(|r| r.began).collect();
+        assert_eq!(began, [100.0, 100.0, 0.0, 100.0, 4000.0]);
+        let mut held = vec![run(281.0, 300.0)];
+        in_sessions(&mut held, &runs);
+        assert_eq!(held[0].began, 100.0);
     }
 }

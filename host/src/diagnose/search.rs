@@ -17,6 +17,7 @@ use crate::robot::Placed;
 
 mod begin;
 mod kinds;
+mod pairs;
 mod shadow;
 mod simplest;
 
@@ -180,6 +181,7 @@ impl<'a> Search<'a> {
                 break;
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
+            let best = self.richer_law_first(base, &chosen, best, &profiles, trials)?;
             let before = chosen.clone();
             let newcomer = best.candidate;
             chosen.push(best);
@@ -211,43 +213,6 @@ impl<'a> Search<'a> {
         self.other_laws(base, &mut chosen)?;
         chosen.sort_by_key(|profile| !self.is_described(&profile.candidate));
         Ok(chosen)
-    }
-
-    /// A gear whose link sticks bends to friction that has memory and falls with speed at once: where two plain effects, by
-    /// whichever law, leave no more than the gear does, the better of them is taken instead.
-    fn plain_before_gear(
-        &self,
-        base: &Fit,
-        chosen: &[Profile],
-        best: Profile,
-        profiles: &[Profile],
-        trials: usize,
-    ) -> Result<Profile, DiagnoseError> {
-        let joint = best.candidate.joint;
-        let plain = (profiles.iter())
-            .filter(|p| !is_gear(p.candidate.kind) && p.candidate.joint == joint)
-            .find(|p| p.refused(trials).is_none());
-        let Some(plain) = plain.filter(|_| is_gear(best.candidate.kind)) else {
-            return Ok(best);
-        };
-        let of =
-            |more: &Profile| -> Vec<Profile> { chosen.iter().chain([more]).cloned().collect() };
-        let mut pair = of(plain);
-        let taken = pair.iter().map(|p| p.candidate);
-        let gears = self.library.iter().filter(|c| is_gear(c.kind));
-        let without: Vec<Candidate> = taken.chain(gears.copied()).collect();
-        let second = self.sweep(&with(base, &pair, None), &without)?;
-        pair.extend((second.into_iter()).find(|p| p.refused(trials).is_none()));
-        for _ in 0..2 {
-            self.refine_all(base, &mut pair)?;
-        }
-        self.other_laws(base, &mut pair)?;
-        let left = |list: &[Profile]| with(base, list, None).rms(joint);
-        let instead = left(&pair) <= left(&of(&best));
-        Ok(match pair.into_iter().nth(chosen.len()) {
-            Some(plain) if instead => plain,
-            _ => best,
-        })
     }
 
     /// What would stand in the place of the `i`-th effect beside all others, best first; gears only where a gear or what is
@@ -286,6 +251,7 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 if let Some(rival) = self.profile(&fit, c, None)?
+                    && rival.vanished.is_none()
                     && rival.evidence.beyond(&chosen[i].evidence) > LEAST_GAIN
                 {
                     chosen[i] = rival;

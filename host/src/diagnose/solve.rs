@@ -29,10 +29,30 @@ pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Opti
     })
 }
 
-/// [`solve`] with the covariance of the jackknife over the blocks of `plain`.
-pub(super) fn jackknifed(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Option<Solution> {
-    solved(columns, slopes, plain, &|all, _, rest| {
-        plain.jackknife(all, rest)
+/// [`solve`] with the covariance of the jackknife over the blocks of `plain`, widened where the blocks of one of `strata` say
+/// more: what a law is off by goes with speed, position or load, and pulls at the parameters the same way in all their rows.
+pub(super) fn jackknifed(
+    plain: &Fit,
+    strata: &[Fit],
+    columns: &[&Column],
+    slopes: &[Column],
+) -> Option<Solution> {
+    solved(columns, slopes, plain, &|all, inverse, rest| {
+        let mut covariance = plain.jackknife(all, rest)?;
+        let mut widest = covariance.diagonal();
+        for strata in strata {
+            let other = strata.sandwich(all, inverse, rest).diagonal();
+            widest.zip_apply(&other, |w, o| *w = w.max(o));
+        }
+        let wider: Vec<f64> = (widest.iter().zip(covariance.diagonal().iter()))
+            .map(|(widest, own)| (widest / own.max(f64::MIN_POSITIVE)).sqrt())
+            .collect();
+        for a in 0..wider.len() {
+            for b in 0..wider.len() {
+                covariance[(a, b)] *= wider[a] * wider[b];
+            }
+        }
+        Some(covariance)
     })
 }
 

@@ -50,6 +50,20 @@ pub enum PrepareError {
         /// Rows that are needed.
         needed: u64,
     },
+    /// Too few rows between one gap in time and the next.
+    #[error(
+        "{label} has gaps in time: the longest stretch without one holds {longest} of its {rows} rows; at least {needed} are needed. Record it again so that fewer rows are lost."
+    )]
+    Broken {
+        /// The recording.
+        label: String,
+        /// Rows of its longest stretch.
+        longest: u64,
+        /// Rows it has.
+        rows: u64,
+        /// Rows that are needed in one stretch.
+        needed: u64,
+    },
     /// The rows are not evenly spaced in time.
     #[error(
         "{label} is not evenly sampled: near line {line} the time advances by {step} s where {mean} s is usual (the longest step is {longest} s); rows that vary that much are not interpolated, so record or resample it at a constant rate."

@@ -257,10 +257,11 @@ impl Survey {
             .into_iter()
             .map(|r| {
                 let (frequency, density) =
-                    r.welch.finish().density(sample_rate).ok_or_else(|| {
-                        PrepareError::TooShort {
+                    (r.welch.finish().density(sample_rate)).ok_or_else(|| {
+                        PrepareError::Broken {
                             label: recording.label(),
-                            rows: longest,
+                            longest,
+                            rows,
                             needed: FEWEST_ROWS,
                         }
                     })?;

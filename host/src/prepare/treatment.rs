@@ -242,10 +242,20 @@ impl Treatment {
         let needed = FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64;
         for survey in surveys {
             if survey.longest < needed {
-                return Err(PrepareError::TooShort {
-                    label: survey.label.clone(),
-                    rows: survey.longest,
-                    needed,
+                let label = survey.label.clone();
+                return Err(if survey.longest < survey.rows {
+                    PrepareError::Broken {
+                        label,
+                        longest: survey.longest,
+                        rows: survey.rows,
+                        needed,
+                    }
+                } else {
+                    PrepareError::TooShort {
+                        label,
+                        rows: survey.rows,
+                        needed,
+                    }
                 });
             }
         }

@@ -69,10 +69,6 @@ pub fn run(
 
 fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseError> {
     let (made, sizes) = case.make()?;
-    let drive = made.robot.joints.first().and_then(|j| j.drive.as_ref());
-    let (constant, ratio) = drive.map_or((f64::NAN, f64::NAN), |d| {
-        (d.torque_constant * d.gear_ratio, d.gear_ratio)
-    });
     Ok(methods
         .iter()
         .map(|method| {
@@ -90,7 +86,7 @@ fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseErr
                     let hidden = made.truth.hidden.iter();
                     hidden
                         .filter(|h| h.effect.name() == named.effect)
-                        .flat_map(|h| compare(&h.effect, &made.truth, named, constant, ratio))
+                        .flat_map(|h| compare(&h.effect, &made.truth, named, &made.robot))
                         .collect::<Vec<_>>()
                 })
                 .collect();

@@ -12,6 +12,7 @@ use super::*;
 use crate::data::{Block, JointColumns};
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Evidence;
+use crate::diagnose::locate::coordinates;
 use crate::diagnose::stated::Stated;
 use crate::prepare::{InMemory, Recording};
 use crate::robot::{ONE_LINK_TEMPLATE, Robot};
@@ -100,7 +101,8 @@ fn errors(robot: &Robot, seed: u64, unknown: f64) -> [[f64; 2]; 2] {
             |d| matches!(d.as_slice(), [(b, _)] if bench.nominal.base.expression(*b) == "fv1"),
         )
         .unwrap();
-    let joint = refit.joint(&source, &chosen, &pairs).unwrap();
+    let along = coordinates(&loaded.rows, &loaded.runs, &source.predicted, robot, 0, &[]);
+    let joint = refit.joint(&source, &chosen, &pairs, &[along]).unwrap();
     [&joint.solution, &refit.solution(&chosen).unwrap()].map(|s| {
         [
             (s.values[free] - DRAG) / s.std(free),

@@ -8,6 +8,8 @@ use crate::robot::{JointKind, Robot};
 
 /// Less than this cannot hold a reversal and a repetition of it, s.
 const SHORTEST: f64 = 1.0;
+/// Less than this in all holds too few stretches of a motion to learn a name from some and to try it on others, s.
+const LEAST_TO_LEARN: f64 = 5.0;
 /// Fewer rows than this cannot hold the parameters of one joint.
 const FEWEST: usize = 100;
 /// Share of the moving time at the torque limit that leaves too little to learn from.
@@ -76,6 +78,25 @@ pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
             "",
             format!(
                 "The recording holds {rows} rows, {time:.2} s; at least {FEWEST} rows and {SHORTEST} s are needed, half a minute with reversals would be right."
+            ),
+        )
+    })
+}
+
+/// Training data that are too short for names, together.
+pub(in crate::diagnose) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault> {
+    let time: f64 = (runs.iter())
+        .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
+        .sum();
+    let all: Vec<&Run> = runs.iter().collect();
+    (time < LEAST_TO_LEARN).then(|| {
+        fault(
+            &all,
+            "too-short",
+            About::Recording,
+            "",
+            format!(
+                "The training data hold {time:.2} s in all; names are not learnt from less than {LEAST_TO_LEARN} s, and half a minute with reversals would be right."
             ),
         )
     })

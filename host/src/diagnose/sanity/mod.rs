@@ -21,6 +21,8 @@ mod swaps;
 #[cfg(test)]
 mod tests;
 
+pub(super) use columns::too_short_to_learn;
+
 use super::outcome::{About, DataFault};
 use super::runs::runs_of_blocks;
 use super::{DiagnoseError, Run};

@@ -14,13 +14,16 @@ use crate::robot::{JointKind, Robot};
 
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
 pub(super) const POOR: f64 = 0.1;
+/// The same of a single joint, whose model has few parameters to make up for a wrong unit or time with.
+const POOR_ALONE: f64 = 0.01;
 /// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
 const BETTER: f64 = 0.35;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
 const MUCH_BETTER: f64 = 0.2;
 pub(super) const GOOD: f64 = 0.2;
-/// Shifts up to this belong to filters and buses, not to clocks, s.
-const SHIFT: f64 = 0.1;
+/// Shifts up to this belong to filters and buses, not to clocks, s: half a row. Those of several joints up to the second,
+/// because their many parameters like a small one by chance.
+const SHIFT: [f64; 2] = [0.01, 0.03];
 /// Farthest shift that is tried, s; no more than a quarter of the recording.
 const FARTHEST: f64 = 5.0;
 /// Times its length that a joint must move for to show a shift: a single short motion is explained by one as well as by
@@ -104,6 +107,14 @@ impl<'a> Judge<'a> {
         Ok(found)
     }
 
+    fn poor(&self) -> f64 {
+        if self.robot.joints.len() == 1 {
+            POOR_ALONE
+        } else {
+            POOR
+        }
+    }
+
     fn name(&self, joint: usize) -> &str {
         &self.robot.joints[joint].name
     }
@@ -153,14 +164,15 @@ impl<'a> Judge<'a> {
     /// A torque that belongs to another time than the motion.
     fn shifted(&self, j: usize) -> Option<DataFault> {
         let fit = self.fits[j].as_ref()?;
-        if fit.unexplained() < POOR {
+        let poor = self.poor();
+        if fit.unexplained() < poor {
             return None;
         }
         let time = self.rows.len() as f64 * self.rows.period;
         let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
         let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        if left[reach] < POOR || least > BETTER * left[reach] || least > GOOD {
+        if left[reach] < poor || least > BETTER * left[reach] || least > GOOD {
             return None;
         }
         // Of a periodic motion the nearest period.
@@ -172,7 +184,7 @@ impl<'a> Judge<'a> {
         let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
         let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
-        (shift.abs() > SHIFT && shown).then(|| {
+        (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
             let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
             self.say(
                 "clock",
@@ -199,7 +211,8 @@ impl<'a> Judge<'a> {
             .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
             .collect();
         let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
-        if left.iter().all(|u| *u < POOR) {
+        let poor = self.poor();
+        if left.iter().all(|u| *u < poor) {
             return Ok(Vec::new());
         }
         let rows = self.rows.thinned(if n == 1 { usize::MAX } else { TRIAL });
@@ -221,7 +234,7 @@ impl<'a> Judge<'a> {
             }
         }
         let mut found = Vec::new();
-        for j in (0..n).filter(|j| left[*j] > POOR) {
+        for j in (0..n).filter(|j| left[*j] > poor) {
             if self.robot.joints[j].kind == JointKind::Prismatic && n == 1 {
                 continue;
             }

@@ -162,6 +162,16 @@ pub enum Effect {
     },
 }
 
+/// A compact body of steel, a few centimetres large, on the link.
+pub(in crate::diagnose) fn payload(mass: f64, distance: f64) -> Body {
+    Body {
+        mass,
+        distance,
+        angle: 0.0,
+        inertia: mass * 4.0e-4,
+    }
+}
+
 /// An effect in one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Hidden {
@@ -321,13 +331,7 @@ impl Effect {
                     about_y: angle,
                 });
             }
-            Self::Payload { mass, distance } => mechanism.bodies.push(Body {
-                mass,
-                distance,
-                angle: 0.0,
-                // A compact body of steel: a few centimetres.
-                inertia: mass * 4.0e-4,
-            }),
+            Self::Payload { mass, distance } => mechanism.bodies.push(payload(mass, distance)),
             Self::Spring { stiffness, rest } => {
                 mechanism.spring = Some(Spring {
                     stiffness,

@@ -26,6 +26,7 @@ use serde::Serialize;
 
 pub use arm::{Arm, ArmRecordings, ArmScenario};
 pub use fault::Fault;
+pub(super) use hidden::payload;
 pub use hidden::{Effect, Hidden};
 pub use record::Intrusion;
 pub use reference::Excitation;
@@ -233,7 +234,7 @@ fn drive_of(robot: &Robot) -> Result<&Drive, DiagnoseError> {
     drive.ok_or_else(|| DiagnoseError::Scenario("the description has no drive".into()))
 }
 
-/// J, m·g·l, fv and fc of the rig before anything was hidden in it.
+/// J, m·g·l, fv and fc of the rig before anything was hidden in it, and its joint-side torque constant.
 fn nominal_parameters(config: &PlantConfig) -> BTreeMap<&'static str, f64> {
     let e = config.equivalent();
     BTreeMap::from([
@@ -241,6 +242,10 @@ fn nominal_parameters(config: &PlantConfig) -> BTreeMap<&'static str, f64> {
         ("gravity", e.gravity_cos.hypot(e.gravity_sin)),
         ("viscous", e.viscous),
         ("coulomb", e.coulomb),
+        (
+            "torque_constant",
+            config.motor.torque_constant * config.mechanism.ratio,
+        ),
     ])
 }
 

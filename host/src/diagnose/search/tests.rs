@@ -5,10 +5,11 @@
 use rig_shared::effects::Kind;
 
 use crate::diagnose::scenario::{Effect, Hidden, Scenario};
-use crate::diagnose::{Options, diagnose};
+use crate::diagnose::{Diagnosis, Options, diagnose};
+use crate::prepare::Recording;
 
-/// Effects found beside gears, which are not what is asked.
-fn found(effect: Effect, seed: u64) -> Vec<String> {
+/// What is found beside gears, which are not what is asked; `again`: the training motion recorded twice.
+fn diagnosed(effect: Effect, seed: u64, again: bool) -> (Diagnosis, f64) {
     let made = Scenario {
         seconds: [30.0, 20.0],
         ..Scenario::new(vec![Hidden { joint: 0, effect }], seed)
@@ -19,15 +20,28 @@ fn found(effect: Effect, seed: u64) -> Vec<String> {
         without: vec![Kind::Backlash, Kind::JointElasticity],
         ..Options::default()
     };
+    let mut training: Vec<&dyn Recording> = vec![&made.train];
+    if again {
+        training.push(made.repeat.as_ref().unwrap());
+    }
     let (diagnosis, _) = diagnose(
         &made.robot,
-        &[&made.train, made.repeat.as_ref().unwrap()],
+        &training,
         &[&made.holdout],
         &options,
         &mut |_| (),
     )
     .unwrap();
+    let drive = made.robot.joints[0].drive.as_ref().unwrap();
+    (diagnosis, drive.torque_constant * drive.gear_ratio)
+}
+
+fn names(diagnosis: Diagnosis) -> Vec<String> {
     diagnosis.steps.into_iter().map(|s| s.effect).collect()
+}
+
+fn found(effect: Effect, seed: u64) -> Vec<String> {
+    names(diagnosed(effect, seed, true).0)
 }
 
 #[test]
@@ -45,4 +59,27 @@ fn a_constant_is_no_spring_and_a_spring_no_constant() {
         };
         assert_eq!(found(spring, seed), ["spring"], "{seed}");
     }
+}
+
+/// The law is one of what the current says, not of what is left of it: by the latter the coefficient is half as large again.
+#[test]
+fn a_saturation_is_as_large_as_it_is() {
+    let loss = 0.12;
+    let (diagnosis, constant) = diagnosed(Effect::TorqueSaturation { loss }, 5, true);
+    let [step] = diagnosis.steps.as_slice() else {
+        panic!("{:?}", names(diagnosis));
+    };
+    assert_eq!(step.effect, "torque_saturation");
+    // The rig's 1/(1 + (i/knee)²) begins as 1 − (i/knee)², and ends a little above.
+    let truth = loss / (1.0 - loss) / (Effect::PEAK_CURRENT * constant).powi(2);
+    let found = step.parameters["coefficient"].value / truth;
+    assert!((0.85..1.03).contains(&found), "{found}");
+}
+
+/// Before it is found, presliding looks like a torque recorded early; what is then taken out as that comes back as a delay.
+#[test]
+fn presliding_is_no_delay_besides() {
+    let effect = Effect::Presliding { stroke: 0.007 };
+    let (diagnosis, _) = diagnosed(effect, 5, false);
+    assert_eq!(names(diagnosis), ["presliding"]);
 }

@@ -36,6 +36,7 @@ fn run(seconds: f64, q: impl Fn(f64) -> f64) -> Run {
             qdd,
             ..JointRun::default()
         }],
+        ..Run::default()
     }
 }
 

@@ -181,7 +181,7 @@ fn winding(
     let after = match stands {
         true => {
             let plain = plain.clustered(floor::memory(rows, &[last.residual(0)]), &pairs);
-            jackknifed(&plain, &all, &training.fading(fade)).ok_or_else(lacking)?
+            jackknifed(&plain, &[], &all, &training.fading(fade)).ok_or_else(lacking)?
         }
         false => before.clone(),
     };
