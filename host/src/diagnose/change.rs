@@ -21,7 +21,7 @@ const SPEAKS_FOR_ALL: f64 = 0.9;
 /// by a per cent.
 const LEAST_CHANGE: f64 = 0.04;
 /// Least relative change of inertia and gravity both that is a payload's …
-const LEAST_OF_BOTH: f64 = 0.01;
+const LEAST_OF_BOTH: f64 = 0.02;
 /// … and that in standard deviations.
 const LEAST_SIGMAS: f64 = 4.0;
 

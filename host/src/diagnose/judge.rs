@@ -12,7 +12,7 @@ use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
 use super::rows::Rows;
 use super::runs::Run;
-use super::search::{Search, shadow, with};
+use super::search::{Search, is_gear, shadow, with};
 use super::testable;
 use crate::report::{format_significant, format_unit};
 use crate::robot::{Joint, Robot};
@@ -37,6 +37,8 @@ const BEYOND_FLOOR_HELD: f64 = 1.5;
 /// Times the noise of a torque's reading from which on what names leave is not passed off as noise without a repeat: a drive's
 /// own unrest is as much again, or twice.
 const FAR_BEYOND_READING: f64 = 3.0;
+/// … beside a gear, whose law makes more of the position's noise where motor and link resonate.
+const FAR_BEYOND_READING_OF_GEARS: f64 = 7.0;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
@@ -265,14 +267,19 @@ impl Judge<'_, '_> {
 
     /// What names leave of a joint that is far more than its reading's own noise, where no repeat says how much of it is noise.
     fn unproven(&self, fit: &Fit, chosen: &[Profile], joint: usize) -> Option<Remainder> {
-        let named = chosen.iter().any(|p| p.candidate.joint == joint);
-        if !named || !self.pairs.is_empty() {
+        let own = || chosen.iter().filter(|p| p.candidate.joint == joint);
+        if own().next().is_none() || !self.pairs.is_empty() {
             return None;
         }
+        let far = if own().any(|p| is_gear(p.candidate.kind)) {
+            FAR_BEYOND_READING_OF_GEARS
+        } else {
+            FAR_BEYOND_READING
+        };
         let own = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
         let rms = fit.rms(joint);
         let Joint { name, kind, .. } = &self.robot.joints[joint];
-        (rms > FAR_BEYOND_READING * own).then(|| Remainder {
+        (rms > far * own).then(|| Remainder {
             joint: name.clone(),
             rms: (rms * rms - own * own).sqrt(),
             ratio: rms / own,
