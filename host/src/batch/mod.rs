@@ -23,6 +23,7 @@ mod threads;
 pub use chain::{ChainBatch, RegressorBlock};
 pub use error::BatchError;
 pub use model::ModelBatch;
+pub use rig_shared::multibody::block::lower;
 pub use threads::over_threads;
 
 /// Samples in a full block of a regressor.
