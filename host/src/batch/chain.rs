@@ -5,7 +5,7 @@ use std::ops::Range;
 use rig_shared::multibody::block::{AxisBlock, Frame, LANES, Lane};
 use rig_shared::multibody::{COLUMNS, Chain, column};
 
-use super::signals::{lanes, load, output, samples, stretches};
+use super::signals::{in_place, lanes, load, output, samples, stretches};
 use super::{BatchError, dispatch};
 
 /// Numbers on a line of the cache.
@@ -100,7 +100,10 @@ impl ChainBatch {
         // An odd number of stretches: columns a power of two apart would share a few places in the cache.
         let stride = (samples.div_ceil(LANES) | 1) * LANES;
         let mut data = vec![0.0; n * width * stride + LINE - 1];
-        let first = data.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE - 1);
+        let first = data
+            .as_ptr()
+            .align_offset(LINE * size_of::<f64>())
+            .min(LINE - 1);
         for joint in 0..n {
             let offset = joint * (width + COLUMNS) + column::OFFSET;
             data[first + offset * stride..][..stride].fill(1.0);
@@ -134,7 +137,11 @@ impl ChainBatch {
     ) -> Result<(), E> {
         let count = self.fitting(q, qd, qdd, block)?;
         if count > 0 && block.room == 0 {
-            return Err(BatchError::SmallBlock { room: 0, samples: count }.into());
+            return Err(BatchError::SmallBlock {
+                room: 0,
+                samples: count,
+            }
+            .into());
         }
         for start in (0..count).step_by(block.room.max(1)) {
             self.fill(q, qd, qdd, start..count.min(start + block.room), block);
@@ -157,7 +164,10 @@ impl ChainBatch {
     ) -> Result<(), BatchError> {
         let samples = self.fitting(q, qd, qdd, block)?;
         if samples > block.room {
-            return Err(BatchError::SmallBlock { room: block.room, samples });
+            return Err(BatchError::SmallBlock {
+                room: block.room,
+                samples,
+            });
         }
         self.fill(q, qd, qdd, 0..samples, block);
         Ok(())
@@ -173,7 +183,10 @@ impl ChainBatch {
     ) -> Result<usize, BatchError> {
         let expected = self.joint_count();
         if block.joints != expected {
-            return Err(BatchError::WrongBlock { expected, found: block.joints });
+            return Err(BatchError::WrongBlock {
+                expected,
+                found: block.joints,
+            });
         }
         samples(expected, &[("q", q), ("qd", qd), ("qdd", qdd)])
     }
@@ -236,16 +249,10 @@ impl ChainBatch {
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             load(qd, &range, &mut b);
-            dispatch::energy_regressor(
-                &self.frames,
-                self.gravity,
-                &a,
-                &b,
-                out,
-                count,
-                range.start,
-                range.len(),
-            );
+            in_place(&range, count, out, |out, stride, at| {
+                let (frames, gravity) = (&self.frames, self.gravity);
+                dispatch::energy_regressor(frames, gravity, &a, &b, out, stride, at);
+            });
         }
         Ok(())
     }

@@ -8,8 +8,7 @@
 use multiversion::{multiversion, target::match_target};
 use rig_shared::lanes::{MulAdd, Rounded};
 use rig_shared::multibody::block::{
-    self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES, Lane, NotPositive,
-    Section,
+    self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, Lane, NotPositive, Section,
 };
 
 /// Products that go into sums unrounded, for processors that have an instruction for it.
@@ -59,7 +58,7 @@ versions! {
 }
 
 versions! {
-    /// [`block::inertia_matrix`]: column c goes to the [`LANES`] entries of `out` from `c * stride + at` on.
+    /// [`block::inertia_matrix`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     inertia_matrix, inertia_matrix_portable<F>(
         frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock],
         composite: &mut CompositeBlock, out: &mut [f64], stride: usize, at: usize,
@@ -79,7 +78,7 @@ versions! {
 }
 
 versions! {
-    /// [`block::differential_regressor`]: column c goes to the [`LANES`] entries of `out` from `c * stride + at` on.
+    /// [`block::differential_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     differential_regressor, differential_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], qdd: &[Lane], axes: &mut [AxisBlock],
         out: &mut [f64], stride: usize, at: usize,
@@ -90,24 +89,10 @@ versions! {
 }
 
 versions! {
-    /// [`block::energy_regressor`]: the first `len` samples of column c go to `out[c * stride + at..]`.
+    /// [`block::energy_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     energy_regressor, energy_regressor_portable<F>(
-        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane],
-        out: &mut [f64], stride: usize, at: usize, len: usize,
+        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], out: &mut [f64], stride: usize, at: usize,
     ) {
-        block::energy_regressor::<F>(frames, gravity, q, qd, &mut |c, lane| {
-            store(lane, out, c * stride + at, len);
-        });
-    }
-}
-
-/// Writes the first `len` samples of a lane.
-#[inline(always)]
-fn store(lane: &Lane, out: &mut [f64], at: usize, len: usize) {
-    if len == LANES {
-        // Its length known to the compiler.
-        out[at..at + LANES].copy_from_slice(&lane.0);
-    } else {
-        out[at..at + len].copy_from_slice(&lane[..len]);
+        block::energy_regressor::<F>(frames, gravity, q, qd, &mut Section::new(out, stride, at));
     }
 }

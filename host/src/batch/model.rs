@@ -1,9 +1,9 @@
 //! Torques, accelerations and inertia matrices of many samples.
 
-use rig_shared::multibody::block::{Body, CompositeBlock, Frame, JointBlock, LANES, lower};
+use rig_shared::multibody::block::{Body, CompositeBlock, Frame, JointBlock, lower};
 use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
-use super::signals::{lanes, load, output, samples, store, stretches};
+use super::signals::{in_place, lanes, load, output, samples, store, stretches};
 use super::{BatchError, dispatch};
 
 /// A chain with its parameters, prepared for batches.
@@ -139,17 +139,10 @@ impl ModelBatch {
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             let (frames, bodies) = (&self.frames, &self.bodies);
-            let room = &mut composite;
-            if range.len() == LANES {
-                let at = range.start;
-                dispatch::inertia_matrix(frames, bodies, &a, &mut work, room, out, count, at);
-            } else {
-                let mut short = vec![0.0; lower(n, 0) * LANES];
-                dispatch::inertia_matrix(
-                    frames, bodies, &a, &mut work, room, &mut short, LANES, 0,
-                );
-                store(short.as_chunks().0.iter(), &range, count, out);
-            }
+            let (work, composite) = (&mut work, &mut composite);
+            in_place(&range, count, out, |out, stride, at| {
+                dispatch::inertia_matrix(frames, bodies, &a, work, composite, out, stride, at);
+            });
         }
         Ok(())
     }

@@ -82,6 +82,22 @@ pub(super) fn store<'a>(
     }
 }
 
+/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples, at `range`; where
+/// that is shorter, into columns of their own, from which it is copied.
+pub(super) fn in_place(
+    range: &Range<usize>,
+    samples: usize,
+    out: &mut [f64],
+    compute: impl FnOnce(&mut [f64], usize, usize),
+) {
+    if range.len() == LANES {
+        return compute(out, samples, range.start);
+    }
+    let mut short = vec![0.0; out.len() / samples * LANES];
+    compute(&mut short, LANES, 0);
+    store(short.as_chunks().0.iter(), range, samples, out);
+}
+
 /// One lane a joint, all zero.
 pub(super) fn lanes(count: usize) -> Vec<Lane> {
     vec![Lane::ZERO; count]

@@ -10,7 +10,7 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use super::slow::{SlowMotor, slow_motors};
-use crate::batch::{BatchError, ChainBatch, RegressorBlock};
+use crate::batch::{BLOCK, BatchError, ChainBatch, RegressorBlock};
 use crate::prepare::{Decimator, JointMotion, Motion, PrepareError};
 
 /// Rows that go through regressor and low-pass together, about: with six joints 0.3 MB of regressor.
@@ -225,7 +225,7 @@ impl<'a> Differential<'a> {
         };
         let together = (STRETCH / step as usize).max(1);
         let stride = together * step as usize;
-        let mut block = self.batch.block();
+        let mut block = self.batch.block(BLOCK);
         let mut chunk = vec![0.0; self.signals.len() * stride];
         let mut ends = vec![0.0; self.signals.len() * 2];
         self.signals_at(motion, &[0, rows as usize - 1], 2, &mut ends, &mut block)?;

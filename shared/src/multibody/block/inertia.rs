@@ -1,8 +1,8 @@
 //! Inertia matrix of a block.
 
 use super::super::spatial::Vector3;
-use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
 use super::columns::{Columns, Section};
+use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
 use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 

@@ -154,9 +154,8 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     iyz: &mut [f64; LANES],
     izz: &mut [f64; LANES],
 ) {
-    let dot = |a: f64, x: f64, b: f64, y: f64, c: f64, z: f64| {
-        F::mul_add(a, x, F::mul_add(b, y, c * z))
-    };
+    let dot =
+        |a: f64, x: f64, b: f64, y: f64, c: f64, z: f64| F::mul_add(a, x, F::mul_add(b, y, c * z));
     for k in 0..LANES {
         let place = place(k);
         let (s, c) = (sin[k], cos[k]);
@@ -174,9 +173,21 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         let [u21, u31, u32] = get(&motion.below, k).0;
         let [u12, u13, u23] = get(&motion.above, k).0;
         m[k] = dot(lx, vx, ly, vy, lz, vz);
-        mx[k] = F::mul_add(vy, sz, F::mul_add(-vz, sy, dot(u21, ly, u31, lz, -yy_zz, lx)));
-        my[k] = F::mul_add(vz, sx, F::mul_add(-vx, sz, dot(u12, lx, u32, lz, -xx_zz, ly)));
-        mz[k] = F::mul_add(vx, sy, F::mul_add(-vy, sx, dot(u13, lx, u23, ly, -xx_yy, lz)));
+        mx[k] = F::mul_add(
+            vy,
+            sz,
+            F::mul_add(-vz, sy, dot(u21, ly, u31, lz, -yy_zz, lx)),
+        );
+        my[k] = F::mul_add(
+            vz,
+            sx,
+            F::mul_add(-vx, sz, dot(u12, lx, u32, lz, -xx_zz, ly)),
+        );
+        mz[k] = F::mul_add(
+            vx,
+            sy,
+            F::mul_add(-vy, sx, dot(u13, lx, u23, ly, -xx_yy, lz)),
+        );
         ixx[k] = dot(ex, sx, xz, sy, -xy, sz);
         ixy[k] = dot(u32, sy, -u31, sx, x_y, sz);
         ixz[k] = dot(u21, sx, z_x, sy, -u23, sz);
@@ -229,29 +240,27 @@ fn negated(lane: &Lane, out: &mut [f64; LANES]) {
     }
 }
 
-/// Row of the total mechanical energy, column by column of the 14·n: `out(c, …)`. Friction and offset columns are not written.
+/// Row of the total mechanical energy, column by column of the 14·n. Friction and offset columns are not written.
 #[inline(always)]
 pub fn energy_regressor<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     q: &[Lane],
     qd: &[Lane],
-    out: &mut impl FnMut(usize, &Lane),
+    out: &mut Section,
 ) {
     let (mut angular, mut linear) = (ZERO3, ZERO3);
     let mut field = gravity.map(|g| Lane([g; LANES]));
     let mut depth = ZERO;
     let (mut sin, mut cos) = (ZERO, ZERO);
-    let mut block = [ZERO; 11];
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
+        let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = out.lanes(i * COLUMNS);
         at_each_lane!(F, frame, &q[i], place => link_energy(
             place, frame.prismatic, &sin, &cos, &qd[i],
-            &mut angular, &mut linear, &mut field, &mut depth, &mut block,
+            &mut angular, &mut linear, &mut field, &mut depth,
+            m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive,
         ));
-        for (c, lane) in block.iter().enumerate() {
-            out(i * COLUMNS + c, lane);
-        }
     }
 }
 
@@ -267,10 +276,19 @@ fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     linear: &mut Lane3,
     gravity: &mut Lane3,
     depth: &mut Lane,
-    block: &mut [Lane; 11],
+    m: &mut [f64; LANES],
+    mx: &mut [f64; LANES],
+    my: &mut [f64; LANES],
+    mz: &mut [f64; LANES],
+    ixx: &mut [f64; LANES],
+    ixy: &mut [f64; LANES],
+    ixz: &mut [f64; LANES],
+    iyy: &mut [f64; LANES],
+    iyz: &mut [f64; LANES],
+    izz: &mut [f64; LANES],
+    drive: &mut [f64; LANES],
 ) {
     let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
-    let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = block;
     for k in 0..LANES {
         let place = place(k);
         let (s, c) = (sin[k], cos[k]);
