@@ -6,7 +6,7 @@ mod arms;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use rig_host::batch::{BatchError, ChainBatch, ModelBatch};
+use rig_host::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, lower};
 use rig_shared::multibody::{
     COLUMNS, articulated_forward_dynamics, coriolis_matrix, differential_regressor,
     energy_regressor, forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
@@ -63,7 +63,7 @@ fn batch(criterion: &mut Criterion) {
         let model = ModelBatch::new(&arm.chain(), &arm.parameters).unwrap();
         let chain = ChainBatch::new(&arm.chain());
         let [q, qd, qdd] = arms::motion(n, SAMPLES);
-        let mut out = vec![0.0; n * n * COLUMNS * SAMPLES];
+        let mut out = vec![0.0; n * COLUMNS * SAMPLES];
         let mut group = criterion.benchmark_group(format!("{SAMPLES} samples, {}", arm.name));
         group.throughput(Throughput::Elements(SAMPLES as u64));
         group.bench_function("inverse dynamics", |b| {
@@ -79,7 +79,7 @@ fn batch(criterion: &mut Criterion) {
             b.iter(|| model.gravity(black_box(&q), out).unwrap());
         });
         group.bench_function("inertia matrix", |b| {
-            let out = &mut out[..n * n * SAMPLES];
+            let out = &mut out[..lower(n, 0) * SAMPLES];
             b.iter(|| model.inertia_matrix(black_box(&q), out).unwrap());
         });
         group.bench_function("forward dynamics", |b| {
@@ -90,14 +90,15 @@ fn batch(criterion: &mut Criterion) {
                     .unwrap()
             });
         });
-        group.bench_function("differential regressor, written out", |b| {
+        let mut stored = chain.block(SAMPLES);
+        group.bench_function("differential regressor, stored", |b| {
             b.iter(|| {
                 chain
-                    .differential_regressor(black_box(&q), &qd, &qdd, &mut out)
+                    .differential_regressor(black_box(&q), &qd, &qdd, &mut stored)
                     .unwrap()
             });
         });
-        let mut block = chain.block();
+        let mut block = chain.block(BLOCK);
         group.bench_function("differential regressor, block by block", |b| {
             b.iter(|| {
                 chain
@@ -109,8 +110,11 @@ fn batch(criterion: &mut Criterion) {
             });
         });
         group.bench_function("energy regressor", |b| {
-            let out = &mut out[..n * COLUMNS * SAMPLES];
-            b.iter(|| chain.energy_regressor(black_box(&q), &qd, out).unwrap());
+            b.iter(|| {
+                chain
+                    .energy_regressor(black_box(&q), &qd, &mut out)
+                    .unwrap()
+            });
         });
         group.finish();
     }

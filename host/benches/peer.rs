@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use rig_host::batch::{BatchError, ChainBatch, ModelBatch};
+use rig_host::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, lower};
 use rig_shared::multibody::{COLUMNS, column};
 
 /// Samples of a call; the other side walks through as many. Results stay in the cache on both sides.
@@ -54,7 +54,8 @@ fn times() {
         });
         print("inverse_dynamics", inverse);
         let inertia = nanoseconds(SAMPLES, || {
-            model.inertia_matrix(black_box(&q), &mut out).unwrap();
+            let triangle = &mut out[..lower(n, 0) * SAMPLES];
+            model.inertia_matrix(black_box(&q), triangle).unwrap();
         });
         print("inertia_matrix", inertia);
         let forward = nanoseconds(SAMPLES, || {
@@ -63,7 +64,7 @@ fn times() {
                 .unwrap();
         });
         print("forward_dynamics", forward);
-        let mut block = chain.block();
+        let mut block = chain.block(BLOCK);
         let regressor = nanoseconds(SAMPLES, || {
             chain
                 .each_differential_block(black_box(&q), &qd, &qdd, &mut block, |block| {
@@ -81,7 +82,7 @@ fn times() {
         });
         print("energy_regressor", rows);
         let [q, qd, qdd] = arms::motion(n, RECORDING);
-        let mut stored = vec![0.0; n * n * COLUMNS * RECORDING];
+        let mut stored = chain.block(RECORDING);
         let regressor = nanoseconds(RECORDING, || {
             chain
                 .differential_regressor(black_box(&q), &qd, &qdd, &mut stored)
@@ -113,15 +114,14 @@ fn write(folder: &Path) {
         }
         let mut tau = vec![0.0; n * CHECKED];
         model.inverse_dynamics(&q, &qd, &qdd, &mut tau).unwrap();
-        let mut inertia = vec![0.0; n * n * CHECKED];
+        let mut inertia = vec![0.0; lower(n, 0) * CHECKED];
         model.inertia_matrix(&q, &mut inertia).unwrap();
         let torques: Vec<Vec<f64>> = tau.chunks_exact(CHECKED).map(<[f64]>::to_vec).collect();
         let mut forward = vec![0.0; n * CHECKED];
         model
             .forward_dynamics(&q, &qd, &torques, &mut forward)
             .unwrap();
-        let width = n * COLUMNS;
-        let mut matrix = vec![0.0; n * width * CHECKED];
+        let mut matrix = chain.block(CHECKED);
         chain
             .differential_regressor(&q, &qd, &qdd, &mut matrix)
             .unwrap();
@@ -132,11 +132,10 @@ fn write(folder: &Path) {
             for result in [&tau, &inertia, &forward] {
                 line(&mut text, result.iter().skip(k).step_by(CHECKED));
             }
-            let inertial = (0..n * width).filter(|entry| entry % width % COLUMNS < INERTIAL);
-            line(
-                &mut text,
-                inertial.map(|entry| &matrix[entry * CHECKED + k]),
-            );
+            for joint in 0..n {
+                let inertial = (0..n * COLUMNS).filter(|c| c % COLUMNS < INERTIAL);
+                line(&mut text, inertial.map(|c| &matrix.column(joint, c)[k]));
+            }
         }
         std::fs::write(folder.join(format!("{}.txt", arm.name)), text).unwrap();
     }

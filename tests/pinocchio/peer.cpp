@@ -85,7 +85,9 @@ Arm read(const std::string &path) {
         check.v = vector(arm.n);
         check.a = vector(arm.n);
         check.tau = vector(arm.n);
-        check.inertia = matrix(arm.n, arm.n);
+        check.inertia = MatrixXd::Zero(arm.n, arm.n);
+        for (int i = 0; i < arm.n; i++)
+            for (int j = 0; j <= i; j++) check.inertia(i, j) = number();
         check.forward = vector(arm.n);
         check.regressor = matrix(arm.n, 10 * arm.n);
         arm.checks.push_back(check);
@@ -104,8 +106,9 @@ void check(Arm &arm) {
     double tau = 0, inertia = 0, forward = 0, regressor = 0;
     for (const Check &c : arm.checks) {
         tau = std::max(tau, difference(c.tau, pin::rnea(arm.model, data, c.q, c.v, c.a)));
-        MatrixXd m = pin::crba(arm.model, data, c.q);
-        m.triangularView<Eigen::StrictlyLower>() = m.transpose().triangularView<Eigen::StrictlyLower>();
+        // It fills the upper triangle, the other side the lower.
+        MatrixXd m = MatrixXd::Zero(arm.n, arm.n);
+        m.triangularView<Eigen::Lower>() = pin::crba(arm.model, data, c.q).transpose();
         inertia = std::max(inertia, difference(c.inertia, m));
         forward = std::max(forward, difference(c.forward, pin::aba(arm.model, data, c.q, c.v, c.tau)));
         // Its order of a link's parameters: m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz.

@@ -1,13 +1,15 @@
 //! Regressors of many samples.
 
+use std::ops::Range;
+
 use rig_shared::multibody::block::{AxisBlock, Frame, LANES, Lane};
 use rig_shared::multibody::{COLUMNS, Chain, column};
 
-use super::signals::{lanes, load, output, samples, stretches};
-use super::{BLOCK, BatchError, dispatch};
+use super::signals::{in_place, lanes, load, output, samples, stretches};
+use super::{BatchError, dispatch};
 
-/// Samples of a run when a regressor is written out.
-const RUN: usize = 4 * BLOCK;
+/// Numbers on a line of the cache.
+const LINE: usize = 8;
 
 /// A chain's geometry and gravity, prepared for batches of regressors.
 #[derive(Clone, Debug)]
@@ -16,25 +18,34 @@ pub struct ChainBatch {
     gravity: [f64; 3],
 }
 
-/// The differential regressor of up to [`BLOCK`] samples, column by column: [`Self::column`].
+/// The differential regressor of a number of samples, column by column: [`Self::column`].
+///
+/// It owns the room for as many samples as [`ChainBatch::block`] was asked for, be they a few that are looked at and
+/// overwritten or a whole recording, and is used again without a new allocation. Columns that are zero by structure,
+/// more than half of them, can be read like the others but are never written, so that the operating system never
+/// has to find memory for them.
 #[derive(Clone, Debug)]
 pub struct RegressorBlock {
-    width: usize,
+    joints: usize,
+    room: usize,
     start: usize,
     len: usize,
-    /// Entry (joint, c) from `(joint * width + c) * BLOCK` on; nothing is ever written where it is zero.
+    /// Column (joint, c) begins at `first + (joint * 14 * joints + c) * stride`.
     data: Vec<f64>,
+    /// What is left out so that columns begin with a line of the cache.
+    first: usize,
+    stride: usize,
     signals: [Vec<Lane>; 3],
     axes: Vec<AxisBlock>,
 }
 
 impl RegressorBlock {
-    /// Number of the block's first sample in the recording.
+    /// Number of the first sample in the recording.
     pub fn start(&self) -> usize {
         self.start
     }
 
-    /// Number of samples, at most [`BLOCK`].
+    /// Number of samples that it holds now.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -44,13 +55,19 @@ impl RegressorBlock {
         self.len == 0
     }
 
+    /// Number of samples that it has room for.
+    pub fn room(&self) -> usize {
+        self.room
+    }
+
     /// What multiplies parameter `c` (of the 14·n) in the torque of `joint` (from 0), sample by sample.
     ///
     /// # Panics
     /// Where `joint` or `c` is past the end.
     pub fn column(&self, joint: usize, c: usize) -> &[f64] {
-        assert!(c < self.width, "column {c} of {}", self.width);
-        let at = (joint * self.width + c) * BLOCK;
+        let width = self.joints * COLUMNS;
+        assert!(c < width, "column {c} of {width}");
+        let at = self.first + (joint * width + c) * self.stride;
         &self.data[at..at + self.len]
     }
 
@@ -76,22 +93,37 @@ impl ChainBatch {
         self.frames.len()
     }
 
-    /// An empty block for [`Self::each_differential_block`], to be used again and again.
-    pub fn block(&self) -> RegressorBlock {
+    /// An empty block with room for `samples`, to be used again and again with this chain.
+    pub fn block(&self, samples: usize) -> RegressorBlock {
         let n = self.joint_count();
         let width = n * COLUMNS;
+        // An odd number of stretches: columns a power of two apart would share a few places in the cache.
+        let stride = (samples.div_ceil(LANES) | 1) * LANES;
+        let mut data = vec![0.0; n * width * stride + LINE - 1];
+        let first = data
+            .as_ptr()
+            .align_offset(LINE * size_of::<f64>())
+            .min(LINE - 1);
+        for joint in 0..n {
+            let offset = joint * (width + COLUMNS) + column::OFFSET;
+            data[first + offset * stride..][..stride].fill(1.0);
+        }
         RegressorBlock {
-            width,
+            joints: n,
+            room: samples,
             start: 0,
             len: 0,
-            data: vec![0.0; n * width * BLOCK],
+            data,
+            first,
+            stride,
             signals: [lanes(n), lanes(n), lanes(n)],
             axes: vec![AxisBlock::ZERO; n],
         }
     }
 
-    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) block by block and calls
-    /// `visit` with each in the order of time. `block` comes from [`Self::block`] of the same chain and is overwritten.
+    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) piece by piece, each as long
+    /// as `block` has room, and calls `visit` with each in the order of time. `block` comes from [`Self::block`] of the
+    /// same chain and is overwritten.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong; what `visit` gives ends the walk.
@@ -103,97 +135,91 @@ impl ChainBatch {
         block: &mut RegressorBlock,
         mut visit: impl FnMut(&RegressorBlock) -> Result<(), E>,
     ) -> Result<(), E> {
-        let n = self.joint_count();
-        let width = n * COLUMNS;
-        let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
-        output(n * width, BLOCK, &block.data)?;
-        for start in (0..count).step_by(BLOCK) {
-            block.start = start;
-            block.len = BLOCK.min(count - start);
-            for range in stretches(start..start + block.len) {
-                let [a, b, c] = &mut block.signals;
-                load(q, &range, a);
-                load(qd, &range, b);
-                load(qdd, &range, c);
-                dispatch::differential_regressor(
-                    &self.frames,
-                    self.gravity,
-                    a,
-                    b,
-                    c,
-                    &mut block.axes,
-                    &mut block.data,
-                    width,
-                    BLOCK,
-                    range.start - start,
-                    // What a short stretch is filled up with goes to the unused end of the block.
-                    LANES,
-                );
+        let count = self.fitting(q, qd, qdd, block)?;
+        if count > 0 && block.room == 0 {
+            return Err(BatchError::SmallBlock {
+                room: 0,
+                samples: count,
             }
+            .into());
+        }
+        for start in (0..count).step_by(block.room.max(1)) {
+            self.fill(q, qd, qdd, start..count.min(start + block.room), block);
             visit(block)?;
         }
         Ok(())
     }
 
-    /// [`differential_regressor`](rig_shared::multibody::differential_regressor) of every sample written out: `out`
-    /// holds 14·n² columns, column `joint * 14 * n + c` what multiplies parameter `c` in the torque of `joint`. Zeros
-    /// are written too.
+    /// [`differential_regressor`](rig_shared::multibody::differential_regressor) of every sample, stored in `block`, which
+    /// comes from [`Self::block`] of the same chain.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong.
+    /// [`BatchError`] where a length is wrong, or `block` has no room for all samples.
     pub fn differential_regressor<S: AsRef<[f64]>>(
         &self,
         q: &[S],
         qd: &[S],
         qdd: &[S],
-        out: &mut [f64],
+        block: &mut RegressorBlock,
     ) -> Result<(), BatchError> {
-        let n = self.joint_count();
-        let width = n * COLUMNS;
-        let count = samples(n, &[("q", q), ("qd", qd), ("qdd", qdd)])?;
-        output(n * width, count, out)?;
-        if count == 0 {
-            return Ok(());
+        let samples = self.fitting(q, qd, qdd, block)?;
+        if samples > block.room {
+            return Err(BatchError::SmallBlock {
+                room: block.room,
+                samples,
+            });
         }
-        for (entry, column) in out.chunks_exact_mut(count).enumerate() {
-            if RegressorBlock::is_zero(entry / width, entry % width) {
-                column.fill(0.0);
-            }
-        }
-        let [mut a, mut b, mut c] = [(); 3].map(|()| lanes(n));
-        let mut axes = vec![AxisBlock::ZERO; n];
-        // Through a buffer that stays in the cache: memory is then written in runs of this many samples, which
-        // it takes several times faster than many short ones.
-        let run = RUN.min(count.next_multiple_of(LANES));
-        let mut buffer = vec![0.0; n * width * run];
-        for start in (0..count).step_by(run) {
-            let end = count.min(start + run);
-            for range in stretches(start..end) {
-                load(q, &range, &mut a);
-                load(qd, &range, &mut b);
-                load(qdd, &range, &mut c);
-                dispatch::differential_regressor(
-                    &self.frames,
-                    self.gravity,
-                    &a,
-                    &b,
-                    &c,
-                    &mut axes,
-                    &mut buffer,
-                    width,
-                    run,
-                    range.start - start,
-                    LANES,
-                );
-            }
-            let columns = out.chunks_exact_mut(count).zip(buffer.chunks_exact(run));
-            for (entry, (column, block)) in columns.enumerate() {
-                if !RegressorBlock::is_zero(entry / width, entry % width) {
-                    column[start..end].copy_from_slice(&block[..end - start]);
-                }
-            }
-        }
+        self.fill(q, qd, qdd, 0..samples, block);
         Ok(())
+    }
+
+    /// Checks lengths, and gives that of the signals.
+    fn fitting<S: AsRef<[f64]>>(
+        &self,
+        q: &[S],
+        qd: &[S],
+        qdd: &[S],
+        block: &RegressorBlock,
+    ) -> Result<usize, BatchError> {
+        let expected = self.joint_count();
+        if block.joints != expected {
+            return Err(BatchError::WrongBlock {
+                expected,
+                found: block.joints,
+            });
+        }
+        samples(expected, &[("q", q), ("qd", qd), ("qdd", qdd)])
+    }
+
+    /// Puts the samples `range`, for which there is room, into the block.
+    fn fill<S: AsRef<[f64]>>(
+        &self,
+        q: &[S],
+        qd: &[S],
+        qdd: &[S],
+        range: Range<usize>,
+        block: &mut RegressorBlock,
+    ) {
+        let start = range.start;
+        (block.start, block.len) = (start, range.len());
+        for part in stretches(range) {
+            let [a, b, c] = &mut block.signals;
+            load(q, &part, a);
+            load(qd, &part, b);
+            load(qdd, &part, c);
+            dispatch::differential_regressor(
+                &self.frames,
+                self.gravity,
+                a,
+                b,
+                c,
+                &mut block.axes,
+                &mut block.data[block.first..],
+                block.stride,
+                // What a short stretch is filled up with goes to the unused end of the columns.
+                part.start - start,
+            );
+        }
     }
 
     /// [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample written out: `out` holds 14·n
@@ -223,16 +249,10 @@ impl ChainBatch {
         for range in stretches(0..count) {
             load(q, &range, &mut a);
             load(qd, &range, &mut b);
-            dispatch::energy_regressor(
-                &self.frames,
-                self.gravity,
-                &a,
-                &b,
-                out,
-                count,
-                range.start,
-                range.len(),
-            );
+            in_place(&range, count, out, |out, stride, at| {
+                let (frames, gravity) = (&self.frames, self.gravity);
+                dispatch::energy_regressor(frames, gravity, &a, &b, out, stride, at);
+            });
         }
         Ok(())
     }

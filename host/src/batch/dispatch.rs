@@ -8,7 +8,7 @@
 use multiversion::{multiversion, target::match_target};
 use rig_shared::lanes::{MulAdd, Rounded};
 use rig_shared::multibody::block::{
-    self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES, Lane, NotPositive,
+    self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, Lane, NotPositive, Section,
 };
 
 /// Products that go into sums unrounded, for processors that have an instruction for it.
@@ -58,23 +58,12 @@ versions! {
 }
 
 versions! {
-    /// [`block::inertia_matrix`]: the first `len` samples of entry (i, j), and of its mirror image, go to
-    /// `out[(i * n + j) * stride + at..]`. `matrix` holds n(n + 1)/2.
+    /// [`block::inertia_matrix`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     inertia_matrix, inertia_matrix_portable<F>(
         frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock],
-        composite: &mut CompositeBlock, matrix: &mut [Lane], out: &mut [f64], stride: usize, at: usize, len: usize,
+        composite: &mut CompositeBlock, out: &mut [f64], stride: usize, at: usize,
     ) {
-        block::inertia_matrix::<F>(frames, bodies, q, work, composite, matrix);
-        let n = frames.len();
-        for i in 0..n {
-            for j in 0..=i {
-                let lane = &matrix[block::lower(i, j)];
-                store(lane, out, (i * n + j) * stride + at, len);
-                if i != j {
-                    store(lane, out, (j * n + i) * stride + at, len);
-                }
-            }
-        }
+        block::inertia_matrix::<F>(frames, bodies, q, work, composite, &mut Section::new(out, stride, at));
     }
 }
 
@@ -89,37 +78,21 @@ versions! {
 }
 
 versions! {
-    /// [`block::differential_regressor`]: the first `len` samples of entry (joint, c) go to
-    /// `out[(joint * width + c) * stride + at..]`.
+    /// [`block::differential_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     differential_regressor, differential_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], qdd: &[Lane], axes: &mut [AxisBlock],
-        out: &mut [f64], width: usize, stride: usize, at: usize, len: usize,
+        out: &mut [f64], stride: usize, at: usize,
     ) {
-        block::differential_regressor::<F>(frames, gravity, q, qd, qdd, axes, &mut |joint, c, lane| {
-            store(lane, out, (joint * width + c) * stride + at, len);
-        });
+        let out = &mut Section::new(out, stride, at);
+        block::differential_regressor::<F>(frames, gravity, q, qd, qdd, axes, out);
     }
 }
 
 versions! {
-    /// [`block::energy_regressor`]: the first `len` samples of column c go to `out[c * stride + at..]`.
+    /// [`block::energy_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
     energy_regressor, energy_regressor_portable<F>(
-        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane],
-        out: &mut [f64], stride: usize, at: usize, len: usize,
+        frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], out: &mut [f64], stride: usize, at: usize,
     ) {
-        block::energy_regressor::<F>(frames, gravity, q, qd, &mut |c, lane| {
-            store(lane, out, c * stride + at, len);
-        });
-    }
-}
-
-/// Writes the first `len` samples of a lane.
-#[inline(always)]
-fn store(lane: &Lane, out: &mut [f64], at: usize, len: usize) {
-    if len == LANES {
-        // Its length known to the compiler.
-        out[at..at + LANES].copy_from_slice(lane);
-    } else {
-        out[at..at + len].copy_from_slice(&lane[..len]);
+        block::energy_regressor::<F>(frames, gravity, q, qd, &mut Section::new(out, stride, at));
     }
 }

@@ -43,6 +43,22 @@ pub enum BatchError {
         /// Length it has.
         found: usize,
     },
+    /// A block of regressors was made for a chain with another number of joints.
+    #[error("The block was made for {found} joints, the chain has {expected}.")]
+    WrongBlock {
+        /// Joints of the chain.
+        expected: usize,
+        /// Joints that the block was made for.
+        found: usize,
+    },
+    /// A block of regressors has room for fewer samples than there are.
+    #[error("The block has room for {room} samples, the signals have {samples}.")]
+    SmallBlock {
+        /// Samples that it can hold.
+        room: usize,
+        /// Samples of the signals.
+        samples: usize,
+    },
     /// The inertia matrix is not positive definite at some sample, or a number there is NaN.
     #[error(
         "The inertia matrix of sample {sample} is not positive definite at joint {}; the inertial parameters \

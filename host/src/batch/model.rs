@@ -3,7 +3,7 @@
 use rig_shared::multibody::block::{Body, CompositeBlock, Frame, JointBlock, lower};
 use rig_shared::multibody::{COLUMNS, Chain, MultibodyError, column};
 
-use super::signals::{lanes, load, output, samples, store, stretches};
+use super::signals::{in_place, lanes, load, output, samples, store, stretches};
 use super::{BatchError, dispatch};
 
 /// A chain with its parameters, prepared for batches.
@@ -85,7 +85,7 @@ impl ModelBatch {
                 &mut work,
                 &mut d,
             );
-            store(&d, &range, count, tau);
+            store(d.iter().map(|lane| &lane.0), &range, count, tau);
         }
         Ok(())
     }
@@ -114,14 +114,14 @@ impl ModelBatch {
                 &mut work,
                 &mut d,
             );
-            store(&d, &range, count, out);
+            store(d.iter().map(|lane| &lane.0), &range, count, out);
         }
         Ok(())
     }
 
     /// Inertia matrices, drive inertias on the diagonal included:
-    /// [`inertia_matrix`](rig_shared::multibody::inertia_matrix) of every sample. `out` holds n² columns, column
-    /// `i * n + j` the entry (i, j).
+    /// [`inertia_matrix`](rig_shared::multibody::inertia_matrix) of every sample. They are symmetric, and `out` holds
+    /// the n(n + 1)/2 columns of the lower triangle, column [`lower(i, j)`](lower) the entry (i, j) with j ≤ i.
     ///
     /// # Errors
     /// [`BatchError`] where a length is wrong.
@@ -132,24 +132,17 @@ impl ModelBatch {
     ) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
-        output(n * n, count, out)?;
-        let (mut a, mut matrix) = (lanes(n), lanes(lower(n, 0)));
+        output(lower(n, 0), count, out)?;
+        let mut a = lanes(n);
         let mut work = vec![JointBlock::ZERO; n];
         let mut composite = CompositeBlock::ZERO;
         for range in stretches(0..count) {
             load(q, &range, &mut a);
-            dispatch::inertia_matrix(
-                &self.frames,
-                &self.bodies,
-                &a,
-                &mut work,
-                &mut composite,
-                &mut matrix,
-                out,
-                count,
-                range.start,
-                range.len(),
-            );
+            let (frames, bodies) = (&self.frames, &self.bodies);
+            let (work, composite) = (&mut work, &mut composite);
+            in_place(&range, count, out, |out, stride, at| {
+                dispatch::inertia_matrix(frames, bodies, &a, work, composite, out, stride, at);
+            });
         }
         Ok(())
     }
@@ -195,7 +188,7 @@ impl ModelBatch {
                 sample: range.start + e.lane,
                 joint: e.joint,
             })?;
-            store(&d, &range, count, qdd);
+            store(d.iter().map(|lane| &lane.0), &range, count, qdd);
         }
         Ok(())
     }

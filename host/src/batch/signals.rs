@@ -62,7 +62,7 @@ pub(super) fn load<S: AsRef<[f64]>>(columns: &[S], range: &Range<usize>, lanes: 
     for (lane, column) in lanes.iter_mut().zip(columns) {
         let part = &column.as_ref()[range.clone()];
         if let Ok(full) = part.try_into() {
-            *lane = full;
+            lane.0 = full;
         } else {
             lane.fill(part.last().copied().unwrap_or(0.0));
             lane[..part.len()].copy_from_slice(part);
@@ -71,13 +71,34 @@ pub(super) fn load<S: AsRef<[f64]>>(columns: &[S], range: &Range<usize>, lanes: 
 }
 
 /// Writes lanes to columns of `samples` samples, at `range`.
-pub(super) fn store(lanes: &[Lane], range: &Range<usize>, samples: usize, out: &mut [f64]) {
+pub(super) fn store<'a>(
+    lanes: impl Iterator<Item = &'a [f64; LANES]>,
+    range: &Range<usize>,
+    samples: usize,
+    out: &mut [f64],
+) {
     for (column, lane) in out.chunks_exact_mut(samples).zip(lanes) {
         column[range.clone()].copy_from_slice(&lane[..range.len()]);
     }
 }
 
+/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples, at `range`; where
+/// that is shorter, into columns of their own, from which it is copied.
+pub(super) fn in_place(
+    range: &Range<usize>,
+    samples: usize,
+    out: &mut [f64],
+    compute: impl FnOnce(&mut [f64], usize, usize),
+) {
+    if range.len() == LANES {
+        return compute(out, samples, range.start);
+    }
+    let mut short = vec![0.0; out.len() / samples * LANES];
+    compute(&mut short, LANES, 0);
+    store(short.as_chunks().0.iter(), range, samples, out);
+}
+
 /// One lane a joint, all zero.
 pub(super) fn lanes(count: usize) -> Vec<Lane> {
-    vec![[0.0; LANES]; count]
+    vec![Lane::ZERO; count]
 }

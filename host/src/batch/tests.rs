@@ -3,12 +3,13 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rig_shared::multibody::block::Lane;
 use rig_shared::multibody::{
     COLUMNS, Chain, JointGeometry, JointKind, differential_regressor, energy_regressor,
     forward_dynamics, gravity_vector, inertia_matrix, inverse_dynamics,
 };
 
-use super::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, over_threads};
+use super::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, lower, over_threads};
 
 struct Made {
     chain: Chain<f64>,
@@ -115,7 +116,7 @@ fn every_function_agrees_with_that_of_one_sample() {
             model.inverse_dynamics(q, qd, qdd, &mut tau).unwrap();
             let mut gravity = vec![f64::NAN; n * count];
             model.gravity(q, &mut gravity).unwrap();
-            let mut inertia = vec![f64::NAN; n * n * count];
+            let mut inertia = vec![f64::NAN; lower(n, 0) * count];
             model.inertia_matrix(q, &mut inertia).unwrap();
             let torques: Vec<&[f64]> = tau.chunks_exact(count).collect();
             let [q_, qd_] = [q, qd].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
@@ -126,9 +127,9 @@ fn every_function_agrees_with_that_of_one_sample() {
             let width = n * COLUMNS;
             let mut energy = vec![f64::NAN; width * count];
             regressors.energy_regressor(q, qd, &mut energy).unwrap();
-            let mut matrix = vec![f64::NAN; n * width * count];
+            let mut stored = regressors.block(count);
             regressors
-                .differential_regressor(q, qd, qdd, &mut matrix)
+                .differential_regressor(q, qd, qdd, &mut stored)
                 .unwrap();
             for k in 0..count {
                 let (a, b, c) = (at(q, k), at(qd, k), at(qdd, k));
@@ -142,13 +143,20 @@ fn every_function_agrees_with_that_of_one_sample() {
                 compare("acceleration", &found, count, k, &row, 1e-9);
                 let mut square = vec![0.0; n * n];
                 inertia_matrix(chain, p, &a, &mut square).unwrap();
-                compare("inertia", &inertia, count, k, &square, 1e-13);
+                let triangle: Vec<f64> = (0..n)
+                    .flat_map(|i| square[i * n..=i * n + i].to_vec())
+                    .collect();
+                compare("inertia", &inertia, count, k, &triangle, 1e-13);
+                assert_eq!(triangle[lower(n - 1, n / 2)], square[(n - 1) * n + n / 2]);
                 let mut line = vec![0.0; width];
                 energy_regressor(chain, &a, &b, &mut line).unwrap();
                 compare("energy", &energy, count, k, &line, 1e-13);
                 let mut wide = vec![0.0; n * width];
                 differential_regressor(chain, &a, &b, &c, &mut wide).unwrap();
-                compare("regressor", &matrix, count, k, &wide, 1e-13);
+                let row: Vec<f64> = (0..n * width)
+                    .map(|entry| stored.column(entry / width, entry % width)[k])
+                    .collect();
+                compare("regressor", &row, 1, 0, &wide, 1e-13);
             }
         }
     }
@@ -160,7 +168,7 @@ fn blocks_cover_every_sample_once_and_say_which_columns_are_zero() {
     let made = made(5, count, 1);
     let [q, qd, qdd] = &made.signals;
     let batch = ChainBatch::new(&made.chain);
-    let mut block = batch.block();
+    let mut block = batch.block(BLOCK);
     let mut next = 0;
     batch
         .each_differential_block(q, qd, qdd, &mut block, |block| {
@@ -180,6 +188,40 @@ fn blocks_cover_every_sample_once_and_say_which_columns_are_zero() {
         })
         .unwrap();
     assert_eq!(next, count);
+}
+
+/// The same numbers whether a block holds all samples or a few, and nothing is left over of what it held before.
+#[test]
+fn a_block_used_again_holds_the_new_samples_alone() {
+    let (n, count) = (4, 2 * BLOCK + 5);
+    let [long, short] = [(count, 8), (7, 9)].map(|(samples, seed)| made(n, samples, seed).signals);
+    let batch = ChainBatch::new(&made(n, 1, 8).chain);
+    let mut stored = batch.block(count);
+    for signals in [&long, &short, &long] {
+        let [q, qd, qdd] = signals;
+        batch
+            .differential_regressor(q, qd, qdd, &mut stored)
+            .unwrap();
+        assert_eq!((stored.start(), stored.len()), (0, q[0].len()));
+        let mut next = 0;
+        batch
+            .each_differential_block(q, qd, qdd, &mut batch.block(37), |part| {
+                for (joint, c) in
+                    (0..n * n * COLUMNS).map(|e| (e / (n * COLUMNS), e % (n * COLUMNS)))
+                {
+                    assert_eq!(
+                        part.column(joint, c),
+                        &stored.column(joint, c)[next..next + part.len()],
+                        "joint {joint}, column {c}"
+                    );
+                }
+                assert_eq!(part.start(), next);
+                next += part.len();
+                Ok::<(), BatchError>(())
+            })
+            .unwrap();
+        assert_eq!(next, q[0].len());
+    }
 }
 
 #[test]
@@ -243,9 +285,34 @@ fn wrong_shapes_are_named() {
     assert_eq!(
         model.inertia_matrix(q, &mut out),
         Err(BatchError::WrongOutput {
-            columns: 4,
+            columns: 3,
             samples: 10,
             found: 20
+        })
+    );
+    let batch = ChainBatch::new(&made.chain);
+    let mut block = batch.block(9);
+    assert_eq!(
+        batch.differential_regressor(q, qd, qdd, &mut block),
+        Err(BatchError::SmallBlock {
+            room: 9,
+            samples: 10
+        })
+    );
+    let mut nothing = batch.block(0);
+    assert_eq!(
+        batch.each_differential_block(q, qd, qdd, &mut nothing, |_| Ok::<(), BatchError>(())),
+        Err(BatchError::SmallBlock {
+            room: 0,
+            samples: 10
+        })
+    );
+    let other = ChainBatch::new(&self::made(3, 1, 3).chain);
+    assert_eq!(
+        batch.differential_regressor(q, qd, qdd, &mut other.block(10)),
+        Err(BatchError::WrongBlock {
+            expected: 2,
+            found: 3
         })
     );
     assert!(matches!(
@@ -282,14 +349,16 @@ fn alike(what: &str, chosen: &[f64], portable: &[f64], tolerance: f64) {
     }
 }
 
+fn flat(lanes: &[Lane]) -> Vec<f64> {
+    lanes.iter().flat_map(|lane| lane.0).collect()
+}
+
 /// The version chosen for this machine may leave products unrounded; nothing else sets it apart from the portable one.
 #[test]
 fn every_version_gives_the_same_results_but_for_rounding() {
     use super::dispatch::*;
     use super::signals::{lanes, load};
-    use rig_shared::multibody::block::{
-        AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES, lower,
-    };
+    use rig_shared::multibody::block::{AxisBlock, Body, CompositeBlock, Frame, JointBlock, LANES};
     for n in LENGTHS {
         let made = made(n, LANES, 7);
         let frames: Vec<Frame> = Frame::of(&made.chain).collect();
@@ -305,18 +374,14 @@ fn every_version_gives_the_same_results_but_for_rounding() {
         let [mut a, mut b] = [(); 2].map(|()| lanes(n));
         inverse_dynamics(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut a);
         inverse_dynamics_portable(&frames, g, &bodies, &q, &qd, Some(&qdd), &mut work, &mut b);
-        alike("torque", a.as_flattened(), b.as_flattened(), 1e-13);
+        alike("torque", &flat(&a), &flat(&b), 1e-13);
         let tau = a;
-        let [mut ma, mut mb] = [(); 2].map(|()| lanes(lower(n, 0)));
         let mut room = CompositeBlock::ZERO;
-        let [mut a, mut b] = [(); 2].map(|()| vec![f64::NAN; n * n * LANES]);
-        inertia_matrix(
-            &frames, &bodies, &q, &mut work, &mut room, &mut ma, &mut a, LANES, 0, LANES,
-        );
-        inertia_matrix_portable(
-            &frames, &bodies, &q, &mut work, &mut room, &mut mb, &mut b, LANES, 0, LANES,
-        );
+        let [mut a, mut b] = [(); 2].map(|()| vec![f64::NAN; lower(n, 0) * LANES]);
+        inertia_matrix(&frames, &bodies, &q, &mut work, &mut room, &mut a, LANES, 0);
+        inertia_matrix_portable(&frames, &bodies, &q, &mut work, &mut room, &mut b, LANES, 0);
         alike("inertia", &a, &b, 1e-13);
+        let [mut ma, mut mb] = [(); 2].map(|()| lanes(lower(n, 0)));
         let [mut a, mut b] = [(); 2].map(|()| lanes(n));
         forward_dynamics(
             &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut room, &mut ma, &mut a,
@@ -326,20 +391,16 @@ fn every_version_gives_the_same_results_but_for_rounding() {
             &frames, g, &bodies, &q, &qd, &tau, &mut work, &mut room, &mut mb, &mut b,
         )
         .unwrap();
-        alike("acceleration", a.as_flattened(), b.as_flattened(), 1e-9);
+        alike("acceleration", &flat(&a), &flat(&b), 1e-9);
         let width = n * COLUMNS;
         let mut axes = vec![AxisBlock::ZERO; n];
         let [mut a, mut b] = [(); 2].map(|()| vec![0.0; n * width * LANES]);
-        differential_regressor(
-            &frames, g, &q, &qd, &qdd, &mut axes, &mut a, width, LANES, 0, LANES,
-        );
-        differential_regressor_portable(
-            &frames, g, &q, &qd, &qdd, &mut axes, &mut b, width, LANES, 0, LANES,
-        );
+        differential_regressor(&frames, g, &q, &qd, &qdd, &mut axes, &mut a, LANES, 0);
+        differential_regressor_portable(&frames, g, &q, &qd, &qdd, &mut axes, &mut b, LANES, 0);
         alike("regressor", &a, &b, 1e-13);
         let [mut a, mut b] = [(); 2].map(|()| vec![0.0; width * LANES]);
-        energy_regressor(&frames, g, &q, &qd, &mut a, LANES, 0, LANES);
-        energy_regressor_portable(&frames, g, &q, &qd, &mut b, LANES, 0, LANES);
+        energy_regressor(&frames, g, &q, &qd, &mut a, LANES, 0);
+        energy_regressor_portable(&frames, g, &q, &qd, &mut b, LANES, 0);
         alike("energy", &a, &b, 1e-13);
     }
 }

@@ -8,7 +8,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use super::DiagnoseError;
 use super::runs::Run;
 use super::transmission::ABREAST;
-use crate::batch::{ChainBatch, RegressorBlock};
+use crate::batch::{BLOCK, ChainBatch, RegressorBlock};
 use crate::identify::{Base, ModelKind, chain_of, transmission_of};
 use crate::prepare::{LowPass, Treatment};
 use crate::robot::{JointKind, Robot};
@@ -246,7 +246,7 @@ impl Nominal {
             .filter(|&(_, j, c)| !RegressorBlock::is_zero(j, c))
             .collect();
         let mut values = vec![Vec::with_capacity(samples); wanted.len()];
-        let mut block = self.batch.block();
+        let mut block = self.batch.block(BLOCK);
         self.batch
             .each_differential_block(motion[0], motion[1], motion[2], &mut block, |part| {
                 for (to, &(_, j, c)) in values.iter_mut().zip(&wanted) {

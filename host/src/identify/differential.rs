@@ -10,7 +10,7 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
 use super::slow::{SlowMotor, slow_motors};
-use crate::batch::{BatchError, ChainBatch, RegressorBlock};
+use crate::batch::{BLOCK, BatchError, ChainBatch, RegressorBlock};
 use crate::prepare::{Decimator, JointMotion, Motion, PrepareError};
 
 /// Rows that go through regressor and low-pass together, about: with six joints 0.3 MB of regressor.
@@ -34,6 +34,13 @@ pub(super) struct Differential<'a> {
     /// Rows after which the low-pass has forgotten.
     settle: usize,
     signals: Vec<Signal>,
+}
+
+/// What a stretch of rows goes through, used again for the next one.
+struct Room {
+    /// Position, velocity and acceleration, joint by joint.
+    motion: [Vec<Vec<f64>>; 3],
+    block: RegressorBlock,
 }
 
 /// Where a row of the extended motion comes from. Beyond the ends of a segment it is continued by the odd reflection
@@ -80,16 +87,17 @@ impl<'a> Differential<'a> {
         rows: &[usize],
         stride: usize,
         out: &mut [f64],
-        block: &mut RegressorBlock,
+        room: &mut Room,
     ) -> Result<(), PrepareError> {
-        let gather = |of: &dyn Fn(&JointMotion) -> &[f64]| -> Vec<Vec<f64>> {
-            let pick = |joint| {
-                let list: &[f64] = of(joint);
-                rows.iter().map(|&k| list[k]).collect()
-            };
-            motion.joints.iter().map(pick).collect()
-        };
-        let (q, qd, qdd) = (gather(&|j| &j.q), gather(&|j| &j.qd), gather(&|j| &j.qdd));
+        let of: [fn(&JointMotion) -> &[f64]; 3] = [|j| &j.q, |j| &j.qd, |j| &j.qdd];
+        for (columns, of) in room.motion.iter_mut().zip(of) {
+            for (column, joint) in columns.iter_mut().zip(&motion.joints) {
+                let list = of(joint);
+                column.clear();
+                column.extend(rows.iter().map(|&k| list[k]));
+            }
+        }
+        let [q, qd, qdd] = &room.motion;
         for (s, signal) in self.signals.iter().enumerate() {
             if let Signal::Torque(j) = signal {
                 let tau = &motion.joints[*j].tau;
@@ -98,9 +106,9 @@ impl<'a> Differential<'a> {
                 }
             }
         }
-        self.motors_at(&q, &qd, &qdd, stride, out)?;
+        self.motors_at(q, qd, qdd, stride, out)?;
         self.batch
-            .each_differential_block(&q, &qd, &qdd, block, |part| {
+            .each_differential_block(q, qd, qdd, &mut room.block, |part| {
                 for (s, signal) in self.signals.iter().enumerate() {
                     if let Signal::Regressor(j, c, _) = signal {
                         let start = s * stride + part.start();
@@ -225,10 +233,13 @@ impl<'a> Differential<'a> {
         };
         let together = (STRETCH / step as usize).max(1);
         let stride = together * step as usize;
-        let mut block = self.batch.block();
+        let mut room = Room {
+            motion: [(); 3].map(|()| vec![Vec::new(); motion.joints.len()]),
+            block: self.batch.block(BLOCK),
+        };
         let mut chunk = vec![0.0; self.signals.len() * stride];
         let mut ends = vec![0.0; self.signals.len() * 2];
-        self.signals_at(motion, &[0, rows as usize - 1], 2, &mut ends, &mut block)?;
+        self.signals_at(motion, &[0, rows as usize - 1], 2, &mut ends, &mut room)?;
         let skipped = ((first - start) / step - 1) as usize;
         let wanted = result.t.len();
         let mut take = |from: usize, s: usize, values: &[f64]| {
@@ -254,7 +265,7 @@ impl<'a> Differential<'a> {
             indices.extend(origins.clone().map(|o| match o {
                 Origin::Row(k) | Origin::Before(k) | Origin::After(k) => k,
             }));
-            self.signals_at(motion, &indices, stride, &mut chunk, &mut block)?;
+            self.signals_at(motion, &indices, stride, &mut chunk, &mut room)?;
             for (r, o) in origins.enumerate() {
                 let side = match o {
                     Origin::Row(_) => continue,

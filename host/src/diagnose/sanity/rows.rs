@@ -116,13 +116,13 @@ impl Rows {
     ) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
         let (n, rows) = (chain.joint_count(), self.len());
         let width = n * COLUMNS;
-        let mut all = vec![0.0; n * width * rows];
+        let mut block = chain.block(rows);
         chain
-            .differential_regressor(&self.q, &self.qd, &self.qdd, &mut all)
+            .differential_regressor(&self.q, &self.qd, &self.qdd, &mut block)
             .map_err(|e| DiagnoseError::Model(e.to_string()))?;
-        Ok(all
-            .chunks_exact((width * rows).max(1))
-            .map(|own| DMatrix::from_column_slice(rows, width, own))
+        let column = |joint, c| block.column(joint, c).iter().copied();
+        Ok((0..n)
+            .map(|j| DMatrix::from_iterator(rows, width, (0..width).flat_map(|c| column(j, c))))
             .collect())
     }
 }

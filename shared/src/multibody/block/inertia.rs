@@ -1,6 +1,7 @@
 //! Inertia matrix of a block.
 
 use super::super::spatial::Vector3;
+use super::columns::{Columns, Section};
 use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back};
 use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
@@ -34,7 +35,7 @@ pub const fn lower(i: usize, j: usize) -> usize {
 /// Lower triangle of the inertia matrix, row by row, drive inertias included: composite-rigid-body algorithm (Walker &
 /// Orin 1982) on gathered bodies.
 ///
-/// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2; what `composite` holds does not matter.
+/// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2 columns, each written once; what `composite` holds does not matter.
 #[inline(always)]
 pub fn inertia_matrix<F: MulAdd>(
     frames: &[Frame],
@@ -42,7 +43,7 @@ pub fn inertia_matrix<F: MulAdd>(
     q: &[Lane],
     work: &mut [JointBlock],
     composite: &mut CompositeBlock,
-    out: &mut [Lane],
+    out: &mut Section,
 ) {
     // Where the first joint stands does not matter.
     for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work).skip(1) {
@@ -59,25 +60,22 @@ pub(super) fn composite_bodies<F: MulAdd>(
     q: &[Lane],
     work: &[JointBlock],
     composite: &mut CompositeBlock,
-    out: &mut [Lane],
+    out: &mut (impl Columns + ?Sized),
 ) {
     let (Some(tip), Some(last)) = (bodies.last(), frames.last()) else {
         return;
     };
     let n = frames.len();
-    out[lower(n - 1, n - 1)].fill(own_diagonal(last, tip));
+    out.lane(lower(n - 1, n - 1)).fill(own_diagonal(last, tip));
     if n == 2 {
-        composite.first_moment = tip.first_moment.map(|x| [x; LANES]);
-        composite.inertia = six(tip).map(|x| [x; LANES]);
+        composite.first_moment = tip.first_moment.map(|x| Lane([x; LANES]));
+        composite.inertia = six(tip).map(|x| Lane([x; LANES]));
     }
     // It does not depend on the sample.
     let mut mass = tip.mass;
     for i in (1..n).rev() {
         let (frame, joint, slides) = (&frames[i], &work[i], frames[i - 1].prismatic);
-        let (before, row) = out.split_at_mut(lower(i, 0));
-        let (Some(diagonal), entry) = (before.last_mut(), &mut row[i - 1]) else {
-            return;
-        };
+        let [diagonal, entry] = out.two(lower(i - 1, i - 1), lower(i, i - 1));
         let own = &bodies[i - 1];
         if i == 1 {
             at_each_lane!(F, frame, &q[i], place => inwards::<_, _, _, _, false, true>(
@@ -91,7 +89,7 @@ pub(super) fn composite_bodies<F: MulAdd>(
         }
         for j in (0..i - 1).rev() {
             let (joint, between, slides) = (&work[j + 1], &frames[j + 1], frames[j].prismatic);
-            let entry = &mut row[j];
+            let entry = out.lane(lower(i, j));
             if j == 0 {
                 at_each_lane!(F, between, &q[j + 1], place =>
                     onwards::<_, _, _, _, true>(place, slides, joint, composite, entry));
@@ -145,8 +143,8 @@ fn inwards<
     tip: &Body,
     own: &Body,
     composite: &mut CompositeBlock,
-    entry: &mut Lane,
-    diagonal: &mut Lane,
+    entry: &mut [f64; LANES],
+    diagonal: &mut [f64; LANES],
 ) {
     let total = mass + own.mass + own.drive;
     let (first_moment, inertia) = (own.first_moment, six(own));
@@ -267,7 +265,7 @@ fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST:
     slides: bool,
     joint: &JointBlock,
     composite: &mut CompositeBlock,
-    entry: &mut Lane,
+    entry: &mut [f64; LANES],
 ) {
     let CompositeBlock { force, moment, .. } = composite;
     for k in 0..LANES {

@@ -53,7 +53,7 @@ pub fn inverse_dynamics<F: MulAdd>(
     let mut motion = MotionBlock {
         spin: ZERO3,
         turning: ZERO3,
-        proper: gravity.map(|g| [-g; LANES]),
+        proper: gravity.map(|g| Lane([-g; LANES])),
     };
     for (i, frame) in frames.iter().enumerate() {
         let joint = &mut work[i];

@@ -14,13 +14,19 @@
 //! Angles beyond [`ANGLE_LIMIT`](crate::lanes::ANGLE_LIMIT) take the slow way, sample by sample, with the same accuracy.
 
 mod body;
+mod columns;
 mod forward;
 mod frame;
 mod inertia;
 mod inverse;
 mod regressor;
 
+use core::ops::{Deref, DerefMut};
+
+use super::spatial::Vector3;
+
 pub use body::Body;
+pub use columns::Section;
 pub use forward::{NotPositive, forward_dynamics};
 pub use frame::Frame;
 pub use inertia::{CompositeBlock, inertia_matrix, lower};
@@ -30,13 +36,34 @@ pub use regressor::{AxisBlock, differential_regressor, energy_regressor};
 /// Samples in a block.
 pub const LANES: usize = 32;
 
-/// One quantity at the samples of a block.
-pub type Lane = [f64; LANES];
+/// One quantity at the samples of a block; so aligned that no vector of it straddles two lines of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct Lane(pub [f64; LANES]);
+
+impl Lane {
+    /// All zero.
+    pub const ZERO: Self = Self([0.0; LANES]);
+}
+
+impl Deref for Lane {
+    type Target = [f64; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Lane {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
 
 /// A vector at the samples of a block.
 pub type Lane3 = [Lane; 3];
-
-use super::spatial::Vector3;
 
 /// The vector of one sample.
 #[inline(always)]
@@ -53,5 +80,5 @@ fn set(v: &mut Lane3, k: usize, value: Vector3<f64>) {
     v[2][k] = z;
 }
 
-const ZERO: Lane = [0.0; LANES];
+const ZERO: Lane = Lane::ZERO;
 const ZERO3: Lane3 = [ZERO; 3];

@@ -1,6 +1,8 @@
 //! Regressors of a block.
 
 use super::super::parameters::{COLUMNS, column};
+use super::super::spatial::Vector3;
+use super::columns::{Columns, Section};
 use super::frame::{Place, at_each_lane, spin};
 use super::{Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
@@ -8,12 +10,22 @@ use crate::scalar::Real;
 
 /// How a link moves: what all its columns are made of.
 struct LinkBlock {
-    /// Angular velocity.
+    /// Angular velocity ω.
     spin: Lane3,
     /// Angular acceleration.
     turning: Lane3,
     /// Acceleration of the origin less gravity.
     proper: Lane3,
+    /// ωx·ωy, ωx·ωz, ωy·ωz
+    mixed: Lane3,
+    /// ωy² + ωz², ωx² + ωz², ωx² + ωy²
+    sums: Lane3,
+    /// ωx² − ωy², ωz² − ωx², ωy² − ωz²
+    differences: Lane3,
+    /// Entries 21, 31, 32 of U = ė× + ω×ω×, by which points of the link accelerate against its origin.
+    below: Lane3,
+    /// Entries 12, 13, 23 of U.
+    above: Lane3,
 }
 
 /// A joint's axis in the frame of some link further out: rotation, and velocity of that frame's origin.
@@ -33,9 +45,10 @@ impl AxisBlock {
 
 /// Regressor of the differential model (Atkeson, An & Hollerbach 1986), every torque linear in the 14·n parameters.
 ///
-/// Column c of joint j goes to `out[column_of(j, c)]`'s first [`LANES`] entries from `at` on; only columns that are not
-/// zero for every motion are written: those of the links from j outwards, and of drive, friction and offset
-/// those of joint j itself. `frames`, `axes` and the signals have one entry a joint.
+/// Parameter c of joint j has the column `j * 14 * n + c` of `out`. Written are only columns that depend on the
+/// sample: of joint j, those of the links from j outwards, and of its own drive and friction. All others
+/// are left as they are: what is zero for every motion, and the offset's, whose entries are 1. `frames`, `axes` and the
+/// signals have one entry a joint.
 #[inline(always)]
 pub fn differential_regressor<F: MulAdd>(
     frames: &[Frame],
@@ -44,38 +57,39 @@ pub fn differential_regressor<F: MulAdd>(
     qd: &[Lane],
     qdd: &[Lane],
     axes: &mut [AxisBlock],
-    out: &mut impl FnMut(usize, usize, &Lane),
+    out: &mut Section,
 ) {
     let mut motion = LinkBlock {
         spin: ZERO3,
         turning: ZERO3,
-        proper: gravity.map(|g| [-g; LANES]),
+        proper: gravity.map(|g| Lane([-g; LANES])),
+        mixed: ZERO3,
+        sums: ZERO3,
+        differences: ZERO3,
+        below: ZERO3,
+        above: ZERO3,
     };
+    let width = frames.len() * COLUMNS;
     let (mut sin, mut cos) = (ZERO, ZERO);
-    let mut block = [ZERO; 10];
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
         at_each_lane!(F, frame, &q[i], place => {
             next_link(&place, frame.prismatic, &sin, &cos, &qd[i], &qdd[i], &mut motion);
             for (j, axis) in axes[..i].iter_mut().enumerate() {
-                carried_axis(&place, &sin, &cos, axis, &motion, &mut block);
-                for (c, lane) in block.iter().enumerate() {
-                    out(j, i * COLUMNS + c, lane);
-                }
+                let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = out.lanes(j * width + i * COLUMNS);
+                carried_axis(
+                    &place, &sin, &cos, axis, &motion, m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz,
+                );
             }
         });
-        own_axis(frame.prismatic, &motion, &mut axes[i], &mut block);
-        for (c, lane) in block.iter().enumerate() {
-            out(i, i * COLUMNS + c, lane);
-        }
-        out(i, i * COLUMNS + column::DRIVE_INERTIA, &qdd[i]);
-        out(i, i * COLUMNS + column::VISCOUS, &qd[i]);
-        let mut sign = ZERO;
+        let own = i * width + i * COLUMNS;
+        own_axis(frame.prismatic, &motion, &mut axes[i], own, out);
+        *out.lane(own + column::DRIVE_INERTIA) = qdd[i].0;
+        *out.lane(own + column::VISCOUS) = qd[i].0;
+        let sign = out.lane(own + column::COULOMB);
         for k in 0..LANES {
             sign[k] = qd[i][k].sgn();
         }
-        out(i, i * COLUMNS + column::COULOMB, &sign);
-        out(i, i * COLUMNS + column::OFFSET, &[1.0; LANES]);
     }
 }
 
@@ -100,17 +114,24 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         let (s, c) = (sin[k], cos[k]);
         let (w, e, v) = (spin::<F>(s, c, w), spin::<F>(s, c, e), spin::<F>(s, c, v));
         let (turn, slide) = (turns * qd[k], slides * qd[k]);
-        set(&mut motion.spin, k, w.plus_z(turn));
+        let e = (e + w.cross_z(turn)).plus_z(turns * qdd[k]);
+        let v = (v + w.cross_z(slide + slide)).plus_z(slides * qdd[k]);
+        let w = w.plus_z(turn);
+        set(&mut motion.spin, k, w);
+        set(&mut motion.turning, k, e);
+        set(&mut motion.proper, k, v);
+        let ([wx, wy, wz], [ex, ey, ez]) = (w.0, e.0);
+        let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
+        let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
+        set(&mut motion.mixed, k, Vector3([xy, xz, yz]));
+        set(&mut motion.sums, k, Vector3([yy + zz, xx + zz, xx + yy]));
         set(
-            &mut motion.turning,
+            &mut motion.differences,
             k,
-            (e + w.cross_z(turn)).plus_z(turns * qdd[k]),
+            Vector3([xx - yy, zz - xx, yy - zz]),
         );
-        set(
-            &mut motion.proper,
-            k,
-            (v + w.cross_z(slide + slide)).plus_z(slides * qdd[k]),
-        );
+        set(&mut motion.below, k, Vector3([xy + ez, xz - ey, yz + ex]));
+        set(&mut motion.above, k, Vector3([xy - ez, xz + ey, yz - ex]));
     }
 }
 
@@ -122,9 +143,19 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     cos: &Lane,
     axis: &mut AxisBlock,
     motion: &LinkBlock,
-    block: &mut [Lane; 10],
+    m: &mut [f64; LANES],
+    mx: &mut [f64; LANES],
+    my: &mut [f64; LANES],
+    mz: &mut [f64; LANES],
+    ixx: &mut [f64; LANES],
+    ixy: &mut [f64; LANES],
+    ixz: &mut [f64; LANES],
+    iyy: &mut [f64; LANES],
+    iyz: &mut [f64; LANES],
+    izz: &mut [f64; LANES],
 ) {
-    let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = block;
+    let dot =
+        |a: f64, x: f64, b: f64, y: f64, c: f64, z: f64| F::mul_add(a, x, F::mul_add(b, y, c * z));
     for k in 0..LANES {
         let place = place(k);
         let (s, c) = (sin[k], cos[k]);
@@ -134,141 +165,102 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         set(&mut axis.angular, k, angular);
         set(&mut axis.linear, k, linear);
         let ([sx, sy, sz], [lx, ly, lz]) = (angular.0, linear.0);
-        let field = Field::of(motion, k);
-        let [vx, vy, vz] = field.proper;
-        let Field {
-            xx,
-            yy,
-            zz,
-            xy,
-            xz,
-            yz,
-            ..
-        } = field;
-        let [ex, ey, ez] = field.turning;
-        m[k] = lx * vx + ly * vy + lz * vz;
-        mx[k] = (vy * sz - vz * sy) + (field.u21 * ly + field.u31 * lz - (yy + zz) * lx);
-        my[k] = (vz * sx - vx * sz) + (field.u12 * lx + field.u32 * lz - (xx + zz) * ly);
-        mz[k] = (vx * sy - vy * sx) + (field.u13 * lx + field.u23 * ly - (xx + yy) * lz);
-        ixx[k] = ex * sx + xz * sy - xy * sz;
-        ixy[k] = field.u32 * sy - field.u31 * sx + (xx - yy) * sz;
-        ixz[k] = field.u21 * sx + (zz - xx) * sy - field.u23 * sz;
-        iyy[k] = ey * sy - yz * sx + xy * sz;
-        iyz[k] = (yy - zz) * sx - field.u12 * sy + field.u13 * sz;
-        izz[k] = yz * sx - xz * sy + ez * sz;
+        let [vx, vy, vz] = get(&motion.proper, k).0;
+        let [ex, ey, ez] = get(&motion.turning, k).0;
+        let [xy, xz, yz] = get(&motion.mixed, k).0;
+        let [yy_zz, xx_zz, xx_yy] = get(&motion.sums, k).0;
+        let [x_y, z_x, y_z] = get(&motion.differences, k).0;
+        let [u21, u31, u32] = get(&motion.below, k).0;
+        let [u12, u13, u23] = get(&motion.above, k).0;
+        m[k] = dot(lx, vx, ly, vy, lz, vz);
+        mx[k] = F::mul_add(
+            vy,
+            sz,
+            F::mul_add(-vz, sy, dot(u21, ly, u31, lz, -yy_zz, lx)),
+        );
+        my[k] = F::mul_add(
+            vz,
+            sx,
+            F::mul_add(-vx, sz, dot(u12, lx, u32, lz, -xx_zz, ly)),
+        );
+        mz[k] = F::mul_add(
+            vx,
+            sy,
+            F::mul_add(-vy, sx, dot(u13, lx, u23, ly, -xx_yy, lz)),
+        );
+        ixx[k] = dot(ex, sx, xz, sy, -xy, sz);
+        ixy[k] = dot(u32, sy, -u31, sx, x_y, sz);
+        ixz[k] = dot(u21, sx, z_x, sy, -u23, sz);
+        iyy[k] = dot(ey, sy, -yz, sx, xy, sz);
+        iyz[k] = dot(y_z, sx, -u12, sy, u13, sz);
+        izz[k] = dot(yz, sx, -xz, sy, ez, sz);
     }
 }
 
-/// The same for the joint that carries the link, whose axis is z of the frame.
+/// The same for the joint that carries the link, whose axis is z of the frame. `own` is the first of its columns.
 #[inline(always)]
-fn own_axis(prismatic: bool, motion: &LinkBlock, axis: &mut AxisBlock, block: &mut [Lane; 10]) {
-    let z = [ZERO, ZERO, [1.0; LANES]];
-    *axis = if prismatic {
-        AxisBlock {
+fn own_axis(
+    prismatic: bool,
+    motion: &LinkBlock,
+    axis: &mut AxisBlock,
+    own: usize,
+    out: &mut Section,
+) {
+    let z = [ZERO, ZERO, Lane([1.0; LANES])];
+    let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz] = out.lanes(own);
+    if prismatic {
+        *axis = AxisBlock {
             angular: ZERO3,
             linear: z,
-        }
+        };
+        *m = motion.proper[2].0;
+        *mx = motion.below[1].0;
+        *my = motion.below[2].0;
+        negated(&motion.sums[2], mz);
     } else {
-        AxisBlock {
+        *axis = AxisBlock {
             angular: z,
             linear: ZERO3,
-        }
-    };
-    let [m, mx, my, mz, inertia @ ..] = block;
-    if prismatic {
-        for k in 0..LANES {
-            let field = Field::of(motion, k);
-            m[k] = field.proper[2];
-            mx[k] = field.u31;
-            my[k] = field.u32;
-            mz[k] = -(field.xx + field.yy);
-        }
-        inertia.fill(ZERO);
-        return;
+        };
+        *mx = motion.proper[1].0;
+        negated(&motion.proper[0], my);
+        negated(&motion.mixed[0], ixx);
+        *ixy = motion.differences[0].0;
+        negated(&motion.above[2], ixz);
+        *iyy = motion.mixed[0].0;
+        *iyz = motion.above[1].0;
+        *izz = motion.turning[2].0;
     }
-    *m = ZERO;
-    *mz = ZERO;
-    let [ixx, ixy, ixz, iyy, iyz, izz] = inertia;
+}
+
+#[inline(always)]
+fn negated(lane: &Lane, out: &mut [f64; LANES]) {
     for k in 0..LANES {
-        let field = Field::of(motion, k);
-        mx[k] = field.proper[1];
-        my[k] = -field.proper[0];
-        ixx[k] = -field.xy;
-        ixy[k] = field.xx - field.yy;
-        ixz[k] = -field.u23;
-        iyy[k] = field.xy;
-        iyz[k] = field.u13;
-        izz[k] = field.turning[2];
+        out[k] = -lane[k];
     }
 }
 
-/// Accelerations of the points of a link at one sample: proper + U·r with U = ė× + ω×ω×.
-struct Field {
-    proper: [f64; 3],
-    turning: [f64; 3],
-    xx: f64,
-    yy: f64,
-    zz: f64,
-    xy: f64,
-    xz: f64,
-    yz: f64,
-    u21: f64,
-    u12: f64,
-    u31: f64,
-    u13: f64,
-    u32: f64,
-    u23: f64,
-}
-
-impl Field {
-    #[inline(always)]
-    fn of(motion: &LinkBlock, k: usize) -> Self {
-        let [wx, wy, wz] = get(&motion.spin, k).0;
-        let turning = get(&motion.turning, k).0;
-        let [ex, ey, ez] = turning;
-        let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
-        Self {
-            proper: get(&motion.proper, k).0,
-            turning,
-            xx: wx * wx,
-            yy: wy * wy,
-            zz: wz * wz,
-            xy,
-            xz,
-            yz,
-            u21: xy + ez,
-            u12: xy - ez,
-            u31: xz - ey,
-            u13: xz + ey,
-            u32: yz + ex,
-            u23: yz - ex,
-        }
-    }
-}
-
-/// Row of the total mechanical energy, column by column of the 14·n: `out(c, …)`. Friction and offset columns are not written.
+/// Row of the total mechanical energy, column by column of the 14·n. Friction and offset columns are not written.
 #[inline(always)]
 pub fn energy_regressor<F: MulAdd>(
     frames: &[Frame],
     gravity: [f64; 3],
     q: &[Lane],
     qd: &[Lane],
-    out: &mut impl FnMut(usize, &Lane),
+    out: &mut Section,
 ) {
     let (mut angular, mut linear) = (ZERO3, ZERO3);
-    let mut field = gravity.map(|g| [g; LANES]);
+    let mut field = gravity.map(|g| Lane([g; LANES]));
     let mut depth = ZERO;
     let (mut sin, mut cos) = (ZERO, ZERO);
-    let mut block = [ZERO; 11];
     for (i, frame) in frames.iter().enumerate() {
         frame.angle::<F>(&q[i], &mut sin, &mut cos);
+        let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = out.lanes(i * COLUMNS);
         at_each_lane!(F, frame, &q[i], place => link_energy(
             place, frame.prismatic, &sin, &cos, &qd[i],
-            &mut angular, &mut linear, &mut field, &mut depth, &mut block,
+            &mut angular, &mut linear, &mut field, &mut depth,
+            m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive,
         ));
-        for (c, lane) in block.iter().enumerate() {
-            out(i * COLUMNS + c, lane);
-        }
     }
 }
 
@@ -284,10 +276,19 @@ fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     linear: &mut Lane3,
     gravity: &mut Lane3,
     depth: &mut Lane,
-    block: &mut [Lane; 11],
+    m: &mut [f64; LANES],
+    mx: &mut [f64; LANES],
+    my: &mut [f64; LANES],
+    mz: &mut [f64; LANES],
+    ixx: &mut [f64; LANES],
+    ixy: &mut [f64; LANES],
+    ixz: &mut [f64; LANES],
+    iyy: &mut [f64; LANES],
+    iyz: &mut [f64; LANES],
+    izz: &mut [f64; LANES],
+    drive: &mut [f64; LANES],
 ) {
     let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
-    let [m, mx, my, mz, ixx, ixy, ixz, iyy, iyz, izz, drive] = block;
     for k in 0..LANES {
         let place = place(k);
         let (s, c) = (sin[k], cos[k]);
