@@ -60,6 +60,9 @@ pub(crate) struct Args {
     /// Record the experiment that is proposed for an open set of names on the same rig, and ask again with it
     #[arg(long)]
     pub(crate) follow: bool,
+    /// Record an encoder on the link beside the motor's
+    #[arg(long)]
+    pub(crate) second_encoder: bool,
     /// Methods to judge
     #[arg(long, value_enum, value_delimiter = ',', default_value = "diagnose")]
     pub(crate) only: Vec<Judged>,
@@ -117,6 +120,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         controls: args.controls,
         follow: args.follow,
         seconds: [args.train, args.holdout],
+        second_encoder: args.second_encoder,
     };
     let cases = plan.cases()?;
     folder(&args.out)?;

@@ -35,6 +35,8 @@ pub(super) enum Role {
     /// Times the value of that column.
     Duty(usize, usize, f64),
     Temperature(usize),
+    /// On the link's side of the transmission.
+    LinkPosition(usize),
     /// No meaning to the model.
     None,
 }
@@ -65,8 +67,8 @@ pub(super) struct Layout {
 /// Columns that mean something beside the joints' own: wrist sensor and supply.
 const NUMERIC_EXTRAS: [&str; 7] = ["fx", "fy", "fz", "mx", "my", "mz", "supply"];
 
-const QUANTITIES: [&str; 11] = [
-    "taum", "tau", "ref", "temp", "duty", "qdd", "qd", "qm", "q", "i", "u",
+const QUANTITIES: [&str; 12] = [
+    "taum", "tau", "ref", "temp", "duty", "qdd", "qd", "qm", "ql", "q", "i", "u",
 ];
 
 /// `tau12` → ("tau", 12); a number has no leading zero except `0` itself.
@@ -180,6 +182,7 @@ pub(super) fn layout(
                     "ref" => (Role::Reference(joint), false),
                     "u" => (Role::Voltage(joint), false),
                     "temp" => (Role::Temperature(joint), false),
+                    "ql" => (Role::LinkPosition(joint), false),
                     _ => match supply {
                         _ if find(&format!("u{k}")).is_some() => (Role::None, true),
                         Some(column) => (Role::Duty(joint, column, duty_scale(robot, joint)), true),

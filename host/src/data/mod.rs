@@ -47,6 +47,8 @@ pub struct JointColumns {
     pub voltage: Option<Vec<f64>>,
     /// Temperature, if recorded, °C.
     pub temperature: Option<Vec<f64>>,
+    /// What an encoder on the link's side of the transmission reads, if recorded (`ql<k>`), rad or m; its zero is free.
+    pub link: Option<Vec<f64>>,
     /// What of the torque is the description's effects', N·m or N; in no file, from [`crate::effects::Compensated`].
     pub effects: Option<Vec<f64>>,
 }

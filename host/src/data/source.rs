@@ -331,6 +331,7 @@ impl Blocks<'_> {
                 Role::Reference(_) => joint.reference = Some(column()),
                 Role::Voltage(_) | Role::Duty(..) => joint.voltage = Some(column()),
                 Role::Temperature(_) => joint.temperature = Some(column()),
+                Role::LinkPosition(_) => joint.link = Some(column()),
                 Role::Time | Role::None | Role::MotorEffort(..) => {}
             }
         }
@@ -377,6 +378,7 @@ impl Blocks<'_> {
                     (joint.voltage.as_mut(), share * self.values[supply])
                 }
                 Role::Temperature(_) => (joint.temperature.as_mut(), value),
+                Role::LinkPosition(_) => (joint.link.as_mut(), value),
                 Role::MotorPosition(k) => {
                     set(self.motors.as_mut().map(|m| &mut m.psi), k, value);
                     (None, value)
@@ -516,7 +518,8 @@ fn joint_of(role: Role) -> Option<usize> {
         | Role::Duty(k, ..)
         | Role::MotorPosition(k)
         | Role::MotorEffort(k, _)
-        | Role::Temperature(k) => Some(k),
+        | Role::Temperature(k)
+        | Role::LinkPosition(k) => Some(k),
     }
 }
 

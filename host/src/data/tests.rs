@@ -78,6 +78,29 @@ fn columns_find_their_joints_and_units() {
 }
 
 #[test]
+fn an_encoder_on_the_link_has_a_column_of_its_own() {
+    let folder = Folder::new();
+    let path = folder.file("t,q1,ql1,tau1\n0,0.5,-0.25,1\n0.001,0.25,-0.5,2\n");
+    let (blocks, warnings) = read(&path, &rig()).unwrap();
+    let joint = &blocks[0].joints[0];
+    assert_eq!(joint.q, [0.5, 0.25]);
+    assert_eq!(joint.link.as_deref(), Some([-0.25, -0.5].as_slice()));
+    assert!(blocks[0].extra.is_empty() && warnings.is_empty());
+
+    for (text, words) in [
+        ("t,q1,ql1,tau1\n0,0,0,0\n0.1,0,nan,0\n", "a.csv:3:"),
+        ("t,q1,ql1,tau1\n0,0,0,0\n0.1,0,far,0\n", "`ql1`"),
+        (
+            "t,q1,ql2,tau1\n0,0,0,0\n0.1,0,0,0\n",
+            "`ql2` belongs to joint 2",
+        ),
+    ] {
+        let error = read(&folder.file(text), &rig()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
 fn wrong_recordings_are_named_by_line_and_column() {
     let folder = Folder::new();
     let rows = "0,0,0\n0.1,0,0\n";

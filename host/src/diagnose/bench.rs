@@ -15,7 +15,7 @@ use super::rows::{Column, Nominal, Rows, combined};
 use super::runs::{Run, runs_of};
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
-use crate::prepare::{Choice, PrepareOptions, Recording, Survey, Treatment};
+use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
@@ -71,10 +71,7 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`DiagnoseError`].
     pub(super) fn load(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
-        let position = self
-            .treatment
-            .position_filter()
-            .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))?;
+        let position = self.position_filter()?;
         let mut runs = Vec::new();
         for (k, &recording) in recordings.iter().enumerate() {
             let rate = self.treatment.sample_rate;
@@ -88,6 +85,15 @@ impl<'a> Bench<'a> {
             });
         }
         self.rows(runs)
+    }
+
+    /// What positions pass before they are differentiated.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where there is no such filter.
+    pub(super) fn position_filter(&self) -> Result<LowPass, DiagnoseError> {
+        (self.treatment.position_filter())
+            .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
     }
 
     /// The rows of runs, less what the held parameters contribute.

@@ -10,7 +10,7 @@ use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::profile::Profile;
-use super::rows::{Column, Nominal, Thinning};
+use super::rows::{Column, Nominal, Thinning, links_of, motion_of};
 use super::runs::Run;
 use super::search::is_gear;
 use super::slopes::Slopes;
@@ -186,6 +186,10 @@ impl Source<'_> {
         r: usize,
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let run = &self.runs[r];
+        // An encoder on the link has seen what the gear does.
+        if let Some(excess) = self.measured(candidate.joint, r)? {
+            return Ok(vec![excess; shapes.len()]);
+        }
         let driven = self.driven(candidate.joint, r)?;
         let load = Load {
             period: 1.0 / run.rate,
@@ -196,6 +200,56 @@ impl Source<'_> {
         Ok((driven.excess(candidate.kind, shapes, &load).into_iter())
             .map(|excess| excess.unwrap_or_else(|| vec![0.0; run.len()]))
             .collect())
+    }
+
+    /// What the links' measured motion adds to the torque of a joint over a run beside that of rigid gears; none where its
+    /// link has no encoder.
+    fn measured(&self, joint: usize, r: usize) -> Result<Option<Vec<f64>>, DiagnoseError> {
+        let run = &self.runs[r];
+        let own = &run.joints[joint];
+        let Some([_, _, acceleration]) = &own.link else {
+            return Ok(None);
+        };
+        let inertial = |[q, v, a]: [Vec<Vec<f64>>; 3]| self.inertial(joint, [&q, &v, &a]);
+        let (rigid, measured) = (inertial(motion_of(run))?, inertial(links_of(run))?);
+        let drive = self.drive_inertia(joint);
+        let moved = acceleration
+            .iter()
+            .zip(&own.qdd)
+            .map(|(l, m)| drive * (l - m));
+        Ok(Some(
+            (measured.iter().zip(&rigid).zip(moved))
+                .map(|((with, without), drive)| with - without - drive)
+                .collect(),
+        ))
+    }
+
+    /// Torque on the gear of a joint over a run for the links' measured motion.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn load_of_link(&self, joint: usize, r: usize) -> Result<Vec<f64>, DiagnoseError> {
+        let mut load = self.predicted[r].load[joint].clone();
+        for (to, more) in load
+            .iter_mut()
+            .zip(self.measured(joint, r)?.iter().flatten())
+        {
+            *to += more;
+        }
+        Ok(load)
+    }
+
+    /// Inertia that the gear of a joint carries, over a run on average.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn mass(&self, joint: usize, r: usize) -> Result<f64, DiagnoseError> {
+        Ok(self.driven(joint, r)?.mean_mass())
+    }
+
+    /// Coulomb friction of a joint, as identified; 0 where it came out below that.
+    pub(super) fn coulomb(&self, joint: usize) -> f64 {
+        self.friction(joint)[1].max(0.0)
     }
 
     /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.

@@ -37,7 +37,7 @@ pub(super) fn by_description(
     let mut moved = false;
     for k in 0..chosen.len() {
         // Its name is the description's own.
-        if judge.search.is_described(&chosen[k].candidate) {
+        if judge.search.rank_of(&chosen[k].candidate) < 2 {
             continue;
         }
         let joint = chosen[k].candidate.joint;

@@ -5,6 +5,7 @@ mod steps;
 use rig_shared::effects::{Kind, Periodic};
 
 use self::steps::{change_step, refuse, steps};
+use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, Loaded, library};
 use super::change::change;
 use super::descent::Descent;
@@ -22,7 +23,7 @@ use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
 use super::search::{Search, with};
-use super::stated::{Now, Stated};
+use super::stated::{Now, Stated, candidate};
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
@@ -138,7 +139,13 @@ fn attempt(
     } else {
         (&loaded, lead, first)
     };
-    if more.hold_what_is_not_refuted(&pass.search.source, &pass.refit.base, &pass.found)? {
+    let refuted = |c: &_| refutes(&pass.across, c);
+    if more.hold_what_is_not_refuted(
+        &pass.search.source,
+        &pass.refit.base,
+        &pass.found,
+        &refuted,
+    )? {
         return Ok(Attempt::Hold(more));
     }
     let sealed = sealed
@@ -149,6 +156,7 @@ fn attempt(
         search,
         found,
         mut tried,
+        across: _,
     } = pass;
     progress(0.85);
     let robot = bench.robot;
@@ -181,7 +189,7 @@ fn attempt(
     let judged = judge.judged(found)?;
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     // A name that makes the simulated motion worse stands in for something else.
-    while let Some(k) = trial.spoiling(&judged.chosen, search.count_described(&judged.chosen))? {
+    while let Some(k) = trial.spoiling(&judged.chosen, search.count_given(&judged.chosen))? {
         let mut stand = judged.chosen;
         refuse(robot, &mut tried, &stand.remove(k));
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
@@ -194,7 +202,7 @@ fn attempt(
     )?;
     // What the voltage has given another name is the description's no longer.
     let mut named: Vec<_> = judged.chosen.drain(..).zip(said).collect();
-    named.sort_by_key(|(profile, _)| !search.is_described(&profile.candidate));
+    named.sort_by_key(|(profile, _)| search.rank_of(&profile.candidate));
     let (chosen, said): (Vec<_>, Vec<_>) = named.into_iter().unzip();
     judged.chosen = chosen;
     let described = search.count_described(&judged.chosen);
@@ -222,6 +230,22 @@ fn attempt(
     let joint = refit.joint(&search.source, chosen, &judge.pairs, &coordinates)?;
     let after = &joint.solution;
     let before = refit.solution(&chosen[..described])?;
+    let across = {
+        let nominal = bench.anchor.values(&after.values[..refit.free.len()]);
+        let of = |loaded| -> Result<_, DiagnoseError> {
+            (bench.source(loaded, &nominal)?).loaded_by(chosen, &after.values[refit.free.len()..])
+        };
+        let held = (sealed.as_ref()).map(of).transpose()?;
+        across(
+            &of(loaded)?,
+            &bench.anchor,
+            after,
+            loaded,
+            held.as_ref().zip(sealed.as_ref()),
+            &bench.position_filter()?,
+            options,
+        )?
+    };
     progress(0.95);
     let motion = (described..=chosen.len())
         .map(|count| Ok(replay.errors(&chosen[..count])?.map(|errors| errors.rms())))
@@ -255,7 +279,9 @@ fn attempt(
         robot: robot.name.clone(),
         verdict: verdict(
             &judged,
-            chosen.len() > described || name_something(&windings),
+            chosen.len() > described
+                || name_something(&windings)
+                || names_something(&across, &|c| stated.states(c)),
             change.is_some() || contradict(&windings) || stated.changed(&stood),
         ),
         residual: Residual::Torque,
@@ -306,6 +332,7 @@ fn attempt(
     let mut model = finish(&found, &mut diagnosis)?;
     model.effects.extend(stated.held().cloned());
     tell(windings, &mut diagnosis, &mut model);
+    tell_across(across, &mut diagnosis, &mut model);
     let told = diagnosis.described.iter().map(|d| d.text.clone());
     diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
@@ -369,6 +396,7 @@ struct Pass<'a> {
     search: Search<'a>,
     found: Vec<Profile>,
     tried: Vec<Tried>,
+    across: Vec<Across>,
 }
 
 impl<'a> Pass<'a> {
@@ -379,18 +407,35 @@ impl<'a> Pass<'a> {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Self, DiagnoseError> {
         let refit = Refit::of(bench, &loaded.rows)?;
+        let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
+        // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
+        let across = across(
+            &source,
+            &bench.anchor,
+            &refit.before,
+            loaded,
+            None,
+            &bench.position_filter()?,
+            options,
+        )?;
+        let mut library = library(bench.robot, &loaded.runs, &options.without);
+        library.retain(|c| !refutes(&across, c));
+        let mut described = bench.stated.free();
+        described.retain(|placed| !refutes(&across, &candidate(placed)));
         let mut search = Search::new(
-            bench.source(loaded, &bench.anchor.values(&refit.before.values))?,
-            library(bench.robot, &loaded.runs, &options.without),
-            bench.stated.free(),
+            source,
+            library,
+            described,
             crate::prepare::threads(options.threads),
         );
+        search.measured = gears(&across);
         let (found, tried) = searched(bench, loaded, &refit, &mut search, progress)?;
         Ok(Self {
             refit,
             search,
             found,
             tried,
+            across,
         })
     }
 }

@@ -93,8 +93,7 @@ impl Judge<'_, '_> {
                 closed([rms(Some(k)), rms(None)], floors[j])
             };
             // What the description states is no guess of the search.
-            let mut doubtful: Vec<(usize, f64)> = (self.search.count_described(chosen)
-                ..chosen.len())
+            let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
                 .map(|k| (k, closes(k)))
                 .filter(|(_, share)| *share < HALF)
                 .collect();

@@ -46,7 +46,9 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
                 .chosen
                 .iter()
                 .any(|p| p.candidate.joint == j && p.candidate.kind.about().name == name);
-            if taken || known(&list) {
+            // An encoder on the link has shown it or not.
+            let across = is_gear(kind) && (runs.iter()).any(|r| r.joints[j].link.is_some());
+            if taken || across || known(&list) {
                 continue;
             }
             let lacking = testable::not_testable(kind, found.robot, j, runs);

@@ -1,6 +1,7 @@
 //! The gap workflow: where simulation and data disagree, which physical effect is missing, what it takes away on data not
 //! used, and when to stop.
 
+mod across;
 mod anchor;
 #[cfg(test)]
 mod arm_tests;

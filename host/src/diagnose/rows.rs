@@ -310,6 +310,19 @@ pub(super) fn motion_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
     [of(|j| &j.q), of(|j| &j.qd), of(|j| &j.qdd)]
 }
 
+/// The same of the links, where encoders on them were recorded.
+pub(super) fn links_of(run: &Run) -> [Vec<Vec<f64>>; 3] {
+    let mut motion = motion_of(run);
+    for (j, joint) in run.joints.iter().enumerate() {
+        if let Some(link) = &joint.link {
+            for (to, from) in motion.iter_mut().zip(link) {
+                to[j].clone_from(from);
+            }
+        }
+    }
+    motion
+}
+
 impl Rows {
     /// Forms torque, masks and nominal columns of all runs.
     ///

@@ -32,6 +32,12 @@ pub struct JointRun {
     pub voltage: Option<Vec<f64>>,
     /// Temperature, where recorded, °C.
     pub temperature: Option<Vec<f64>>,
+    /// What an encoder on the link's side of the transmission reads, where recorded, rad or m, its zero where the joint's own
+    /// has it.
+    pub link_raw: Option<Vec<f64>>,
+    /// The link's position: the filtered one less what is read across the transmission in its band; with velocity and
+    /// acceleration.
+    pub link: Option<[Vec<f64>; 3]>,
 }
 
 /// A stretch of a recording without a gap.
@@ -102,6 +108,15 @@ pub(super) fn in_sessions(runs: &mut [Run], before: &[Run]) {
             .fold(first, f64::min);
         spans.push(span(run));
     }
+}
+
+/// Band of what is read across a transmission, Hz: twist and play are slow beside the steps of two encoders, whose second
+/// derivative would be most of the torque that is computed from them.
+const ACROSS_BAND: f64 = 25.0;
+
+/// What the difference of a joint's two encoders passes beside the filter of the positions.
+pub(super) fn across_band(rate: f64) -> Option<LowPass> {
+    LowPass::butterworth(4, f64::min(ACROSS_BAND, 0.2 * rate), rate)
 }
 
 /// Reads `recording` stretch by stretch; positions are filtered by `position` (zero phase) and differentiated.
@@ -176,14 +191,50 @@ impl Gathered {
 
     fn differentiated(self, position: &LowPass) -> Vec<Run> {
         let mut runs = self.runs;
+        zero(&mut runs);
         for run in &mut runs {
+            let band = across_band(run.rate);
             for joint in &mut run.joints {
                 joint.q = position.zero_phase(&joint.q_raw);
                 joint.qd = central_difference(&joint.q, 1.0 / run.rate);
                 joint.qdd = second_difference(&joint.q, 1.0 / run.rate);
+                joint.link = joint
+                    .link_raw
+                    .as_ref()
+                    .zip(band.as_ref())
+                    .map(|(raw, band)| {
+                        let apart: Vec<f64> =
+                            joint.q_raw.iter().zip(raw).map(|(a, b)| a - b).collect();
+                        let apart = band.zero_phase(&position.zero_phase(&apart));
+                        let q: Vec<f64> = joint.q.iter().zip(&apart).map(|(q, x)| q - x).collect();
+                        let qd = central_difference(&q, 1.0 / run.rate);
+                        let qdd = second_difference(&q, 1.0 / run.rate);
+                        [q, qd, qdd]
+                    });
             }
         }
         runs
+    }
+}
+
+/// Moves the zero of the encoders on the links to that of the joints' own, on average over the recording: the model's gravity
+/// is to be taken where the link is.
+fn zero(runs: &mut [Run]) {
+    let joints = runs.first().map_or(0, |run| run.joints.len());
+    for j in 0..joints {
+        let both = |joint: &JointRun| -> Option<(f64, usize)> {
+            let link = joint.link_raw.as_ref()?;
+            let apart = joint.q_raw.iter().zip(link).map(|(q, l)| q - l);
+            Some((apart.sum(), link.len()))
+        };
+        let (sum, count) = (runs.iter())
+            .filter_map(|run| both(&run.joints[j]))
+            .fold((0.0, 0), |(s, n), (sum, count)| (s + sum, n + count));
+        let offset = sum / count.max(1) as f64;
+        for run in runs.iter_mut() {
+            let readings = run.joints[j].link_raw.iter_mut().flatten();
+            readings.for_each(|l| *l += offset);
+        }
     }
 }
 
@@ -210,6 +261,7 @@ fn append(run: &mut Run, block: Block) {
         join(&mut to.reference, from.reference, before);
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);
+        join(&mut to.link_raw, from.link, before);
     }
 }
 

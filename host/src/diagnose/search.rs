@@ -39,6 +39,8 @@ pub(super) struct Search<'a> {
     pub(super) library: Vec<Candidate>,
     /// What the description states of them: the search begins with it.
     pub(super) described: Vec<Placed>,
+    /// Gears that encoders on the links have shown, with their shapes: the torque has no say in them.
+    pub(super) measured: Vec<(Candidate, [f64; SHAPES])>,
     /// Threads.
     pub(super) threads: usize,
     /// Joint by joint.
@@ -61,6 +63,7 @@ impl<'a> Search<'a> {
             source,
             library,
             described,
+            measured: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -211,7 +214,7 @@ impl<'a> Search<'a> {
             }
         }
         self.other_laws(base, &mut chosen)?;
-        chosen.sort_by_key(|profile| !self.is_described(&profile.candidate));
+        chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
         Ok(chosen)
     }
 
@@ -278,6 +281,9 @@ impl<'a> Search<'a> {
         // Something else in the place of an effect that was taken before the last.
         if chosen.len() > 1 {
             for i in 0..chosen.len() - 1 {
+                if self.is_measured(&chosen[i].candidate) {
+                    continue;
+                }
                 let fit = with(base, chosen, Some(i));
                 let others: Vec<Candidate> = (chosen.iter().enumerate())
                     .filter(|(k, _)| *k != i)

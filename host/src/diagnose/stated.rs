@@ -109,6 +109,13 @@ impl Stated {
         self.effects.iter().any(of)
     }
 
+    /// Whether the description has the effect, whatever became of it.
+    pub(super) fn states(&self, effect: &Candidate) -> bool {
+        self.effects
+            .iter()
+            .any(|(_, placed, _)| is_one(placed, effect))
+    }
+
     /// What recordings are freed of; none where nothing is held.
     ///
     /// # Errors
@@ -181,6 +188,7 @@ impl Stated {
     }
 
     /// Holds free effects that are not among those found and that the recordings do not contradict; whether there was one.
+    /// Those that encoders on the links have `refuted` are contradicted.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -189,6 +197,7 @@ impl Stated {
         source: &Source,
         base: &Fit,
         found: &[Profile],
+        refuted: &dyn Fn(&Candidate) -> bool,
     ) -> Result<bool, DiagnoseError> {
         let stays = self.matched(found);
         let fit = with(base, found, None);
@@ -198,7 +207,7 @@ impl Stated {
             let replaced = is_gear(placed.effect.kind)
                 && (found.iter())
                     .any(|p| p.candidate.joint == placed.joint && is_gear(p.candidate.kind));
-            if *way != Way::Free || stays.is_some() || replaced {
+            if *way != Way::Free || stays.is_some() || replaced || refuted(&candidate(placed)) {
                 continue;
             }
             let columns = source.columns(&candidate(placed), &placed.effect.shapes)?;

@@ -66,6 +66,11 @@ impl Driven {
         })
     }
 
+    /// The link's own inertia on average over the run.
+    pub(super) fn mean_mass(&self) -> f64 {
+        self.mass.iter().sum::<f64>() / self.mass.len().max(1) as f64
+    }
+
     /// What the drive's torque differs by from a rigid gear's, one signal for each of the shapes; none where the link has no
     /// inertia of its own, the contact is too stiff for the steps or the gear softer than [`MOST_TWIST`] allows.
     pub(super) fn excess(

@@ -120,11 +120,26 @@ pub struct Encoder {
     pub timed: bool,
 }
 
+/// Encoder on the link's side of the gear, absolute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkEncoder {
+    /// Counts per turn of the joint.
+    pub counts_per_turn: f64,
+    /// Joint angle at which it reads 0, rad.
+    pub zero: f64,
+    /// Standard deviation of one reading before it is counted, rad.
+    pub noise: Option<f64>,
+    /// Once-per-turn reading error, of the joint's turn.
+    pub eccentricity: Option<EncoderEccentricity>,
+}
+
 /// What the controller gets to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     /// Position.
     pub encoder: Encoder,
+    /// Position of the link, which the controller does not see.
+    pub link_encoder: Option<LinkEncoder>,
     /// Motor current.
     pub current: Channel,
     /// Supply voltage.
@@ -344,6 +359,7 @@ impl Default for PlantConfig {
                     unequal_lines: None,
                     timed: true,
                 },
+                link_encoder: None,
                 current: Channel {
                     noise: Some(0.02),
                     offset: 0.03,

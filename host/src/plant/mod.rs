@@ -43,7 +43,9 @@ mod truth;
 mod tests;
 
 pub use body::Body;
-pub use config::{Bridge, Channel, Encoder, Equivalent, Mechanism, Motor, PlantConfig, Sensors};
+pub use config::{
+    Bridge, Channel, Encoder, Equivalent, LinkEncoder, Mechanism, Motor, PlantConfig, Sensors,
+};
 pub use fault::Faults;
 pub use friction::{Friction, Presliding, VelocityWeakening};
 pub(crate) use sensors::stream;
@@ -58,7 +60,7 @@ use rig_shared::units::AdcCode;
 
 use body::Load;
 use integrate::{Dynamics, Held};
-use sensors::{Converter, EdgeClock};
+use sensors::{Converter, EdgeClock, LinkReader};
 
 /// The emulated rig.
 #[derive(Clone, Debug)]
@@ -81,6 +83,7 @@ pub struct Plant {
     current: Converter,
     supply: Converter,
     temperature: Converter,
+    link: Option<LinkReader>,
     disturbance_rng: Pcg64Mcg,
 }
 
@@ -115,6 +118,8 @@ impl Plant {
                 2,
             ),
             disturbance_rng: sensors::stream(seed, 3),
+            link: (config.sensors.link_encoder)
+                .map(|encoder| LinkReader::new(encoder, sensors::stream(seed, 4))),
             late_current: VecDeque::from(vec![0.0; config.sensors.current_delay.unwrap_or(0)]),
             held_count: config
                 .sensors
@@ -266,6 +271,12 @@ impl Plant {
             encoder_open: false,
             stack_left: None,
         }
+    }
+
+    /// What an encoder on the link reads at the last sampling instant, rad; none where the rig has none.
+    pub fn link_angle(&mut self) -> Option<f64> {
+        let angle = self.truth().position;
+        self.link.as_mut().map(|link| link.read(angle))
     }
 
     /// The true state at the last sampling instant.

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::SeedableRng;
 use rig_shared::units::{AdcCode, EncoderCount};
 
-use super::config::{Channel, Encoder};
+use super::config::{Channel, Encoder, LinkEncoder};
 
 /// An independent random stream for one purpose, so that one noise switched off leaves the others as they
 /// were. The odd multiplier spreads the streams over the seeds (Steele, Lea & Flood 2014, γ of SplitMix64).
@@ -79,6 +79,31 @@ impl Encoder {
                 .map_or(0.0, |e| e.error(shaft) - e.error(0.0));
         let even = read / TAU * self.counts_per_turn;
         self.unequal_lines.map_or(even, |lines| lines.reading(even))
+    }
+}
+
+/// A running encoder on the link.
+#[derive(Clone, Debug)]
+pub(crate) struct LinkReader {
+    encoder: LinkEncoder,
+    rng: Pcg64Mcg,
+}
+
+impl LinkReader {
+    pub(crate) fn new(encoder: LinkEncoder, rng: Pcg64Mcg) -> Self {
+        Self { encoder, rng }
+    }
+
+    /// The angle that it reads at a true angle of the joint, rad: the middle of its count, not wrapped.
+    pub(crate) fn read(&mut self, angle: f64) -> f64 {
+        let own = angle - self.encoder.zero;
+        let error = self.encoder.eccentricity.map_or(0.0, |e| e.error(own));
+        let noise = self.encoder.noise.map_or(0.0, |std| {
+            let normal: f64 = StandardNormal.sample(&mut self.rng);
+            std * normal
+        });
+        let count = TAU / self.encoder.counts_per_turn;
+        (((own + error + noise) / count).floor() + 0.5) * count
     }
 }
 

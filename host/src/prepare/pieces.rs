@@ -96,6 +96,7 @@ pub(crate) fn stretch(block: &Block, start: usize, end: usize) -> Block {
                 reference: j.reference.as_ref().map(of),
                 voltage: j.voltage.as_ref().map(of),
                 temperature: j.temperature.as_ref().map(of),
+                link: j.link.as_ref().map(of),
                 effects: j.effects.as_ref().map(of),
             })
             .collect(),
@@ -129,6 +130,7 @@ fn append(block: &mut Block, mut more: Block) {
         join(&mut a.reference, b.reference);
         join(&mut a.voltage, b.voltage);
         join(&mut a.temperature, b.temperature);
+        join(&mut a.link, b.link);
         join(&mut a.effects, b.effects);
     }
     for ((_, a), (_, b)) in block.extra.iter_mut().zip(more.extra) {
@@ -148,6 +150,7 @@ fn drop_front(block: &mut Block, rows: usize) {
             &mut joint.reference,
             &mut joint.voltage,
             &mut joint.temperature,
+            &mut joint.link,
             &mut joint.effects,
         ]
         .into_iter()

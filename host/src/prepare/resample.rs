@@ -13,7 +13,7 @@ pub(super) const LONGEST_STEP: f64 = 2.5;
 /// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
 /// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
 /// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Time, position, torque,
-/// measured derivatives and temperature are kept, other columns left out.
+/// measured derivatives, temperature and the link's position are kept, other columns left out.
 pub(super) struct Resampled<'a> {
     source: &'a dyn Recording,
     period: f64,
@@ -25,7 +25,8 @@ impl<'a> Resampled<'a> {
     }
 }
 
-/// Signals of a block in a fixed order: position, torque, then velocity, acceleration and temperature where recorded.
+/// Signals of a block in a fixed order: position, torque, then velocity, acceleration, temperature and the link's position where
+/// recorded.
 fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
     [
         Some(&joint.q),
@@ -33,6 +34,7 @@ fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
         joint.qd.as_ref(),
         joint.qdd.as_ref(),
         joint.temperature.as_ref(),
+        joint.link.as_ref(),
     ]
     .into_iter()
     .flatten()
@@ -121,6 +123,7 @@ impl Grid {
                     joint.qd.as_mut(),
                     joint.qdd.as_mut(),
                     joint.temperature.as_mut(),
+                    joint.link.as_mut(),
                 ];
                 for (list, value) in lists.into_iter().flatten().zip(values) {
                     list.push(value);
@@ -165,6 +168,7 @@ impl Grid {
                     qd: j.qd.as_ref().map(|_| Vec::new()),
                     qdd: j.qdd.as_ref().map(|_| Vec::new()),
                     temperature: j.temperature.as_ref().map(|_| Vec::new()),
+                    link: j.link.as_ref().map(|_| Vec::new()),
                     ..Default::default()
                 })
                 .collect(),
@@ -214,6 +218,7 @@ impl Recording for Resampled<'_> {
                             qd: j.qd.as_ref().map(|_| Vec::new()),
                             qdd: j.qdd.as_ref().map(|_| Vec::new()),
                             temperature: j.temperature.as_ref().map(|_| Vec::new()),
+                            link: j.link.as_ref().map(|_| Vec::new()),
                             ..Default::default()
                         })
                         .collect(),

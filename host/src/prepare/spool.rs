@@ -136,6 +136,7 @@ fn bare(block: Block) -> Block {
             .map(|j| JointColumns {
                 reference: None,
                 voltage: None,
+                link: None,
                 ..j
             })
             .collect(),

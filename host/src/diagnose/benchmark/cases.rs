@@ -112,6 +112,8 @@ pub struct Plan {
     pub follow: bool,
     /// Length of training and hold-out, s.
     pub seconds: [f64; 2],
+    /// Whether the rig has a second encoder, on the link.
+    pub second_encoder: bool,
 }
 
 impl Plan {
@@ -129,6 +131,7 @@ impl Plan {
                 scenario: Scenario {
                     noise,
                     seconds: self.seconds,
+                    second_encoder: self.second_encoder,
                     ..scenario
                 },
                 without: Vec::new(),

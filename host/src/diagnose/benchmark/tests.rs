@@ -43,6 +43,7 @@ fn plan() -> Plan {
         controls: true,
         follow: false,
         seconds: [20.0, 20.0],
+        second_encoder: false,
     }
 }
 

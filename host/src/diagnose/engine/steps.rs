@@ -46,8 +46,12 @@ pub(super) fn steps(
             gap_closed: closed(unseen.unwrap_or(train), floors[j]),
             why: String::new(),
         };
-        let rivals = search.alternatives(&refit.base, chosen, k)?;
-        rank(&mut step, profile, &rivals, source.runs);
+        if search.is_measured(&profile.candidate) {
+            step.set.push(step.effect.clone());
+        } else {
+            let rivals = search.alternatives(&refit.base, chosen, k)?;
+            rank(&mut step, profile, &rivals, source.runs);
+        }
         steps.push(step);
     }
     Ok(steps)

@@ -12,6 +12,7 @@
 
 mod columns;
 mod fit;
+mod link;
 mod model;
 mod names;
 mod rows;
@@ -145,6 +146,9 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         // A wrong position belongs to no measured velocity either; that says nothing new.
         if found.iter().all(|f| f.joint != robot.joints[j].name) {
             found.extend(columns::velocity(robot, runs, j));
+        }
+        if found.iter().all(|f| f.joint != robot.joints[j].name) {
+            found.extend(link::fault(robot, runs, j));
         }
         found.extend(columns::at_limit(robot, runs, j));
     }

@@ -397,3 +397,48 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     two[1].t = still[0].t.clone();
     assert_eq!(faults(&robot, &two).unwrap(), []);
 }
+
+/// Recordings with what an encoder on the link makes of the joint's position.
+fn with_link(runs: &[Run], change: impl Fn(usize, f64) -> f64) -> Vec<Run> {
+    let mut runs = runs.to_vec();
+    for run in &mut runs {
+        let joint = &mut run.joints[0];
+        let reading = joint.q_raw.iter().enumerate();
+        joint.link_raw = Some(reading.map(|(k, q)| change(k, *q)).collect());
+    }
+    runs
+}
+
+#[test]
+fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
+    let (robot, mut runs) = emulated();
+    runs.truncate(1);
+    // Its zero is free; a little twist or play is what it is there for.
+    let fine = with_link(&runs, |k, q| {
+        0.98 * q + 40.0 + 1e-3 * f64::from((k % 7) as u32)
+    });
+    assert_eq!(faults(&robot, &fine).unwrap(), []);
+    let cases: [(&dyn Fn(usize, f64) -> f64, &str, &str); 6] = [
+        (&|_, q| 57.296 * q, "unit", "degrees"),
+        (&|_, q| -q, "sign", "reverse its sense"),
+        (&|_, q| 50.0 * q, "ratio", "gear ratio 50"),
+        (&|_, q| 1.7 * q, "unit", "1.7000 times"),
+        (&|_, _| 0.3, "not-moving", "stands still"),
+        (
+            &|k, q| if k < 4000 { q } else { q + 6.283 },
+            "jump",
+            "ql1 jumps",
+        ),
+    ];
+    for (change, kind, words) in cases {
+        let wrong = with_link(&runs, change);
+        assert!(says(&robot, &wrong, kind, words), "{kind} {words}");
+    }
+    // Beside one that has none, one that has is judged by itself.
+    let mut both = runs.clone();
+    both.extend(with_link(&runs, |_, q| -q));
+    both[1].recording = 1;
+    let found = faults(&robot, &both).unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].kind, "sign");
+}

@@ -72,6 +72,8 @@ pub struct Scenario {
     pub intrusion: Option<Intrusion>,
     /// Substeps of the rig per 0.1 ms; none for what suffices.
     pub substeps: Option<u32>,
+    /// Whether an encoder on the link is recorded beside the motor's.
+    pub second_encoder: bool,
 }
 
 impl Scenario {
@@ -88,6 +90,7 @@ impl Scenario {
             description_error: 0.0,
             intrusion: None,
             substeps: None,
+            second_encoder: false,
         }
     }
 
@@ -217,6 +220,7 @@ impl Scenario {
         if let Some(substeps) = self.substeps {
             config.substeps = substeps;
         }
+        config.sensors.link_encoder = self.second_encoder.then_some(rig::LINK_ENCODER);
         for hidden in &self.hidden {
             hidden.effect.hide(&mut config);
         }
@@ -347,6 +351,10 @@ fn write_csv(path: &Path, blocks: &[Block]) -> Result<(), crate::data::DataError
             columns.push(Column::new(&format!("{name}{joint}"), unit));
         }
     }
+    let links = (blocks.iter()).all(|b| b.joints.iter().all(|joint| joint.link.is_some()));
+    if links {
+        columns.extend((1..=joints).map(|joint| Column::new(&format!("ql{joint}"), "rad")));
+    }
     let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
     let mut row = Vec::with_capacity(columns.len());
     for block in blocks {
@@ -363,6 +371,10 @@ fn write_csv(path: &Path, blocks: &[Block]) -> Result<(), crate::data::DataError
                     at(joint.reference.as_ref()),
                     at(joint.voltage.as_ref()),
                 ]);
+            }
+            if links {
+                let links = block.joints.iter().filter_map(|j| j.link.as_ref());
+                row.extend(links.map(|link| link.get(k).copied().unwrap_or(f64::NAN)));
             }
             writer.push_row(&row)?;
         }

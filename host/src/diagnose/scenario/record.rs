@@ -97,8 +97,8 @@ impl Loop {
     }
 }
 
-/// Runs the rig along `reference` and records t, q, torque by the nominal constant, reference and voltage in force
-/// (that of the control period before the sample).
+/// Runs the rig along `reference` and records t, q, torque by the nominal constant, reference, voltage in force
+/// (that of the control period before the sample) and what an encoder on the link reads, where there is one.
 pub(super) fn record(
     config: PlantConfig,
     drive: &Drive,
@@ -127,6 +127,7 @@ pub(super) fn record(
     let mut block = Block::default();
     let mut joint = JointColumns::default();
     let (mut references, mut voltages) = (Vec::new(), Vec::new());
+    let mut links = Vec::new();
     for (k, &position) in reference.iter().enumerate() {
         let t = k as f64 / RATE;
         if let Some(intrusion) = intrusion {
@@ -140,6 +141,7 @@ pub(super) fn record(
         block.t.push(t);
         joint.q.push(q);
         joint.tau.push(constant * current);
+        links.extend(plant.link_angle());
         references.push(position);
         voltages.push(f64::from(command.duty.0) * control.supply);
 
@@ -155,6 +157,7 @@ pub(super) fn record(
     }
     joint.reference = Some(references);
     joint.voltage = Some(voltages);
+    joint.link = (!links.is_empty()).then_some(links);
     block.joints.push(joint);
     block
 }

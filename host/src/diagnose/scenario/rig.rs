@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::dice::Dice;
 use crate::diagnose::DiagnoseError;
 use crate::plant::effect::disturbance::Disturbance;
-use crate::plant::{Body, Friction, PlantConfig, Presliding};
+use crate::plant::{Body, Friction, LinkEncoder, PlantConfig, Presliding};
 use crate::robot::{JointFriction, ONE_LINK_TEMPLATE, Robot};
 
 /// Ticks of the rig per second: also the resolution of a delay.
@@ -23,6 +23,14 @@ const BEFORE_GEAR: f64 = 0.75;
 const HANGING: f64 = -FRAC_PI_2;
 /// Largest relative departure of a rig from the reference.
 const SPREAD: f64 = 0.1;
+
+/// The encoder on the link where there is one: absolute, of 17 bits, with half a count of noise; nobody has set its zero.
+pub(super) const LINK_ENCODER: LinkEncoder = LinkEncoder {
+    counts_per_turn: 131_072.0,
+    zero: HANGING + 0.2,
+    noise: Some(2.4e-5),
+    eccentricity: None,
+};
 
 /// How much the sensors and the surroundings disturb.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,6 +33,8 @@ fn randomise(recording: &mut InMemory, seed: u64, purpose: u64) -> Result<(), Di
         let Some(joint) = block.joints.first_mut() else {
             continue;
         };
+        // The link does not move as that torque would have it.
+        joint.link = None;
         let mut left: Vec<f64> = joint.tau.iter().zip(&model).map(|(t, m)| t - m).collect();
         let length = left.len() as f64;
         let mut planner = RealFftPlanner::<f64>::new();

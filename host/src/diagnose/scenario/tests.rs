@@ -150,3 +150,38 @@ fn random_phases_keep_the_spectrum_and_lose_the_motion() {
     assert!(likeness.abs() < 0.1, "{likeness}");
     assert!(surrogate.truth.hidden.is_empty());
 }
+
+#[test]
+fn a_second_encoder_changes_nothing_but_what_is_recorded() {
+    let plain = short(&["joint_elasticity"], 6);
+    let seen = Scenario {
+        second_encoder: true,
+        ..plain.clone()
+    };
+    let (plain, mut seen) = (plain.make().unwrap(), seen.make().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    seen.write(folder.path()).unwrap();
+    let read = crate::data::Source::open(&folder.path().join("train.csv"), &seen.robot).unwrap();
+    let (blocks, _) = read.read_all().unwrap();
+    let own = seen.train.blocks[0].joints[0].link.take().unwrap();
+    assert_eq!(blocks[0].joints[0].link.as_ref(), Some(&own));
+    assert_eq!(plain.train.blocks, seen.train.blocks);
+    // Counts of 17 bits from a zero of its own; the shaft twists by milliradians.
+    let count = core::f64::consts::TAU / 131_072.0;
+    let off = (own.iter()).fold(0.0f64, |m, x| {
+        m.max(
+            (x / count - 0.5)
+                .rem_euclid(1.0)
+                .min(1.0 - (x / count - 0.5).rem_euclid(1.0)),
+        )
+    });
+    assert!(off < 1e-6, "{off}");
+    let q = &seen.train.blocks[0].joints[0].q;
+    let apart: Vec<f64> = q.iter().zip(&own).map(|(q, l)| q - l).collect();
+    let mean = apart.iter().sum::<f64>() / apart.len() as f64;
+    let most = apart.iter().fold(0.0f64, |m, x| m.max((x - mean).abs()));
+    assert!(
+        (0.19..0.21).contains(&mean) && most > 1e-3 && most < 0.05,
+        "{mean} {most}"
+    );
+}

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rig_shared::effects::SHAPES;
+
 use super::{Profile, STAYS, Search, in_the_shadow};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::{Candidate, Source};
@@ -13,6 +15,32 @@ impl<'a> Search<'a> {
     /// Whether an effect is one that the description states.
     pub(in crate::diagnose) fn is_described(&self, effect: &Candidate) -> bool {
         self.described.iter().any(|placed| is_one(placed, effect))
+    }
+
+    /// The shapes of a gear that an encoder on the link has shown; none of anything else.
+    pub(in crate::diagnose) fn shapes_of(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
+        let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
+        self.measured.iter().find(own).map(|(_, shapes)| *shapes)
+    }
+
+    /// Whether an encoder on the link has shown it.
+    pub(in crate::diagnose) fn is_measured(&self, effect: &Candidate) -> bool {
+        self.shapes_of(effect).is_some()
+    }
+
+    /// The description's effects come first, then what encoders on the links have shown.
+    pub(in crate::diagnose) fn rank_of(&self, effect: &Candidate) -> u8 {
+        match (self.is_described(effect), self.is_measured(effect)) {
+            (true, _) => 0,
+            (false, true) => 1,
+            (false, false) => 2,
+        }
+    }
+
+    /// How many of the effects, in the order of their rank, no search by torque has found.
+    pub(in crate::diagnose) fn count_given(&self, chosen: &[Profile]) -> usize {
+        let given = |p: &&Profile| self.rank_of(&p.candidate) < 2;
+        chosen.iter().take_while(given).count()
     }
 
     /// How many of the effects, those of the description first, it states.
@@ -31,8 +59,12 @@ impl<'a> Search<'a> {
         renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let mut chosen = Vec::new();
-        for placed in &self.described {
-            let (candidate, shapes) = (candidate(placed), placed.effect.shapes);
+        let described = self.described.iter().map(|placed| {
+            let own = candidate(placed);
+            (own, self.shapes_of(&own).unwrap_or(placed.effect.shapes))
+        });
+        let measured = (self.measured.iter().copied()).filter(|(c, _)| !self.is_described(c));
+        for (candidate, shapes) in described.chain(measured) {
             chosen.push(Profile {
                 columns: Arc::new(self.source.columns(&candidate, &shapes)?),
                 candidate,
@@ -65,7 +97,7 @@ impl<'a> Search<'a> {
         while i < chosen.len() {
             let e = &chosen[i].evidence;
             let unsure = e.p_value > STAYS || e.gain_sigmas < LEAST_SIGMAS;
-            let weak = if self.is_described(&chosen[i].candidate) {
+            let weak = if self.rank_of(&chosen[i].candidate) < 2 {
                 unsure
             } else {
                 chosen.len() > 1

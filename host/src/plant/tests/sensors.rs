@@ -183,3 +183,42 @@ fn faults_do_what_they_say() {
         "the driver's outputs are off whatever is ordered"
     );
 }
+
+/// The encoder on the link sees the link alone, in counts from a zero of its own, and changes nothing else.
+#[test]
+fn an_encoder_on_the_link_reads_the_link() {
+    let mut config = PlantConfig::default();
+    config.mechanism.backlash = Some(crate::plant::effect::transmission::Backlash {
+        gap: 0.01,
+        stiffness: 3000.0,
+        damping: 2.0,
+    });
+    let step = core::f64::consts::TAU / 4096.0;
+    let with = |noise| {
+        let mut config = config.clone();
+        config.sensors.link_encoder = Some(crate::plant::LinkEncoder {
+            counts_per_turn: 4096.0,
+            zero: 0.5,
+            noise,
+            eccentricity: None,
+        });
+        config
+    };
+    let (mut plain, mut read) = (Plant::new(config.clone(), 1), Plant::new(with(None), 1));
+    let mut noisy = Plant::new(with(Some(5.0 * step)), 1);
+    assert_eq!(plain.link_angle(), None);
+    let (mut apart, mut off) = (0.0f64, 0.0f64);
+    for k in 0..3000 {
+        let command = drive(shake(f64::from(k) * 1.0e-4));
+        let sample = plain.advance(command);
+        assert_eq!(sample, read.advance(command));
+        noisy.advance(command);
+        let truth = read.truth();
+        let angle = read.link_angle().unwrap();
+        assert!((angle + 0.5 - truth.position).abs() <= 0.5001 * step);
+        apart = apart.max((truth.motor_position / 50.0 - truth.position).abs());
+        off = off.max((noisy.link_angle().unwrap() + 0.5 - truth.position).abs());
+    }
+    assert!(apart > 0.004, "{apart}");
+    assert!(off > 5.0 * step && off < 30.0 * step, "{off}");
+}
