@@ -86,6 +86,7 @@ pub(super) fn burst(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use rand::{RngExt, SeedableRng};
 
@@ -99,7 +100,7 @@ mod tests {
         let residual: Vec<f64> = (0..6000)
             .map(|k| {
                 let t = k as f64 * PERIOD;
-                let loud = if (t / 7.0) as usize % 2 == 0 {
+                let loud = if ((t / 7.0) as usize).is_multiple_of(2) {
                     1.0
                 } else {
                     3.0
@@ -119,7 +120,7 @@ mod tests {
     #[test]
     fn a_knock_is_told_from_a_motion_that_is_louder_at_times() {
         assert_eq!(found(0.0), None);
-        let knock = found(20.0).unwrap_or_else(|| panic!("a knock of 20"));
+        let knock = found(20.0).unwrap();
         assert_eq!(knock.label, "a.csv");
         assert!((25.0..26.0).contains(&knock.time[0]), "{knock:?}");
         assert!(

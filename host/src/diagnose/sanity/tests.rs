@@ -425,7 +425,13 @@ fn an_encoder_on_the_link_is_checked_like_the_joint_s_own() {
         (&|_, q| 1.7 * q, "unit", "1.7000 times"),
         (&|_, _| 0.3, "not-moving", "stands still"),
         (
-            &|k, q| if k < 4000 { q } else { q + 6.283 },
+            &|k, q| {
+                if k < 4000 {
+                    q
+                } else {
+                    q + std::f64::consts::TAU
+                }
+            },
             "jump",
             "ql1 jumps",
         ),

@@ -1,5 +1,7 @@
 //! Codes, noise and faults.
 
+#![allow(clippy::unwrap_used)]
+
 use rig_shared::units::AdcCode;
 
 use super::{OFF, Plant, PlantConfig, drive, horizontal, run, shake};
