@@ -12,6 +12,7 @@
 
 mod contact;
 mod equation;
+mod gear;
 mod law;
 mod tell;
 #[cfg(test)]
@@ -21,8 +22,9 @@ use std::collections::BTreeMap;
 
 use rig_shared::effects::{Kind, SHAPES};
 
-use self::contact::{Contact, contact};
+use self::contact::contact;
 use self::equation::{ACROSS, Equation};
+use self::gear::Gear;
 use self::law::{Found, Law, Laws, beside, laws};
 use super::anchor::Anchor;
 use super::bench::Loaded;
@@ -44,12 +46,6 @@ use crate::robot::unit_of;
 
 pub(super) use self::tell::tell;
 
-/// Teeth that are closed carry their link at more than so many Hz; where it swings more slowly, something gives beside them.
-const CLOSED_TEETH: f64 = 16.0;
-/// Standard deviations from which stiffness, damping and friction of the link count as told.
-const TOLD: f64 = 3.0;
-/// Damping ratio that stands where the motion does not tell one.
-const USUAL_DAMPING: f64 = 0.03;
 /// Relative difference of the two encoders' scales that is said, in standard deviations and by itself.
 const SURE: f64 = 5.0;
 const SCALE_OFF: f64 = 1e-3;
@@ -321,78 +317,6 @@ impl Between<'_, '_> {
         variance.max(0.0).sqrt()
     }
 
-    /// The gear as the coefficients have it; none where it neither gives nor has play.
-    fn gear(
-        &self,
-        solved: &Solved,
-        base: &Fit,
-        laws: &Laws,
-        touch: Option<&Contact>,
-    ) -> Option<Gear> {
-        let equation = self.training;
-        let usual = |stiffness: f64| {
-            let damping = 2.0 * USUAL_DAMPING * (stiffness * equation.mass.max(0.0)).sqrt();
-            [damping, f64::INFINITY]
-        };
-        let twist = laws.found.iter().any(|f| f.law == Law::Twist);
-        if let Some(touch) = touch {
-            let [stiffness, std] = touch.stiffness;
-            let stiff = [
-                stiffness,
-                std.hypot(stiffness * self.of_the_load(base, solved)),
-            ];
-            let damping = Some(touch.damping)
-                .filter(|[d, std]| *d > TOLD * std)
-                .unwrap_or_else(|| usual(stiffness));
-            let share = (equation.friction > 0.0)
-                .then(|| touch.friction.map(|f| f / equation.friction))
-                .map_or([0.0, f64::INFINITY], |[s, std]| [s.clamp(0.0, 1.0), std]);
-            // Closed teeth give, too, but less.
-            let mass = equation.mass.max(f64::MIN_POSITIVE);
-            let swing = (stiffness / mass).sqrt() / std::f64::consts::TAU;
-            return Some(Gear {
-                kind: Kind::Backlash,
-                shapes: [touch.gap[0], stiff[0], damping[0], share[0]],
-                stds: [touch.gap[1], stiff[1], damping[1], share[1]],
-                gives: (twist && swing < CLOSED_TEETH).then_some([stiff, damping, share]),
-            });
-        }
-        if !twist {
-            return None;
-        }
-        let of = |wanted: &dyn Fn(&Term) -> bool| solved.of(equation, wanted);
-        let given = of(&|t| *t == Term::Load).filter(|[a, std]| *a > TOLD * std);
-        let [compliance, told] = match given {
-            Some([a, std]) => {
-                let load = self.of_the_load(base, solved);
-                [a, std.hypot(a * load)]
-            }
-            // Too stiff to tell: as stiff as that.
-            None => {
-                let [a, std] = of(&|t| *t == Term::Load).unwrap_or([0.0, 0.0]);
-                let least = equation.resolution / law::spread(equation, &equation.load);
-                [(a + TOLD * std).max(least), f64::INFINITY]
-            }
-        };
-        let stiffness = 1.0 / compliance;
-        let stiffness_std = told * stiffness * stiffness;
-        let damping = (of(&|t| *t == Term::Change))
-            .map(|[c, std]| [-c * stiffness * stiffness, std * stiffness * stiffness])
-            .filter(|[d, std]| *d > TOLD * std)
-            .unwrap_or_else(|| usual(stiffness));
-        let per_friction = stiffness / equation.friction.max(f64::MIN_POSITIVE);
-        let share = (of(&|t| *t == Term::Direction))
-            .map(|[c, std]| [(c * per_friction).clamp(0.0, 1.0), std * per_friction])
-            .filter(|_| equation.friction > 0.0)
-            .unwrap_or([0.0, f64::INFINITY]);
-        Some(Gear {
-            kind: Kind::JointElasticity,
-            shapes: [stiffness, damping[0], share[0], 0.0],
-            stds: [stiffness_std, damping[1], share[1], 0.0],
-            gives: None,
-        })
-    }
-
     fn named(
         &self,
         base: &Fit,
@@ -511,24 +435,6 @@ impl Between<'_, '_> {
             list.extend(softest.and_then(|k| of(Kind::JointElasticity, "stiffness", k)));
         }
         list
-    }
-}
-
-/// A gear with the standard deviations of its shapes.
-struct Gear {
-    kind: Kind,
-    shapes: [f64; SHAPES],
-    stds: [f64; SHAPES],
-    /// Stiffness, damping and share of the link's friction of what gives beside play, each with its standard deviation.
-    gives: Option<[[f64; 2]; 3]>,
-}
-
-impl Gear {
-    fn values(&self) -> Vec<[f64; 2]> {
-        let count = self.kind.about().shapes.len();
-        (self.shapes.iter().zip(&self.stds).take(count))
-            .map(|(value, std)| [*value, *std])
-            .collect()
     }
 }
 
