@@ -6,7 +6,7 @@ use super::runs::Run;
 /// Share of the band of thinned rows that the low-pass before the thinning passes.
 const PASSED: f64 = 0.8;
 /// Squares of third differences over those of second ones from which a reading counts as white, where it would be 10/3.
-const STILL_WHITE: f64 = 2.5;
+const STILL_WHITE: f64 = 3.2;
 /// Two recordings repeat each other when their references (else their positions) differ by less than this share of their
 /// spread.
 const ALIKE: f64 = 0.02;

@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn what_goes_on_by_one_clock_is_one_session() {
         // A pause of 5 s, a stretch of the same recording behind a gap, a clock that begins anew, an hour's rest.
-        let mut runs = vec![run(100.0, 190.0), run(195.0, 280.0), run(0.0, 60.0)];
+        let mut runs = vec![run(100.0, 190.0), run(195.0, 280.0), run(0.0, 30.0)];
         runs.push(Run {
             t: vec![230.0, 280.0],
             ..run(195.0, 280.0)

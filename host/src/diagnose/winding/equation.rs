@@ -15,9 +15,11 @@ pub(super) const CHANGE: usize = 1;
 pub(super) const SPEED: usize = 2;
 /// what sampling apart does to it,
 pub(super) const ACCELERATION: usize = 3;
-/// and the current sensor's zero.
+/// the current sensor's zero,
 pub(super) const CONSTANT: usize = 4;
-const COLUMNS: usize = 5;
+/// and the back-EMF that iron loses as it saturates, to first order in the current's square.
+const SATURATION: usize = 5;
+const COLUMNS: usize = 6;
 /// Place of the current among the coordinates.
 pub(super) const ACROSS: usize = 0;
 
@@ -86,6 +88,10 @@ impl Equation {
             thinning.push(&vec![1.0; i.len()], &mut columns[CONSTANT]);
             // The sign of what the current is without its noise.
             let smooth = thinning.smooth(&i);
+            let saturated: Vec<f64> = (smooth.iter().zip(&omega))
+                .map(|(i, omega)| i * i * omega)
+                .collect();
+            thinning.push(&saturated, &mut columns[SATURATION]);
             for (dead, fade) in dead.iter_mut().zip(FADES) {
                 let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
                 thinning.push(&lost, dead);

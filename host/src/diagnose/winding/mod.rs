@@ -1,6 +1,6 @@
 //! What the recorded voltage of a motor says of its winding, its inverter and its current sensor.
 //!
-//! u = R·(i − i₀) + L·di/dt + k·ω + c·dω/dt + volts · sgn(i), with i the current that the torque stands for by the
+//! u = R·(i − i₀) + L·di/dt + k·ω·(1 − b·i²) + c·dω/dt + volts · sgn(i), with i the current that the torque stands for by the
 //! description's torque constant, ω the motor's speed, i₀ what the sensor reads without a current (Krause, Wasynczuk &
 //! Sudhoff 2002, ch. 2; the last term, which fades at low current: Holtz 1992). L and c take up, to first order, that voltage, current and position are
 //! sampled at different instants. No torque is in it: friction, load and gear do not bend it, and what it says of the
