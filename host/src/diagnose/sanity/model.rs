@@ -20,10 +20,14 @@ const POOR_ALONE: f64 = 0.01;
 const BETTER: f64 = 0.35;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
 const MUCH_BETTER: f64 = 0.2;
+/// … and for a small misfit or a small shift, which slow reversals under friction like better by chance, too.
+const FAR_BETTER: f64 = 0.1;
 pub(super) const GOOD: f64 = 0.2;
 /// Shifts up to this belong to filters and buses, not to clocks, s: half a row. Those of several joints up to the second,
 /// because their many parameters like a small one by chance.
 const SHIFT: [f64; 2] = [0.01, 0.03];
+/// Shifts up to this are small, s.
+const SMALL: f64 = 0.1;
 /// Farthest shift that is tried, s; no more than a quarter of the recording.
 const FARTHEST: f64 = 5.0;
 /// Times its length that a joint must move for to show a shift: a single short motion is explained by one as well as by
@@ -180,6 +184,10 @@ impl<'a> Judge<'a> {
             .filter(|k| left[*k] <= 1.3 * least)
             .min_by_key(|k| k.abs_diff(reach))?;
         let shift = (at as f64 - reach as f64) * self.rows.period;
+        let small = shift.abs() <= SMALL || left[reach] < POOR;
+        if small && least > FAR_BETTER * left[reach] {
+            return None;
+        }
         let speed = &self.rows.qd[j];
         let fastest = speed.iter().fold(0.0f64, |most, v| most.max(v.abs()));
         let moving = speed.iter().filter(|v| v.abs() > IN_MOTION * fastest);
@@ -245,7 +253,11 @@ impl<'a> Judge<'a> {
                 // What misfits by a little more than a quarter is an effect's business.
                 let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
                 let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
-                let least = if unit { BETTER } else { MUCH_BETTER };
+                let least = match unit {
+                    _ if left[j] < POOR => FAR_BETTER,
+                    true => BETTER,
+                    false => MUCH_BETTER,
+                };
                 if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
                     tried.push((factor, own));
                 }
