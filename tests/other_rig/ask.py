@@ -94,7 +94,8 @@ def _left(case, columns):
             y, x = y - case.description["gravity"] * x[1], x[2:]
     moves = np.abs(v) > SLOWEST
     x = np.column_stack(x)[moves]
-    return np.std(y[moves] - x @ np.linalg.lstsq(x, y[moves], rcond=None)[0])
+    # RMS and not deviation: a constant is an effect and not the standard model's.
+    return np.sqrt(np.mean((y[moves] - x @ np.linalg.lstsq(x, y[moves], rcond=None)[0]) ** 2))
 
 
 def _write(path, columns):
