@@ -32,6 +32,7 @@ LONGEST = 600  # s, one diagnosis
 FLOOR_RISE = 0.1
 CORNER = 40.0  # Hz, low-pass of the fit
 SLOWEST = 0.005  # rad/s, below which a speed's sign is not known
+AROUND = 25  # rows about such a speed that the low-pass smears it into
 FORMATS = {"t": "%.4f", "q1": "%.8f", "qd1": "%.6f", "i1": "%.5f", "ref1": "%.7f", "u1": "%.4f"}
 
 
@@ -92,7 +93,7 @@ def _left(case, columns):
             # A fit takes a payload over; it shows against the description alone.
             y = y - (case.description["motor_inertia"] + case.description["link_inertia"]) * x[0]
             y, x = y - case.description["gravity"] * x[1], x[2:]
-    moves = np.abs(v) > SLOWEST
+    moves = np.convolve(np.abs(v) <= SLOWEST, np.ones(2 * AROUND + 1), "same") < 0.5
     x = np.column_stack(x)[moves]
     # RMS and not deviation: a constant is an effect and not the standard model's.
     return np.sqrt(np.mean((y[moves] - x @ np.linalg.lstsq(x, y[moves], rcond=None)[0]) ** 2))
