@@ -61,17 +61,17 @@ fn a_constant_is_no_spring_and_a_spring_no_constant() {
     }
 }
 
-/// The law is one of what the current says, not of what is left of it: by the latter the coefficient is half as large again.
+/// The law is one of what the current says, not of what is left of it: by the latter the coefficient is a quarter too large.
 #[test]
 fn a_saturation_is_as_large_as_it_is() {
     let loss = 0.12;
     let (diagnosis, constant) = diagnosed(Effect::TorqueSaturation { loss }, 5, true);
     assert_eq!(names(&diagnosis), ["torque_saturation"]);
     let step = &diagnosis.steps[0];
-    // The rig's 1/(1 + (i/knee)²) begins as 1 − (i/knee)², and ends a little above.
+    // The rig's 1/(1 + (i/knee)²) begins as 1 − (i/knee)² and ends above it, by an eighth at the peak current and more beyond.
     let truth = loss / (1.0 - loss) / (Effect::PEAK_CURRENT * constant).powi(2);
     let found = step.parameters["coefficient"].value / truth;
-    assert!((0.85..1.03).contains(&found), "{found}");
+    assert!((0.75..1.03).contains(&found), "{found}");
 }
 
 /// Before it is found, presliding looks like a torque recorded early; what is then taken out as that comes back as a delay.
