@@ -16,7 +16,7 @@ use super::runs::{Run, runs_of};
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
 use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment};
-use crate::robot::Robot;
+use crate::robot::{JointKind, Robot};
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
 const LEAST_BAND: f64 = 30.0;
@@ -258,6 +258,9 @@ pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Cand
                     list.extend((0..n).filter(|k| *k != joint).map(|k| at(Some(k))))
                 }
                 Kind::ViscousWarmupTemperature if !warm => {}
+                // A slide has no turn.
+                Kind::EncoderEccentricityJoint
+                    if robot.joints[joint].kind == JointKind::Prismatic => {}
                 // One tilt for the whole base.
                 Kind::GravityTilt if joint > 0 => {}
                 _ => list.push(at(None)),

@@ -56,8 +56,9 @@ pub(super) const DELAY: f64 = 0.002;
 /// Effects whose torque acts on the link: a gear between motor and link transmits it.
 const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
 
-/// Effects that are laws of the torque that the current stands for.
-const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::TorqueRipple];
+/// Effects whose laws ask for the torque that the current stands for, with all that is in the model. To a ripple, which
+/// repeats with an angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
+const OF_THE_CURRENT: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
 /// Rounds in which such a law meets the torque that it makes: what is missing falls by its share of the torque in each.
 const OWN_ROUNDS: usize = 4;
 
@@ -72,7 +73,6 @@ impl Source<'_> {
         chosen: &[Profile],
         gains: &[f64],
     ) -> Result<Self, DiagnoseError> {
-        let of_the_drive = |kind: Kind| OF_THE_DRIVE.contains(&kind);
         let mut at = 0;
         for profile in chosen {
             let Candidate { kind, joint, .. } = profile.candidate;
@@ -81,21 +81,20 @@ impl Source<'_> {
             }
             at += profile.columns.len();
         }
+        let asked = (chosen.iter()).any(|p| OF_THE_CURRENT.contains(&p.candidate.kind));
         for r in 0..self.runs.len() {
             let load = self.sum(r, chosen, gains, &|kind| ON_THE_LINK.contains(&kind))?;
             add(&mut self.predicted[r].load, &load);
-            // A late reading is no torque.
-            let torque = self.sum(r, chosen, gains, &|kind| {
-                kind != Kind::MeasurementDelay && !of_the_drive(kind)
-            })?;
-            add(&mut self.predicted[r].torque, &torque);
-            if !chosen.iter().any(|p| of_the_drive(p.candidate.kind)) {
+            if !asked {
                 continue;
             }
-            // Laws of what the current says, in which their own part is.
+            // A late reading is no torque.
+            let others = self.sum(r, chosen, gains, &|kind| !OF_THE_CURRENT.contains(&kind))?;
+            add(&mut self.predicted[r].torque, &others);
+            // A saturation is in the torque that its law asks for.
             let rest = self.predicted[r].torque.clone();
             for _ in 0..OWN_ROUNDS {
-                let own = self.sum(r, chosen, gains, &of_the_drive)?;
+                let own = self.sum(r, chosen, gains, &|kind| kind == Kind::TorqueSaturation)?;
                 self.predicted[r].torque.clone_from(&rest);
                 add(&mut self.predicted[r].torque, &own);
             }

@@ -88,15 +88,16 @@ fn attempt(
     if let Some(sealed) = &mut sealed {
         in_sessions(&mut sealed.runs, &loaded.runs);
     }
-    for recordings in std::iter::once(&loaded).chain(&sealed) {
-        let mut wrong = faults(&stated.robot, &recordings.runs)?;
-        if wrong.is_empty() && std::ptr::eq(recordings, &loaded) {
-            wrong.extend(too_short_to_learn(&loaded.runs));
-        }
-        if !wrong.is_empty() {
-            let fault = (faulty(robot, wrong), robot.clone());
-            return Ok(Attempt::Done(Box::new(fault)));
-        }
+    let mut wrong = faults(&stated.robot, &loaded.runs)?;
+    if wrong.is_empty() {
+        wrong.extend(too_short_to_learn(&loaded.runs));
+    }
+    if let (true, Some(sealed)) = (wrong.is_empty(), &sealed) {
+        wrong = faults(&stated.robot, &sealed.runs)?;
+    }
+    if !wrong.is_empty() {
+        let fault = (faulty(robot, wrong), robot.clone());
+        return Ok(Attempt::Done(Box::new(fault)));
     }
     let mut more = stated.clone();
     if more.hold_delays(slack(&loaded.runs)) {

@@ -65,6 +65,14 @@ impl<'a> Fit<'a> {
         fit
     }
 
+    /// The same with columns taken in.
+    pub(super) fn taking<'c>(mut self, columns: impl IntoIterator<Item = &'c Column>) -> Self {
+        for column in columns {
+            self.push(column);
+        }
+        self
+    }
+
     /// The same with blocks for a residual that is correlated over another time, s.
     pub(super) fn blocked_anew(&self, memory: f64) -> Self {
         let (block, blocks) = blocked(self.rows, memory);

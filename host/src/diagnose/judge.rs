@@ -313,11 +313,12 @@ impl Judge<'_, '_> {
         );
         let name = &self.robot.joints[joint].name;
         let percent = format_significant(100.0 * found.gain, 2);
+        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
         if names.is_empty() {
             // The description's own friction and filters leave a little of that.
             return (found.gain > UNNAMED).then(|| Remainder {
                 joint: name.clone(),
-                rms: rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt(),
+                rms: left,
                 ratio: rms / floor,
                 text: format!(
                     "No effect of the library explains what is left of joint {name}, but {what} takes {percent} % off it, on stretches that it was not fitted to: something is missing that has no name here."
@@ -326,7 +327,6 @@ impl Judge<'_, '_> {
                 doubt: true,
             });
         }
-        let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
         let taken = (self.base.rms(joint).powi(2) - rms * rms).max(0.0).sqrt();
         if left < NOT_QUITE * taken {
             return None;

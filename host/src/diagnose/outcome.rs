@@ -207,7 +207,7 @@ pub struct Remainder {
     pub places: Vec<Place>,
     /// In words.
     pub text: String,
-    /// Whether it is within the noise of a sample and repeats: what the names found leave and right ones would not.
+    /// Whether it is no number beyond a known floor but a reason not to believe that all is explained: the text says which.
     #[serde(skip)]
     pub doubt: bool,
 }
@@ -215,7 +215,7 @@ pub struct Remainder {
 /// Something about a recording that no physics explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
-    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `saturation`, `too-short`, `not-moving`.
+    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `saturation`, `jump`, `too-short`, `not-moving`.
     pub kind: String,
     /// Which columns.
     #[serde(skip)]

@@ -50,7 +50,7 @@ impl<'r> Refit<'r> {
         let n = rows.joints();
         let free = bench.anchor.columns(rows);
         let (plain, _) = weighed(rows, &free);
-        let base = fitted(plain.clone(), &free);
+        let base = plain.clone().taking(&free);
         let before = solve(&plain, &free.iter().collect::<Vec<_>>(), &[]).ok_or_else(|| {
             DiagnoseError::Model(
                 "its nominal parameters are not excited by this motion; record a livelier one."
@@ -189,17 +189,10 @@ impl<'r> Refit<'r> {
     }
 }
 
-fn fitted<'r>(mut fit: Fit<'r>, columns: &[Column]) -> Fit<'r> {
-    for column in columns {
-        fit.push(column);
-    }
-    fit
-}
-
 /// The rows in units of what columns leave of each joint, and the time that this remembers, s.
 fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
     let n = rows.joints();
-    let first = fitted(Fit::new(rows, vec![1.0; n], 0.1), columns);
+    let first = Fit::new(rows, vec![1.0; n], 0.1).taking(columns);
     let scale: Vec<f64> = (0..n)
         .map(|j| 1.0 / first.rms(j).max(f64::MIN_POSITIVE))
         .collect();

@@ -182,11 +182,11 @@ impl Between<'_, '_> {
         let rows = &equation.rows;
         let name = &self.source.robot.joints[self.joint].name;
         let nominal: Vec<&Column> = rows.nominal.iter().collect();
-        let first = taken(Fit::new(rows, vec![1.0], 0.1), &nominal);
+        let first = Fit::new(rows, vec![1.0], 0.1).taking(nominal.iter().copied());
         let weight = 1.0 / first.rms(0).max(f64::MIN_POSITIVE);
         let memory = floor::memory(rows, &[first.residual(0)]);
         let plain = Fit::new(rows, vec![weight], memory);
-        let base = taken(plain.clone(), &nominal);
+        let base = plain.clone().taking(nominal.iter().copied());
         let mut laws = laws(equation, &base, name, &self.options.without);
         let (mut touch, mut settled) = (None, false);
         let (last, floor, solved) = loop {
@@ -483,11 +483,4 @@ fn term_of(law: Law, term: &Term) -> bool {
         Law::Play(_) => matches!(term, Term::Level(_)),
         Law::Wave(k) => matches!(term, Term::Wave(w, _) if *w == k),
     }
-}
-
-fn taken<'r>(mut fit: Fit<'r>, columns: &[&Column]) -> Fit<'r> {
-    for column in columns {
-        fit.push(column);
-    }
-    fit
 }

@@ -27,7 +27,6 @@ use super::locate::locate;
 use super::outcome::{Absorbed, Detectable, Diagnosis, Fate, Map, Place, Step, Tried, Value};
 use super::pictures::map;
 use super::profile::{Profile, SIGNIFICANT};
-use super::rows::Column;
 use super::solve::{Solution, jackknifed, solve};
 use super::{DiagnoseError, Options};
 use crate::report::{format_significant, format_value};
@@ -110,14 +109,14 @@ fn winding(
 ) -> Result<Winding, String> {
     let rows = &training.rows;
     let columns: Vec<_> = rows.nominal.iter().collect();
-    let first = taken(Fit::new(rows, vec![1.0], 0.1), &columns);
+    let first = Fit::new(rows, vec![1.0], 0.1).taking(columns.iter().copied());
     let weight = 1.0 / first.rms(0).max(f64::MIN_POSITIVE);
     let plain = Fit::new(
         rows,
         vec![weight],
         floor::memory(rows, &[first.residual(0)]),
     );
-    let base = taken(plain.clone(), &columns);
+    let base = plain.clone().taking(columns.iter().copied());
     let lacking = || "the motion does not tell resistance and back-EMF apart".to_owned();
     let before = solve(&plain, &columns, &[]).ok_or_else(lacking)?;
     let left = (base.rms(0) / plain.rms(0)).powi(2);
@@ -285,13 +284,6 @@ fn too_small(profile: &Profile) -> Option<String> {
             100.0 * LEAST_SHARE
         )
     })
-}
-
-fn taken<'r>(mut fit: Fit<'r>, columns: &[&Column]) -> Fit<'r> {
-    for column in columns {
-        fit.push(column);
-    }
-    fit
 }
 
 fn value(solution: &Solution, k: usize, unit: &str) -> Value {
