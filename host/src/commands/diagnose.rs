@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, refuse_shared};
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared};
 use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
@@ -80,18 +80,24 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let mut progress = ui.progress("diagnosing", 1000);
     let (found, model) = workflow(
         &robot,
-        &training.recordings(),
-        &holdout.recordings(),
+        &recordings(&training.listened()),
+        &recordings(&holdout.listened()),
         &options,
         &mut |share| progress.at((1000.0 * share) as u64),
     )?;
     drop(progress);
+    let heard = [training.heard(), holdout.heard()].concat();
+    for warning in &heard {
+        ui.remark(warning);
+    }
     let text = model.to_toml()?;
     let context = Context {
         command: command_line(),
         identified: Some(("model.toml".into(), text.clone())),
         remarks: Vec::new(),
-        warnings: training.warnings().chain(holdout.warnings()).collect(),
+        warnings: (training.warnings().chain(holdout.warnings()))
+            .chain(heard)
+            .collect(),
     };
     let page = report::render(&pages::diagnosis(&found, &context))?;
     let json = serde_json::to_string_pretty(&found).map_err(|error| {
@@ -138,11 +144,11 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
         return Ok(Vec::new());
     };
     let log = Inputs::read(robot, std::slice::from_ref(path))?;
-    let zeros = (log.recordings().into_iter())
+    let zeros = (recordings(&log.listened()).into_iter())
         .map(sensor_zeros)
         .collect::<Result<Vec<_>, _>>()?
         .concat();
-    for warning in log.warnings() {
+    for warning in log.warnings().chain(log.heard()) {
         ui.remark(&warning);
     }
     Ok(zeros)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line};
+use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::identify::{FrictionMapOptions, Options, friction_map, identify};
@@ -57,13 +57,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             robot.joints.len()
         )));
     };
-    let context = Context {
-        command: command_line(),
-        warnings: training.warnings().chain(sweep.warnings()).collect(),
-        ..Context::default()
-    };
-    let identification = identify(&robot, &training.recordings(), &[], &Options::default())?;
-    for source in sweep.recordings() {
+    let identification = identify(
+        &robot,
+        &recordings(&training.listened()),
+        &[],
+        &Options::default(),
+    )?;
+    for source in recordings(&sweep.listened()) {
         let map = friction_map(
             &robot,
             &identification,
@@ -71,6 +71,17 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             joint,
             FrictionMapOptions::default(),
         )?;
+        let heard = [training.heard(), sweep.heard()].concat();
+        for warning in &heard {
+            ui.remark(warning);
+        }
+        let context = Context {
+            command: command_line(),
+            warnings: (training.warnings().chain(sweep.warnings()))
+                .chain(heard)
+                .collect(),
+            ..Context::default()
+        };
         folder(&args.out)?;
         let json = serde_json::to_string_pretty(&map).map_err(|error| {
             CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))

@@ -18,7 +18,7 @@ use crate::identify::{
 use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
 use crate::report;
-use crate::robot::Robot;
+use crate::robot::{MOST_LEAD, Robot};
 
 /// Which equations are fitted.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -114,6 +114,26 @@ fn auto<T: std::str::FromStr>(text: &str) -> Result<Choice<T>, String> {
         .map_err(|_| format!("\"{text}\" is neither a number nor \"auto\""))
 }
 
+/// A least speed: `auto` or a number that can be one.
+fn speed(text: &str) -> Result<Choice<f64>, String> {
+    match auto::<f64>(text)? {
+        Choice::Fixed(speed) if !(speed >= 0.0 && speed.is_finite()) => Err(format!(
+            "{text} is no least speed; 0 keeps all rows, and a number above it leaves out slower ones"
+        )),
+        choice => Ok(choice),
+    }
+}
+
+/// A lead that a description may have too.
+fn lead(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(lead) if lead.abs() <= MOST_LEAD => Ok(lead),
+        _ => Err(format!(
+            "\"{text}\" is no lead; it must lie between -{MOST_LEAD} and {MOST_LEAD} s"
+        )),
+    }
+}
+
 /// Identifies the parameters of a robot from recordings.
 ///
 /// Writes identified.toml (the description with the identified values), identification.json and report.html
@@ -139,30 +159,33 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "auto")]
     compare: Compare,
     /// How often each --data counts, in their order; 1 where not given
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     weight: Vec<f64>,
     /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for ridge and consistent
     /// [default: ridge: what makes the data most likely; consistent: 2]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     prior_uncertainty: Option<f64>,
     /// Take the description as it is: do not look for springs, ripple or a base that is not level
     #[arg(long)]
     as_described: bool,
     /// Cut-off of the zero-phase low-pass on the position, Hz, or "auto": chosen from the data
-    #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
+    #[arg(long, default_value = "auto", value_parser = auto::<f64>, allow_negative_numbers = true)]
     cutoff: Choice<f64>,
     /// Keep every n-th row after the parallel low-pass, or "auto"
     #[arg(long, default_value = "auto", value_parser = auto::<usize>)]
     decimation: Choice<usize>,
     /// Leave out rows slower than this, rad/s or m/s, where friction has no sign yet; 0 keeps all, or "auto"
-    #[arg(long, default_value = "auto", value_parser = auto::<f64>)]
+    #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
     min_speed: Choice<f64>,
     /// Length of the integral model's windows, s [default: chosen from the motion]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     window: Option<f64>,
     /// How much later a recorded torque acts, s (half a sample for a command held until the next one)
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = lead, allow_negative_numbers = true)]
     torque_lead: f64,
+    /// Use the recorded qd<k> (and qdd<k>) instead of deriving them from the filtered position
+    #[arg(long)]
+    measured_derivatives: bool,
     /// Seed of the random states from which the base parameters are found
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -187,6 +210,7 @@ impl Args {
                 decimation: self.decimation,
                 speed_threshold: self.min_speed,
                 torque_lead: self.torque_lead,
+                measured_derivatives: self.measured_derivatives,
                 ..PrepareOptions::default()
             },
             window: self.window,
@@ -255,6 +279,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &args.options(&robot, training.bytes()),
     )?;
     drop(progress);
+    let heard = [training.heard(), holdout.heard()].concat();
+    for warning in &heard {
+        ui.remark(warning);
+    }
     if !args.even_if_wrong {
         refuse_driving_friction(&robot, &identification)?;
     }
@@ -284,7 +312,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
         remarks,
-        warnings: training.warnings().chain(holdout.warnings()).collect(),
+        warnings: (training.warnings().chain(holdout.warnings()))
+            .chain(heard)
+            .collect(),
     };
     let page = pages::identification(&robot, &identification, &context);
 

@@ -7,7 +7,10 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
-use crate::data::{Block, EffortNeed, Implausible, Source, plausibility, strange_references};
+use crate::data::{
+    Block, EffortNeed, Implausible, KEPT_WARNINGS, Source, Warning, plausibility,
+    strange_references,
+};
 use crate::diagnose::outcome::About;
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
@@ -15,6 +18,8 @@ use crate::robot::{Description, Robot};
 
 /// Rows that are looked at for units; a recording in the wrong unit shows it at once.
 const UNIT_CHECK_ROWS: usize = 100_000;
+/// Warnings of one recording that are said one by one.
+const SAID: usize = 5;
 
 /// The robot description.
 #[derive(Debug, ClapArgs)]
@@ -65,6 +70,8 @@ pub(crate) struct Faults {
 /// Recordings that fit the robot.
 pub(crate) struct Inputs {
     sources: Vec<Source>,
+    /// What the rows of each were worth saying, in the pass that came furthest.
+    heard: Vec<RefCell<Vec<Warning>>>,
 }
 
 impl Inputs {
@@ -88,8 +95,9 @@ impl Inputs {
         let sources = paths
             .iter()
             .map(|path| Source::open_with(path, robot, need))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { sources })
+            .collect::<Result<Vec<_>, _>>()?;
+        let heard = sources.iter().map(|_| RefCell::default()).collect();
+        Ok(Self { sources, heard })
     }
 
     /// Opens recordings and checks their columns and units.
@@ -177,7 +185,7 @@ impl Inputs {
         Ok(strange)
     }
 
-    /// What the reader should know of them.
+    /// What their headers make worth saying.
     pub(crate) fn warnings(&self) -> impl Iterator<Item = String> + '_ {
         self.sources.iter().flat_map(|source| {
             source
@@ -185,6 +193,24 @@ impl Inputs {
                 .iter()
                 .map(move |warning| format!("{}: {warning}", source.path().display()))
         })
+    }
+
+    /// What their rows made worth saying, once they were read: gaps, uneven steps, text where a number belongs. The first
+    /// few of each recording, and how many there are.
+    pub(crate) fn heard(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        for (source, heard) in self.sources.iter().zip(&self.heard) {
+            let (path, heard) = (source.path().display(), heard.borrow());
+            all.extend((heard.iter().take(SAID)).map(|warning| format!("{path}: {warning}")));
+            if heard.len() > SAID {
+                all.push(format!(
+                    "{path}: {}{} more of gaps, uneven steps in time or text where a number belongs.",
+                    if heard.len() < KEPT_WARNINGS { "" } else { "at least " },
+                    heard.len() - SAID
+                ));
+            }
+        }
+        all
     }
 
     /// Whether any of them has a torque or a current.
@@ -197,19 +223,40 @@ impl Inputs {
         self.sources.iter().map(Source::bytes).sum()
     }
 
-    /// The recordings as the library takes them.
-    pub(crate) fn recordings(&self) -> Vec<&dyn Recording> {
-        self.sources
-            .iter()
-            .map(|source| source as &dyn Recording)
+    /// The recordings, each reporting what its rows make worth saying.
+    pub(crate) fn listened(&self) -> Vec<Watched<'_>> {
+        self.with_progress(None)
+    }
+
+    /// The same, each reporting to `progress` what was read.
+    pub(crate) fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
+        self.with_progress(Some(progress))
+    }
+
+    fn with_progress<'a>(&'a self, progress: Option<&'a RefCell<Progress>>) -> Vec<Watched<'a>> {
+        (self.sources.iter().zip(&self.heard))
+            .map(|(source, heard)| Watched {
+                source,
+                heard,
+                progress,
+            })
             .collect()
     }
 }
 
-/// A recording whose reading moves a progress bar.
+/// A recording that is listened to while it is read, and may move a progress bar.
 pub(crate) struct Watched<'a> {
     source: &'a Source,
-    progress: &'a RefCell<Progress>,
+    heard: &'a RefCell<Vec<Warning>>,
+    progress: Option<&'a RefCell<Progress>>,
+}
+
+impl Watched<'_> {
+    fn advance(&self, bytes: u64) {
+        if let Some(progress) = self.progress {
+            progress.borrow_mut().advance(bytes);
+        }
+    }
 }
 
 impl Recording for Watched<'_> {
@@ -227,25 +274,19 @@ impl Recording for Watched<'_> {
         while let Some(block) = blocks.next() {
             take(block.map_err(|error| PrepareError::Read(error.to_string()))?)?;
             let read = blocks.bytes_read();
-            self.progress.borrow_mut().advance(read - before);
+            self.advance(read - before);
             before = read;
+        }
+        // Every pass hears the same, as far as it goes.
+        let mut heard = self.heard.borrow_mut();
+        if blocks.warnings().len() > heard.len() {
+            *heard = blocks.warnings().to_vec();
         }
         Ok(())
     }
 
     fn passed(&self, share: f64) {
-        let bytes = share * self.source.bytes() as f64;
-        self.progress.borrow_mut().advance(bytes as u64);
-    }
-}
-
-impl Inputs {
-    /// The recordings, each reporting to `progress` what was read.
-    pub(crate) fn watched<'a>(&'a self, progress: &'a RefCell<Progress>) -> Vec<Watched<'a>> {
-        self.sources
-            .iter()
-            .map(|source| Watched { source, progress })
-            .collect()
+        self.advance((share * self.source.bytes() as f64) as u64);
     }
 }
 
@@ -258,7 +299,7 @@ pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recordin
 }
 
 /// The same of two names of one file; a file that is not there is told of by whoever reads it.
-fn real(path: &Path) -> PathBuf {
+pub(crate) fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 

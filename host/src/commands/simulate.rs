@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::error::CommandError;
-use super::input::described;
+use super::input::{described, real};
 use super::ui::Ui;
 use crate::excite::{Noise, load_reference, replay};
 
@@ -23,16 +23,16 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) out: PathBuf,
     /// Samples a second for a .toml trajectory, Hz; a .csv has its own
-    #[arg(long, default_value_t = 1000.0)]
+    #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     pub(crate) rate: f64,
     /// Standard deviation of the noise on positions, rad or m
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) noise_position: f64,
     /// Standard deviation of the noise on velocities, rad/s or m/s
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) noise_velocity: f64,
     /// Standard deviation of the noise on torques, N·m or N
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) noise_torque: f64,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
@@ -45,6 +45,23 @@ pub(crate) struct Args {
 /// Files that cannot be read or written, a model that cannot be simulated.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let robot = described(&args.robot, ui)?.robot;
+    if real(&args.out) == real(&args.trajectory) {
+        return Err(CommandError::Sentence(format!(
+            "--out {} is the trajectory itself; give another file.",
+            args.out.display()
+        )));
+    }
+    for (option, deviation) in [
+        ("position", args.noise_position),
+        ("velocity", args.noise_velocity),
+        ("torque", args.noise_torque),
+    ] {
+        if !(deviation >= 0.0 && deviation.is_finite()) {
+            return Err(CommandError::Sentence(format!(
+                "--noise-{option} {deviation} is no standard deviation; it must be 0 or a number above it."
+            )));
+        }
+    }
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {
         position: args.noise_position,

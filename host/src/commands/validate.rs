@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line};
+use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::ui::Ui;
 use crate::files::{folder, write_whole};
 use crate::pages::{self, Context};
@@ -45,16 +45,20 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let mut progress = ui.progress("validating", 1000);
     let validation = validate(
         &robot,
-        &inputs.recordings(),
+        &recordings(&inputs.listened()),
         &Options::default(),
         &mut |share| {
             progress.at((1000.0 * share) as u64);
         },
     )?;
     drop(progress);
+    let heard = inputs.heard();
+    for warning in &heard {
+        ui.remark(warning);
+    }
     let context = Context {
         command: command_line(),
-        warnings: inputs.warnings().collect(),
+        warnings: inputs.warnings().chain(heard).collect(),
         ..Context::default()
     };
     folder(&args.out)?;

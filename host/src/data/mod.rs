@@ -17,7 +17,7 @@ pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
 pub(crate) use plausibility::velocity_scale;
 pub use plausibility::{Implausible, plausibility, strange_references};
-pub use source::{Blocks, Sampling, Source};
+pub use source::{Blocks, KEPT_WARNINGS, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
 /// Where the effort (torque or force) of a joint comes from.

@@ -32,8 +32,8 @@ const IRREGULAR_GAP: f64 = 5.0;
 /// rows that are on it (KUKA LWR over a network: 3.4 and 6.5 ms instead of 5 ms twice) parts nothing.
 const UNEVEN: f64 = 0.2;
 
-/// Warnings that are kept; more are only counted, so that memory does not grow.
-const KEPT_WARNINGS: usize = 1000;
+/// Warnings of a recording that are kept; more are only counted, so that memory does not grow.
+pub const KEPT_WARNINGS: usize = 1000;
 
 /// How a recording is sampled, judged by its first 1001 rows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -163,7 +163,8 @@ impl Belief {
     }
 
     /// Logarithm of the evidence but for a constant, mean and variances. A·Aᵀ + 1 is formed: with its diagonal scaled to
-    /// one that costs the square of what base parameters are told apart by, not of their sizes.
+    /// one that costs the square of what base parameters are told apart by, not of their sizes. Where data without noise
+    /// make that too much, its factor is found without forming it.
     pub(super) fn judged(
         &self,
         data: &Seen,
@@ -176,14 +177,18 @@ impl Belief {
             sum[(k, k)] += 1.0;
         }
         let failed = || singular("of the description's evidence");
-        let (cholesky, scale) = scaled_cholesky(sum).ok_or_else(failed)?;
-        let lower = cholesky.l_dirty();
+        let (lower, scale) = match scaled_cholesky(sum) {
+            Some((cholesky, scale)) => (cholesky.unpack_dirty(), scale),
+            None => (unsquared(&seen), DVector::repeat(seen.nrows(), 1.0)),
+        };
         let logarithm: f64 = (0..scale.len())
-            .map(|k| 2.0 * (lower[(k, k)] / scale[k]).ln())
+            .map(|k| 2.0 * (lower[(k, k)] / scale[k]).abs().ln())
             .sum();
         let surprise = z - r * (&self.combination * &self.centre);
-        let pulls = cholesky.solve(&surprise.component_mul(&scale));
-        let along = pulls.dot(&surprise.component_mul(&scale));
+        let half =
+            (lower.solve_lower_triangular(&surprise.component_mul(&scale))).ok_or_else(failed)?;
+        let along = half.norm_squared();
+        let pulls = lower.tr_solve_lower_triangular(&half).ok_or_else(failed)?;
         let step = seen.tr_mul(&pulls.component_mul(&scale));
         for mut column in seen.column_iter_mut() {
             column.component_mul_assign(&scale);
@@ -267,4 +272,12 @@ impl Posterior {
         }
         base
     }
+}
+/// Lower factor of A·Aᵀ + 1 by orthogonal transformations of A's transpose over 1 (Golub and Van Loan 2013, section 5.2).
+fn unsquared(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let (m, n) = a.shape();
+    let mut tall = DMatrix::zeros(n + m, m);
+    tall.rows_mut(0, n).copy_from(&a.transpose());
+    tall.rows_mut(n, m).fill_diagonal(1.0);
+    tall.qr().r().transpose()
 }

@@ -16,7 +16,7 @@ use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError, motor_column};
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
-use super::slow::slow_motors;
+use super::slow::{HARDLY, slow_motors, stays};
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// What the motors add to momentum and loss, each joint × motor column (3 a motor). With q̇ in place of the acceleration and
@@ -211,14 +211,16 @@ pub(super) fn momentum_rows(
         }));
         all
     };
-    let slow: Vec<Vec<u32>> = motion
-        .joints
-        .iter()
-        .map(|j| count(&|k| j.slow[k]))
+    // Rows in which a joint or motor is slow, and in which it hardly moves.
+    let slow: Vec<[Vec<u32>; 2]> = (motion.joints.iter().zip(&plan.treatment.speed_threshold))
+        .map(|(j, threshold)| {
+            let hardly = |k: usize| j.qd[k].abs() < HARDLY * threshold;
+            [count(&|k| j.slow[k]), count(&hardly)]
+        })
         .collect();
-    let slow_motors: Vec<(Vec<bool>, Vec<u32>)> = slow_motors(motion, plan)?
+    let slow_motors: Vec<(Vec<bool>, [Vec<u32>; 2])> = slow_motors(motion, plan)?
         .into_iter()
-        .map(|m| (m.moves, count(&|k| m.slow[k])))
+        .map(|m| (m.moves, [count(&|k| m.slow[k]), count(&|k| m.hardly[k])]))
         .collect();
     let saturated: Vec<Vec<u32>> = motion
         .joints
@@ -261,7 +263,10 @@ pub(super) fn momentum_rows(
                     .push((torque[j][k] - torque[j][done.start]) / duration);
                 let over = |c: &[u32]| c[k + 1] - c[done.start];
                 // Half a window without a sign of the velocity says little of friction.
-                let most = |c: &[u32]| 2 * over(c) as usize > plan.window;
+                let most = |[slow, hardly]: &[Vec<u32>; 2]| {
+                    let rows = over(slow) as usize;
+                    2 * rows > plan.window || stays(rows, over(hardly) as usize, plan.window)
+                };
                 let still =
                     most(&slow[j]) || slow_motors.iter().any(|(moves, c)| moves[j] && most(c));
                 let saturated = over(&saturated[j]) > 0;

@@ -1,12 +1,27 @@
-//! Where the motor of a coupled drive is slow: its friction has no known sign there, though every joint may move fast.
+//! Where friction has no known sign: where the motor of a coupled drive is slow, though every joint may move fast, and where
+//! a shaft stays instead of passing through zero.
 
 use super::model::{Plan, failed};
 use crate::prepare::{Motion, PrepareError};
+
+/// Share of the least speed below which a shaft hardly moves: as large a share of the rows in which it passes through zero
+/// is of such.
+pub(super) const HARDLY: f64 = 1.0 / 3.0;
+/// Share of a window that a shaft may stay in it: friction there is whatever holds the shaft, anything between its two signs.
+const STAYING: f64 = 0.05;
+
+/// Whether a shaft stays for long within `all` rows, of which it is slow in `slow` and hardly moves in `hardly`.
+pub(super) fn stays(slow: usize, hardly: usize, all: usize) -> bool {
+    let beyond_passing = hardly as f64 - HARDLY * slow as f64;
+    beyond_passing > STAYING * (1.0 - HARDLY) * all as f64
+}
 
 /// Rows in which a motor is slow, and the joints that it moves.
 pub(super) struct SlowMotor {
     /// Per row of the piece.
     pub slow: Vec<bool>,
+    /// Per row, whether the motor hardly moves.
+    pub hardly: Vec<bool>,
     /// Per joint, whether the motor's friction is in its torque.
     pub moves: Vec<bool>,
 }
@@ -24,6 +39,7 @@ pub(super) fn slow_motors(motion: &Motion, plan: &Plan) -> Result<Vec<SlowMotor>
     let mut motors: Vec<SlowMotor> = (0..n)
         .map(|_| SlowMotor {
             slow: Vec::with_capacity(rows),
+            hardly: Vec::with_capacity(rows),
             moves: vec![false; n],
         })
         .collect();
@@ -44,8 +60,35 @@ pub(super) fn slow_motors(motion: &Motion, plan: &Plan) -> Result<Vec<SlowMotor>
                 motor.moves[j] |= *along != 0.0;
             }
             motor.slow.push(speed.abs() < square.sqrt());
+            motor.hardly.push(speed.abs() < HARDLY * square.sqrt());
         }
     }
     motors.retain(|m| m.moves.contains(&true));
     Ok(motors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a shaft with this speed over time stays within 0.4 s.
+    fn of(speed: &dyn Fn(f64) -> f64) -> bool {
+        let below = |threshold: f64| {
+            let speeds = (0..400).map(|k| speed(k as f64 * 1e-3 - 0.2));
+            speeds.filter(|v| v.abs() < threshold).count()
+        };
+        stays(below(0.1), below(HARDLY * 0.1), 400)
+    }
+
+    #[test]
+    fn a_passage_through_zero_is_no_stay_and_a_stop_is_one() {
+        for acceleration in [0.6, 2.0, 50.0] {
+            assert!(!of(&|t| acceleration * t), "{acceleration}");
+            assert!(!of(&|t| acceleration * (t + 0.1)), "{acceleration}");
+        }
+        // Stuck for 40 ms at a reversal; the same smoothed, so that it never quite stands; stopping and going on.
+        assert!(of(&|t: f64| t.signum() * (t.abs() - 0.02).max(0.0) * 5.0));
+        assert!(of(&|t| 100.0 * t.powi(3)));
+        assert!(of(&|t: f64| (t.abs() - 0.02).max(0.0) * 5.0));
+    }
 }

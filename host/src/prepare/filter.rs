@@ -203,11 +203,16 @@ pub fn decimator_edge(factor: usize, sample_rate: f64) -> f64 {
     0.8 * sample_rate / (2.0 * factor as f64)
 }
 
-/// Central difference (x₊ − x₋)/2Δ, one-sided at the ends.
+/// First derivative by five points, (x₋₂ − 8x₋₁ + 8x₊₁ − x₊₂)/12Δ (Abramowitz and Stegun 1964, table 25.2); by fewer at the ends.
+///
+/// What it is off by falls with Δ⁴: at twenty samples a period 0.03 %, by three points 1.6 %.
 pub fn central_difference(x: &[f64], dt: f64) -> Vec<f64> {
     let n = x.len();
     (0..n)
         .map(|k| {
+            if k >= 2 && k + 2 < n {
+                return (x[k - 2] - x[k + 2] + 8.0 * (x[k + 1] - x[k - 1])) / (12.0 * dt);
+            }
             let (low, high) = (k.saturating_sub(1), (k + 1).min(n - 1));
             if high > low {
                 (x[high] - x[low]) / ((high - low) as f64 * dt)
@@ -218,7 +223,8 @@ pub fn central_difference(x: &[f64], dt: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Second central difference (x₊ − 2x + x₋)/Δ²; the ends repeat their neighbours.
+/// Second derivative by five points, (−x₋₂ + 16x₋₁ − 30x + 16x₊₁ − x₊₂)/12Δ² (Abramowitz and Stegun 1964, table 25.2); by three
+/// beside the ends, which repeat their neighbours.
 pub fn second_difference(x: &[f64], dt: f64) -> Vec<f64> {
     let n = x.len();
     if n < 3 {
@@ -227,7 +233,12 @@ pub fn second_difference(x: &[f64], dt: f64) -> Vec<f64> {
     (0..n)
         .map(|k| {
             let c = k.clamp(1, n - 2);
-            (x[c + 1] - 2.0 * x[c] + x[c - 1]) / (dt * dt)
+            let near = x[c + 1] - 2.0 * x[c] + x[c - 1];
+            if c < 2 || c + 2 >= n {
+                return near / (dt * dt);
+            }
+            let far = x[c + 2] - 2.0 * x[c] + x[c - 2];
+            (16.0 * near - far) / (12.0 * dt * dt)
         })
         .collect()
 }
@@ -306,10 +317,21 @@ mod tests {
     }
 
     #[test]
-    fn differences_are_exact_on_a_parabola() {
-        let dt = 1e-3;
-        let x: Vec<f64> = (0..50).map(|k| 3.0 * (k as f64 * dt).powi(2)).collect();
-        assert!((central_difference(&x, dt)[20] - 6.0 * 20.0 * dt).abs() < 1e-9);
-        assert!((second_difference(&x, dt)[20] - 6.0).abs() < 1e-6);
+    fn differences_are_exact_on_a_quartic_and_near_the_ends_on_a_parabola() {
+        let dt = 1e-2;
+        let of =
+            |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..50).map(|k| f(k as f64 * dt)).collect() };
+        let (parabola, quartic) = (of(&|t| 3.0 * t * t), of(&|t| t.powi(4) - t.powi(3)));
+        for k in [1, 20, 48] {
+            let t = k as f64 * dt;
+            assert!((central_difference(&parabola, dt)[k] - 6.0 * t).abs() < 1e-9);
+            assert!((second_difference(&parabola, dt)[k] - 6.0).abs() < 1e-9);
+        }
+        for k in [2, 20, 47] {
+            let t = k as f64 * dt;
+            let (first, second) = (4.0 * t.powi(3) - 3.0 * t * t, 12.0 * t * t - 6.0 * t);
+            assert!((central_difference(&quartic, dt)[k] - first).abs() < 1e-10);
+            assert!((second_difference(&quartic, dt)[k] - second).abs() < 1e-8);
+        }
     }
 }

@@ -271,7 +271,7 @@ impl Treatment {
             derivatives: if options.measured_derivatives {
                 "Velocity and, where recorded, acceleration from the recording, through the position's filter.".into()
             } else {
-                "Central differences of the filtered position: (q₊ − q₋)/2Δ and (q₊ − 2q + q₋)/Δ²."
+                "Differences of the filtered position by five points (Abramowitz and Stegun 1964, table 25.2)."
                     .into()
             },
             measured_derivatives: options.measured_derivatives,

@@ -7,7 +7,7 @@ use super::written::{float, line, list};
 use crate::prepare::Treatment;
 
 /// Longest lead, s: a torque that acts so much later is of another motion.
-const MOST_LEAD: f64 = 1.0;
+pub(crate) const MOST_LEAD: f64 = 1.0;
 
 /// Band and rows in which the values of a description were found: what they are judged in unless asked otherwise, as an
 /// error relative to the torque depends on both.

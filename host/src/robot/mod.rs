@@ -7,6 +7,7 @@
 //! RotX(alpha) · TransX(a) · RotZ(theta + σ̄q) · TransZ(d + σq), with σ = 1 where prismatic, σ̄ = 1 − σ.
 
 mod angles;
+mod array;
 mod band;
 mod bodies;
 mod check;
@@ -29,7 +30,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use self::array::exact;
+
 pub use band::IdentifiedBand;
+pub(crate) use band::MOST_LEAD;
 pub use check::EFFECT_NAMES;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
@@ -69,6 +73,7 @@ pub struct Robot {
     /// Name for titles and files.
     pub name: String,
     /// Gravity acceleration in the base frame, m/s².
+    #[serde(deserialize_with = "exact")]
     pub gravity: [f64; 3],
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
@@ -152,8 +157,10 @@ pub struct Inertial {
     /// kg
     pub mass: f64,
     /// m·c, kg·m
+    #[serde(deserialize_with = "exact")]
     pub first_moment: [f64; 3],
     /// Ixx Ixy Ixz Iyy Iyz Izz about the origin of the frame, kg·m²
+    #[serde(deserialize_with = "exact")]
     pub inertia: [f64; 6],
 }
 
@@ -162,6 +169,7 @@ pub struct Inertial {
 #[serde(deny_unknown_fields)]
 pub struct JointLimits {
     /// Lowest and highest position, rad or m; −∞ and ∞ where a revolute joint turns endlessly.
+    #[serde(deserialize_with = "exact")]
     pub position: [f64; 2],
     /// Highest speed, rad/s or m/s.
     pub velocity: f64,

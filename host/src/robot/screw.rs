@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use rig_shared::transmission::ScrewMap;
 use serde::{Deserialize, Serialize};
 
+use super::array::{exact, exact_or_none};
+
 /// A ball screw between a fixed anchor and the tip of a crank that turns with the joints.
 ///
 /// In the plane of the crank, its axle at the origin: the tip lies at crank·(cos ψ, sin ψ) with ψ = Σ c_j·q_j + offset,
@@ -17,6 +19,7 @@ pub struct Screw {
     /// m
     pub crank: f64,
     /// Place of the anchor, m.
+    #[serde(deserialize_with = "exact")]
     pub anchor: [f64; 2],
     /// Radians of the crank a radian (or metre) of each joint named.
     pub angle: BTreeMap<String, f64>,
@@ -24,7 +27,11 @@ pub struct Screw {
     #[serde(default)]
     pub offset: f64,
     /// Lowest and highest angle of the crank, rad; absent: what the limits of its joints allow.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "exact_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub range: Option<[f64; 2]>,
 }
 
