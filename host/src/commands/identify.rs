@@ -272,16 +272,15 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
-    let identification = identify(
+    let mut identification = identify(
         &robot,
         &recordings(&training.watched(&progress)),
         &recordings(&holdout.watched(&progress)),
         &args.options(&robot, training.bytes()),
     )?;
     drop(progress);
-    let heard = [training.heard(), holdout.heard()].concat();
-    for warning in &heard {
-        ui.remark(warning);
+    for inputs in [&training, &holdout] {
+        identification.warnings.extend(inputs.heard());
     }
     if !args.even_if_wrong {
         refuse_driving_friction(&robot, &identification)?;
@@ -312,9 +311,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         command: command_line(),
         identified: Some(("identified.toml".into(), text.clone())),
         remarks,
-        warnings: (training.warnings().chain(holdout.warnings()))
-            .chain(heard)
-            .collect(),
+        warnings: training.warnings().chain(holdout.warnings()).collect(),
     };
     let page = pages::identification(&robot, &identification, &context);
 

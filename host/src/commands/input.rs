@@ -349,3 +349,34 @@ pub(crate) fn command_line() -> String {
     }));
     words.join(" ")
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::robot::ONE_LINK_TEMPLATE;
+
+    /// What is wrong with rows is known only once they were read; every later pass hears the same again.
+    #[test]
+    fn gaps_are_heard_once_however_often_a_recording_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let rows: String = (0..400)
+            .filter(|k| !(100..150).contains(k) && !(k % 2 == 1 && *k > 300))
+            .map(|k| format!("{},0,0\n", f64::from(k) * 1e-3))
+            .collect();
+        std::fs::write(&path, format!("t,q1,tau1\n{rows}")).unwrap();
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "r.toml".as_ref()).unwrap();
+        let inputs = Inputs::read(&robot, &[path]).unwrap();
+        assert!(inputs.heard().is_empty());
+        for _ in 0..2 {
+            for recording in recordings(&inputs.listened()) {
+                recording.each_block(64, &mut |_| Ok(())).unwrap();
+            }
+            let heard = inputs.heard();
+            assert_eq!(heard.len(), SAID + 1, "{heard:?}");
+            assert!(heard[0].contains("line 102") && heard[0].contains("0.050000 s are missing"));
+            assert!(heard[SAID].contains(" 45 more "), "{}", heard[SAID]);
+        }
+    }
+}

@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ));
     }
     let mut progress = ui.progress("validating", 1000);
-    let validation = validate(
+    let mut validation = validate(
         &robot,
         &recordings(&inputs.listened()),
         &Options::default(),
@@ -52,13 +52,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         },
     )?;
     drop(progress);
-    let heard = inputs.heard();
-    for warning in &heard {
-        ui.remark(warning);
-    }
+    validation.warnings.extend(inputs.heard());
     let context = Context {
         command: command_line(),
-        warnings: inputs.warnings().chain(heard).collect(),
+        warnings: inputs.warnings().collect(),
         ..Context::default()
     };
     folder(&args.out)?;

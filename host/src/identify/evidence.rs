@@ -281,3 +281,26 @@ fn unsquared(a: &DMatrix<f64>) -> DMatrix<f64> {
     tall.rows_mut(n, m).fill_diagonal(1.0);
     tall.qr().r().transpose()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_of_a_sum_that_cannot_be_formed_is_that_of_one_that_can() {
+        // Columns of very different sizes, as data without noise weigh them.
+        let a = DMatrix::from_fn(4, 6, |r, c| {
+            10f64.powi(c as i32 - 2) * ((r * 7 + c * 3) as f64).sin()
+        });
+        let lower = unsquared(&a);
+        let sum = &a * a.transpose() + DMatrix::identity(4, 4);
+        assert!((&lower * lower.transpose() - &sum).norm() < 1e-12 * sum.norm());
+        assert!(
+            lower
+                .upper_triangle()
+                .iter()
+                .enumerate()
+                .all(|(k, x)| k % 5 == 0 || *x == 0.0)
+        );
+    }
+}

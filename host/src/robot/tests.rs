@@ -387,3 +387,26 @@ fn a_moved_link_without_inertial_is_named_with_its_line() {
     );
     assert!(urdf_says(&negative).contains("mass of link `arm` is -1"));
 }
+
+/// A full 3 x 3 matrix has its numbers in other places than the six of a symmetric one.
+#[test]
+fn lists_with_surplus_numbers_are_refused() {
+    for (right, wrong, length) in [
+        (
+            "gravity = [0.0, 0.0, -9.81]",
+            "gravity = [0.0, 0.0, -9.81, 0.0]",
+            4,
+        ),
+        ("position = [", "position = [-9.0, ", 3),
+    ] {
+        assert!(ONE_LINK_TEMPLATE.contains(right), "{right}");
+        let text = ONE_LINK_TEMPLATE.replacen(right, wrong, 1);
+        let error = Robot::from_toml(&text, Path::new("x.toml"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains(&format!("invalid length {length}")),
+            "{error}"
+        );
+    }
+}
