@@ -125,14 +125,22 @@ impl Judge<'_, '_> {
 
     fn as_found(&self, chosen: Vec<Profile>) -> Judged {
         let fit = with(self.base, &chosen, None);
-        let floors: Vec<f64> = (0..self.rows.joints())
+        let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
+            .map(|j| self.burst(&fit, j))
+            .collect();
+        // Of a joint without its bursts.
+        let quiet = |j: usize| {
+            let loud = bursts[j].as_ref().map_or(0.0, |burst| burst.share);
+            (1.0 - loud).max(0.0).sqrt()
+        };
+        let floors: Vec<f64> = (0..bursts.len())
             .map(|j| {
                 floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), j)
-                    .unwrap_or_else(|| fit.rms(j) * self.quiet(&fit, j))
+                    .unwrap_or_else(|| fit.rms(j) * quiet(j))
             })
             .collect();
         let left = (0..floors.len())
-            .filter_map(|j| self.remainder_of(&fit, &chosen, j, floors[j]))
+            .filter_map(|j| self.remainder_of(&fit, &chosen, j, floors[j], bursts[j].as_ref()))
             .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let much_left = (left.as_ref())
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
@@ -186,11 +194,6 @@ impl Judge<'_, '_> {
             .flatten()
     }
 
-    /// Share of a joint's RMS without its bursts.
-    fn quiet(&self, fit: &Fit, joint: usize) -> f64 {
-        (self.burst(fit, joint)).map_or(1.0, |burst| (1.0 - burst.share).max(0.0).sqrt())
-    }
-
     /// What is left of a joint beyond the floor and goes with the motion, or came and went.
     fn remainder_of(
         &self,
@@ -198,6 +201,7 @@ impl Judge<'_, '_> {
         chosen: &[Profile],
         joint: usize,
         floor: f64,
+        burst: Option<&Burst>,
     ) -> Option<Remainder> {
         let repeated = !self.pairs.is_empty();
         let rms = fit.rms(joint);
@@ -205,8 +209,8 @@ impl Judge<'_, '_> {
         let shown = (places.iter())
             .find(|p| p.p_value < SIGNIFICANT)
             .filter(|p| repeated || p.share > SHARE_LEFT);
-        if let Some(burst) = self.burst(fit, joint) {
-            return Some(self.knocked(&burst, rms, joint, places));
+        if let Some(burst) = burst {
+            return Some(self.knocked(burst, rms, joint, places));
         }
         // Without a repeat the floor is what no coordinate of the motion explains.
         let ratio = if repeated {

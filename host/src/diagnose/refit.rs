@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
@@ -293,6 +295,17 @@ pub(super) struct Joint {
 }
 
 impl Joint {
+    /// Probability that the gains of the `k`-th effect are nothing but error (Wald 1943), by the covariance that its
+    /// intervals are of.
+    pub(super) fn of_nothing(&self, chosen: &[Profile], free: usize, k: usize) -> f64 {
+        let at = free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>();
+        let count = chosen[k].columns.len();
+        let gains = DVector::from_column_slice(&self.solution.values[at..at + count]);
+        let own = (self.solution.covariance.view((at, at), (count, count))).into_owned();
+        let wald = own.cholesky().map(|c| gains.dot(&c.solve(&gains)));
+        (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
+    }
+
     /// Gains and shapes of the `k`-th effect with their standard deviations.
     pub(super) fn parameters(
         &self,

@@ -18,7 +18,7 @@ use super::interval::Interval;
 use super::optimise::{Round, minimise};
 use super::problem::Problem;
 use super::schedule::JointMotion;
-use super::{ExciteError, Options};
+use super::{Criterion, ExciteError, Options};
 use crate::robot::Robot;
 use crate::simulate::SimulateError;
 
@@ -52,6 +52,11 @@ const LAST: [Round; 5] = [
     round(3e3, 64, 160),
     round(3e3, 128, 160),
 ];
+
+/// A motion scaled to less than this share of its size is refined again from there …
+const KEPT_SIZE: f64 = 0.9;
+/// … so many times at most.
+const AGAIN: usize = 2;
 
 /// One motion that passed the proof.
 pub(super) struct Candidate {
@@ -164,21 +169,17 @@ fn improve(frame: &Frame, seed: u64, index: usize, done: &dyn Fn()) -> (f64, DVe
 
 type Outcome = Result<Result<Candidate, Blame>, ExciteError>;
 
-fn refine(
+/// The motion that `x` stands for, scaled until the proof succeeds.
+fn proven(
     frame: &Frame,
     enclosing: &Chain<Interval>,
-    from: DVector<f64>,
-    done: &dyn Fn(),
+    problem: &mut Problem<'_>,
+    x: &DVector<f64>,
 ) -> Outcome {
-    let mut problem = Problem::new(frame, FINE, LAST[0].smoothing);
-    let x = minimise(&mut problem, from, &LAST, done);
     if x.iter().any(|v| !v.is_finite()) {
-        done();
         return Ok(Err((0, "position")));
     }
-    let fitted = fit_within(frame, enclosing, problem.decode(&x))?;
-    done();
-    let (motions, reached) = match fitted {
+    let (motions, reached) = match fit_within(frame, enclosing, problem.decode(x))? {
         Err(blame) => return Ok(Err(blame)),
         Ok(found) => found,
     };
@@ -189,6 +190,35 @@ fn refine(
         reached,
         values,
     }))
+}
+
+fn refine(
+    frame: &Frame,
+    enclosing: &Chain<Interval>,
+    criterion: Criterion,
+    from: DVector<f64>,
+    done: &dyn Fn(),
+) -> Outcome {
+    let mut problem = Problem::new(frame, FINE, LAST[0].smoothing);
+    let x = minimise(&mut problem, from, &LAST, done);
+    let mut best = proven(frame, enclosing, &mut problem, &x)?;
+    // What ended outside a limit and was scaled into it is no optimum: there is a better one beside it.
+    for _ in 0..AGAIN {
+        let Ok(candidate) = &best else { break };
+        let scaled = problem.encode(&candidate.motions);
+        if scaled.norm() > KEPT_SIZE * x.norm() {
+            break;
+        }
+        let x = minimise(&mut problem, scaled, &LAST[2..], &|| ());
+        match proven(frame, enclosing, &mut problem, &x)? {
+            Ok(other) if criterion.cost(&other.values) < criterion.cost(&candidate.values) => {
+                best = Ok(other);
+            }
+            _ => break,
+        }
+    }
+    done();
+    Ok(best)
 }
 
 /// The best motion found, and the criterion reached from each start that was refined.
@@ -230,7 +260,10 @@ pub(super) fn search(
     let outcomes = in_parallel(
         threads,
         finalists,
-        |rank, tick| refine(frame, &enclosing, improved[rank].2.clone(), tick),
+        |rank, tick| {
+            let from = improved[rank].2.clone();
+            refine(frame, &enclosing, options.criterion, from, tick)
+        },
         || {
             done += fine;
             progress(done, total);

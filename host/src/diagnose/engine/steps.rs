@@ -58,12 +58,12 @@ pub(super) fn steps(
 }
 
 /// Says of an effect that was taken why it does not stand.
-pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], spoilt: &Profile) {
-    let title = title_of(spoilt.candidate.kind);
-    let joint = &robot.joints[spoilt.candidate.joint].name;
+pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: &str) {
+    let title = title_of(fallen.candidate.kind);
+    let joint = &robot.joints[fallen.candidate.joint].name;
     let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
     if let Some(taken) = tried.iter_mut().find(own) {
-        taken.refused = "explains torque, but the simulated motion gets worse with it".into();
+        taken.refused = why.into();
     }
 }
 
