@@ -131,20 +131,3 @@ fn exact_positions_bias_nothing() {
         }
     }
 }
-
-/// The same arm with positions so noisy and so little filtered that some of the acceleration is noise.
-#[test]
-fn noisy_positions_bias_least_squares() {
-    let prepare = PrepareOptions {
-        cutoff: Choice::Fixed(40.0),
-        decimation: Choice::Fixed(1),
-        ..Default::default()
-    };
-    for seed in 0..4 {
-        let (robot, recording) = driven(shipped("edda.toml"), seed, 3e-5, 0.002);
-        let found = compared(&robot, &recording, prepare.clone());
-        let verdict = found.endogeneity.unwrap().verdict;
-        assert_eq!(verdict, Verdict::Biased, "{seed}");
-        assert_eq!(found.recommended, Estimator::Iv, "{seed}");
-    }
-}
