@@ -257,7 +257,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     } else {
         for sentence in strange {
             ui.remark(&format!(
-                "{sentence}. Only --estimator output-error uses references."
+                "{sentence}. They are not used: --estimator iv and the comparison take the smoothed position instead, and only output-error needs them."
             ));
         }
     }
@@ -298,6 +298,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         match found {
             Ok(found) => {
                 said = found.remarks;
+                said.extend(chosen_inertias(&robot, &identification));
                 urdf = Some(found.text);
             }
             Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
@@ -328,6 +329,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     report::write(&args.out.join("report.html"), &page)?;
     printed::print(ui, &identification);
+    if args.compare == Compare::Auto && training.bytes() > COMPARED_BYTES {
+        ui.say(&format!(
+            "No estimators were compared, so none is recommended: the recordings have {:.0} MiB, and beyond {} MiB that takes long; --compare all does it.",
+            training.bytes() as f64 / f64::from(1 << 20),
+            COMPARED_BYTES >> 20
+        ));
+    }
     for sentence in &said {
         ui.say(&format!("identified.urdf: {sentence}"));
     }
@@ -336,6 +344,25 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         args.out.join("report.html").display()
     ));
     Ok(())
+}
+
+/// Drive inertias that stand in the files and were identified in a sum only.
+fn chosen_inertias(robot: &Robot, found: &Identification) -> Option<String> {
+    let set = found.standard_parameters.as_ref()?;
+    let joints = robot.joints.iter().enumerate();
+    let chosen: Vec<&str> = joints
+        .filter(|(j, _)| {
+            let own = set.parameters.get(j * COLUMNS + column::DRIVE_INERTIA);
+            own.is_some_and(|own| !own.determined && own.value != 0.0)
+        })
+        .map(|(_, joint)| joint.name.as_str())
+        .collect();
+    (!chosen.is_empty()).then(|| {
+        format!(
+            "The drive inertias of {} are a choice: only their sums with inertias of links are identified, and the split nearest to the description was taken. Use them with the links of this file only.",
+            chosen.join(", ")
+        )
+    })
 }
 
 /// Friction that drives the motion at every speed is no friction: the torque has the wrong sign.

@@ -6,6 +6,7 @@ use rig_shared::transmission::{
     DriveKind, MOTOR_COLUMN_NAMES, MOTOR_COLUMNS, Transmission, motor_column,
 };
 
+use super::grouping::{agree, grouped};
 use super::states::States;
 use super::{IdentifyError, ModelKind};
 use crate::robot::{self, Robot};
@@ -204,12 +205,35 @@ impl Base {
                 robot: robot.name.clone(),
             });
         }
-        Ok(Self {
+        let numeric = Self {
             columns: found.kept,
             combination: found.combination,
             kinds,
             drives: robot.drive_kinds(),
+        };
+        Ok(match grouped(robot) {
+            Ok(rules) if agree(&rules, &numeric) => numeric.with_coefficients_of(&rules),
+            _ => numeric,
         })
+    }
+
+    /// The same with the coefficients of rules that say the same, which have no rounding of random states in them.
+    fn with_coefficients_of(self, rules: &Self) -> Self {
+        if self.columns == rules.columns {
+            return Self {
+                combination: rules.combination.clone(),
+                ..self
+            };
+        }
+        // The identity over the own columns makes the combination unique.
+        let there = rules.combination.select_columns(&self.columns);
+        match there.lu().solve(&rules.combination) {
+            Some(combination) => Self {
+                combination,
+                ..self
+            },
+            None => self,
+        }
     }
 
     /// The base parameters whose own column satisfies `keep`.
@@ -296,7 +320,7 @@ pub fn expression(combination: &DMatrix<f64>, row: usize, own: usize) -> String 
         if (size - 1.0).abs() < 1e-9 {
             text.push_str(&format!(" {sign} {name}"));
         } else {
-            let digits = format!("{size:.4e}").parse::<f64>().unwrap_or(size);
+            let digits = format!("{size:.6e}").parse::<f64>().unwrap_or(size);
             text.push_str(&format!(" {sign} {digits} {name}"));
         }
     }

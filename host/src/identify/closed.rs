@@ -4,13 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, Chain};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS};
 
-use super::IdentifyError;
 use super::consistent::{Quadratic, consistent};
 use super::factor::TriangularFactor;
 use super::prior::Prior;
 use super::problem::Problem;
 use super::twin::Companion;
-use crate::data::Block;
+use super::{Estimator, IdentifyError};
+use crate::data::{Block, strange_references};
 use crate::effects::Effects;
 use crate::prepare::{LowPass, PrepareError};
 use crate::robot::{Controller, Robot};
@@ -19,6 +19,8 @@ use crate::validate::added_torque;
 
 /// Rows through which a parabola is laid for the first state of a stretch.
 const FIRST_ROWS: usize = 21;
+/// Rows of a recording by which its references are judged.
+const JUDGED_ROWS: usize = 100_000;
 /// Steps of the simulation within one sample.
 const SUBSTEPS: u32 = 4;
 /// Cut-off of the stand-in for a missing reference, as a multiple of the highest frequency of the motion.
@@ -34,35 +36,72 @@ pub(super) enum Source {
     Smoothed(LowPass),
 }
 
-impl Source {
-    /// The best that description and recordings allow, and in words.
-    pub(super) fn of(problem: &Problem) -> Result<(Self, String), IdentifyError> {
-        let n = problem.robot.joints.len();
-        let mut referenced = true;
+/// What the references of the recordings are good for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum References {
+    /// Some are missing.
+    Missing,
+    /// All are there, and some are in another unit or sense than their positions.
+    Strange,
+    /// All are there.
+    Usable,
+}
+
+impl References {
+    fn of(problem: &Problem) -> Result<Self, IdentifyError> {
+        let mut found = Self::Usable;
         for recording in problem.sources {
             // One block decides: columns do not change within a recording.
             let mut looked = false;
-            recording.each_block(1 << 10, &mut |block| {
+            recording.each_block(JUDGED_ROWS, &mut |block| {
                 if !looked {
-                    referenced &= block.joints.iter().all(|j| j.reference.is_some());
                     looked = true;
+                    if block.joints.iter().any(|j| j.reference.is_none()) {
+                        found = Self::Missing;
+                    } else if found == Self::Usable
+                        && !strange_references(&block, problem.robot).is_empty()
+                    {
+                        found = Self::Strange;
+                    }
                 }
                 Ok(())
             })?;
         }
-        let controllers: Vec<Controller> = problem
-            .robot
-            .joints
-            .iter()
-            .filter_map(|j| j.controller.clone())
-            .collect();
-        if referenced && controllers.len() == n {
-            return Ok((
-                Self::Loop(controllers),
-                "the closed loop of the identified model and the description's controllers, driven by the recorded reference".into(),
-            ));
+        Ok(found)
+    }
+}
+
+fn stated_controllers(problem: &Problem) -> Option<Vec<Controller>> {
+    let joints = problem.robot.joints.iter();
+    joints.map(|j| j.controller.clone()).collect()
+}
+
+const LOOP: &str = "the closed loop of the identified model and the description's controllers, driven by the recorded reference";
+
+impl Source {
+    /// The closed loop that description and recordings state, and in words.
+    ///
+    /// # Errors
+    /// [`IdentifyError::NoLoop`] where they state none, [`IdentifyError::StrangeReference`] where the references cannot be
+    /// the motion's and the estimator that needs them was not asked for by name.
+    pub(super) fn closed_loop(problem: &Problem) -> Result<(Self, String), IdentifyError> {
+        let references = References::of(problem)?;
+        match (references, stated_controllers(problem)) {
+            (References::Missing, _) | (_, None) => Err(IdentifyError::NoLoop),
+            (References::Strange, _) if problem.options.estimator != Estimator::OutputError => {
+                Err(IdentifyError::StrangeReference)
+            }
+            (_, Some(controllers)) => Ok((Self::Loop(controllers), LOOP.into())),
         }
-        if referenced {
+    }
+
+    /// The best that description and recordings allow, and in words.
+    pub(super) fn of(problem: &Problem) -> Result<(Self, String), IdentifyError> {
+        let references = References::of(problem)?;
+        if references == References::Usable {
+            if let Some(controllers) = stated_controllers(problem) {
+                return Ok((Self::Loop(controllers), LOOP.into()));
+            }
             return Ok((
                 Self::Reference,
                 "the recorded reference, which the loop of the identified model and a computed-torque controller designed from it follows (the description has no [joint.controller] for every joint)".into(),
@@ -79,7 +118,12 @@ impl Source {
         Ok((
             Self::Smoothed(low_pass),
             format!(
-                "the measured position behind a low-pass of {cutoff:.3} Hz, because the recordings have no reference (columns ref<k>); noise below that frequency is still in it"
+                "the measured position behind a low-pass of {cutoff:.3} Hz, because {}; noise below that frequency is still in it",
+                match references {
+                    References::Strange =>
+                        "the recorded references (columns ref<k>) are in another unit or sense than the positions",
+                    _ => "the recordings have no reference (columns ref<k>)",
+                }
             ),
         ))
     }

@@ -4,7 +4,11 @@
 //! least certain parameter goes, the others are fitted anew, until none is more than [`RATIO`] times as uncertain as
 //! the best known, or until an F-test, rows counted as what they are worth, says that one was needed: of the last
 //! parameter alone, and of all that went together (many that were not needed would hide one that was).
+//!
+//! It begins from the estimate that is returned, with the covariance that this has: what follows from a free fit where the
+//! estimate is one of bodies would be values that no body has.
 
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -48,29 +52,96 @@ struct Fit {
     squares: f64,
 }
 
-/// Eliminates on a factor of weighted rows; `columns` are the identified ones in it, `memory` the rows that the
-/// residual remembers. `None` where the fit is singular.
-pub(super) fn essential(
-    factor: &TriangularFactor,
-    columns: &[usize],
+/// What is known of the identified combinations x, as ‖r·x − z‖² + rest.
+pub(super) struct Known {
+    r: DMatrix<f64>,
+    z: DVector<f64>,
+    /// Squares that no x explains.
+    rest: f64,
+    /// Rows behind it.
+    rows: f64,
+    /// Rows that the residual remembers.
     memory: f64,
-    names: &[(String, String)],
-) -> Option<EssentialSet> {
-    let (r, z) = factor.system();
-    let rows = factor.rows() as f64 / memory;
-    let rest = {
-        // What no parameter of the factor explains.
+    /// Whether the squares have the variance of the noise as unit; else it is what they leave.
+    unit: bool,
+}
+
+impl Known {
+    /// Of least squares on weighted rows; `columns` are the identified ones in the factor, `memory` the rows that the
+    /// residual remembers. `None` where the fit is singular.
+    pub(super) fn of_rows(
+        factor: &TriangularFactor,
+        columns: &[usize],
+        memory: f64,
+    ) -> Option<Self> {
+        let (r, z) = factor.system();
         let solution = r.clone().svd(true, true).solve(&z, 1e-12 * r.norm()).ok()?;
-        factor.residual_squares(solution.as_slice()) - (&r * &solution - &z).norm_squared()
-    };
-    let fit = |active: &[usize]| -> Option<Fit> {
-        let pick: Vec<usize> = active.iter().map(|&k| columns[k]).collect();
-        let a = r.select_columns(&pick);
+        let rest =
+            factor.residual_squares(solution.as_slice()) - (&r * &solution - &z).norm_squared();
+        Some(Self {
+            r: r.select_columns(columns),
+            z,
+            rest: rest.max(0.0),
+            rows: factor.rows() as f64,
+            memory,
+            unit: false,
+        })
+    }
+
+    /// Of an estimate with its covariance. `None` where that has no inverse.
+    pub(super) fn of_estimate(
+        values: &[f64],
+        covariance: &DMatrix<f64>,
+        rows: f64,
+    ) -> Option<Self> {
+        // Scaled to correlations: columns differ by many orders of magnitude.
+        let std = covariance.diagonal().map(f64::sqrt);
+        let size = values.len();
+        let correlation =
+            DMatrix::from_fn(size, size, |i, j| covariance[(i, j)] / (std[i] * std[j]));
+        let inverse = correlation.cholesky()?.inverse().cholesky()?;
+        let upper = inverse.l().transpose();
+        let r = DMatrix::from_fn(size, size, |i, j| upper[(i, j)] / std[j]);
+        let z = &r * DVector::from_column_slice(values);
+        Some(Self {
+            r,
+            z,
+            rest: 0.0,
+            rows,
+            memory: 1.0,
+            unit: true,
+        })
+    }
+
+    /// Of an estimate beside which the rows of `factor` say how well each combination is known.
+    pub(super) fn about(
+        values: &[f64],
+        factor: &TriangularFactor,
+        columns: &[usize],
+        memory: f64,
+    ) -> Option<Self> {
+        let mut known = Self::of_rows(factor, columns, memory)?;
+        let least = known.fit(&(0..columns.len()).collect::<Vec<_>>())?.squares;
+        known.z = &known.r * DVector::from_column_slice(values);
+        known.rest = least;
+        Some(known)
+    }
+
+    fn variance(&self, squares: f64, active: usize) -> f64 {
+        if self.unit {
+            1.0
+        } else {
+            squares / (self.rows - active as f64).max(1.0) * self.memory
+        }
+    }
+
+    fn fit(&self, active: &[usize]) -> Option<Fit> {
+        let a = self.r.select_columns(active);
         let qr = a.clone().qr();
         let inverse = qr.r().try_inverse()?;
-        let values = &inverse * (qr.q().transpose() * &z);
-        let squares = (&a * &values - &z).norm_squared() + rest.max(0.0);
-        let variance = squares / (factor.rows() as f64 - active.len() as f64).max(1.0) * memory;
+        let values = &inverse * (qr.q().transpose() * &self.z);
+        let squares = (&a * &values - &self.z).norm_squared() + self.rest;
+        let variance = self.variance(squares, active.len());
         let relative = (0..active.len())
             .map(|k| variance.sqrt() * inverse.row(k).norm() / values[k].abs())
             .collect();
@@ -79,10 +150,22 @@ pub(super) fn essential(
             relative,
             squares,
         })
-    };
-    let mut active: Vec<usize> = (0..columns.len()).collect();
+    }
+}
+
+/// Eliminates; `left` gives what values of all identified combinations leave of the torque. `None` where the fit is
+/// singular.
+pub(super) fn essential(
+    known: &Known,
+    names: &[(String, String)],
+    left: &dyn Fn(&[f64]) -> f64,
+) -> Option<EssentialSet> {
+    let size = known.r.ncols();
+    let rows = known.rows / known.memory;
+    let fit = |active: &[usize]| known.fit(active);
+    let mut active: Vec<usize> = (0..size).collect();
     let first = fit(&active)?;
-    let freedom = (rows - columns.len() as f64).max(1.0);
+    let freedom = (rows - size as f64).max(1.0);
     let mut current = Fit {
         values: first.values.clone(),
         relative: first.relative.clone(),
@@ -109,13 +192,12 @@ pub(super) fn essential(
         let gone = fewer.remove(worst);
         let next = fit(&fewer)?;
         // Where the residual remembers m rows, chance moves the squares m times as far.
-        let variance =
-            first.squares / (factor.rows() as f64 - columns.len() as f64).max(1.0) * memory;
+        let variance = known.variance(first.squares, size);
         let chance = |grown: f64, removed: f64| {
             let f = grown / removed / variance.max(f64::MIN_POSITIVE);
             FisherSnedecor::new(removed, freedom).map_or(1.0, |d| d.sf(f.max(0.0)))
         };
-        let removed = (columns.len() - fewer.len()) as f64;
+        let removed = (size - fewer.len()) as f64;
         let p = chance(next.squares - current.squares, 1.0)
             .min(chance(next.squares - first.squares, removed));
         if p < NEEDED {
@@ -127,6 +209,11 @@ pub(super) fn essential(
         left_out.push(names[gone].0.clone());
         (active, current) = (fewer, next);
     };
+    let mut few = vec![0.0; size];
+    for (&k, value) in active.iter().zip(&current.values) {
+        few[k] = *value;
+    }
+    let grown = left(&few) / left(&first.values).max(f64::MIN_POSITIVE);
     Some(EssentialSet {
         parameters: active
             .iter()
@@ -139,7 +226,7 @@ pub(super) fn essential(
             })
             .collect(),
         left_out,
-        residual_increase_percent: 100.0 * ((current.squares / first.squares).sqrt() - 1.0),
+        residual_increase_percent: 100.0 * (grown - 1.0),
         ended,
     })
 }

@@ -4,14 +4,14 @@
 use nalgebra::DMatrix;
 
 use super::beyond::{Beyond, Together, beyond, together};
-use super::compare::{Comparison, compare, fit, judge};
+use super::compare::{Comparison, Held, compare, fit, judge};
 use super::consistent::consistent;
 use super::covariance::Estimate;
-use super::essential::{EssentialSet, essential};
+use super::essential::{EssentialSet, Known, essential};
 use super::evaluate::Planned;
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
-use super::linear::classical;
+use super::linear::{classical, spread};
 use super::parts::Parts;
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
@@ -130,6 +130,22 @@ pub(super) struct Outcome<'a> {
     pub measured: Option<[Vec<f64>; 2]>,
 }
 
+/// What it means that an estimator leaves much more than the weighted fit; `trusted` where the comparison recommends it.
+fn what_it_means(estimator: Estimator, trusted: bool) -> &'static str {
+    match estimator {
+        Estimator::Consistent => {
+            "The weighted fit is free to follow what the model lacks with values that no body has, and another motion need not bear them out."
+        }
+        Estimator::Ridge => {
+            "The weighted fit is free to follow what the model lacks with values far from the description's, and another motion need not bear them out."
+        }
+        _ if trusted => "Noise in the motion hides as much from the weighted fit.",
+        _ => {
+            "What it assumes of the noise does not hold here, so do not take its values for better ones."
+        }
+    }
+}
+
 /// Computes it.
 pub(super) fn further(
     problem: &Problem,
@@ -152,14 +168,33 @@ pub(super) fn further(
         .iter()
         .map(|p| (p.expression.clone(), p.unit.clone()))
         .collect();
-    further.essential = essential(&combine(&|_| 1.0), &data.kept, memory, &names);
+    let weighted = combine(&|_| 1.0);
+    let known = match &own {
+        None => Known::of_rows(&weighted, &data.kept, memory),
+        // A jackknife of sixteen stretches has no inverse: there the rows say how well each value is known.
+        Some(own) => match &own.fitted.covariance {
+            Some(_) => {
+                let estimate = result.estimate;
+                let size = estimate.values.len();
+                let covariance = DMatrix::from_fn(size, size, |i, j| estimate.covariance[i][j]);
+                Known::of_estimate(&estimate.values, &covariance, estimate.effective_rows)
+            }
+            None => Known::about(&result.estimate.values, &weighted, &data.kept, memory),
+        },
+    };
+    let left = |values: &[f64]| {
+        weighted
+            .residual_squares(&spread(values, &data.kept, base.len()))
+            .sqrt()
+    };
+    further.essential = known.and_then(|known| essential(&known, &names, &left));
     let prior = prior(problem);
     let estimator = problem.options.estimator;
     let wanted = problem.robot.joints.len() > 1
         || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
     let compared = !problem.options.compare.is_empty();
     let held = if wanted || compared {
-        judge(problem, holdout)?
+        Held::of(problem, holdout)?
     } else {
         None
     };
@@ -198,7 +233,7 @@ pub(super) fn further(
                     &Judges {
                         fitted: result.factors,
                         training: of_momentum.as_deref().unwrap_or(result.factors),
-                        holdout: held.as_deref(),
+                        holdout: held.as_ref().map(|held| held.all.as_slice()),
                         measured: result.measured.as_ref(),
                     },
                 ));
@@ -222,7 +257,7 @@ pub(super) fn further(
             problem,
             parts,
             &prior,
-            held.as_deref(),
+            held.as_ref(),
             &problem.options.compare,
             &names,
             result.measured.as_ref(),
@@ -237,14 +272,24 @@ pub(super) fn further(
                 .map(|f| f.residual_squares(full).sqrt())
                 .collect()
         };
+        let mut more: Vec<String> = Vec::new();
         for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
             if *own > MUCH_MORE * plain {
                 let joint = problem.robot.joints.get(k).map_or("", |j| j.name.as_str());
-                further.warnings.push(format!(
-                    "Joint {joint}: this estimator leaves {:.1} times the residual of the weighted fit; what it assumes of the noise does not hold here, so do not take its values for better ones.",
-                    own / plain
-                ));
+                more.push(format!("{:.1} times at joint {joint}", own / plain));
             }
+        }
+        if !more.is_empty() {
+            let trusted = further
+                .comparison
+                .as_ref()
+                .is_some_and(|compared| compared.recommended == estimator);
+            further.warnings.push(format!(
+                "On the training data {} leaves more than the weighted fit: {}. {}",
+                estimator.name(),
+                more.join(", "),
+                what_it_means(estimator, trusted)
+            ));
         }
         further.procedure = own.fitted.said;
         further.warnings.extend(own.fitted.warnings);

@@ -161,6 +161,24 @@ fn shipped_robots_agree() {
     }
 }
 
+/// One length squared times several masses is one number, and one for both models.
+#[test]
+fn equal_coefficients_are_printed_alike() {
+    let robot = Robot::from_toml(IRP6_TEMPLATE, Path::new("irp6.toml")).unwrap();
+    let [differential, integral] = [ModelKind::Differential, ModelKind::Integral].map(|model| {
+        let base = Base::structural(&robot, model, 1).unwrap();
+        (0..base.len())
+            .map(|k| base.expression(k))
+            .collect::<Vec<String>>()
+    });
+    assert_eq!(differential, integral);
+    let masses = "0.207025 m3 + 0.207025 m4 + 0.207025 m5";
+    assert!(
+        differential.iter().any(|e| e.contains(masses)),
+        "{differential:#?}"
+    );
+}
+
 #[test]
 fn the_rules_print_the_published_expressions_too() {
     let robot = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();

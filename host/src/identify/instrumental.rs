@@ -5,6 +5,10 @@
 //! the noise of the position, or feedback of it through the controller, makes regressor and residual correlated;
 //! this is not. Solved through the triangular factor of [Z | X | y], so that no condition number is squared.
 //!
+//! How strong the instruments are is asked with Cragg and Donald's statistic (1993), rows counted as what they are worth when
+//! the residual remembers its past: the smallest eigenvalue of the first stage's F matrix. One regressor with one instrument
+//! needs some 10 (Staiger & Stock 1997); Stock & Yogo (2005) tabulate it for few regressors, from 7 to 16.
+//!
 //! Leaves out: re-estimation of the joints' weights between passes; refined IV with a noise model (RIV).
 
 use nalgebra::{DMatrix, DVector};
@@ -19,13 +23,19 @@ use super::parts::{LeaveOut, PARTS, Parts, Refit, joined, part_of};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem, singular};
 use super::twin::{Companion, Twin, each_pair};
+use crate::report::format_significant;
 
 /// Settled when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 0.02;
 /// … or after this many passes; then a warning says so.
 const MOST_PASSES: usize = 12;
-/// Least canonical correlation of instruments and regressor that does not call for a warning.
-const WEAK: f64 = 0.3;
+/// Cragg and Donald's statistic below which instruments are weak.
+const WEAK: f64 = 10.0;
+/// A reference farther off the motion than this share of the motion's spread is a guess at what the arm does.
+const OFF: f64 = 0.02;
+/// A residual of so many times the weighted fit's comes from the instruments, not from noise that biases least squares: noise
+/// that takes three quarters of an inertia away doubles it.
+const SEVERAL: f64 = 2.0;
 
 /// Rows along the simulated motion beside the measured ones, as told by `source` and the model `standard`.
 pub(super) fn each_simulated(
@@ -63,6 +73,14 @@ fn solve(factor: &TriangularFactor, size: usize) -> Result<Vec<f64>, IdentifyErr
         .filter(|x| x.iter().all(|v| v.is_finite()))
         .map(|x| x.as_slice().to_vec())
         .ok_or_else(|| singular("of the instruments"))
+}
+
+/// Cragg and Donald's statistic of as many instruments as regressors, from their smallest canonical correlation; `rows` are
+/// independent ones.
+fn cragg_donald(strength: f64, rows: f64, size: usize) -> f64 {
+    let size = size as f64;
+    let share = (strength * strength).min(1.0);
+    (rows - size).max(0.0) / size * share / (1.0 - share).max(f64::EPSILON)
 }
 
 /// Smallest canonical correlation of Z and X.
@@ -134,22 +152,67 @@ pub(super) fn instrumental(
                     "Instrumental variables had not settled after {MOST_PASSES} passes: a parameter still moves by {moved:.2} of its standard deviation."
                 ));
             }
-            if strength < WEAK {
-                warnings.push(format!(
-                    "The instruments are weak (smallest canonical correlation with the regressor {strength:.2}): the estimate by instrumental variables scatters and is pulled towards least squares."
-                ));
-            }
+            let memory = parts.memory.iter().copied().fold(1.0, f64::max);
+            let statistic = cragg_donald(strength, parts.rows as f64 / memory, size);
             let mut said = vec![format!(
-                "Instruments from {words}; {passes} pass{}, smallest canonical correlation with the regressor {strength:.3}.",
-                if passes == 1 { "" } else { "es" }
+                "Instruments from {words}; {passes} pass{}, smallest canonical correlation with the regressor {strength:.3}, Cragg and Donald's statistic {}.",
+                if passes == 1 { "" } else { "es" },
+                format_significant(statistic, 3)
             )];
             said.push(drift.words(problem));
-            let doubtful = strength < WEAK || matches!(source, Source::Smoothed(_));
+            let full = spread(&kept.whole, &data.kept, p);
+            let doubtful = if statistic < WEAK {
+                Some(format!(
+                    "the instruments are weak (Cragg and Donald's statistic is {}, and some {WEAK} are needed), so that the estimate by instrumental variables scatters and is pulled towards least squares",
+                    format_significant(statistic, 2)
+                ))
+            } else if let Some((joint, times)) = much_more(problem, parts, &full) {
+                Some(format!(
+                    "the estimate by instrumental variables leaves {times:.1} times the residual of the weighted fit at joint {joint}, more than noise in the motion could hide from least squares"
+                ))
+            } else {
+                match source {
+                    Source::Loop(_) => None,
+                    Source::Reference => drift.farthest(problem).filter(|(_, off)| *off > OFF).map(
+                        |(joint, off)| {
+                            format!(
+                                "the recorded reference, which is the instrument, is {:.1} % of the motion's spread off the motion of joint {joint}",
+                                100.0 * off
+                            )
+                        },
+                    ),
+                    Source::Smoothed(_) => Some(
+                        "the instruments are the measured motion smoothed, in which noise of low frequency still is"
+                            .to_owned(),
+                    ),
+                }
+            };
+            warnings.extend(doubtful.as_ref().map(|why| {
+                format!("Do not trust the estimate by instrumental variables over the weighted fit: {why}.")
+            }));
             return fitted(
                 problem, &all.whole, kept, &measured, said, warnings, doubtful,
             );
         }
     }
+}
+
+/// The joint at which values of the base columns leave most of the weighted fit's residual, and how many times as much, where
+/// that is [`SEVERAL`].
+fn much_more<'a>(problem: &'a Problem, parts: &Parts, full: &[f64]) -> Option<(&'a str, f64)> {
+    let plain = problem.start_full();
+    let squares = |k: usize, full: &[f64]| -> f64 {
+        let stretches = parts.fitted.iter();
+        stretches.map(|part| part[k].residual_squares(full)).sum()
+    };
+    let joints = problem.robot.joints.iter().enumerate();
+    joints
+        .map(|(k, joint)| {
+            let times = squares(k, full) / squares(k, &plain).max(f64::MIN_POSITIVE);
+            (joint.name.as_str(), times.sqrt())
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, times)| *times > SEVERAL)
 }
 
 /// Distance of the simulated from the measured motion.
@@ -179,16 +242,25 @@ impl Drift {
         }
     }
 
+    /// RMS distance joint by joint, as a share of the motion's spread.
+    fn shares<'a>(&'a self, problem: &'a Problem) -> impl Iterator<Item = (&'a str, f64)> {
+        let joints = self.sums.iter().zip(&problem.robot.joints);
+        joints.map(|([n, sum, squares, off], joint)| {
+            let n = n.max(1.0);
+            let spread = (squares / n - (sum / n).powi(2)).max(f64::MIN_POSITIVE);
+            (joint.name.as_str(), (off / n / spread).sqrt())
+        })
+    }
+
+    /// The joint that is farthest off.
+    fn farthest<'a>(&'a self, problem: &'a Problem) -> Option<(&'a str, f64)> {
+        self.shares(problem).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     pub(super) fn words(&self, problem: &Problem) -> String {
         let shares: Vec<String> = self
-            .sums
-            .iter()
-            .zip(&problem.robot.joints)
-            .map(|([n, sum, squares, off], joint)| {
-                let n = n.max(1.0);
-                let spread = (squares / n - (sum / n).powi(2)).max(f64::MIN_POSITIVE);
-                format!("{} {:.2} %", joint.name, 100.0 * (off / n / spread).sqrt())
-            })
+            .shares(problem)
+            .map(|(joint, share)| format!("{joint} {:.2} %", 100.0 * share))
             .collect();
         format!(
             "RMS distance of that motion from the measured one, as a share of the motion's spread: {}.",
@@ -204,7 +276,7 @@ fn fitted(
     measured: &LeaveOut,
     said: Vec<String>,
     warnings: Vec<String>,
-    doubtful: bool,
+    doubtful: Option<String>,
 ) -> Result<Fitted, IdentifyError> {
     let size = kept.whole.len();
     let (r, _) = factor.system();

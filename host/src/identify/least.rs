@@ -32,7 +32,7 @@ pub(super) fn from_factors(problem: &Problem, factors: &LeaveOut) -> Result<Fitt
         regressor: triangle(&factors.whole, data),
         said: Vec::new(),
         warnings: Vec::new(),
-        doubtful: false,
+        doubtful: None,
     })
 }
 

@@ -45,6 +45,7 @@ mod position;
 mod prior;
 mod problem;
 mod pseudo_inertia;
+mod repeat;
 mod residual;
 mod ridge;
 mod robust;
@@ -70,7 +71,7 @@ pub use base::{
     transmission_of, unit,
 };
 pub use cache::RowCache;
-pub use compare::{Compared, Comparison, Endogeneity};
+pub use compare::{Compared, Comparison, Endogeneity, Verdict};
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
 pub(crate) use describe::{Combinations, redistributed};
@@ -355,6 +356,11 @@ pub enum IdentifyError {
         "Estimator output-error simulates the closed loop: every joint needs a [joint.controller] in the description and a column ref<k> in every recording; use iv, which makes do with less."
     )]
     NoLoop,
+    /// References that are not the motion's.
+    #[error(
+        "Estimator output-error follows the recorded references (columns ref<k>), and these are in another unit or sense than the positions; correct them."
+    )]
+    StrangeReference,
     /// The identified model cannot be simulated.
     #[error("The identified model cannot be simulated: {0}")]
     Simulation(String),

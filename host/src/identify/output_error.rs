@@ -25,16 +25,13 @@ const MOST_PASSES: usize = 15;
 /// Fits the simulated torque to the measured one.
 ///
 /// # Errors
-/// [`IdentifyError::NoLoop`] where description or recording do not state the closed loop.
+/// Those of [`Source::closed_loop`].
 pub(super) fn output_error(
     problem: &Problem,
     parts: &Parts,
     prior: &Prior,
 ) -> Result<Fitted, IdentifyError> {
-    let (source, words) = Source::of(problem)?;
-    if !matches!(source, Source::Loop(_)) {
-        return Err(IdentifyError::NoLoop);
-    }
+    let (source, words) = Source::closed_loop(problem)?;
     let data = problem.data;
     let p = problem.base.len();
     let tempered = LeaveOut::of(&parts.weighted(&problem.tempered(parts))).whole;

@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::linear::product;
 use super::terms::terms_of;
+use crate::report::format_value;
 use crate::robot::{Robot, RobotEffect};
 
 /// Torque that goes with a joint's position.
@@ -46,13 +47,15 @@ impl PositionTorque {
     pub(super) fn said(&self) -> String {
         let what = match self.periods {
             None => format!(
-                "like a spring of {:.4} ± {:.4} (N*m/rad or N/m), as a cable or hose pulls",
-                self.values[0], self.std[0]
+                "like a spring of {} (N*m/rad or N/m), as a cable or hose pulls",
+                format_value(self.values[0], self.std[0])
             ),
             Some(periods) => format!(
-                "with {periods} periods a turn and {:.4} ± {:.4} N*m, as eccentric gears and the spokes of a torque sensor have it",
-                self.values[0].hypot(self.values[1]),
-                self.std[0].hypot(self.std[1])
+                "with {periods} periods a turn and {} N*m, as eccentric gears and the spokes of a torque sensor have it",
+                format_value(
+                    self.values[0].hypot(self.values[1]),
+                    self.std[0].hypot(self.std[1])
+                )
             ),
         };
         format!(

@@ -83,8 +83,8 @@ pub(super) struct Fitted {
     pub said: Vec<String>,
     /// What the reader must know.
     pub warnings: Vec<String>,
-    /// Whether the estimate rests on something too weak to trust it over others (instruments only).
-    pub doubtful: bool,
+    /// Why the estimate is not to be trusted over others, a clause (instruments only).
+    pub doubtful: Option<String>,
 }
 
 impl Fitted {

@@ -73,6 +73,6 @@ pub(super) fn ridge(
             100.0 * s
         )],
         warnings,
-        doubtful: false,
+        doubtful: None,
     })
 }

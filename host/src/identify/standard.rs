@@ -243,6 +243,6 @@ pub(super) fn consistent_fit(
             whole.steps
         )],
         warnings: Vec::new(),
-        doubtful: false,
+        doubtful: None,
     })
 }

@@ -13,6 +13,7 @@ use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};
 use serde::Serialize;
 
 use crate::prepare::PrepareError;
+use crate::report::format_value;
 
 /// Gravity as the data show it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,9 +57,8 @@ impl BaseTilt {
     pub(super) fn said(&self) -> String {
         let [x, y, z] = self.gravity;
         format!(
-            "Gravity stands {:.2} ± {:.2} degrees off the direction that the description states: the base is not level. Data and description are e^{:.0} times as likely so; a joint's zero or a torque sensor's gain that is off by much can look alike. It was fitted with gravity ({x:.4}, {y:.4}, {z:.4}) m/s^2, which identified.toml states; identified.urdf turns the base.",
-            self.angle.to_degrees(),
-            self.std.to_degrees(),
+            "Gravity stands {} degrees off the direction that the description states: the base is not level. Data and description are e^{:.0} times as likely so; a joint's zero or a torque sensor's gain that is off by much can look alike. It was fitted with gravity ({x:.4}, {y:.4}, {z:.4}) m/s^2, which identified.toml states; identified.urdf turns the base.",
+            format_value(self.angle.to_degrees(), self.std.to_degrees()),
             self.log_evidence
         )
     }

@@ -59,6 +59,42 @@ impl Companion for Disturbed {
     }
 }
 
+/// Standard deviation of the position's noise, joint by joint, as its spectrum shows it, rad or m.
+fn noise_levels(problem: &Problem) -> Vec<f64> {
+    let treatment = problem.plan.treatment;
+    // A one-sided density of d over half the rate is a variance of d·rate/2.
+    let spectra = treatment.spectra.iter();
+    spectra
+        .map(|s| (0.5 * s.floor * treatment.sample_rate).max(0.0).sqrt())
+        .collect()
+}
+
+/// By how much that noise is expected to move weighted least squares off `values`: (XᵀX)⁻¹·N·β with N the noise of the
+/// columns (Fuller 1987, sec. 1.1).
+pub(super) fn moved_by_noise(
+    problem: &Problem,
+    parts: &Parts,
+    values: &[f64],
+) -> Result<Vec<f64>, IdentifyError> {
+    let noise = column_noise(problem, &noise_levels(problem))?;
+    let whole = LeaveOut::of(&parts.weighted(problem.weights)).whole;
+    let beta = DVector::from_column_slice(values);
+    let size = values.len();
+    let mut pull = DVector::zeros(size);
+    for (factor, weight) in noise.iter().zip(problem.weights) {
+        let width = factor.columns() + 1;
+        let own = DMatrix::from_vec(width, width, factor.triangle())
+            .view((0, 0), (size, size))
+            .into_owned();
+        pull += own.tr_mul(&(&own * &beta)) * weight.powi(2);
+    }
+    let r = triangle(&whole, problem.data);
+    r.tr_solve_upper_triangular(&pull)
+        .and_then(|half| r.solve_upper_triangular(&half))
+        .map(|moved| moved.as_slice().to_vec())
+        .ok_or_else(|| singular("of the regressor"))
+}
+
 /// What the columns' noise amounts to, equation by equation: factor of the differences, rows counted.
 fn column_noise(problem: &Problem, sigma: &[f64]) -> Result<Vec<TriangularFactor>, IdentifyError> {
     let kept = &problem.data.kept;
@@ -179,13 +215,7 @@ fn solve(
 
 /// Fits by total least squares.
 pub(super) fn total(problem: &Problem, parts: &Parts) -> Result<Fitted, IdentifyError> {
-    let treatment = problem.plan.treatment;
-    // A one-sided density of d over half the rate is a variance of d·rate/2.
-    let sigma: Vec<f64> = treatment
-        .spectra
-        .iter()
-        .map(|s| (0.5 * s.floor * treatment.sample_rate).max(0.0).sqrt())
-        .collect();
+    let sigma = noise_levels(problem);
     let noise = column_noise(problem, &sigma)?;
     let all = LeaveOut::of(&parts.weighted(problem.weights));
     let equations = |left_out: Option<usize>| -> Vec<TriangularFactor> {
@@ -246,7 +276,7 @@ pub(super) fn total(problem: &Problem, parts: &Parts) -> Result<Fitted, Identify
             torques.join(", ")
         )],
         warnings: Vec::new(),
-        doubtful: false,
+        doubtful: None,
     })
 }
 

@@ -109,6 +109,12 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
             comparison.folds
         ),
     }));
+    if !comparison.repeated_holdout.is_empty() {
+        section = section.with(Block::Text(format!(
+            "Held back, but a repetition of a motion learnt from: {}. That is no evidence of how another motion is predicted.",
+            comparison.repeated_holdout.join(", ")
+        )));
+    }
     if let Some(endogeneity) = &comparison.endogeneity {
         section = section.with(Block::Text(endogeneity.text.clone()));
     }
@@ -122,7 +128,7 @@ fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> S
 }
 
 fn essential(set: &EssentialSet) -> Section {
-    let intro = "The few parameters that the torque needs: the least certain one is taken as zero and the rest fitted anew, as long as that costs nothing that chance would not.";
+    let intro = "The few parameters that the torque needs, from the estimate given here: the least certain one is taken as zero and the rest fitted anew, as long as that costs nothing that chance would not.";
     let section = Section::new("essential", "Essential parameters", intro);
     if set.left_out.is_empty() {
         return section.with(parts::info(format!(

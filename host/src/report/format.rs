@@ -101,44 +101,99 @@ pub fn format_value(value: f64, std: f64) -> String {
             format_significant(std, 2)
         );
     }
-    let (_, std_exponent) = scientific(std, 2);
-    let (_, value_exponent) = scientific(value, 2);
-    let exponent = if value == 0.0 {
-        std_exponent
-    } else {
-        value_exponent.max(std_exponent)
-    };
-    // A deviation far below the value's own digits: writing them all would claim nothing.
-    if exponent - std_exponent > 15 {
-        return format_significant(value, 15);
-    }
-    let decimals = 1 - std_exponent;
-    if plain(exponent) && decimals <= 8 {
-        if decimals >= 0 {
-            let decimals = decimals as usize;
-            return format!("{} ± {}", fixed(value, decimals), fixed(std, decimals));
+    match Rounding::of(value, std) {
+        Rounding::Plain(decimals) => {
+            format!("{} ± {}", plainly(value, decimals), plainly(std, decimals))
         }
-        let unit = 10f64.powi(-decimals);
-        let round = |v: f64| fixed((v / unit).round() * unit, 0);
-        return format!("{} ± {}", round(value), round(std));
+        Rounding::Power { exponent, decimals } => format!(
+            "({} ± {})·{}",
+            fixed(shifted(value, exponent), decimals),
+            fixed(shifted(std, exponent), decimals),
+            power_of_ten(exponent)
+        ),
+        Rounding::Digits => format_significant(value, 15),
     }
-    // Through text, not through powi: 10^-320 has no exact double.
-    let shift = |v: f64| {
-        format!("{v:e}")
-            .split_once('e')
-            .and_then(|(m, e)| {
-                let e: i32 = e.parse().ok()?;
-                format!("{m}e{}", e - exponent).parse::<f64>().ok()
-            })
-            .unwrap_or(0.0)
+}
+
+/// The ends of an interval about a value, rounded as [`format_value`] rounds the value: `94.90 to 95.33`.
+#[must_use]
+pub fn format_interval(ends: [f64; 2], value: f64, std: f64) -> String {
+    let std = std.abs();
+    let known = value.is_finite() && std.is_finite() && std > 0.0;
+    let rounding = if known && ends.iter().all(|end| end.is_finite()) {
+        Rounding::of(value, std)
+    } else {
+        Rounding::Digits
     };
-    let decimals = (1 - std_exponent + exponent).max(0) as usize;
-    format!(
-        "({} ± {})·{}",
-        fixed(shift(value), decimals),
-        fixed(shift(std), decimals),
-        power_of_ten(exponent)
-    )
+    match rounding {
+        Rounding::Plain(decimals) => {
+            let [low, high] = ends.map(|end| plainly(end, decimals));
+            format!("{low} to {high}")
+        }
+        Rounding::Power { exponent, decimals } => {
+            let [low, high] = ends.map(|end| fixed(shifted(end, exponent), decimals));
+            format!("({low} to {high})·{}", power_of_ten(exponent))
+        }
+        Rounding::Digits => {
+            let [low, high] = ends.map(|end| format_significant(end, 4));
+            format!("{low} to {high}")
+        }
+    }
+}
+
+/// How a value is rounded to the two significant digits of its deviation.
+enum Rounding {
+    /// To so many decimals, before the point where below zero.
+    Plain(i32),
+    /// With a power of ten.
+    Power { exponent: i32, decimals: usize },
+    /// A deviation far below the value's own digits: writing them all would claim nothing.
+    Digits,
+}
+
+impl Rounding {
+    fn of(value: f64, std: f64) -> Self {
+        let (_, std_exponent) = scientific(std, 2);
+        let (_, value_exponent) = scientific(value, 2);
+        let exponent = if value == 0.0 {
+            std_exponent
+        } else {
+            value_exponent.max(std_exponent)
+        };
+        let decimals = 1 - std_exponent;
+        if exponent - std_exponent > 15 {
+            Self::Digits
+        } else if plain(exponent) && decimals <= 8 {
+            Self::Plain(decimals)
+        } else {
+            Self::Power {
+                exponent,
+                decimals: (decimals + exponent).max(0) as usize,
+            }
+        }
+    }
+}
+
+/// A number to so many decimals, or to tens, hundreds and so on where below zero.
+fn plainly(value: f64, decimals: i32) -> String {
+    match usize::try_from(decimals) {
+        Ok(decimals) => fixed(value, decimals),
+        Err(_) => {
+            let unit = 10f64.powi(-decimals);
+            fixed((value / unit).round() * unit, 0)
+        }
+    }
+}
+
+/// A value over a power of ten, through text and not through powi: 10^-320 has no exact double.
+fn shifted(value: f64, exponent: i32) -> f64 {
+    format!("{value:e}")
+        .split_once('e')
+        .and_then(|(m, e)| {
+            let e: i32 = e.parse().ok()?;
+            format!("{m}e{}", e - exponent).parse::<f64>().ok()
+        })
+        .unwrap_or(0.0)
 }
 
 /// A probability: `0.031`, `4·10⁻¹²`, and `< 10⁻³⁰⁰` where the computation ran out of exponents.
@@ -167,6 +222,20 @@ mod tests {
         assert_eq!(format_value(1234.0, 234.0), "1230 ± 230");
         assert_eq!(format_value(0.0, 0.5), "0.00 ± 0.50");
         assert_eq!(format_value(3.0, 40.0), "3 ± 40");
+    }
+
+    #[test]
+    fn intervals_are_rounded_as_their_value_is() {
+        let of = |ends, value, std| format_interval(ends, value, std);
+        assert_eq!(of([1.211642, 1.286091], 1.249, 0.019), "1.212 to 1.286");
+        assert_eq!(of([-0.510356, 0.0001], -0.466, 0.022), "−0.510 to 0.000");
+        assert_eq!(of([765.0, 1702.0], 1234.0, 234.0), "770 to 1700");
+        assert_eq!(
+            of([1.211e-5, 1.259e-5], 1.235e-5, 1.2e-7),
+            "(1.211 to 1.259)·10⁻⁵"
+        );
+        assert_eq!(of([2.0, 2.0], 2.0, 0.0), "2.000 to 2.000");
+        assert_eq!(of([f64::NEG_INFINITY, 1.0], 0.5, 0.1), "−∞ to 1.000");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::super::ui::Ui;
 use crate::identify::{Estimator, Identification, NotExcited, StandardSet};
-use crate::report::format_value;
+use crate::report::{format_interval, format_value};
 
 /// The result at a glance.
 pub(super) fn print(ui: &Ui, result: &Identification) {
@@ -14,12 +14,11 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         .unwrap_or(0);
     for parameter in &result.base_parameters {
         ui.say(&format!(
-            "{:width$}  {} {}  (95 %: {:.6} to {:.6})",
+            "{:width$}  {} {}  (95 %: {})",
             parameter.expression,
             format_value(parameter.value, parameter.std),
             parameter.unit,
-            parameter.interval[0],
-            parameter.interval[1],
+            format_interval(parameter.interval, parameter.value, parameter.std),
         ));
     }
     for joint in &result.joints {

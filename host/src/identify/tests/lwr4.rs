@@ -103,3 +103,109 @@ fn bodies_predict_another_motion_where_least_squares_fails() {
     let set = found.standard_parameters.unwrap();
     assert!(set.least_eigenvalue.iter().all(|e| *e > 0.0));
 }
+
+/// A run as it was recorded, references and all.
+fn recorded(number: usize) -> Option<(Robot, crate::data::Source)> {
+    let folder = crate::data::data_dir()?.join("kuka_lwr4");
+    let robot = Robot::load(&folder.join("kuka_lwr4.urdf")).unwrap();
+    let path = folder.join(format!("run{number}.csv"));
+    let source = crate::data::Source::open(&path, &robot).unwrap();
+    Some((robot, source))
+}
+
+/// As `rig identify` runs where nothing is asked for.
+fn by_default(robot: &Robot, training: &[usize], holdout: &[usize]) -> Identification {
+    let open = |list: &[usize]| -> Vec<crate::data::Source> {
+        list.iter().map(|n| recorded(*n).unwrap().1).collect()
+    };
+    let (training, holdout) = (open(training), open(holdout));
+    let [training, holdout] = [&training, &holdout].map(|list| {
+        list.iter()
+            .map(|s| s as &dyn crate::prepare::Recording)
+            .collect::<Vec<_>>()
+    });
+    let options = Options {
+        estimator: Estimator::for_robot(robot),
+        compare: vec![Estimator::Weighted, Estimator::Iv, Estimator::Consistent],
+        look_beyond: true,
+        ..Default::default()
+    };
+    identify(robot, &training, &holdout, &options).unwrap()
+}
+
+/// Its references are 57 times too small: they are no instruments, and the estimate by instrumental variables stays near the
+/// weighted one. Smoothed positions have the noise still in them, so nothing is concluded from them.
+#[test]
+fn references_that_are_not_the_motions_are_no_instruments() {
+    let Some((robot, _)) = recorded(1) else {
+        return;
+    };
+    let found = by_default(&robot, &[1], &[]);
+    let comparison = found.comparison.unwrap();
+    let of = |e: Estimator| {
+        let row = comparison.estimators.iter().find(|row| row.estimator == e);
+        row.unwrap().cross_validated_relative_error.clone().unwrap()
+    };
+    let (plain, iv) = (of(Estimator::Weighted), of(Estimator::Iv));
+    println!(
+        "weighted {plain:.3?}, iv {iv:.3?}, {:?}",
+        comparison.endogeneity
+    );
+    for (iv, plain) in iv.iter().zip(&plain) {
+        assert!(*iv < 1.5 * plain, "{iv} {plain}");
+    }
+    let said = comparison.endogeneity.unwrap();
+    assert_eq!(said.verdict, Verdict::Undecided);
+    assert!(said.text.contains("not known"), "{}", said.text);
+}
+
+/// Run 2 repeats run 1 and run 3 does not: whichever is held back, or none, the result given is the one to trust, and no
+/// warning says otherwise.
+#[test]
+fn one_recommendation_whichever_run_is_held_back() {
+    let Some((robot, _)) = recorded(1) else {
+        return;
+    };
+    for (training, holdout, repeated) in [
+        (&[1][..], &[][..], 0),
+        (&[1], &[2], 1),
+        (&[1], &[3], 0),
+        (&[1, 2], &[3], 0),
+        (&[1], &[2, 3], 1),
+        (&[2], &[3], 0),
+        (&[3], &[1], 0),
+    ] {
+        let found = by_default(&robot, training, holdout);
+        let comparison = found.comparison.unwrap();
+        println!("{training:?} {holdout:?} {}", comparison.recommendation);
+        println!("   {:?}", found.base_tilt);
+        println!("   {:?}", found.warnings);
+        assert_eq!(comparison.repeated_holdout.len(), repeated);
+        assert_eq!(comparison.recommended, found.estimator);
+        assert!(!found.warnings.iter().any(|w| w.contains("do not take")));
+        let unseen = holdout.is_empty() || holdout == [2];
+        assert_eq!(
+            comparison.recommendation.contains("different motion"),
+            unseen,
+            "{training:?} {holdout:?}"
+        );
+        // Friction, drive inertia and what a body has are not below zero here either.
+        let essential = found.essential.unwrap();
+        for own in &essential.parameters {
+            println!("   {} {}", own.expression, own.value);
+            let alone = !own.expression.contains(' ');
+            let first = own.expression.get(..2).unwrap();
+            assert!(
+                !alone || !["Ia", "fv", "fc"].contains(&first) || own.value > 0.0,
+                "{own:?}"
+            );
+            let given = (found.base_parameters.iter())
+                .find(|b| b.expression == own.expression)
+                .unwrap();
+            assert!(
+                (own.value - given.value).abs() < 4.0 * given.std,
+                "{own:?} {given:?}"
+            );
+        }
+    }
+}

@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod arms;
+mod bias;
 mod chains;
 mod emps;
 mod exact;
@@ -10,6 +11,7 @@ mod made;
 mod position;
 mod rate;
 mod still;
+mod tx40;
 
 use super::*;
 use crate::data::{Block, JointColumns};

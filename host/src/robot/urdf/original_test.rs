@@ -238,7 +238,7 @@ fn what_urdf_cannot_hold_is_said_and_a_tilt_has_a_link_of_its_own() {
     for words in [
         "level_world_to_base at the end of the file turns floor in it by 2.1",
         "spring of wrist (stiffness 0.25 N*m/rad, preload 0.5 N*m)",
-        "constant torques at the joints: feed 0.125 N",
+        "constant torques at the joints: feed 0.1250 N",
     ] {
         assert!(
             said.contains(words) && written.text.contains(words),

@@ -4,6 +4,7 @@ use rig_shared::effects::Parameter;
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::DriveKind;
 
+use crate::report::format_significant;
 use crate::robot::effects::{title_of, unit_of};
 use crate::robot::{JointKind, Robot, RobotEffect};
 
@@ -16,7 +17,10 @@ impl Robot {
                 .iter()
                 .zip(parameters)
                 .filter(|(_, row)| row[place] != 0.0)
-                .map(|(joint, row)| format!("{} {:?} {}", joint.name, row[place], unit(joint.kind)))
+                .map(|(joint, row)| {
+                    let value = format_significant(row[place], 4);
+                    format!("{} {value} {}", joint.name, unit(joint.kind))
+                })
                 .collect();
             (!entries.is_empty()).then(|| entries.join(", "))
         };
