@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
 use crate::data::{Block, Implausible, strange_references};
+use crate::excite::REPLAY_STEP;
 use crate::prepare::{Recording, Survey};
 use crate::robot::{Controller, Robot};
 use crate::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
@@ -117,8 +118,14 @@ pub(super) fn check(
         }
         Ok::<_, SimulateError>((errors, motions))
     };
-    let mut substeps = options.substeps.unwrap_or(SUBSTEPS[0]).max(1);
-    let last = options.substeps.unwrap_or(SUBSTEPS[1]).max(1);
+    let [begin, most] = if stand_ins.is_empty() {
+        SUBSTEPS
+    } else {
+        // As it was made; a stand-in's motion is not worth sixteen times the work.
+        [(period / REPLAY_STEP).ceil().max(1.0) as u32; 2]
+    };
+    let mut substeps = options.substeps.unwrap_or(begin).max(1);
+    let last = options.substeps.unwrap_or(most).max(1);
     // The work doubles from run to run: the first ones are a small share of it.
     let outcome = (|| {
         let mut coarse = run(substeps, &mut |p| progress(0.3 * p))?;
