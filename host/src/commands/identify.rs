@@ -91,6 +91,9 @@ pub(crate) enum Compare {
 
 /// Bytes of recordings up to which a comparison takes a second or two.
 const COMPARED_BYTES: u64 = 12 << 20;
+/// Half-widths of a 95 % interval by which friction has to lie below zero: five standard deviations. A few seconds of a motion
+/// leave friction and the rest of a joint hard to tell apart, and of many joints one may then come out below zero by chance.
+const CLEARLY: f64 = 2.5;
 
 impl Compare {
     fn list(self, bytes: u64) -> Vec<Estimator> {
@@ -375,7 +378,7 @@ fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), 
                 .iter()
                 .position(|column| *column == j * COLUMNS + place);
             row.and_then(|row| found.details.free.get(row))
-                .is_some_and(|[_, _, high]| *high < 0.0)
+                .is_some_and(|[value, _, high]| value + CLEARLY * (high - value) < 0.0)
         };
         if below_zero(column::VISCOUS) && below_zero(column::COULOMB) {
             return Err(CommandError::Implausible(format!(

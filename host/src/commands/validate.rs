@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     }
     for sentence in inputs.strange_references(&robot)? {
         ui.remark(&format!(
-            "{sentence}. A simulated motion follows them as they are."
+            "{sentence}. A controller of the description follows them as they are."
         ));
     }
     let mut progress = ui.progress("validating", 1000);

@@ -43,6 +43,7 @@ pub use certificate::Reach;
 pub use criterion::{Criterion, Values};
 pub use error::ExciteError;
 pub use frame::default_period;
+pub(crate) use replay::STEP as REPLAY_STEP;
 pub use replay::{Noise, Replay, replay};
 pub use stages::{StagedKind, staged};
 pub use trajectory_file::{

@@ -14,7 +14,7 @@ use crate::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, co
 /// The model stands in its controller for so long before the recording begins that gravity has found its balance, s.
 const SETTLING: f64 = 1.0;
 /// Longest step of the simulation, s: a hundredth of the fastest time constant that the controllers here have.
-const STEP: f64 = 0.25e-3;
+pub(crate) const STEP: f64 = 0.25e-3;
 
 /// White normal noise of the measured columns, standard deviations; 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

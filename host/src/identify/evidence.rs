@@ -100,6 +100,11 @@ impl Belief {
         }
     }
 
+    /// Values of the base columns, those of terms behind them.
+    pub(super) fn base_values(&self, standard: &DVector<f64>) -> DVector<f64> {
+        &self.combination * standard
+    }
+
     /// Deviations of the first values, and of what came behind them since.
     pub(super) fn widened(&self, first: &DVector<f64>) -> DVector<f64> {
         let even = self.even(1.0);

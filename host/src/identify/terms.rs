@@ -1,5 +1,7 @@
 //! Columns beyond the description's parameters, and how likely they make the data.
 
+use nalgebra::DVector;
+
 use super::IdentifyError;
 use super::ModelKind;
 use super::covariance::Memory;
@@ -17,6 +19,11 @@ pub(super) const PERIODS: std::ops::RangeInclusive<usize> = 2..=6;
 const TERMS: usize = 1 + 2 * (*PERIODS.end() + 1 - *PERIODS.start()) + 2;
 /// Angle, rad, within which a base that is called level is believed to be so before the data (standard deviation).
 const LEVEL: f64 = 0.1;
+
+/// Instants that are looked at, evenly spread over all recordings: at six joints some 10⁵ rows for some 100 columns. More
+/// tell the same more surely, which terms of a size that matters do not need; a term's values are known to the share of its
+/// own size that the root of so many rows gives.
+const ENOUGH: u64 = 20_000;
 
 /// A term that may be taken.
 #[derive(Clone, Copy, PartialEq)]
@@ -94,7 +101,18 @@ impl Evidence {
     ) -> Result<Self, IdentifyError> {
         let joints = problem.robot.joints.len();
         let p = problem.base.len();
-        let weights = weights(problem)?;
+        let Noise {
+            deviation,
+            memory,
+            instants,
+        } = Noise::of(problem)?;
+        let step = instants.div_ceil(ENOUGH).max(1);
+        // Of rows further apart each says more.
+        let weight_at = |step: u64| -> Vec<f64> {
+            let one = |(s, m): (&f64, &f64)| 1.0 / (s * (m / step as f64).max(1.0).sqrt());
+            deviation.iter().zip(&memory).map(one).collect()
+        };
+        let weights = weight_at(1);
         let mut tilt = match Axes::of(described) {
             Some(axes) => {
                 let mut all = TriangularFactor::new(p);
@@ -111,11 +129,13 @@ impl Evidence {
         let mut parts = vec![TriangularFactor::new(p + TERMS); joints];
         let mut sums = vec![[[0.0; 2]; TERMS]; joints];
         let mut row = vec![0.0; p + TERMS];
+        let mut instant = 0;
         for (recording, weight) in problem.training.iter().zip(problem.recording_weights()) {
             let differential = ModelKind::Differential;
             each_rows(*recording, problem.plan, differential, &mut |rows| {
                 for i in 0..rows.t.len() {
-                    if !rows.equations.iter().any(|equation| equation.keep[i]) {
+                    instant += 1;
+                    if instant % step != 0 || rows.equations.iter().all(|e| !e.keep[i]) {
                         continue;
                     }
                     let turned = match &mut tilt {
@@ -155,8 +175,26 @@ impl Evidence {
         Ok(Self {
             parts,
             spread,
-            weights,
+            weights: weight_at(step),
         })
+    }
+
+    /// By joint, squares that these values of the base columns and of `terms` leave.
+    pub(super) fn left(&self, terms: &[Term], values: &DVector<f64>) -> Vec<f64> {
+        let p = self.parts.first().map_or(0, TriangularFactor::columns) - TERMS;
+        let of = |(j, part): (usize, &TriangularFactor)| {
+            let mut all = vec![0.0; p + TERMS];
+            all[..p].copy_from_slice(&values.as_slice()[..p]);
+            let mut at = p;
+            for term in terms {
+                for c in term.columns() {
+                    all[p + c] = if term.at(j) { values[at] } else { 0.0 };
+                    at += 1;
+                }
+            }
+            part.residual_squares(&all)
+        };
+        self.parts.iter().enumerate().map(of).collect()
     }
 
     /// All joints' rows at their weights, with the columns of `terms` behind the base's.
@@ -201,29 +239,46 @@ impl Evidence {
     }
 }
 
-/// By joint, one over the standard deviation of what the weighted fit leaves of the torque and the root of what it remembers.
-fn weights(problem: &Problem) -> Result<Vec<f64>, IdentifyError> {
-    let joints = problem.robot.joints.len();
-    let beta = problem.start_full();
-    let p = beta.len();
-    let mut memories = vec![Memory::default(); joints];
-    let mut left = vec![0.0; joints];
-    for recording in problem.training {
-        let differential = ModelKind::Differential;
-        each_rows(*recording, problem.plan, differential, &mut |rows| {
-            for (j, equation) in rows.equations.iter().enumerate() {
-                for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
-                    let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta);
-                    memories[j].push(e);
-                    left[j] += e * e;
+/// What the weighted fit leaves.
+struct Noise {
+    /// By joint, standard deviation; one where nothing is left.
+    deviation: Vec<f64>,
+    /// By joint, rows that it remembers.
+    memory: Vec<f64>,
+    /// Instants of all recordings.
+    instants: u64,
+}
+
+impl Noise {
+    fn of(problem: &Problem) -> Result<Self, IdentifyError> {
+        let joints = problem.robot.joints.len();
+        let beta = problem.start_full();
+        let p = beta.len();
+        let mut memories = vec![Memory::default(); joints];
+        let mut left = vec![0.0; joints];
+        let mut instants = 0;
+        for recording in problem.training {
+            let differential = ModelKind::Differential;
+            each_rows(*recording, problem.plan, differential, &mut |rows| {
+                instants += rows.t.len() as u64;
+                for (j, equation) in rows.equations.iter().enumerate() {
+                    for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                        let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta);
+                        memories[j].push(e);
+                        left[j] += e * e;
+                    }
                 }
-            }
-            Ok(())
-        })?;
+                Ok(())
+            })?;
+        }
+        Ok(Self {
+            deviation: (left.iter().zip(&memories))
+                .map(|(squares, memory)| 1.0 / unit(*squares, memory.seen()))
+                .collect(),
+            memory: memories.iter().map(Memory::length).collect(),
+            instants,
+        })
     }
-    let one =
-        |(squares, memory): (&f64, &Memory)| unit(*squares, memory.seen()) / memory.length().sqrt();
-    Ok(left.iter().zip(&memories).map(one).collect())
 }
 
 /// One over the RMS of what `squares` sum up to over so many rows.

@@ -3,7 +3,8 @@
 //! Two checks a recording. *Torque*: the model's torque for the measured motion against the measured torque,
 //! prepared and evaluated as [`crate::identify`] evaluates its hold-out, so that both figures can be compared.
 //! *Motion*: the closed loop of model and controller, driven by the recorded reference from the recording's
-//! first state, against the measured position and torque; here errors of the model add up over time.
+//! first state, against the measured position and torque; here errors of the model add up over time. A joint without a
+//! controller in the description is moved by the stand-in that `rig simulate` takes, which a warning says.
 //!
 //! A recording may say that the drive applied more than its controller asked for. Column `added<k>`: torque or
 //! force on joint k beside the controller's, N·m or N. Column `pulses`: added to the output of the first joint's
@@ -30,7 +31,7 @@ use crate::effects::Compensated;
 use crate::identify::{IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals};
 use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
-use crate::simulate::{Model, SimulateError};
+use crate::simulate::{Model, STAND_IN_BANDWIDTH, SimulateError};
 
 /// Settings of a validation.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,6 +162,8 @@ pub enum Motion {
         stretches: usize,
         /// Steps within one sample.
         substeps: u32,
+        /// Joints that a stand-in moved, because the description has no controller for them.
+        stand_ins: Vec<String>,
         /// Sentences: initial state, step, added torque, what was left out.
         remarks: Vec<String>,
     },
@@ -314,11 +317,19 @@ pub fn validate(
         let motion = motion::check(robot, &model, *recording, survey, options, &mut |part| {
             progress(done + share * part);
         })?;
-        if let Motion::NotSimulated { why } = &motion {
-            warnings.push(format!(
+        match &motion {
+            Motion::NotSimulated { why } => warnings.push(format!(
                 "{}: the motion was not simulated. {why}",
                 survey.label
-            ));
+            )),
+            Motion::Simulated { stand_ins, .. } if !stand_ins.is_empty() => {
+                warnings.push(format!(
+                    "{}: the description has no [joint.controller] for {}; the stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth that `rig simulate` takes followed ref<k> there. Where another controller ran, the difference of the motions is the controllers', not the model's.",
+                    survey.label,
+                    stand_ins.join(", ")
+                ));
+            }
+            Motion::Simulated { .. } => {}
         }
         checked.push(Checked {
             recording: survey.label.clone(),

@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
-use crate::data::Block;
+use crate::data::{Block, Implausible, strange_references};
+use crate::excite::REPLAY_STEP;
 use crate::prepare::{Recording, Survey};
 use crate::robot::{Controller, Robot};
-use crate::simulate::{Inputs, Model, SimulateError, closed_loop};
+use crate::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
 
 /// Rows at the start of a stretch through which a parabola is laid for the first state.
 const FIRST_ROWS: usize = 21;
@@ -47,24 +48,26 @@ pub(super) fn check(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Motion, ValidateError> {
     let not = |why: String| Ok(Motion::NotSimulated { why });
-    let mut controllers: Vec<Controller> = Vec::new();
     for joint in &robot.joints {
-        match &joint.controller {
-            Some(c) if stiffness(c) == 0.0 => {
-                return not(format!(
-                    "A gain of the controller of joint {} is zero, so it does not follow its reference.",
-                    joint.name
-                ));
-            }
-            Some(controller) => controllers.push(controller.clone()),
-            None => {
-                return not(format!(
-                    "The description has no controller for joint {}; with [joint.controller] tables, and references ref<k> in the recording, the closed loop is simulated.",
-                    joint.name
-                ));
-            }
+        if joint
+            .controller
+            .as_ref()
+            .is_some_and(|c| stiffness(c) == 0.0)
+        {
+            return not(format!(
+                "A gain of the controller of joint {} is zero, so it does not follow its reference.",
+                joint.name
+            ));
         }
     }
+    let first = match first_reference(robot, recording)? {
+        Ok(first) => first,
+        Err(why) => return not(why),
+    };
+    let (controllers, stand_ins) = match controllers(robot, model, &first) {
+        Ok(found) => found,
+        Err(e) => return not(sentence(&e.to_string())),
+    };
     let gathered = match gather(robot, &controllers, recording, options.most_samples)? {
         Ok(gathered) => gathered,
         Err(why) => return not(why),
@@ -115,8 +118,14 @@ pub(super) fn check(
         }
         Ok::<_, SimulateError>((errors, motions))
     };
-    let mut substeps = options.substeps.unwrap_or(SUBSTEPS[0]).max(1);
-    let last = options.substeps.unwrap_or(SUBSTEPS[1]).max(1);
+    let [begin, most] = if stand_ins.is_empty() {
+        SUBSTEPS
+    } else {
+        // As it was made; a stand-in's motion is not worth sixteen times the work.
+        [(period / REPLAY_STEP).ceil().max(1.0) as u32; 2]
+    };
+    let mut substeps = options.substeps.unwrap_or(begin).max(1);
+    let last = options.substeps.unwrap_or(most).max(1);
     // The work doubles from run to run: the first ones are a small share of it.
     let outcome = (|| {
         let mut coarse = run(substeps, &mut |p| progress(0.3 * p))?;
@@ -210,6 +219,7 @@ pub(super) fn check(
         of: survey.rows,
         stretches: gathered.stretches.len(),
         substeps,
+        stand_ins,
         remarks,
     })
 }
@@ -226,6 +236,48 @@ fn sentence(text: &str) -> String {
         .next()
         .map(|c| c.to_uppercase().chain(letters).collect())
         .unwrap_or_default()
+}
+
+/// Reference of every joint in the first row, at which a stand-in is designed as where the motion was made; the inner error
+/// is the sentence that says why a motion that follows the references would be none of the recording's.
+fn first_reference(
+    robot: &Robot,
+    recording: &dyn Recording,
+) -> Result<Result<Vec<f64>, String>, ValidateError> {
+    let mut found = None;
+    recording.each_block(1 << 16, &mut |block| {
+        if found.is_none() && !block.is_empty() {
+            found = Some(of_block(robot, &block));
+        }
+        Ok(())
+    })?;
+    Ok(found.unwrap_or_else(|| Err("The recording has no rows.".to_owned())))
+}
+
+fn no_reference(joint: &str, j: usize) -> String {
+    format!(
+        "The recording has no reference for joint {joint} (column ref{}).",
+        j + 1
+    )
+}
+
+fn of_block(robot: &Robot, block: &Block) -> Result<Vec<f64>, String> {
+    let mut first = Vec::new();
+    for (j, (columns, joint)) in block.joints.iter().zip(&robot.joints).enumerate() {
+        let value = columns.reference.as_ref().and_then(|r| r.first().copied());
+        first.push(value.ok_or_else(|| no_reference(&joint.name, j))?);
+    }
+    // A controller that is described is told what it was told; a stand-in only what the joint did follow.
+    let strange = strange_references(block, robot).into_iter().find(|found| {
+        matches!(found, Implausible::ReferenceScale { joint, .. }
+            if robot.joints.get(joint - 1).is_some_and(|j| j.controller.is_none()))
+    });
+    match strange {
+        Some(found) => Err(format!(
+            "The description has no [joint.controller], and a stand-in cannot follow these references: {found}."
+        )),
+        None => Ok(first),
+    }
 }
 
 /// Reads what the simulation needs; the inner error is the sentence that says what is missing.
@@ -246,11 +298,7 @@ fn gather(
             return Ok(());
         }
         if let Some(j) = block.joints.iter().position(|j| j.reference.is_none()) {
-            missing = Some(format!(
-                "The recording has no reference for joint {} (column ref{}).",
-                robot.joints[j].name,
-                j + 1
-            ));
+            missing = Some(no_reference(&robot.joints[j].name, j));
             return Ok(());
         }
         if !block.continues || all.is_empty() {

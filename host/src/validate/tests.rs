@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::data::{Block, JointColumns};
+use crate::excite::{Noise, SampledReference, replay};
 use crate::prepare::{Choice, InMemory};
 use crate::robot::{Controller, JointFriction};
 use crate::simulate::{Inputs, closed_loop};
@@ -164,19 +165,97 @@ fn what_is_missing_is_said() {
     };
     assert!(why.contains("ref1"), "{why}");
     assert!(found.warnings.iter().any(|w| w.contains("ref1")));
-    let mut open = robot.clone();
-    open.joints[0].controller = None;
-    let found = run(&open, block);
-    assert!(
-        found
-            .warnings
-            .iter()
-            .any(|w| w.contains("[joint.controller]"))
-    );
     let json = serde_json::to_value(&found).unwrap();
     assert_eq!(json["schema"], "rig-validation/1");
     assert_eq!(json["recordings"][0]["motion"]["status"], "not_simulated");
     assert!(json["recordings"][0]["torque"][0]["relative_error"].is_number());
+}
+
+/// Two joints of an arm and its recording as `rig simulate` makes it, without a controller in the description.
+#[test]
+fn what_the_stand_in_made_it_makes_again() {
+    let mut robot = Robot::from_toml(
+        crate::robot::template("edda").unwrap(),
+        Path::new("edda.toml"),
+    )
+    .unwrap();
+    for joint in &mut robot.joints {
+        joint.controller = None;
+    }
+    let n = robot.joints.len();
+    let period = 1e-3;
+    let middle = robot.middle_position();
+    let reference = SampledReference {
+        period,
+        position: (0..n)
+            .map(|j| {
+                let at = |k: u32| (f64::from(k) * period * (2.0 + j as f64)).sin();
+                (0..6000).map(|k| middle[j] + 0.3 * at(k)).collect()
+            })
+            .collect(),
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+    };
+    let noise = Noise {
+        position: 0.0,
+        velocity: 0.0,
+        torque: 0.0,
+    };
+    let made = replay(&robot, &reference, noise, 1, |_, _| ()).unwrap();
+    assert_eq!(made.notes.len(), n, "{:?}", made.notes);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("made.csv");
+    made.save(&path, &robot).unwrap();
+    let source = crate::data::Source::open(&path, &robot).unwrap();
+    let judged = |robot: &Robot| {
+        let found = validate(robot, &[&source], &Options::default(), &mut |_| ()).unwrap();
+        let Motion::Simulated {
+            joints, stand_ins, ..
+        } = found.recordings[0].motion.clone()
+        else {
+            panic!("{:?}", found.warnings);
+        };
+        assert_eq!(stand_ins.len(), n);
+        let said =
+            |w: &String| w.contains("no [joint.controller]") && w.contains("stand-in of 5 Hz");
+        assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
+        joints
+    };
+    for joint in judged(&robot) {
+        println!(
+            "{} {} {}",
+            joint.joint, joint.tracking_relative_error, joint.torque_relative_error
+        );
+        assert!(joint.tracking_relative_error < 1e-3, "{joint:?}");
+    }
+    let mut other = robot.clone();
+    for joint in &mut other.joints {
+        if let Some(friction) = &mut joint.friction {
+            friction.coulomb += 5.0;
+        }
+    }
+    for joint in judged(&other) {
+        assert!(joint.tracking_relative_error > 0.02, "{joint:?}");
+    }
+}
+
+/// References in another unit are none that a stand-in can follow.
+#[test]
+fn a_stand_in_does_not_follow_references_of_another_unit() {
+    let robot = pendulum();
+    let mut block = simulated(&robot, 0.0);
+    let reference = block.joints[0].reference.as_mut().unwrap();
+    reference.iter_mut().for_each(|r| *r /= 57.296);
+    let mut open = robot.clone();
+    open.joints[0].controller = None;
+    let found = run(&open, block);
+    let Motion::NotSimulated { why } = &found.recordings[0].motion else {
+        panic!("simulated");
+    };
+    assert!(
+        why.contains("stand-in cannot follow") && why.contains("ref1"),
+        "{why}"
+    );
 }
 
 #[test]

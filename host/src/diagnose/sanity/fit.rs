@@ -6,8 +6,13 @@ use crate::identify::independent_columns;
 
 /// A column counts as excited where more than this share of it is left beside the others.
 const EXCITED: f64 = 1e-5;
-/// Stretches that are taken as independent of each other (cluster-robust covariance, Liang and Zeger 1986).
-const STRETCHES: usize = 30;
+/// Most stretches that are taken as independent of each other.
+const STRETCHES: usize = 60;
+/// Rows of a stretch at least: what residuals remember of each other is shorter.
+const LEAST_STRETCH: usize = 25;
+
+/// Share of a direction that may be rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// A fitted model of one torque.
 pub(super) struct Fit {
@@ -17,23 +22,29 @@ pub(super) struct Fit {
     basis: DMatrix<f64>,
     values: DVector<f64>,
     covariance: DMatrix<f64>,
+    /// Stretches less one.
+    freedom: f64,
     /// Measured minus predicted.
     pub(super) residual: DVector<f64>,
     /// Sum of squares of the torque about its mean.
     total: f64,
 }
 
-/// A number and its standard deviation.
+/// A number and its standard deviation, which so many degrees of freedom have shown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
     pub(super) value: f64,
     pub(super) std: f64,
+    freedom: f64,
 }
 
 impl Measured {
-    /// In standard deviations.
+    /// In standard deviations of a normal distribution that are as rare: Student's t at its degrees of freedom, turned into
+    /// them by Wallace's formula (1959).
     pub(super) fn sigmas(self) -> f64 {
-        self.value / self.std.max(f64::MIN_POSITIVE)
+        let (t, f) = (self.value / self.std.max(f64::MIN_POSITIVE), self.freedom);
+        let normal = (8.0 * f + 1.0) / (8.0 * f + 3.0) * (f * (t * t / f).ln_1p()).sqrt();
+        normal.copysign(t)
     }
 }
 
@@ -42,6 +53,36 @@ pub(super) fn about_mean(x: impl Iterator<Item = f64> + Clone) -> f64 {
     let count = x.clone().count().max(1) as f64;
     let mean = x.clone().sum::<f64>() / count;
     x.map(|v| (v - mean) * (v - mean)).sum()
+}
+
+/// Covariance of the coordinates in an orthonormal `basis`, from what leaving out one stretch of time at a time does to them,
+/// and the number of stretches.
+///
+/// The cluster jackknife (Bell & McCaffrey 2002; MacKinnon, Nielsen & Webb 2023, "CV₃"). With Q_g the basis' rows of stretch g
+/// and e_g their residual, leaving it out moves the coordinates by (1 − Q_gᵀ·Q_g)⁻¹·Q_gᵀ·e_g. The residuals alone, without
+/// the inverse, would be far too small where parameters are nearly as many as stretches: the fit has bent to them. What one
+/// stretch alone shows has no bounds.
+fn jackknife(basis: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, usize) {
+    let (rows, size) = basis.shape();
+    let length = rows.div_ceil(STRETCHES).max(LEAST_STRETCH);
+    let mut sum = DMatrix::zeros(size, size);
+    let mut stretches = 0_usize;
+    for from in (0..rows).step_by(length) {
+        let count = length.min(rows - from);
+        let own = basis.rows(from, count);
+        let score = own.transpose() * residual.rows(from, count);
+        let mut rest = -(own.transpose() * own);
+        for k in 0..size {
+            // Rounding must not make it less than nothing.
+            rest[(k, k)] += 1.0 + ROUNDING;
+        }
+        let moved = rest.cholesky().map(|c| c.solve(&score));
+        let moved = moved.unwrap_or(score / ROUNDING);
+        sum.ger(1.0, &moved, &moved, 1.0);
+        stretches += 1;
+    }
+    let share = (stretches as f64 - 1.0) / (stretches as f64).max(1.0);
+    (sum * share, stretches)
 }
 
 impl Fit {
@@ -60,19 +101,14 @@ impl Fit {
         let values = r.solve_upper_triangular(&along)?;
         let residual = &y - &basis * &along;
         let inverse = r.solve_upper_triangular(&DMatrix::identity(kept.len(), kept.len()))?;
-        let mut scores = DMatrix::zeros(kept.len(), kept.len());
-        let length = rows.div_ceil(STRETCHES).max(1);
-        for from in (0..rows).step_by(length) {
-            let count = length.min(rows - from);
-            let score = basis.rows(from, count).transpose() * residual.rows(from, count);
-            scores += &score * score.transpose();
-        }
-        let covariance = &inverse * scores * inverse.transpose();
+        let (spread, stretches) = jackknife(&basis, &residual);
+        let covariance = &inverse * spread * inverse.transpose();
         Some(Self {
             kept,
             basis,
             values,
             covariance,
+            freedom: stretches.saturating_sub(1).max(1) as f64,
             residual,
             total: about_mean(torque.iter().copied()),
         })
@@ -89,6 +125,7 @@ impl Fit {
         Measured {
             value: own.dot(&self.values),
             std: own.dot(&(&self.covariance * &own)).max(0.0).sqrt(),
+            freedom: self.freedom,
         }
     }
 
@@ -98,6 +135,7 @@ impl Fit {
         Some(Measured {
             value: self.values[at],
             std: self.covariance[(at, at)].max(0.0).sqrt(),
+            freedom: self.freedom,
         })
     }
 

@@ -7,8 +7,8 @@
 //!
 //! Leaves out: faults that leave the data consistent in themselves where the description states nothing (both signs
 //! reversed, one factor on everything); a late torque of a slow arm whose motion has few harmonics, which the
-//! model's many parameters take up; a fault that comes and goes within a recording; drives that move several
-//! joints enter with their joint's own inertia only.
+//! model's many parameters take up; a fault that comes and goes within a recording; a sign that a short motion does not
+//! show beyond what its many parameters take up.
 
 mod columns;
 mod fit;

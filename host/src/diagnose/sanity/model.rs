@@ -7,9 +7,8 @@ use super::super::{DiagnoseError, Run};
 use super::columns::fault;
 use super::fit::{Fit, Measured};
 use super::names;
-use super::rows::Rows;
-use crate::batch::ChainBatch;
-use crate::identify::{chain_of, preference};
+use super::rows::{Form, Rows};
+use crate::identify::preference;
 use crate::robot::{JointKind, Robot};
 
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
@@ -42,7 +41,7 @@ pub(super) const TRIAL: usize = 500;
 pub(super) struct Judge<'a> {
     pub(super) robot: &'a Robot,
     runs: &'a [&'a Run],
-    pub(super) chain: ChainBatch,
+    pub(super) form: Form,
     pub(super) rows: Rows,
     pub(super) order: Vec<usize>,
     matrices: Vec<DMatrix<f64>>,
@@ -55,11 +54,12 @@ pub(super) fn model_error(error: impl ToString) -> DiagnoseError {
 
 impl<'a> Judge<'a> {
     pub(super) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
-        let chain = ChainBatch::new(&chain_of(robot).map_err(model_error)?);
+        let form = Form::of(robot)?;
         let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
         let rows = Rows::of(runs, robot.joints.len());
-        let order = preference(&kinds);
-        let matrices = rows.regressors(&chain)?;
+        let mut order = preference(&kinds);
+        order.extend(order.len()..form.width());
+        let matrices = rows.regressors(&form)?;
         let fits = matrices
             .iter()
             .zip(&rows.tau)
@@ -68,7 +68,7 @@ impl<'a> Judge<'a> {
         Ok(Self {
             robot,
             runs,
-            chain,
+            form,
             rows,
             order,
             matrices,
@@ -226,7 +226,7 @@ impl<'a> Judge<'a> {
         let rows = self.rows.thinned(if n == 1 { usize::MAX } else { TRIAL });
         let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
             let moved = rows.rescaled(joint, factor);
-            let matrices = moved.regressors(&self.chain)?;
+            let matrices = moved.regressors(&self.form)?;
             let fits = matrices.iter().zip(&moved.tau);
             Ok(fits
                 .map(|(x, y)| Fit::of(x, y, &self.order).map_or(1.0, |f| f.unexplained()))

@@ -2,14 +2,44 @@
 
 use nalgebra::DMatrix;
 use rig_shared::multibody::COLUMNS;
+use rig_shared::transmission::{MOTOR_COLUMNS, Transmission};
 
 use super::super::{DiagnoseError, Run};
+use super::model::model_error;
 use crate::batch::ChainBatch;
+use crate::identify::{chain_of, transmission_of};
+use crate::robot::Robot;
 
 /// Rows a second that are kept: slow against the noise, fast against what drives are asked to do.
 const RATE: f64 = 50.0;
 /// Rows that are looked at; what is wrong with a column is wrong all along it.
 const MOST: usize = 6000;
+
+/// What the regressors are formed for: links, and the drives where they move more than their own joint.
+pub(super) struct Form {
+    chain: ChainBatch,
+    drives: Option<Transmission<f64>>,
+}
+
+impl Form {
+    /// That of a description.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where geometry or drives are none.
+    pub(super) fn of(robot: &Robot) -> Result<Self, DiagnoseError> {
+        let drives = transmission_of(robot).map_err(model_error)?;
+        Ok(Self {
+            chain: ChainBatch::new(&chain_of(robot).map_err(model_error)?),
+            drives: (!drives.is_simple()).then_some(drives),
+        })
+    }
+
+    /// Number of columns: the joints' own, then the motors'.
+    pub(super) fn width(&self) -> usize {
+        let motors = self.drives.as_ref().map_or(0, |_| MOTOR_COLUMNS);
+        self.chain.joint_count() * (COLUMNS + motors)
+    }
+}
 
 /// Means over stretches of equal length.
 #[derive(Clone, Debug, Default)]
@@ -109,20 +139,56 @@ impl Rows {
         }
     }
 
-    /// The standard regressor of each joint's torque, rows × 14 n.
-    pub(super) fn regressors(
-        &self,
-        chain: &ChainBatch,
-    ) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
-        let (n, rows) = (chain.joint_count(), self.len());
-        let width = n * COLUMNS;
-        let mut block = chain.block(rows);
-        chain
+    /// The regressor of each joint's torque, rows × [`Form::width`]: the joints' standard parameters, then the motors' own
+    /// where drives are coupled.
+    pub(super) fn regressors(&self, form: &Form) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
+        let (n, rows) = (form.chain.joint_count(), self.len());
+        let links = n * COLUMNS;
+        let mut block = form.chain.block(rows);
+        form.chain
             .differential_regressor(&self.q, &self.qd, &self.qdd, &mut block)
-            .map_err(|e| DiagnoseError::Model(e.to_string()))?;
-        let column = |joint, c| block.column(joint, c).iter().copied();
+            .map_err(model_error)?;
+        let motors = self.of_motors(form)?;
         Ok((0..n)
-            .map(|j| DMatrix::from_iterator(rows, width, (0..width).flat_map(|c| column(j, c))))
+            .map(|j| {
+                let mut matrix = DMatrix::zeros(rows, form.width());
+                for c in 0..links {
+                    matrix.column_mut(c).copy_from_slice(block.column(j, c));
+                }
+                if let Some(own) = motors.get(j) {
+                    matrix.columns_mut(links, own.ncols()).copy_from(own);
+                }
+                matrix
+            })
             .collect())
+    }
+
+    /// The motors' columns in each joint's torque, rows × [`MOTOR_COLUMNS`] n; empty where every drive moves its own joint
+    /// alone. A screw beyond its reach has none: they are not numbers there, and no fit takes such a column.
+    pub(super) fn of_motors(&self, form: &Form) -> Result<Vec<DMatrix<f64>>, DiagnoseError> {
+        let Some(drives) = &form.drives else {
+            return Ok(Vec::new());
+        };
+        let n = form.chain.joint_count();
+        let width = n * MOTOR_COLUMNS;
+        let mut all = vec![DMatrix::zeros(self.len(), width); n];
+        let mut columns = vec![0.0; n * width];
+        let mut state = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+        for row in 0..self.len() {
+            for (now, lists) in state.iter_mut().zip([&self.q, &self.qd, &self.qdd]) {
+                for (to, list) in now.iter_mut().zip(lists) {
+                    *to = list[row];
+                }
+            }
+            drives
+                .motor_columns(&state[0], &state[1], &state[2], &mut columns)
+                .map_err(model_error)?;
+            for (matrix, own) in all.iter_mut().zip(columns.chunks_exact(width)) {
+                for (c, value) in own.iter().enumerate() {
+                    matrix[(row, c)] = *value;
+                }
+            }
+        }
+        Ok(all)
     }
 }

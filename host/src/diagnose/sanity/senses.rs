@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
@@ -20,19 +21,41 @@ const CLEAR: f64 = 4.0;
 /// Measured over stated gravity and inertia, where they show.
 pub(super) type Scales = (Option<Measured>, Option<Measured>);
 
+/// Columns of what friction may do to a joint: offset, dry and viscous friction of its own, then those of the motors that
+/// move it beside others.
+pub(super) fn friction(qd: &[f64], motors: Option<&DMatrix<f64>>) -> DMatrix<f64> {
+    let of_motors: Vec<(&DMatrix<f64>, usize)> = motors
+        .iter()
+        .flat_map(|own| {
+            (0..own.ncols())
+                .filter(|c| c % MOTOR_COLUMNS != motor_column::INERTIA)
+                .map(move |c| (*own, c))
+        })
+        .collect();
+    DMatrix::from_fn(qd.len(), 3 + of_motors.len(), |k, c| match c {
+        0 => 1.0,
+        1 if qd[k] == 0.0 => 0.0,
+        1 => qd[k].signum(),
+        2 => qd[k],
+        _ => {
+            let (own, column) = of_motors[c - 3];
+            own[(k, column)]
+        }
+    })
+}
+
 impl Judge<'_> {
     /// Mean of the joint's own inertia over its motion, as weights of the parameters.
     fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
-        let n = self.robot.joints.len();
         let mut still = self.rows.thinned(200);
         for column in still.qd.iter_mut().chain(&mut still.qdd) {
             column.fill(0.0);
         }
-        let without = still.regressors(&self.chain)?;
+        let without = still.regressors(&self.form)?;
         still.qdd[j].fill(1.0);
-        let with = still.regressors(&self.chain)?;
+        let with = still.regressors(&self.form)?;
         let difference = &with[j] - &without[j];
-        Ok(DVector::from_fn(n * COLUMNS, |c, _| {
+        Ok(DVector::from_fn(self.form.width(), |c, _| {
             difference.column(c).mean()
         }))
     }
@@ -42,9 +65,25 @@ impl Judge<'_> {
         let qd = &self.rows.qd[j];
         let count = qd.len().max(1) as f64;
         let squares = qd.iter().map(|v| v * v).sum::<f64>() / count;
-        let mut friction = DVector::zeros(self.robot.joints.len() * COLUMNS);
+        let mut friction = DVector::zeros(self.form.width());
         friction[j * COLUMNS + column::VISCOUS] = squares;
         friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
+        // What a coupled motor's dry friction takes it takes from all its joints; its column in this joint's torque stands for
+        // all of that. Its viscous part is in the joints' own but for what goes from one to the other, of either sign.
+        let motors = self.rows.of_motors(&self.form)?;
+        for motor in 0..motors.len() {
+            let c = motor * MOTOR_COLUMNS + motor_column::COULOMB;
+            let power = (motors.iter().zip(&self.rows.qd))
+                .flat_map(|(own, qd)| {
+                    own.column(c)
+                        .iter()
+                        .zip(qd)
+                        .map(|(y, v)| y * v)
+                        .collect::<Vec<_>>()
+                })
+                .sum::<f64>();
+            friction[self.robot.joints.len() * COLUMNS + c] = power / count;
+        }
         let loss = fit.functional(&friction);
         let varied = (about_mean(self.rows.tau[j].iter().copied()) / count).sqrt();
         let share = loss.value / (varied * squares.sqrt()).max(f64::MIN_POSITIVE);
@@ -61,7 +100,7 @@ impl Judge<'_> {
         // Each may be hidden by what the motion does not show; then the other has to be the clearer.
         let both = l < -1.5 && i < -1.5 && (l + i) / core::f64::consts::SQRT_2 < -CLEAR;
         let by_friction = l < -CLEAR && share < -0.1 && i < 3.0;
-        let by_inertia = i < -2.0 * CLEAR && share < -0.02 && l < 3.0;
+        let by_inertia = i < -1.5 * CLEAR && share < -0.02 && l < 3.0;
         if !(both || by_friction || by_inertia) || fit.unexplained() > 0.5 {
             return Ok(None);
         }
@@ -97,6 +136,35 @@ impl Judge<'_> {
         if !stated || data.len() == 0 {
             return Ok((None, None));
         }
+        let [weight, all] = self.described(data)?.map(|mut list| list.swap_remove(j));
+        let motors = data.of_motors(&self.form)?;
+        let lost = friction(&data.qd[j], motors.get(j));
+        let first = lost.ncols();
+        let x = DMatrix::from_fn(data.len(), first + 2, |k, c| match c.checked_sub(first) {
+            None => lost[(k, c)],
+            Some(0) => weight[k],
+            Some(_) => all[k] - weight[k],
+        });
+        let tau = &data.tau[j];
+        let Some(fit) = Fit::of(&x, tau, &(0..first + 2).collect::<Vec<_>>()) else {
+            return Ok((None, None));
+        };
+        let shown = |c: usize| -> Option<Measured> {
+            let order: Vec<usize> = (0..first + 2).filter(|o| *o != c).collect();
+            let without = Fit::of(&x, tau, &order)?.unexplained();
+            fit.parameter(c)
+                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
+        };
+        // A description that explains little of the torque is no scale for it.
+        let whole = fit.unexplained() < 0.2;
+        Ok((
+            shown(first).filter(|_| whole),
+            shown(first + 1).filter(|_| whole),
+        ))
+    }
+
+    /// Weight and, with it, all that links and rotors need by the description along these rows, joint by joint; no friction.
+    pub(super) fn described(&self, data: &Rows) -> Result<[Vec<Vec<f64>>; 2], DiagnoseError> {
         let (n, rows) = (self.robot.joints.len(), data.len());
         let mut parameters = self.robot.standard_parameters();
         for row in &mut parameters {
@@ -109,30 +177,26 @@ impl Judge<'_> {
         model
             .inverse_dynamics(&data.q, &data.qd, &data.qdd, &mut all)
             .map_err(model_error)?;
-        let own = j * rows..(j + 1) * rows;
-        let (weight, all) = (&weight[own.clone()], &all[own]);
-        let qd = &data.qd[j];
-        let x = DMatrix::from_fn(rows, 5, |k, c| match c {
-            0 => weight[k],
-            1 => all[k] - weight[k],
-            2 => qd[k],
-            3 if qd[k] == 0.0 => 0.0,
-            3 => qd[k].signum(),
-            _ => 1.0,
-        });
-        let tau = &data.tau[j];
-        let Some(fit) = Fit::of(&x, tau, &[4, 3, 2, 0, 1]) else {
-            return Ok((None, None));
+        let split = |list: &[f64]| -> Vec<Vec<f64>> {
+            (0..n)
+                .map(|j| list[j * rows..(j + 1) * rows].to_vec())
+                .collect()
         };
-        let shown = |c: usize| -> Option<Measured> {
-            let order: Vec<usize> = (0..5).filter(|o| *o != c).collect();
-            let without = Fit::of(&x, tau, &order)?.unexplained();
-            fit.parameter(c)
-                .filter(|m| m.sigmas().abs() > 5.0 && without - fit.unexplained() > 0.05)
-        };
-        // A description that explains little of the torque is no scale for it.
-        let whole = fit.unexplained() < 0.2;
-        Ok((shown(0).filter(|_| whole), shown(1).filter(|_| whole)))
+        let (weight, mut all) = (split(&weight), split(&all));
+        let rotors = self.robot.motor_parameters();
+        for (own, columns) in all.iter_mut().zip(data.of_motors(&self.form)?) {
+            for (motor, rotor) in rotors.iter().enumerate() {
+                let column = columns.column(motor * MOTOR_COLUMNS + motor_column::INERTIA);
+                let inertia = rotor[motor_column::INERTIA];
+                // Of a rotor that is not stated nothing comes, also where its column is no number.
+                if inertia != 0.0 {
+                    for (to, y) in own.iter_mut().zip(column.iter()) {
+                        *to += y * inertia;
+                    }
+                }
+            }
+        }
+        Ok([weight, all])
     }
 
     /// Factors between the recording and the description that no change of the robot makes.

@@ -4,15 +4,13 @@
 //! likely is named.
 
 use nalgebra::DMatrix;
-use rig_shared::multibody::column;
 
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
 use super::fit::{Fit, about_mean};
-use super::model::{GOOD, Judge, POOR, TRIAL, model_error};
+use super::model::{GOOD, Judge, POOR, TRIAL};
 use super::rows::Rows;
-use crate::batch::ModelBatch;
-use crate::identify::chain_of;
+use super::senses::friction;
 use crate::robot::Joint;
 
 /// Rise of the logarithm of the residuals' variances, summed over the joints, from which on an undone fault is believed: as
@@ -187,7 +185,7 @@ impl Judge<'_> {
 
     fn left_of_parameters(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
         let (n, count) = (rows.tau.len(), rows.len());
-        let matrices = rows.regressors(&self.chain)?;
+        let matrices = rows.regressors(&self.form)?;
         // A still torque has no variance to explain.
         let size: Vec<f64> = (rows.tau.iter())
             .map(|tau| {
@@ -211,30 +209,17 @@ impl Judge<'_> {
     }
 
     fn left_of_description(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
-        let (n, count) = (self.robot.joints.len(), rows.len());
-        let mut parameters = self.robot.standard_parameters();
-        for row in &mut parameters {
-            row[column::VISCOUS..].fill(0.0);
-        }
-        let chain = chain_of(self.robot).map_err(model_error)?;
-        let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
-        let mut all = vec![0.0; n * count];
-        model
-            .inverse_dynamics(&rows.q, &rows.qd, &rows.qdd, &mut all)
-            .map_err(model_error)?;
+        let n = self.robot.joints.len();
+        let [_, all] = self.described(rows)?;
+        let motors = rows.of_motors(&self.form)?;
         let share = |j: usize| {
-            let qd = &rows.qd[j];
-            let friction = DMatrix::from_fn(count, 3, |k, c| match c {
-                0 => qd[k],
-                1 if qd[k] == 0.0 => 0.0,
-                1 => qd[k].signum(),
-                _ => 1.0,
-            });
-            let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j * count..]))
+            let friction = friction(&rows.qd[j], motors.get(j));
+            let order: Vec<usize> = (0..friction.ncols()).collect();
+            let rest: Vec<f64> = (rows.tau[j].iter().zip(&all[j]))
                 .map(|(tau, own)| tau - own)
                 .collect();
             let total = about_mean(rows.tau[j].iter().copied()).max(f64::MIN_POSITIVE);
-            let squares = Fit::of(&friction, &rest, &[2, 1, 0]).map_or_else(
+            let squares = Fit::of(&friction, &rest, &order).map_or_else(
                 || about_mean(rest.iter().copied()),
                 |fit| fit.residual.norm_squared(),
             );

@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod windows;
+
 use std::path::{Path, PathBuf};
 
 use super::*;
@@ -206,8 +208,8 @@ fn faults_of_two_real_links_are_named() {
     let Some((robot, runs)) = one("dfki") else {
         return;
     };
-    only(&robot, &tau(&runs, 0, -1.0), "sign", 0, "opposite");
-    only(&robot, &tau(&runs, 1, -1.0), "sign", 1, "opposite");
+    only(&robot, &tau(&runs, 0, -1.0), "sign", 0, "tau1");
+    only(&robot, &tau(&runs, 1, -1.0), "sign", 1, "tau2");
     only(&robot, &q(&runs, 0, 57.296), "unit", 0, "degrees");
     let rpm = injured(&runs, |r| {
         let velocity = r.joints[0].measured_velocity.as_mut().unwrap();

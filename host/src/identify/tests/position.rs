@@ -2,6 +2,8 @@
 
 use super::arms::{Noise, arm, record};
 use super::*;
+use crate::data::{Block, JointColumns};
+use crate::excite::{SampledReference, replay};
 use crate::identify::identified_robot;
 
 const STIFFNESS: f64 = 0.4;
@@ -150,4 +152,76 @@ fn a_tilted_base_is_found_and_a_level_one_is_not() {
         let (written, _) = identified_robot(&robot, &found);
         assert_eq!(written.gravity, tilted.gravity);
     }
+}
+
+/// What friction leaves at reversals grows into evidence for anything when the recording is long enough; what is too small to
+/// matter is not taken for it.
+#[test]
+fn a_long_recording_has_no_terms_that_do_not_matter() {
+    let robot = Robot::from_toml(
+        crate::robot::template("irp6").unwrap(),
+        std::path::Path::new("irp6.toml"),
+    )
+    .unwrap();
+    let n = robot.joints.len();
+    let (period, seconds) = (2e-3, 600.0);
+    let middle = robot.middle_position();
+    let reference = SampledReference {
+        period,
+        position: (0..n)
+            .map(|j| {
+                let way = |t: f64| -> f64 {
+                    (1..=5)
+                        .map(|h| {
+                            let turns = f64::from(h) * t / 7.5;
+                            let phase = ((5 * j) as f64 + 3.0 * f64::from(h)) * 0.71;
+                            0.07 * ((std::f64::consts::TAU * turns + phase).sin() - phase.sin())
+                        })
+                        .sum()
+                };
+                let ease = |t: f64| (t / 2.0).min(1.0).powi(2) * (3.0 - 2.0 * (t / 2.0).min(1.0));
+                (0..(seconds / period) as usize)
+                    .map(|k| k as f64 * period)
+                    .map(|t| middle[j] + ease(t) * way(t))
+                    .collect()
+            })
+            .collect(),
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+    };
+    let noise = crate::excite::Noise {
+        position: 1e-5,
+        velocity: 0.0,
+        torque: 0.5,
+    };
+    let made = replay(&robot, &reference, noise, 1, |_, _| ()).unwrap();
+    let count = made.motion.q[0].len();
+    let block = Block {
+        t: (0..count).map(|k| k as f64 * period).collect(),
+        joints: (0..n)
+            .map(|j| JointColumns {
+                q: made.motion.q[j].clone(),
+                tau: made.motion.tau[j].clone(),
+                ..JointColumns::default()
+            })
+            .collect(),
+        first_line: 2,
+        ..Block::default()
+    };
+    let recording = InMemory {
+        label: "long".into(),
+        blocks: vec![block],
+    };
+    let options = Options {
+        estimator: Estimator::Consistent,
+        look_beyond: true,
+        ..Default::default()
+    };
+    let found = identify(&robot, &[&recording], &[], &options).unwrap();
+    assert!(found.base_tilt.is_none(), "{:?}", found.base_tilt);
+    assert!(
+        found.position_torques.is_empty(),
+        "{:?}",
+        found.position_torques
+    );
 }
