@@ -361,9 +361,9 @@ mod tests {
     fn gaps_are_heard_once_however_often_a_recording_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
-        let rows: String = (0..400)
+        let rows: String = (0..3000)
             .filter(|k| !(100..150).contains(k))
-            .filter(|k| *k <= 300 || k % 2 == 0)
+            .filter(|k| *k <= 2800 || k % 2 == 0)
             .map(|k| format!("{},0,0\n", f64::from(k) * 1e-3))
             .collect();
         std::fs::write(&path, format!("t,q1,tau1\n{rows}")).unwrap();
@@ -377,7 +377,7 @@ mod tests {
             let heard = inputs.heard();
             assert_eq!(heard.len(), SAID + 1, "{heard:?}");
             assert!(heard[0].contains("line 102") && heard[0].contains("0.050000 s are missing"));
-            assert!(heard[SAID].contains(" 45 more "), "{}", heard[SAID]);
+            assert!(heard[SAID].contains(" 95 more "), "{}", heard[SAID]);
         }
     }
 }
