@@ -8,7 +8,9 @@ use crate::prepare::{Motion, PrepareError};
 /// is of such.
 pub(super) const HARDLY: f64 = 1.0 / 3.0;
 /// Share of a window that a shaft may stay in it: friction there is whatever holds the shaft, anything between its two signs.
-const STAYING: f64 = 0.05;
+/// By judgement: of a three-joint arm that sticks up to half a second 79 % of the 95 % intervals hold the truth without this, 86 %
+/// with it and 88 % at a third of it, where the TX40's friction then leaves its published values.
+const STAYING: f64 = 0.15;
 
 /// Whether a shaft stays for long within `all` rows, of which it is slow in `slow` and hardly moves in `hardly`.
 pub(super) fn stays(slow: usize, hardly: usize, all: usize) -> bool {
@@ -85,9 +87,9 @@ mod tests {
         for acceleration in [0.6, 2.0, 50.0] {
             assert!(!of(&|t| acceleration * t), "{acceleration}");
         }
-        // Stuck for 40 ms at a reversal; the same smoothed, so that it never quite stands; stopping and going on.
-        assert!(of(&|t: f64| t.signum() * (t.abs() - 0.02).max(0.0) * 5.0));
+        // Stuck for 80 ms at a reversal; the same smoothed, so that it never quite stands; stopping and going on.
+        assert!(of(&|t: f64| t.signum() * (t.abs() - 0.04).max(0.0) * 5.0));
         assert!(of(&|t| 100.0 * t.powi(3)));
-        assert!(of(&|t: f64| (t.abs() - 0.02).max(0.0) * 5.0));
+        assert!(of(&|t: f64| (t.abs() - 0.04).max(0.0) * 5.0));
     }
 }
