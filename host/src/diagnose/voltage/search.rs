@@ -10,8 +10,8 @@ use super::plant::{NOMINAL, Plant};
 use crate::prepare::each_of;
 use crate::robot::Robot;
 
-/// Folds of the cross-validation at most: up to so many recordings each is left out once, in whatever order they are given.
-const FOLDS: usize = 8;
+/// Folds of the cross-validation at most.
+const FOLDS: usize = 4;
 /// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
 const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
