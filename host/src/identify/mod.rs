@@ -23,6 +23,7 @@ mod consistent;
 mod covariance;
 mod describe;
 mod differential;
+mod endogeneity;
 mod essential;
 mod evaluate;
 mod evidence;
@@ -45,6 +46,7 @@ mod position;
 mod prior;
 mod problem;
 mod pseudo_inertia;
+mod recommend;
 mod repeat;
 mod residual;
 mod ridge;
@@ -71,10 +73,11 @@ pub use base::{
     transmission_of, unit,
 };
 pub use cache::RowCache;
-pub use compare::{Compared, Comparison, Endogeneity, Verdict};
+pub use compare::{Compared, Comparison};
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub use describe::identified_robot;
 pub(crate) use describe::{Combinations, redistributed};
+pub use endogeneity::{Endogeneity, Verdict};
 pub use essential::{Essential, EssentialSet};
 pub(crate) use evaluate::{Planned, torque_residuals};
 pub use factor::TriangularFactor;
