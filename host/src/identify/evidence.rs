@@ -278,6 +278,7 @@ impl Posterior {
         base
     }
 }
+
 /// Lower factor of A·Aᵀ + 1 by orthogonal transformations of A's transpose over 1 (Golub and Van Loan 2013, section 5.2).
 fn unsquared(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (m, n) = a.shape();
