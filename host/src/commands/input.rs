@@ -8,7 +8,7 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
 use crate::data::{
-    Block, EffortNeed, Implausible, KEPT_WARNINGS, Source, Warning, plausibility,
+    Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, Warning, plausibility,
     strange_references,
 };
 use crate::diagnose::outcome::About;
@@ -16,8 +16,6 @@ use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
 use crate::robot::{Description, Robot};
 
-/// Rows that are looked at for units; a recording in the wrong unit shows it at once.
-const UNIT_CHECK_ROWS: usize = 100_000;
 /// Warnings of one recording that are said one by one.
 const SAID: usize = 5;
 
@@ -119,7 +117,7 @@ impl Inputs {
     fn wrong_units(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut wrong = Vec::new();
         for source in &self.sources {
-            if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
+            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
                 let found: Vec<String> = plausibility(&block?, robot)
                     .iter()
                     .map(ToString::to_string)
@@ -150,7 +148,7 @@ impl Inputs {
             return Ok(faults);
         }
         for source in &self.sources {
-            for fault in faults_at_start(robot, source, UNIT_CHECK_ROWS)? {
+            for fault in faults_at_start(robot, source, JUDGED_ROWS)? {
                 // How large a torque should be is known from the description alone, whose masses may be stand-ins.
                 let list = if fault.about == About::TorqueScale {
                     &mut faults.doubtful
@@ -170,7 +168,7 @@ impl Inputs {
     pub(crate) fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
-            if let Some(block) = source.blocks(UNIT_CHECK_ROWS).next() {
+            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
                 let found = strange_references(&block?, robot);
                 let mut found = found.iter();
                 let Some(first) = found.next() else { continue };

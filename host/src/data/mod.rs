@@ -20,6 +20,9 @@ pub use plausibility::{Implausible, plausibility, strange_references};
 pub use source::{Blocks, KEPT_WARNINGS, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
+/// Rows at the beginning of a recording by which its columns are judged: a wrong unit or sense shows at once, and all along.
+pub(crate) const JUDGED_ROWS: usize = 100_000;
+
 /// Where the effort (torque or force) of a joint comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffortKind {

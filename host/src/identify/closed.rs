@@ -10,17 +10,15 @@ use super::prior::Prior;
 use super::problem::Problem;
 use super::twin::Companion;
 use super::{Estimator, IdentifyError};
-use crate::data::{Block, strange_references};
+use crate::data::{Block, JUDGED_ROWS, strange_references};
 use crate::effects::Effects;
-use crate::prepare::{LowPass, PrepareError};
+use crate::prepare::{LowPass, PrepareError, first_block};
 use crate::robot::{Controller, Robot};
 use crate::simulate::{Model, Motors, Stepper};
 use crate::validate::added_torque;
 
 /// Rows through which a parabola is laid for the first state of a stretch.
 const FIRST_ROWS: usize = 21;
-/// Rows of a recording by which its references are judged.
-const JUDGED_ROWS: usize = 100_000;
 /// Steps of the simulation within one sample.
 const SUBSTEPS: u32 = 4;
 /// Cut-off of the stand-in for a missing reference, as a multiple of the highest frequency of the motion.
@@ -51,21 +49,15 @@ impl References {
     fn of(problem: &Problem) -> Result<Self, IdentifyError> {
         let mut found = Self::Usable;
         for recording in problem.sources {
-            // One block decides: columns do not change within a recording.
-            let mut looked = false;
-            recording.each_block(JUDGED_ROWS, &mut |block| {
-                if !looked {
-                    looked = true;
-                    if block.joints.iter().any(|j| j.reference.is_none()) {
-                        found = Self::Missing;
-                    } else if found == Self::Usable
-                        && !strange_references(&block, problem.robot).is_empty()
-                    {
-                        found = Self::Strange;
-                    }
-                }
-                Ok(())
-            })?;
+            let Some(block) = first_block(*recording, JUDGED_ROWS)? else {
+                continue;
+            };
+            if block.joints.iter().any(|j| j.reference.is_none()) {
+                return Ok(Self::Missing);
+            }
+            if !strange_references(&block, problem.robot).is_empty() {
+                found = Self::Strange;
+            }
         }
         Ok(found)
     }

@@ -19,6 +19,29 @@ pub trait Recording {
     }
 }
 
+/// The first rows of a recording, at most `rows`, as far as they follow without a gap; none where it has none. What comes
+/// after them is not read.
+///
+/// # Errors
+/// What reading as far as that gives.
+pub(crate) fn first_block(
+    recording: &dyn Recording,
+    rows: usize,
+) -> Result<Option<Block>, PrepareError> {
+    let mut first = None;
+    let read = recording.each_block(rows, &mut |block| {
+        if block.is_empty() {
+            return Ok(());
+        }
+        first = Some(block);
+        Err(PrepareError::Stopped("enough".to_owned()))
+    });
+    match first {
+        Some(block) => Ok(Some(block)),
+        None => read.map(|()| None),
+    }
+}
+
 /// A recording held in memory.
 #[derive(Clone, Debug, Default)]
 pub struct InMemory {
@@ -227,4 +250,43 @@ pub fn each_piece(
         Ok(())
     })?;
     flush(&mut buffer, &mut offset, &mut done, segment, take)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Gives an empty block and these, then cannot be read on.
+    struct Broken(Vec<Block>);
+
+    impl Recording for Broken {
+        fn label(&self) -> String {
+            "broken".into()
+        }
+        fn each_block(
+            &self,
+            _: usize,
+            take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+        ) -> Result<(), PrepareError> {
+            take(Block::default())?;
+            self.0.iter().try_for_each(|block| take(block.clone()))?;
+            Err(PrepareError::Read("line 9 is no number".into()))
+        }
+    }
+
+    #[test]
+    fn for_its_first_rows_no_more_of_a_recording_is_read() {
+        let block = |t: f64| Block {
+            t: vec![t, t + 1.0],
+            ..Block::default()
+        };
+        let broken = Broken(vec![block(0.0), block(2.0)]);
+        assert_eq!(first_block(&broken, 100).unwrap(), Some(block(0.0)));
+        assert!(matches!(
+            first_block(&Broken(Vec::new()), 100),
+            Err(PrepareError::Read(_))
+        ));
+        assert_eq!(first_block(&InMemory::default(), 100).unwrap(), None);
+    }
 }

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
-use crate::data::{Block, Implausible, strange_references};
+use crate::data::{Block, Implausible, JUDGED_ROWS, strange_references};
 use crate::excite::REPLAY_STEP;
-use crate::prepare::{Recording, Survey};
+use crate::prepare::{Recording, Survey, first_block};
 use crate::robot::{Controller, Robot};
 use crate::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
 
@@ -244,14 +244,10 @@ fn first_reference(
     robot: &Robot,
     recording: &dyn Recording,
 ) -> Result<Result<Vec<f64>, String>, ValidateError> {
-    let mut found = None;
-    recording.each_block(1 << 16, &mut |block| {
-        if found.is_none() && !block.is_empty() {
-            found = Some(of_block(robot, &block));
-        }
-        Ok(())
-    })?;
-    Ok(found.unwrap_or_else(|| Err("The recording has no rows.".to_owned())))
+    Ok(first_block(recording, JUDGED_ROWS)?.map_or_else(
+        || Err("The recording has no rows.".to_owned()),
+        |block| of_block(robot, &block),
+    ))
 }
 
 fn no_reference(joint: &str, j: usize) -> String {
