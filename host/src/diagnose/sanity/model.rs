@@ -44,7 +44,7 @@ pub(super) struct Judge<'a> {
     pub(super) form: Form,
     pub(super) rows: Rows,
     pub(super) order: Vec<usize>,
-    matrices: Vec<DMatrix<f64>>,
+    pub(super) matrices: Vec<DMatrix<f64>>,
     pub(super) fits: Vec<Option<Fit>>,
 }
 
@@ -96,11 +96,14 @@ impl<'a> Judge<'a> {
         if !scaled.is_empty() {
             return Ok(scaled);
         }
+        // What states any joint's torque states the last's.
+        let described = self.stated(&self.rows, n.saturating_sub(1))?;
+        let described = described.as_ref();
         let mut found = Vec::new();
         for j in 0..n {
-            found.extend(self.against_description(j)?);
+            found.extend(self.against_description(j, described)?);
             if found.iter().all(|f: &DataFault| f.joint != self.name(j))
-                && let Some(fault) = self.sign(j)?
+                && let Some(fault) = self.sign(j, described)?
             {
                 found.push(fault);
             }
@@ -294,7 +297,7 @@ impl<'a> Judge<'a> {
     /// How far gravity and inertia of these rows are from the description's, as the sum of their logarithms; 0 where
     /// it states none.
     fn misses(&self, rows: &Rows, j: usize) -> Result<f64, DiagnoseError> {
-        let (gravity, inertia) = self.scales_of(rows, j)?;
+        let (gravity, inertia) = self.scales(rows, j, self.stated(rows, j)?.as_ref());
         let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
         Ok(miss(gravity) + miss(inertia))
     }

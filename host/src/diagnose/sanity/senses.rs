@@ -12,6 +12,7 @@ use super::names;
 use super::rows::Rows;
 use crate::batch::ModelBatch;
 use crate::identify::chain_of;
+use crate::robot::Joint;
 
 /// Parameters change by less than this factor; units and ratios by more.
 const CHANGE: f64 = 5.0;
@@ -20,6 +21,15 @@ const CLEAR: f64 = 4.0;
 
 /// Measured over stated gravity and inertia, where they show.
 pub(super) type Scales = (Option<Measured>, Option<Measured>);
+
+/// What the description says of rows, joint by joint; no friction.
+pub(super) struct Described {
+    weight: Vec<Vec<f64>>,
+    /// Weight and all that links and rotors need beside it.
+    pub(super) all: Vec<Vec<f64>>,
+    /// The motors' columns, see [`Rows::of_motors`].
+    pub(super) motors: Vec<DMatrix<f64>>,
+}
 
 /// Columns of what friction may do to a joint: offset, dry and viscous friction of its own, then those of the motors that
 /// move it beside others.
@@ -70,19 +80,12 @@ impl Judge<'_> {
         friction[j * COLUMNS + column::COULOMB] = qd.iter().map(|v| v.abs()).sum::<f64>() / count;
         // What a coupled motor's dry friction takes it takes from all its joints; its column in this joint's torque stands for
         // all of that. Its viscous part is in the joints' own but for what goes from one to the other, of either sign.
-        let motors = self.rows.of_motors(&self.form)?;
-        for motor in 0..motors.len() {
-            let c = motor * MOTOR_COLUMNS + motor_column::COULOMB;
-            let power = (motors.iter().zip(&self.rows.qd))
-                .flat_map(|(own, qd)| {
-                    own.column(c)
-                        .iter()
-                        .zip(qd)
-                        .map(|(y, v)| y * v)
-                        .collect::<Vec<_>>()
-                })
+        let motors = self.robot.joints.len() * COLUMNS..self.form.width();
+        for c in motors.skip(motor_column::COULOMB).step_by(MOTOR_COLUMNS) {
+            let power = (self.matrices.iter().zip(&self.rows.qd))
+                .flat_map(|(own, qd)| qd.iter().enumerate().map(move |(k, v)| own[(k, c)] * v))
                 .sum::<f64>();
-            friction[self.robot.joints.len() * COLUMNS + c] = power / count;
+            friction[c] = power / count;
         }
         let loss = fit.functional(&friction);
         let varied = (about_mean(self.rows.tau[j].iter().copied()) / count).sqrt();
@@ -91,7 +94,11 @@ impl Judge<'_> {
     }
 
     /// Friction that drives and inertia that pulls: torque and motion are counted in opposite senses.
-    pub(super) fn sign(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+    pub(super) fn sign(
+        &self,
+        j: usize,
+        described: Option<&Described>,
+    ) -> Result<Option<DataFault>, DiagnoseError> {
         let Some(fit) = self.fits[j].as_ref() else {
             return Ok(None);
         };
@@ -105,7 +112,7 @@ impl Judge<'_> {
             return Ok(None);
         }
         let n = j + 1;
-        let which = match self.scales(j)?.0 {
+        let which = match self.scales(&self.rows, j, described).0 {
             Some(gravity) if gravity.value > 0.0 => {
                 format!("gravity has the right sense, so reverse q{n}")
             }
@@ -125,20 +132,12 @@ impl Judge<'_> {
 
     /// Measured gravity and measured inertia over the description's, where the description states them and the motion
     /// shows them.
-    fn scales(&self, j: usize) -> Result<Scales, DiagnoseError> {
-        self.scales_of(&self.rows, j)
-    }
-
-    pub(super) fn scales_of(&self, data: &Rows, j: usize) -> Result<Scales, DiagnoseError> {
-        let stated = self.robot.joints[j..]
-            .iter()
-            .all(|joint| joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
-        if !stated || data.len() == 0 {
-            return Ok((None, None));
-        }
-        let [weight, all] = self.described(data)?.map(|mut list| list.swap_remove(j));
-        let motors = data.of_motors(&self.form)?;
-        let lost = friction(&data.qd[j], motors.get(j));
+    pub(super) fn scales(&self, data: &Rows, j: usize, described: Option<&Described>) -> Scales {
+        let Some(described) = described.filter(|_| self.states_from(j)) else {
+            return (None, None);
+        };
+        let (weight, all) = (&described.weight[j], &described.all[j]);
+        let lost = friction(&data.qd[j], described.motors.get(j));
         let first = lost.ncols();
         let x = DMatrix::from_fn(data.len(), first + 2, |k, c| match c.checked_sub(first) {
             None => lost[(k, c)],
@@ -147,7 +146,7 @@ impl Judge<'_> {
         });
         let tau = &data.tau[j];
         let Some(fit) = Fit::of(&x, tau, &(0..first + 2).collect::<Vec<_>>()) else {
-            return Ok((None, None));
+            return (None, None);
         };
         let shown = |c: usize| -> Option<Measured> {
             let order: Vec<usize> = (0..first + 2).filter(|o| *o != c).collect();
@@ -157,14 +156,28 @@ impl Judge<'_> {
         };
         // A description that explains little of the torque is no scale for it.
         let whole = fit.unexplained() < 0.2;
-        Ok((
+        (
             shown(first).filter(|_| whole),
             shown(first + 1).filter(|_| whole),
-        ))
+        )
     }
 
-    /// Weight and, with it, all that links and rotors need by the description along these rows, joint by joint; no friction.
-    pub(super) fn described(&self, data: &Rows) -> Result<[Vec<Vec<f64>>; 2], DiagnoseError> {
+    /// Whether the description states the links from joint `j` outwards, all that its torque moves.
+    pub(super) fn states_from(&self, j: usize) -> bool {
+        let stated = |joint: &Joint| joint.inertial.as_ref().is_some_and(|i| i.mass > 0.0);
+        self.robot.joints[j..].iter().all(stated)
+    }
+
+    /// What the description says of these rows; none where there are none or it does not state joint `j`'s torque.
+    pub(super) fn stated(&self, data: &Rows, j: usize) -> Result<Option<Described>, DiagnoseError> {
+        if data.len() == 0 || !self.states_from(j) {
+            return Ok(None);
+        }
+        self.described(data).map(Some)
+    }
+
+    /// What the description says of these rows.
+    pub(super) fn described(&self, data: &Rows) -> Result<Described, DiagnoseError> {
         let (n, rows) = (self.robot.joints.len(), data.len());
         let mut parameters = self.robot.standard_parameters();
         for row in &mut parameters {
@@ -184,7 +197,8 @@ impl Judge<'_> {
         };
         let (weight, mut all) = (split(&weight), split(&all));
         let rotors = self.robot.motor_parameters();
-        for (own, columns) in all.iter_mut().zip(data.of_motors(&self.form)?) {
+        let motors = data.of_motors(&self.form)?;
+        for (own, columns) in all.iter_mut().zip(&motors) {
             for (motor, rotor) in rotors.iter().enumerate() {
                 let column = columns.column(motor * MOTOR_COLUMNS + motor_column::INERTIA);
                 let inertia = rotor[motor_column::INERTIA];
@@ -196,13 +210,21 @@ impl Judge<'_> {
                 }
             }
         }
-        Ok([weight, all])
+        Ok(Described {
+            weight,
+            all,
+            motors,
+        })
     }
 
     /// Factors between the recording and the description that no change of the robot makes.
-    pub(super) fn against_description(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+    pub(super) fn against_description(
+        &self,
+        j: usize,
+        described: Option<&Described>,
+    ) -> Result<Option<DataFault>, DiagnoseError> {
         let joint = &self.robot.joints[j];
-        let (gravity, inertia) = self.scales(j)?;
+        let (gravity, inertia) = self.scales(&self.rows, j, described);
         // What the description does not state of the drive makes the inertia larger, never smaller.
         let complete = joint
             .drive
@@ -246,7 +268,7 @@ impl Judge<'_> {
                     ),
                 ))
             }
-            (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j)?.is_none() => {
+            (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j, described)?.is_none() => {
                 let held = match self.fits[j].as_ref() {
                     Some(fit) => {
                         let (loss, _, own) = self.senses(j, fit)?;

@@ -10,8 +10,7 @@ use super::super::outcome::{About, DataFault};
 use super::fit::{Fit, about_mean};
 use super::model::{GOOD, Judge, POOR, TRIAL};
 use super::rows::Rows;
-use super::senses::friction;
-use crate::robot::Joint;
+use super::senses::{Described, friction};
 
 /// Rise of the logarithm of the residuals' variances, summed over the joints, from which on an undone fault is believed: as
 /// if one joint's variance fell to a tenth. A description may be far off, and a fault undone may by chance bring it nearer.
@@ -80,7 +79,7 @@ impl Judge<'_> {
                 twin: false,
             });
         }
-        let enough = if self.stated() {
+        let enough = if self.states_from(0) {
             CONVINCING_TO_DESCRIPTION
         } else {
             CONVINCING_TO_FIT
@@ -167,16 +166,10 @@ impl Judge<'_> {
         self.robot.joints[joint].gear_ratio()
     }
 
-    /// Whether the description states every link.
-    fn stated(&self) -> bool {
-        let stated = |j: &Joint| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0);
-        self.robot.joints.iter().all(stated)
-    }
-
     /// Share of each torque's variance that is left: by the description as it stands where it states every link, which has few
     /// numbers to fit, else by one set of parameters for all joints.
     fn left(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
-        if self.stated() {
+        if self.states_from(0) {
             self.left_of_description(rows)
         } else {
             self.left_of_parameters(rows)
@@ -210,8 +203,7 @@ impl Judge<'_> {
 
     fn left_of_description(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
         let n = self.robot.joints.len();
-        let [_, all] = self.described(rows)?;
-        let motors = rows.of_motors(&self.form)?;
+        let Described { all, motors, .. } = self.described(rows)?;
         let share = |j: usize| {
             let friction = friction(&rows.qd[j], motors.get(j));
             let order: Vec<usize> = (0..friction.ncols()).collect();
