@@ -7,7 +7,6 @@ use rig_shared::multibody::{inverse_dynamics, kinetic_energy, potential_energy};
 use rig_shared::scalar::Real as _;
 
 use super::*;
-use crate::data::{Block, JointColumns};
 use crate::identify::identify;
 use crate::prepare::InMemory;
 use crate::robot::{Controller, ONE_LINK_TEMPLATE, RobotEffect};
@@ -174,9 +173,8 @@ fn a_halved_step_converges_with_each_effect() {
 /// A closed loop of ten seconds at 1 kHz.
 fn recorded(robot: &Robot) -> InMemory {
     let period = 1e-3;
-    let t: Vec<f64> = (0..10_000).map(|k| f64::from(k) * period).collect();
-    let reference: Vec<f64> = t
-        .iter()
+    let reference: Vec<f64> = (0..10_000)
+        .map(|k| f64::from(k) * period)
         .map(|t| 0.9 * (1.0 - (1.3 * t).cos()) + 0.4 * (3.7 * t).sin().powi(2) - 1.0)
         .collect();
     let model = Model::from_robot(robot).unwrap();
@@ -189,20 +187,10 @@ fn recorded(robot: &Robot) -> InMemory {
         substeps: 8,
     };
     let controllers = [robot.joints[0].controller.clone().unwrap()];
-    let mut motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();
+    let motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();
     InMemory {
         label: "made".into(),
-        blocks: vec![Block {
-            joints: vec![JointColumns {
-                q: motion.q.remove(0),
-                tau: motion.tau.remove(0),
-                reference: Some(reference),
-                ..JointColumns::default()
-            }],
-            t,
-            first_line: 2,
-            ..Block::default()
-        }],
+        blocks: vec![motion.recorded(period, std::slice::from_ref(&reference))],
     }
 }
 

@@ -1,7 +1,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use crate::data::{Block as Rows, JointColumns};
 use crate::identify::{FrictionFit, FrictionMap, FrictionPoint, Options, identify};
 use crate::prepare::InMemory;
 use crate::report::render;
@@ -25,9 +24,8 @@ fn robot() -> Robot {
 
 /// Thirty seconds of its own closed loop, the torque with a ripple that no model has.
 fn recording(robot: &Robot) -> InMemory {
-    let t: Vec<f64> = (0..30_000).map(|k| f64::from(k) * 1e-3).collect();
-    let reference: Vec<f64> = t
-        .iter()
+    let reference: Vec<f64> = (0..30_000)
+        .map(|k| f64::from(k) * 1e-3)
         .map(|t| 0.8 * (1.0 - (1.3 * t).cos()) + 0.3 * (3.7 * t).sin().powi(2))
         .collect();
     let model = Model::from_robot(robot).unwrap();
@@ -40,26 +38,13 @@ fn recording(robot: &Robot) -> InMemory {
         v: &[0.0],
         substeps: 4,
     };
-    let motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();
-    let tau = motion.tau[0]
-        .iter()
-        .enumerate()
-        .map(|(k, tau)| tau + 0.02 * (0.37 * k as f64).sin())
-        .collect();
+    let mut motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();
+    for (k, tau) in motion.tau[0].iter_mut().enumerate() {
+        *tau += 0.02 * (0.37 * k as f64).sin();
+    }
     InMemory {
         label: "made <b>up</b>.csv".into(),
-        blocks: vec![Rows {
-            t,
-            joints: vec![JointColumns {
-                q: motion.q[0].clone(),
-                tau,
-                reference: Some(reference),
-                ..JointColumns::default()
-            }],
-            extra: Vec::new(),
-            first_line: 2,
-            continues: false,
-        }],
+        blocks: vec![motion.recorded(1e-3, std::slice::from_ref(&reference))],
     }
 }
 

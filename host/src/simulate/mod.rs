@@ -306,6 +306,28 @@ pub struct Motion {
     pub saturated: Vec<usize>,
 }
 
+#[cfg(test)]
+impl Motion {
+    /// As a recording would hold it: t, and per joint q, tau and ref, the last where `reference` has it.
+    pub(crate) fn recorded(self, period: f64, reference: &[Vec<f64>]) -> crate::data::Block {
+        let rows = self.q.first().map_or(0, Vec::len);
+        let joints = self.q.into_iter().zip(self.tau).enumerate();
+        crate::data::Block {
+            t: (0..rows).map(|k| k as f64 * period).collect(),
+            joints: joints
+                .map(|(j, (q, tau))| crate::data::JointColumns {
+                    q,
+                    tau,
+                    reference: reference.get(j).cloned(),
+                    ..Default::default()
+                })
+                .collect(),
+            first_line: 2,
+            ..Default::default()
+        }
+    }
+}
+
 /// Simulates the closed loop over all samples of the reference. `progress` is told how many are done.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::data::{Block, JointColumns};
+use crate::data::Block;
 use crate::excite::{Noise, SampledReference, replay};
 use crate::prepare::{Choice, InMemory};
 use crate::robot::{Controller, JointFriction};
@@ -66,24 +66,14 @@ fn simulated(robot: &Robot, added: f64) -> Block {
         |_| (),
     )
     .unwrap();
-    let tau = motion.tau[0]
-        .iter()
-        .zip(&pulses)
-        .map(|(a, b)| a + b)
-        .collect();
-    Block {
-        t,
-        joints: vec![JointColumns {
-            q: motion.q[0].clone(),
-            tau,
-            reference: Some(reference),
-            qd: Some(motion.qd[0].clone()),
-            ..JointColumns::default()
-        }],
-        extra: vec![("added1".into(), pulses)],
-        first_line: 2,
-        continues: false,
+    let speed = motion.qd[0].clone();
+    let mut block = motion.recorded(period, &[reference]);
+    for (tau, added) in block.joints[0].tau.iter_mut().zip(&pulses) {
+        *tau += added;
     }
+    block.joints[0].qd = Some(speed);
+    block.extra = vec![("added1".into(), pulses)];
+    block
 }
 
 fn run(robot: &Robot, block: Block) -> Validation {
@@ -183,19 +173,9 @@ fn what_the_stand_in_made_it_makes_again() {
         joint.controller = None;
     }
     let n = robot.joints.len();
-    let period = 1e-3;
-    let middle = robot.middle_position();
-    let reference = SampledReference {
-        period,
-        position: (0..n)
-            .map(|j| {
-                let at = |k: u32| (f64::from(k) * period * (2.0 + j as f64)).sin();
-                (0..6000).map(|k| middle[j] + 0.3 * at(k)).collect()
-            })
-            .collect(),
-        velocity: Vec::new(),
-        acceleration: Vec::new(),
-    };
+    let reference = SampledReference::about_middle(&robot, 1e-3, 6.0, |j, t| {
+        0.3 * (t * (2.0 + j as f64)).sin()
+    });
     let noise = Noise {
         position: 0.0,
         velocity: 0.0,

@@ -21,6 +21,50 @@ pub struct SampledReference {
     pub acceleration: Vec<Vec<f64>>,
 }
 
+#[cfg(test)]
+impl SampledReference {
+    /// Positions alone: `way(joint, t)` from the middle of each joint's range.
+    pub(crate) fn about_middle(
+        robot: &Robot,
+        period: f64,
+        seconds: f64,
+        way: impl Fn(usize, f64) -> f64,
+    ) -> Self {
+        let rows = (seconds / period).round() as usize;
+        let position = (robot.middle_position().iter().enumerate())
+            .map(|(j, middle)| {
+                let instants = (0..rows).map(|k| k as f64 * period);
+                instants.map(|t| middle + way(j, t)).collect()
+            })
+            .collect();
+        Self {
+            period,
+            position,
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+        }
+    }
+
+    /// `count` sines of `size` rad or m a joint, the slowest of `slowest` seconds and of `phase(joint, harmonic)` rad, eased
+    /// in over two seconds: at rest in the middle where it begins.
+    pub(crate) fn eased_sines(
+        robot: &Robot,
+        [period, seconds]: [f64; 2],
+        (count, size, slowest): (u32, f64, f64),
+        phase: impl Fn(usize, u32) -> f64,
+    ) -> Self {
+        let turn = core::f64::consts::TAU / slowest;
+        Self::about_middle(robot, period, seconds, |j, t| {
+            let share = (t / 2.0).min(1.0);
+            let sines = (1..=count).map(|h| {
+                let phase = phase(j, h);
+                (turn * f64::from(h) * t + phase).sin() - phase.sin()
+            });
+            share.powi(2) * (3.0 - 2.0 * share) * size * sines.sum::<f64>()
+        })
+    }
+}
+
 impl TrajectoryFile {
     /// The reference at evenly spaced instants, from the first to the last within the motion and one beyond, where
     /// all joints stand again.

@@ -61,30 +61,17 @@ fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, In
         v: &v,
         substeps: 2,
     };
-    let motion = closed_loop(&robot, &model, &list, &inputs, |_| ()).unwrap();
-    let mut noisy = |clean: &[f64], size: f64| -> Vec<f64> {
-        let rows = clean.iter();
-        rows.map(|x| x + size * chance.normal()).collect()
+    let mut motion = closed_loop(&robot, &model, &list, &inputs, |_| ()).unwrap();
+    let mut disturb = |list: &mut [f64], size: f64| {
+        list.iter_mut().for_each(|x| *x += size * chance.normal());
     };
-    let joints = (0..q.len())
-        .map(|j| JointColumns {
-            q: noisy(&motion.q[j], position),
-            tau: noisy(&motion.tau[j], torque * limits[j].torque.unwrap()),
-            reference: Some(reference[j].clone()),
-            ..Default::default()
-        })
-        .collect();
-    let block = Block {
-        t: (0..reference[0].len())
-            .map(|i| i as f64 / LENGTH.1)
-            .collect(),
-        joints,
-        first_line: 2,
-        ..Default::default()
-    };
+    for (j, limits) in limits.iter().enumerate() {
+        disturb(&mut motion.q[j], position);
+        disturb(&mut motion.tau[j], torque * limits.torque.unwrap());
+    }
     let recording = InMemory {
         label: format!("driven {seed}"),
-        blocks: vec![block],
+        blocks: vec![motion.recorded(inputs.period, &reference)],
     };
     (robot, recording)
 }

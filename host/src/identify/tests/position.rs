@@ -2,7 +2,6 @@
 
 use super::arms::{Noise, arm, record};
 use super::*;
-use crate::data::{Block, JointColumns};
 use crate::excite::{SampledReference, replay};
 use crate::identify::identified_robot;
 
@@ -163,54 +162,19 @@ fn a_long_recording_has_no_terms_that_do_not_matter() {
         std::path::Path::new("irp6.toml"),
     )
     .unwrap();
-    let n = robot.joints.len();
-    let (period, seconds) = (2e-3, 600.0);
-    let middle = robot.middle_position();
-    let reference = SampledReference {
-        period,
-        position: (0..n)
-            .map(|j| {
-                let way = |t: f64| -> f64 {
-                    (1..=5)
-                        .map(|h| {
-                            let turns = f64::from(h) * t / 7.5;
-                            let phase = ((5 * j) as f64 + 3.0 * f64::from(h)) * 0.71;
-                            0.07 * ((std::f64::consts::TAU * turns + phase).sin() - phase.sin())
-                        })
-                        .sum()
-                };
-                let ease = |t: f64| (t / 2.0).min(1.0).powi(2) * (3.0 - 2.0 * (t / 2.0).min(1.0));
-                (0..(seconds / period) as usize)
-                    .map(|k| k as f64 * period)
-                    .map(|t| middle[j] + ease(t) * way(t))
-                    .collect()
-            })
-            .collect(),
-        velocity: Vec::new(),
-        acceleration: Vec::new(),
-    };
+    let period = 2e-3;
+    let phase = |j: usize, h: u32| ((5 * j) as f64 + 3.0 * f64::from(h)) * 0.71;
+    let sines = (5, 0.07, 7.5);
+    let reference = SampledReference::eased_sines(&robot, [period, 600.0], sines, phase);
     let noise = crate::excite::Noise {
         position: 1e-5,
         velocity: 0.0,
         torque: 0.5,
     };
     let made = replay(&robot, &reference, noise, 1, |_, _| ()).unwrap();
-    let count = made.motion.q[0].len();
-    let block = Block {
-        t: (0..count).map(|k| k as f64 * period).collect(),
-        joints: (0..n)
-            .map(|j| JointColumns {
-                q: made.motion.q[j].clone(),
-                tau: made.motion.tau[j].clone(),
-                ..JointColumns::default()
-            })
-            .collect(),
-        first_line: 2,
-        ..Block::default()
-    };
     let recording = InMemory {
         label: "long".into(),
-        blocks: vec![block],
+        blocks: vec![made.motion.recorded(period, &[])],
     };
     let options = Options {
         estimator: Estimator::Consistent,

@@ -1,6 +1,7 @@
 //! Sound recordings that are short, or of drives that move several joints: none is accused.
 
 use super::*;
+use crate::excite::SampledReference;
 
 /// The TX40 with friction of its own in every motor, its coupled sixth too, on a motion of `seconds`.
 fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
@@ -20,33 +21,12 @@ fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) 
             drive.viscous = 2.0 / drive.gear_ratio.powi(2);
         }
     }
-    let period = 2e-3;
-    let middle = robot.middle_position();
-    let turn = core::f64::consts::TAU;
-    let reference = crate::excite::SampledReference {
-        period,
-        position: (0..robot.joints.len())
-            .map(|j| {
-                let way = |t: f64| -> f64 {
-                    (1..=4)
-                        .map(|h| {
-                            let phase =
-                                turn * ((seed + 3) as f64 * (7 * j + 3 * h) as f64 * 0.137).fract();
-                            0.3 * ((turn * h as f64 * t / 8.4 + phase).sin() - phase.sin())
-                        })
-                        .sum()
-                };
-                // At rest where it begins.
-                let ease = |t: f64| (t / 2.0).min(1.0).powi(2) * (3.0 - 2.0 * (t / 2.0).min(1.0));
-                (0..(seconds / period) as usize)
-                    .map(|k| k as f64 * period)
-                    .map(|t| middle[j] + ease(t) * way(t))
-                    .collect()
-            })
-            .collect(),
-        velocity: Vec::new(),
-        acceleration: Vec::new(),
+    let phase = |j: usize, h: u32| {
+        let turns = (seed + 3) as f64 * (7 * j + 3 * h as usize) as f64 * 0.137;
+        core::f64::consts::TAU * turns.fract()
     };
+    let sines = (4, 0.3, 8.4);
+    let reference = SampledReference::eased_sines(&robot, [2e-3, seconds], sines, phase);
     let noise = crate::excite::Noise {
         position: 1e-5,
         velocity: 0.0,
