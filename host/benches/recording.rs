@@ -40,30 +40,11 @@ fn six_joints() -> Robot {
         (-quarter, 0.0, 0.0),
         (quarter, 0.0, 0.0),
     ];
-    let joints = geometry
-        .iter()
-        .enumerate()
-        .map(|(j, &(alpha, a, d))| Joint {
-            name: format!("joint{}", j + 1),
-            kind: JointKind::Revolute,
-            alpha,
-            a,
-            theta: 0.0,
-            d,
-            inertial: None,
-            limits: None,
-            friction: None,
-            drive: None,
-            controller: None,
-        });
-    Robot {
-        name: "six joints".into(),
-        gravity: [0.0, 0.0, -9.81],
-        joints: joints.collect(),
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
-    }
+    let joints = geometry.iter().enumerate().map(|(j, &(alpha, a, d))| {
+        let name = format!("joint{}", j + 1);
+        Joint::new(&name, JointKind::Revolute, [alpha, a, 0.0, d])
+    });
+    Robot::new("six joints", joints.collect())
 }
 
 /// What moves in the recordings of an arm of `n` joints.

@@ -27,27 +27,14 @@ fn allocations(work: impl FnOnce()) -> usize {
 fn arm() -> Robot {
     let quarter = std::f64::consts::FRAC_PI_2;
     let geometry = [(0.0, 0.0, 0.4), (quarter, 0.1, 0.0), (0.0, 0.45, 0.05)];
-    let joint = |(j, (alpha, a, d))| Joint {
-        name: format!("joint{j}"),
-        kind: JointKind::Revolute,
-        alpha,
-        a,
-        theta: 0.0,
-        d,
-        inertial: None,
-        limits: None,
-        friction: None,
-        drive: None,
-        controller: None,
+    let joint = |(j, (alpha, a, d))| {
+        Joint::new(
+            &format!("joint{j}"),
+            JointKind::Revolute,
+            [alpha, a, 0.0, d],
+        )
     };
-    Robot {
-        name: "arm".into(),
-        gravity: [0.0, 0.0, -9.81],
-        joints: geometry.into_iter().enumerate().map(joint).collect(),
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
-    }
+    Robot::new("arm", geometry.into_iter().enumerate().map(joint).collect())
 }
 
 fn parameters(n: usize) -> Vec<[f64; COLUMNS]> {

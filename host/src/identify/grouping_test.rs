@@ -13,30 +13,14 @@ use super::{agree, grouped};
 use crate::identify::{Base, ModelKind};
 use crate::robot::{Drive, EDDA_TEMPLATE, IRP6_TEMPLATE, Joint, JointKind, Robot, TX40};
 
-fn joint(number: usize, kind: JointKind, [alpha, a, theta, d]: [f64; 4]) -> Joint {
-    Joint {
-        name: format!("joint_{number}"),
-        kind,
-        alpha,
-        a,
-        theta,
-        d,
-        inertial: None,
-        limits: None,
-        friction: None,
-        drive: None,
-        controller: None,
-    }
+fn joint(number: usize, kind: JointKind, geometry: [f64; 4]) -> Joint {
+    Joint::new(&format!("joint_{number}"), kind, geometry)
 }
 
 fn robot(gravity: [f64; 3], joints: Vec<Joint>) -> Robot {
     Robot {
-        name: "chain".into(),
         gravity,
-        joints,
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
+        ..Robot::new("chain", joints)
     }
 }
 

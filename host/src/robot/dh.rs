@@ -160,14 +160,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         joints.push(joint(body, [alpha, a, theta, d], &link));
         links.push(link);
     }
-    let robot = Robot {
-        name: chain.name.clone(),
-        gravity: [0.0, 0.0, -GRAVITY],
-        joints,
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
-    };
+    let robot = Robot::new(&chain.name, joints);
     Converted {
         robot,
         base,
@@ -176,14 +169,8 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     }
 }
 
-fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {
+fn joint(body: &Body, geometry: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {
     Joint {
-        name: body.joint.clone(),
-        kind: body.kind,
-        alpha,
-        a,
-        theta,
-        d,
         inertial: Some(body.inertia.seen_from(link_in_frame).inertial()),
         limits: body.limits.clone(),
         friction: body.friction.clone(),
@@ -191,7 +178,7 @@ fn joint(body: &Body, [alpha, a, theta, d]: [f64; 4], link_in_frame: &Isometry3<
             gear_ratio,
             ..Drive::default()
         }),
-        controller: None,
+        ..Joint::new(&body.joint, body.kind, geometry)
     }
 }
 

@@ -9,6 +9,7 @@
 mod angles;
 mod array;
 mod band;
+mod bare;
 mod bodies;
 mod check;
 mod check_drives;

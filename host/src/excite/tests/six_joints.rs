@@ -85,14 +85,7 @@ fn arm() -> Robot {
             }
         })
         .collect();
-    Robot {
-        name: "arm".into(),
-        gravity: [0.0, 0.0, -9.81],
-        joints,
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
-    }
+    Robot::new("arm", joints)
 }
 
 /// The same arm on a table and beside a slanted wall.

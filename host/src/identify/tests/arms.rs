@@ -91,7 +91,7 @@ pub(super) fn arm(n: usize, seed: u64) -> Robot {
             j
         })
         .collect();
-    robot("arm", joints)
+    Robot::new("arm", joints)
 }
 
 /// Noise of a recording.

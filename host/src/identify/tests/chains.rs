@@ -98,7 +98,7 @@ fn chain(n: usize, seed: u64) -> Robot {
             joint
         })
         .collect();
-    let mut robot = robot("chain", joints);
+    let mut robot = Robot::new("chain", joints);
     if chance.even() < -0.3 {
         robot.gravity = [3.0, -4.0, -8.4];
     }

@@ -19,7 +19,7 @@ fn base_parameters_group_as_papers_group_them() {
         // Two parallel horizontal axes, links 0.5 m apart: m2 moves to the first link with a² and a.
         let mut second = joint(JointKind::Revolute, 0.0);
         second.a = 0.5;
-        let arm = robot(
+        let arm = Robot::new(
             "arm",
             vec![
                 joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2),
@@ -481,7 +481,7 @@ fn two_links_are_identified_by_both_models() {
     let mut second = joint(JointKind::Revolute, 0.0);
     second.a = 0.5;
     second.name = "second".into();
-    let arm = robot(
+    let arm = Robot::new(
         "arm",
         vec![
             joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2),

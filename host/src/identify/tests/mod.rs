@@ -20,35 +20,12 @@ use crate::robot::{Joint, JointKind, Robot};
 use rand::{RngExt, SeedableRng};
 
 fn joint(kind: JointKind, alpha: f64) -> Joint {
-    Joint {
-        name: "axis".into(),
-        kind,
-        alpha,
-        a: 0.0,
-        theta: 0.0,
-        d: 0.0,
-        inertial: None,
-        limits: None,
-        friction: None,
-        drive: None,
-        controller: None,
-    }
-}
-
-fn robot(name: &str, joints: Vec<Joint>) -> Robot {
-    Robot {
-        name: name.into(),
-        gravity: [0.0, 0.0, -9.81],
-        joints,
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
-    }
+    Joint::new("axis", kind, [alpha, 0.0, 0.0, 0.0])
 }
 
 /// A slide along the horizontal.
 fn slide() -> Robot {
-    robot(
+    Robot::new(
         "slide",
         vec![joint(JointKind::Prismatic, std::f64::consts::FRAC_PI_2)],
     )
@@ -56,7 +33,7 @@ fn slide() -> Robot {
 
 /// A pendulum: axis horizontal, angle zero along the horizontal.
 fn pendulum() -> Robot {
-    robot(
+    Robot::new(
         "pendulum",
         vec![joint(JointKind::Revolute, std::f64::consts::FRAC_PI_2)],
     )

@@ -83,12 +83,8 @@ fn random(rng: &mut Pcg64) -> Robot {
     };
     let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
     Robot {
-        name: "r & d".into(),
         gravity: direction.map(|v| v / size * 9.81),
-        joints,
-        workspace: Vec::new(),
-        identified: None,
-        effects: Vec::new(),
+        ..Robot::new("r & d", joints)
     }
 }
 

@@ -1,0 +1,37 @@
+//! Robots of which no more than the geometry is known.
+
+use super::dh::GRAVITY;
+use super::{Joint, JointKind, Robot};
+
+impl Joint {
+    /// A joint of this geometry: alpha, a, theta and d of the modified Denavit–Hartenberg convention, rad and m.
+    pub fn new(name: &str, kind: JointKind, [alpha, a, theta, d]: [f64; 4]) -> Self {
+        Self {
+            name: name.to_owned(),
+            kind,
+            alpha,
+            a,
+            theta,
+            d,
+            inertial: None,
+            limits: None,
+            friction: None,
+            drive: None,
+            controller: None,
+        }
+    }
+}
+
+impl Robot {
+    /// Joints from the base outwards, z of the base upwards against gravity.
+    pub fn new(name: &str, joints: Vec<Joint>) -> Self {
+        Self {
+            name: name.to_owned(),
+            gravity: [0.0, 0.0, -GRAVITY],
+            joints,
+            workspace: Vec::new(),
+            effects: Vec::new(),
+            identified: None,
+        }
+    }
+}
