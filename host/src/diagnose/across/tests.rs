@@ -5,9 +5,9 @@
 
 use rig_shared::effects::{Effect as Law, Kind};
 
+use crate::diagnose::Options;
 use crate::diagnose::outcome::{Diagnosis, Fate, Step, Verdict};
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
-use crate::diagnose::{Options, diagnose};
 use crate::robot::{Robot, RobotEffect};
 
 const SOFT: Effect = Effect::JointElasticity {
@@ -27,17 +27,6 @@ fn made(hidden: &[Effect], seed: u64) -> Made {
         ..Scenario::new(hidden.collect(), seed)
     }
     .make()
-    .unwrap()
-}
-
-fn asked(made: &Made, robot: &Robot) -> (Diagnosis, Robot) {
-    diagnose(
-        robot,
-        &[&made.train, made.repeat.as_ref().unwrap()],
-        &[&made.holdout],
-        &Options::default(),
-        &mut |_| (),
-    )
     .unwrap()
 }
 
@@ -61,7 +50,7 @@ fn a_gear_that_gives_is_measured() {
         damping: 0.3,
     };
     let made = made(&[soft], seed);
-    let (found, model) = asked(&made, &made.robot);
+    let (found, model) = made.diagnosed(&made.robot, &Options::default());
     println!("{:#?}", found.words);
     assert_eq!(names(&found), ["joint_elasticity"], "{:?}", found.words);
     let step = &found.steps[0];
@@ -85,7 +74,7 @@ fn play_is_measured_and_is_no_presliding() {
     let (degrees, seed) = (0.2f64, 23);
     let gap = degrees.to_radians();
     let made = made(&[Effect::Backlash { gap }], seed);
-    let (found, _) = asked(&made, &made.robot);
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     println!("{:#?}", found.words);
     assert_eq!(names(&found), ["backlash"], "{:?}", found.words);
     let step = &found.steps[0];
@@ -98,7 +87,7 @@ fn play_is_measured_and_is_no_presliding() {
 #[test]
 fn friction_before_the_gear_leaves_the_encoders_together() {
     let made = made(&[Effect::Presliding { stroke: 0.015 }], 25);
-    let (found, _) = asked(&made, &made.robot);
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     println!("{:#?}", found.words);
     assert_eq!(names(&found), ["presliding"], "{:?}", found.words);
     assert_eq!(found.steps[0].set, ["presliding"]);
@@ -110,7 +99,7 @@ fn friction_before_the_gear_leaves_the_encoders_together() {
 #[test]
 fn with_nothing_hidden_it_says_what_it_would_have_shown() {
     let made = made(&[], 26);
-    let (found, model) = asked(&made, &made.robot);
+    let (found, model) = made.diagnosed(&made.robot, &Options::default());
     println!("{:#?}", found.words);
     assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
     assert!(found.steps.is_empty() && model.effects.is_empty());
@@ -136,7 +125,7 @@ fn a_recording_without_it_stands_beside_one_with_it() {
             block.joints[0].link = None;
         }
     }
-    let (found, _) = asked(&made, &made.robot);
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     println!("{:#?}", found.words);
     assert_eq!(names(&found), ["joint_elasticity"], "{:?}", found.words);
     let (error, holds) = off(&found.steps[0], "stiffness", 600.0);
@@ -155,7 +144,7 @@ fn a_described_gear_is_fitted_again_or_goes() {
         ..made.robot.clone()
     };
     let softer = made(&[SOFT], 29);
-    let (found, model) = asked(&softer, &described(&softer));
+    let (found, model) = softer.diagnosed(&described(&softer), &Options::default());
     assert!(found.steps.is_empty(), "{:?}", names(&found));
     assert_eq!(found.described[0].fate, Fate::FittedAgain);
     let value = &found.described[0].parameters["stiffness"];
@@ -164,7 +153,7 @@ fn a_described_gear_is_fitted_again_or_goes() {
     assert_eq!(model.effects[0].effect.shapes[0], value.value);
 
     let rigid = made(&[], 30);
-    let (found, model) = asked(&rigid, &described(&rigid));
+    let (found, model) = rigid.diagnosed(&described(&rigid), &Options::default());
     assert_eq!(found.described[0].fate, Fate::Dropped, "{:?}", found.words);
     assert!(model.effects.is_empty());
 }

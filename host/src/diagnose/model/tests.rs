@@ -8,7 +8,7 @@ use rig_shared::effects::Kind;
 
 use crate::diagnose::bench::treatment_of;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
-use crate::diagnose::{Diagnosis, Options, diagnose};
+use crate::diagnose::{Diagnosis, Options};
 use crate::prepare::{Choice, PrepareOptions, Recording};
 use crate::robot::Robot;
 use crate::validate::{Options as Checks, validate};
@@ -21,18 +21,12 @@ fn found(effect: Effect, seed: u64) -> (Made, Diagnosis, Robot) {
     }
     .make()
     .unwrap();
-    let (diagnosis, model) = diagnose(
-        &made.robot,
-        &[&made.train, made.repeat.as_ref().unwrap()],
-        &[&made.holdout],
-        &Options {
-            // A torque check leaves these out.
-            without: vec![Kind::Backlash, Kind::JointElasticity],
-            ..Options::default()
-        },
-        &mut |_| (),
-    )
-    .unwrap();
+    let options = Options {
+        // A torque check leaves these out.
+        without: vec![Kind::Backlash, Kind::JointElasticity],
+        ..Options::default()
+    };
+    let (diagnosis, model) = made.diagnosed(&made.robot, &options);
     // As it is read from the file.
     let text = model.to_toml().unwrap();
     let read = Robot::from_toml(&text, Path::new("model.toml")).unwrap();

@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+use crate::diagnose::Options;
 use crate::diagnose::outcome::Detectable;
 use crate::diagnose::scenario::{Effect, Hidden, Scenario};
-use crate::diagnose::{Options, diagnose};
 
 /// What shows weakening friction is the speed: before the step the residual leaves its own band, after it it does not, and
 /// the curves of the hold-out lie closer with the effect than without.
@@ -20,14 +20,7 @@ fn weakening_friction_is_drawn_over_the_speed() {
     }
     .make()
     .unwrap();
-    let (found, _) = diagnose(
-        &made.robot,
-        &[&made.train, made.repeat.as_ref().unwrap()],
-        &[&made.holdout],
-        &Options::default(),
-        &mut |_| (),
-    )
-    .unwrap();
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     assert_eq!(found.steps[0].effect, "stribeck");
     let map = found.maps.iter().find(|m| m.step == Some(0)).unwrap();
     assert_eq!(map.coordinate, "velocity");

@@ -320,6 +320,24 @@ pub struct Made {
     pub truth: Truth,
 }
 
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+impl Made {
+    /// What a diagnosis makes of these recordings and `robot`, with the repeat where there is one.
+    pub(super) fn diagnosed(
+        &self,
+        robot: &Robot,
+        options: &super::Options,
+    ) -> (super::Diagnosis, Robot) {
+        use crate::prepare::Recording;
+        let own: Vec<&dyn Recording> = core::iter::once(&self.train)
+            .chain(&self.repeat)
+            .map(|recording| recording as &dyn Recording)
+            .collect();
+        super::diagnose(robot, &own, &[&self.holdout], options, &mut |_| ()).unwrap()
+    }
+}
+
 impl Made {
     /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
     ///

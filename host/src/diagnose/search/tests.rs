@@ -5,12 +5,11 @@
 use rig_shared::effects::Kind;
 
 use crate::diagnose::scenario::{Effect, Hidden, Scenario};
-use crate::diagnose::{Diagnosis, Options, diagnose};
-use crate::prepare::Recording;
+use crate::diagnose::{Diagnosis, Options};
 
 /// What is found beside gears, which are not what is asked; `again`: the training motion recorded twice.
 fn diagnosed(effect: Effect, seed: u64, again: bool) -> (Diagnosis, f64) {
-    let made = Scenario {
+    let mut made = Scenario {
         seconds: [30.0, 20.0],
         ..Scenario::new(vec![Hidden { joint: 0, effect }], seed)
     }
@@ -20,18 +19,10 @@ fn diagnosed(effect: Effect, seed: u64, again: bool) -> (Diagnosis, f64) {
         without: vec![Kind::Backlash, Kind::JointElasticity],
         ..Options::default()
     };
-    let mut training: Vec<&dyn Recording> = vec![&made.train];
-    if again {
-        training.push(made.repeat.as_ref().unwrap());
+    if !again {
+        made.repeat = None;
     }
-    let (diagnosis, _) = diagnose(
-        &made.robot,
-        &training,
-        &[&made.holdout],
-        &options,
-        &mut |_| (),
-    )
-    .unwrap();
+    let (diagnosis, _) = made.diagnosed(&made.robot, &options);
     let drive = made.robot.joints[0].drive.as_ref().unwrap();
     (diagnosis, drive.torque_constant * drive.gear_ratio)
 }

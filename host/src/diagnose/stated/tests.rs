@@ -7,7 +7,7 @@ use std::path::Path;
 use super::*;
 use crate::diagnose::outcome::Verdict;
 use crate::diagnose::scenario::{self, Hidden, Made, Scenario};
-use crate::diagnose::{Diagnosis, Options, diagnose};
+use crate::diagnose::{Diagnosis, Options};
 
 /// Gears take most of a search and are not what is asked here.
 fn without_gears() -> Vec<Kind> {
@@ -30,10 +30,7 @@ fn diagnosed(robot: &Robot, made: &Made, without: Vec<Kind>) -> (Diagnosis, Robo
         without,
         ..Options::default()
     };
-    let training: [&dyn crate::prepare::Recording; 2] =
-        [&made.train, made.repeat.as_ref().unwrap()];
-    let (diagnosis, model) =
-        diagnose(robot, &training, &[&made.holdout], &options, &mut |_| ()).unwrap();
+    let (diagnosis, model) = made.diagnosed(robot, &options);
     // As it is read from the file.
     let read = Robot::from_toml(&model.to_toml().unwrap(), Path::new("model.toml")).unwrap();
     assert_eq!(read, model);

@@ -3,10 +3,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use crate::diagnose::outcome::{Diagnosis, Verdict};
+use crate::diagnose::outcome::Verdict;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
-use crate::diagnose::{Options, diagnose, sensor_zeros};
-use crate::robot::Robot;
+use crate::diagnose::{Options, sensor_zeros};
 use rig_shared::effects::Kind;
 
 fn made(hidden: Option<Effect>, seed: u64) -> Made {
@@ -19,21 +18,10 @@ fn made(hidden: Option<Effect>, seed: u64) -> Made {
     .unwrap()
 }
 
-fn asked(made: &Made, robot: &Robot) -> (Diagnosis, Robot) {
-    diagnose(
-        robot,
-        &[&made.train, made.repeat.as_ref().unwrap()],
-        &[&made.holdout],
-        &Options::default(),
-        &mut |_| (),
-    )
-    .unwrap()
-}
-
 #[test]
 fn a_dead_zone_shows_in_the_voltage_alone() {
     let made = made(Some(Effect::DriveDeadzone { voltage: 0.6 }), 5);
-    let (found, model) = asked(&made, &made.robot);
+    let (found, model) = made.diagnosed(&made.robot, &Options::default());
     let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
     assert_eq!(names, ["drive_deadzone"], "{:?}", found.words);
     assert_eq!(found.verdict, Verdict::Explained);
@@ -56,7 +44,7 @@ fn a_dead_zone_shows_in_the_voltage_alone() {
 #[test]
 fn without_one_the_voltage_names_nothing_and_says_what_it_would_have_shown() {
     let made = made(None, 6);
-    let (found, _) = asked(&made, &made.robot);
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
     let size = found
         .detectable
@@ -73,7 +61,7 @@ fn without_one_the_voltage_names_nothing_and_says_what_it_would_have_shown() {
 #[test]
 fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
     let sensor = made(Some(Effect::CurrentOffset { current: 0.12 }), 7);
-    let (found, _) = asked(&sensor, &sensor.robot);
+    let (found, _) = sensor.diagnosed(&sensor.robot, &Options::default());
     assert_eq!(found.steps.len(), 1, "{:?}", found.words);
     assert_eq!(found.steps[0].set, ["current_offset"]);
     let drive = sensor.robot.joints[0].drive.as_ref().unwrap();
@@ -85,7 +73,7 @@ fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
     );
 
     let torque = made(Some(Effect::TorqueOffset { torque: 0.3 }), 8);
-    let (found, _) = asked(&torque, &torque.robot);
+    let (found, _) = torque.diagnosed(&torque.robot, &Options::default());
     let set = &found.steps[0].set;
     assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
     assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
@@ -118,24 +106,18 @@ fn with_the_drive_off_a_sensor_s_constant_is_told_from_a_torque() {
                 block.joints[0].voltage = None;
             }
         }
-        let (before, _) = asked(&made, &made.robot);
+        let (before, _) = made.diagnosed(&made.robot, &Options::default());
         let set = &before.steps[0].set;
         assert!(set.iter().any(|n| n == "current_offset"), "{set:?}");
         assert!(set.iter().any(|n| n == "torque_offset"), "{set:?}");
         let next = before.next_experiment.unwrap();
         assert_eq!((next.kind.as_str(), next.hands), ("drive-off-log", false));
         let log = scenario.drive_off(&made).unwrap();
-        let (after, _) = diagnose(
-            &made.robot,
-            &[&made.train, made.repeat.as_ref().unwrap()],
-            &[&made.holdout],
-            &Options {
-                sensor_zeros: sensor_zeros(&log).unwrap(),
-                ..Options::default()
-            },
-            &mut |_| (),
-        )
-        .unwrap();
+        let options = Options {
+            sensor_zeros: sensor_zeros(&log).unwrap(),
+            ..Options::default()
+        };
+        let (after, _) = made.diagnosed(&made.robot, &options);
         let set = &after.steps[0].set;
         if sensor {
             assert_eq!(set, &["current_offset"]);
@@ -153,11 +135,11 @@ fn a_wrong_torque_constant_is_contradicted_by_the_back_emf() {
     let mut robot = made.robot.clone();
     let drive = robot.joints[0].drive.as_mut().unwrap();
     drive.pole_pairs = Some(0);
-    let (right, _) = asked(&made, &robot);
+    let (right, _) = made.diagnosed(&robot, &Options::default());
     assert_eq!(right.verdict, Verdict::NothingMissing, "{:?}", right.words);
     let drive = robot.joints[0].drive.as_mut().unwrap();
     drive.torque_constant *= 1.2;
-    let (wrong, _) = asked(&made, &robot);
+    let (wrong, _) = made.diagnosed(&robot, &Options::default());
     assert_eq!(wrong.verdict, Verdict::ParameterChange, "{:?}", wrong.words);
     let words = wrong.words.join(" ");
     assert!(
@@ -179,7 +161,7 @@ fn a_column_that_is_no_motor_voltage_says_nothing() {
             volts.fill(24.0);
         }
     }
-    let (found, _) = asked(&made, &made.robot);
+    let (found, _) = made.diagnosed(&made.robot, &Options::default());
     assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
     let said = |w: &String| w.starts_with("Nothing is concluded from the motor voltage");
     assert!(found.words.iter().any(said), "{:?}", found.words);
