@@ -209,6 +209,14 @@ def _measured_speed(last, q, before):
 
 
 @numba.njit(cache=True)
+def _controller(p, x, before, measured_speed, wanted):
+    """The encoder's reading at a row, the speed that follows from it, and the current that the controller asks for."""
+    q = _encoder(p, x)
+    measured_speed = _measured_speed(measured_speed, q, before)
+    return q, measured_speed, _command(p, wanted[0], wanted[1], wanted[2], q, measured_speed)
+
+
+@numba.njit(cache=True)
 def _rigid(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
     np.random.seed(seed)
     steps = STEPS_PRESLIDING if p.stroke > 0 else STEPS
@@ -223,11 +231,10 @@ def _rigid(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
     before, measured_speed = np.round(x * COUNTS_PER_RAD) / COUNTS_PER_RAD, 0.0
     for row in range(rows):
         t = p.begin + row * ROW
-        q = _encoder(p, x)
-        measured_speed = _measured_speed(measured_speed, q, before)
+        wanted = (ref[row], ref_speed[row], ref_acceleration[row])
+        q, measured_speed, command = _controller(p, x, before, measured_speed, wanted)
         before = q
         position[row], speed[row] = q, v
-        command = _command(p, ref[row], ref_speed[row], ref_acceleration[row], q, measured_speed)
         viscous = _viscous(p, t)
         touch = _touch(t, touch_at, touch_of)
         for step in range(steps):
@@ -280,11 +287,10 @@ def _two_masses(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
     before, measured_speed = np.round(x * COUNTS_PER_RAD) / COUNTS_PER_RAD, 0.0
     for row in range(rows):
         t = p.begin + row * ROW
-        q = _encoder(p, x)
-        measured_speed = _measured_speed(measured_speed, q, before)
+        wanted = (ref[row], ref_speed[row], ref_acceleration[row])
+        q, measured_speed, command = _controller(p, x, before, measured_speed, wanted)
         before = q
         position[row], speed[row] = q, v
-        command = _command(p, ref[row], ref_speed[row], ref_acceleration[row], q, measured_speed)
         viscous = _viscous(p, t)
         touch = _touch(t, touch_at, touch_of)
         for step in range(steps):
