@@ -136,6 +136,8 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
 }
 
 /// Carries a joint's axis over to this link, and the power of the link's ten unit wrenches along it.
+// Ten parameters and not an array of ten: only of references that are parameters does the compiler know that none
+// overlaps another, and only then does it turn the loop into vector code.
 #[inline(always)]
 fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
