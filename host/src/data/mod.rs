@@ -15,8 +15,8 @@ mod writer;
 
 pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
-pub(crate) use plausibility::velocity_scale;
 pub use plausibility::{Implausible, plausibility, strange_references};
+pub(crate) use plausibility::{unit_of_steps, velocity_scale};
 pub use source::{Blocks, KEPT_WARNINGS, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 

@@ -133,8 +133,8 @@ pub enum Implausible {
         /// N·m or N.
         unit: &'static str,
     },
-    /// Time in milliseconds.
-    #[error("t looks like milliseconds (its steps are {step:.4}); give it in s")]
+    /// Time in milliseconds or in a smaller unit.
+    #[error("t looks like {} (its steps are {step:.4}); give it in s", unit_of_steps(*step))]
     Milliseconds {
         /// Median step.
         step: f64,
@@ -179,6 +179,16 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
         check_joint(k, &block.t, columns, joint, &mut found);
     }
     found
+}
+
+/// The unit of time that steps of this size look like, where they are too long for seconds: rows come at between 5 and
+/// 5000 Hz.
+pub(crate) fn unit_of_steps(step: f64) -> &'static str {
+    match step {
+        ..200.0 => "milliseconds",
+        ..2e5 => "microseconds",
+        _ => "nanoseconds",
+    }
 }
 
 fn range(values: &[f64]) -> (f64, f64) {

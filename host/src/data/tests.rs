@@ -546,7 +546,14 @@ fn wrong_units_are_named_and_right_ones_are_not() {
         all(&mut b.joints[0].tau, 0.1 / peak);
         assert_eq!(plausibility(&b, &open).len(), found, "{limit}");
     }
-    assert!(scaled(&|b| all(&mut b.t, 1000.0)).contains("milliseconds"));
+    for (factor, unit) in [
+        (1e3, "milliseconds"),
+        (1e6, "microseconds"),
+        (1e9, "nanoseconds"),
+    ] {
+        let said = scaled(&|b| all(&mut b.t, factor));
+        assert!(said.contains(&format!("t looks like {unit}")), "{said}");
+    }
     assert!(scaled(&|b| all(&mut b.t, 1e-3)).contains("more than ten times its limit"));
 }
 

@@ -3,7 +3,7 @@
 use super::super::Run;
 use super::super::outcome::{About, DataFault};
 use super::names;
-use crate::data::{Block, Implausible, JointColumns, plausibility, velocity_scale};
+use crate::data::{Block, Implausible, JointColumns, plausibility, unit_of_steps, velocity_scale};
 use crate::robot::{JointKind, Robot};
 
 /// Less than this cannot hold a reversal and a repetition of it, s.
@@ -117,12 +117,7 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
         let Implausible::Milliseconds { step } = found else {
             return fault(runs, "clock", About::Recording, "", found.to_string());
         };
-        // A recording in milliseconds has fewer than 200 of them between rows, one in microseconds no fewer.
-        let unit = if *step >= 200.0 {
-            "microseconds"
-        } else {
-            "milliseconds"
-        };
+        let unit = unit_of_steps(*step);
         fault(
             runs,
             "clock",
