@@ -4,6 +4,9 @@
 //! identified from data are often only fixed up to combinations, and are read back as they are.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
+
+use rig_shared::multibody::MAX_JOINTS;
 
 use super::check_drives::{check_drive, check_transmission};
 use super::effects::check_effects;
@@ -75,6 +78,14 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             what: "the list of joints".into(),
             found: "empty".into(),
             right: "a robot has at least one [[joint]]".into(),
+        });
+    }
+    if robot.joints.len() > MAX_JOINTS {
+        return Err(Fault {
+            way: vec![Key("joint"), At(MAX_JOINTS)],
+            what: "the number of joints".into(),
+            found: robot.joints.len().to_string(),
+            right: format!("a robot has at most {MAX_JOINTS}"),
         });
     }
     let mut names = HashSet::new();
@@ -160,6 +171,18 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
         JointKind::Prismatic => ("m", "N"),
     };
     number(joint, &[Key("alpha")], "alpha", "rad", Finite, joint.alpha)?;
+    // The angle between two axes: what is beyond a turn was meant in another unit.
+    if joint.alpha.abs() > TAU {
+        return Err(fault(
+            &[Key("alpha")],
+            &format!("the alpha of joint `{}`", joint.name),
+            &joint.alpha,
+            &format!(
+                "it must be an angle within a turn, in rad; were these degrees, it would be {:.6}",
+                joint.alpha.to_radians()
+            ),
+        ));
+    }
     number(joint, &[Key("a")], "a", "m", Finite, joint.a)?;
     number(joint, &[Key("theta")], "theta", "rad", Finite, joint.theta)?;
     number(joint, &[Key("d")], "d", "m", Finite, joint.d)?;

@@ -369,6 +369,18 @@ fn what_is_no_serial_chain_is_refused_by_name() {
             assert!(said.contains(part), "{said}");
         }
     }
+    // A loop beside the base, and one that the base itself is part of.
+    let beside = joint("one", "revolute", "a", "b", "") + &joint("two", "revolute", "b", "a", "");
+    let through = one.clone()
+        + &joint("two", "fixed", "a", "b", "")
+        + &joint("three", "revolute", "b", "base", "");
+    for (text, names) in [(beside, "`two`, `one`"), (through, "`two`, `three`, `one`")] {
+        let said = urdf_says(&urdf(&text));
+        assert!(
+            said.contains(&format!("joints {names} form a closed loop")),
+            "{said}"
+        );
+    }
     let all_fixed = joint("one", "fixed", "base", "a", "") + &joint("two", "fixed", "a", "b", "");
     assert!(urdf_says(&urdf(&all_fixed)).contains("no movable joint"));
 }
@@ -386,6 +398,103 @@ fn a_moved_link_without_inertial_is_named_with_its_line() {
         "<link name='arm'><inertial><mass value='-1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>",
     );
     assert!(urdf_says(&negative).contains("mass of link `arm` is -1"));
+}
+
+#[test]
+fn what_xacro_has_not_expanded_is_refused_where_it_matters() {
+    let one = joint("one", "continuous", "base", "a", "");
+    let two = joint("two", "continuous", "a", "b", "");
+    let whole = urdf(&(one.clone() + &two));
+    assert!(Robot::from_urdf(&whole, Path::new("r.urdf")).is_ok());
+    let said = urdf_says(&urdf(&(one.clone() + "<xacro:arm side='left'/>")));
+    assert!(
+        said.starts_with("r.urdf:6:2: ") && said.contains("run xacro over the file first"),
+        "{said}"
+    );
+    let declared = |text: &str| {
+        let root = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>";
+        text.replace("<robot name='r'>", root)
+    };
+    let with_element = declared(&urdf(&(one.clone() + "<xacro:arm side='left'/>")));
+    let said = urdf_says(&with_element);
+    assert!(
+        said.contains("this is <xacro:arm>") && said.contains("run xacro"),
+        "{said}"
+    );
+    let said = urdf_says(&whole.replace("name='two'", "name='${side}_two'"));
+    assert!(
+        said.contains("`name` of <joint> is \"${side}_two\"") && said.contains("run xacro"),
+        "{said}"
+    );
+    // What xacro leaves behind, and what other programs expand.
+    let mesh = "<visual><geometry><mesh filename='$(find arm)/a.stl'/></geometry></visual></link>";
+    let left = declared(&whole).replacen("</link>", mesh, 1);
+    assert!(left.contains("$(find"));
+    assert!(Robot::from_urdf(&left, Path::new("r.urdf")).is_ok());
+}
+
+#[test]
+fn a_transmission_of_no_joint_is_named() {
+    let text = urdf(&format!(
+        "{}{}<transmission name='t'><joint name='onne'/></transmission>",
+        joint("one", "continuous", "base", "a", ""),
+        joint("two", "continuous", "a", "b", "")
+    ));
+    let said = urdf_says(&text);
+    assert!(
+        said.starts_with("r.urdf:7:") && said.contains("names joint `onne`"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_robot_of_too_many_joints_is_refused_with_its_file() {
+    let bare = |k: usize| Joint::new(&format!("j{k}"), JointKind::Revolute, [0.0; 4]);
+    let robot = Robot::new("long", (0..17).map(bare).collect());
+    let text = robot.to_toml().unwrap();
+    let said = toml_says(&text);
+    let line = line_of(&text, "name = \"j16\"") - 1;
+    assert!(
+        said.contains(&format!(":{line}:"))
+            && said.contains("the number of joints is 17, but a robot has at most 16"),
+        "{said}"
+    );
+    let mut body = String::new();
+    for k in 0..17 {
+        let parent = match k {
+            0 => "base".to_owned(),
+            _ => format!("l{}", k - 1),
+        };
+        body += &LINK.replace("NAME", &format!("l{k}"));
+        body += &joint(
+            &format!("j{k}"),
+            "continuous",
+            &parent,
+            &format!("l{k}"),
+            "",
+        );
+    }
+    let said = urdf_says(&format!(
+        "<robot name='r'><link name='base'/>{body}</robot>"
+    ));
+    assert!(
+        said.starts_with("r.urdf:") && said.contains("joint 17") && said.contains("at most 16"),
+        "{said}"
+    );
+}
+
+#[test]
+fn an_alpha_in_degrees_is_refused() {
+    for (line, right) in [("alpha = 90.0", "1.570796"), ("alpha = -180", "-3.141593")] {
+        let text = with("alpha", line);
+        let said = toml_says(&text);
+        let at = format!(":{}:", line_of(&text, line));
+        assert!(
+            said.contains(&at) && said.contains("in rad") && said.contains(right),
+            "{said}"
+        );
+    }
+    assert!(Robot::from_toml(&with("alpha", "alpha = 6.28"), Path::new("r.toml")).is_ok());
 }
 
 /// A full 3 x 3 matrix has its numbers in other places than the six of a symmetric one.

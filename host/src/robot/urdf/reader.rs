@@ -16,6 +16,12 @@ pub(super) struct Reader<'a> {
     pub remarks: RefCell<Vec<String>>,
 }
 
+/// What is to be done about a macro.
+const EXPAND: &str = "which is an unexpanded macro; run xacro over the file first";
+
+/// Elements whose contents enter no dynamics and may hold text of other programs.
+const FOREIGN: [&str; 5] = ["visual", "collision", "gazebo", "sensor", "ros2_control"];
+
 /// An element.
 pub(super) type Xml<'a> = Node<'a, 'a>;
 
@@ -27,10 +33,15 @@ pub(super) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, Rob
             line: e.pos().row as usize,
             column: e.pos().col as usize,
         },
-        message: format!(
-            "this is not well-formed XML ({}), but a URDF file is",
-            without_position(&e.to_string())
-        ),
+        message: match &e {
+            roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
+                format!("this is an element or attribute of xacro, {EXPAND}")
+            }
+            _ => format!(
+                "this is not well-formed XML ({}), but a URDF file is",
+                without_position(&e.to_string())
+            ),
+        },
     })
 }
 
@@ -49,6 +60,28 @@ impl<'a> Reader<'a> {
             place: self.place(node),
             message,
         }
+    }
+
+    /// Refuses what xacro should have replaced: its elements anywhere, its expressions where they enter the dynamics.
+    pub(super) fn expanded(&self) -> Result<(), RobotError> {
+        let root = self.document.root_element();
+        for node in root.descendants().filter(Xml::is_element) {
+            let tag = node.tag_name();
+            if tag.namespace().is_some_and(|uri| uri.contains("xacro")) {
+                let message = format!("this is <xacro:{}>, {EXPAND}", tag.name());
+                return Err(self.error(node, message));
+            }
+            let foreign = |n: Xml| FOREIGN.contains(&n.tag_name().name());
+            let expression = |text: &str| text.contains("${") || text.contains("$(");
+            if let Some(found) = node.attributes().find(|a| expression(a.value()))
+                && !node.ancestors().any(foreign)
+            {
+                let (name, value) = (found.name(), found.value());
+                let message = format!("`{name}` of <{}> is \"{value}\", {EXPAND}", tag.name());
+                return Err(self.error(node, message));
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn place(&self, node: Xml<'a>) -> Place {
@@ -77,10 +110,9 @@ impl<'a> Reader<'a> {
     ) -> Result<f64, RobotError> {
         match text.trim().parse::<f64>() {
             Ok(v) if v.is_finite() => Ok(v),
-            _ if text.contains("${") => Err(self.error(
-                node,
-                format!("{what} is \"{text}\", an unexpanded macro; run xacro over the file first"),
-            )),
+            _ if text.contains("${") => {
+                Err(self.error(node, format!("{what} is \"{text}\", {EXPAND}")))
+            }
             _ => Err(self.error(
                 node,
                 format!("{what} is \"{text}\", but it must be a finite number"),

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use nalgebra::{Isometry3, Vector3};
+use rig_shared::multibody::MAX_JOINTS;
 
 use super::reader::{Reader, Xml, child};
 use super::spatial::SpatialInertia;
@@ -12,6 +13,28 @@ use crate::robot::error::{Place, RobotError};
 
 /// A movable joint with the pose of its parent link in the body that it leaves.
 type Outgoing<'a> = (Xml<'a>, Isometry3<f64>);
+
+/// What a link hangs on.
+struct Above<'a> {
+    joint: &'a str,
+    parent: &'a str,
+}
+
+/// Names of the joints of the closed loop that the way from `link` towards the base ends in; none where it ends at a base.
+fn loop_above(link: &str, above: &HashMap<&str, Above>) -> Option<String> {
+    let mut way: Vec<&Above> = Vec::new();
+    let mut link = link;
+    while let Some(next) = above.get(link) {
+        if let Some(first) = way.iter().position(|seen| seen.joint == next.joint) {
+            let names = way[first..].iter().rev();
+            let names: Vec<String> = names.map(|own| format!("`{}`", own.joint)).collect();
+            return Some(names.join(", "));
+        }
+        way.push(next);
+        link = next.parent;
+    }
+    None
+}
 
 /// A link with all that is fixed to it.
 struct Rigid<'a> {
@@ -69,11 +92,12 @@ impl<'a> Reader<'a> {
                 ),
             ));
         }
+        self.expanded()?;
         let links: HashMap<&str, Xml<'a>> = self.named("link")?.into_iter().collect();
         let joints = self.named("joint")?;
-        let reductions = self.reductions()?;
+        let reductions = self.reductions(&joints)?;
         let mut children: HashMap<&str, Vec<Xml<'a>>> = HashMap::new();
-        let mut parent_of: HashMap<&str, &str> = HashMap::new();
+        let mut above: HashMap<&str, Above<'a>> = HashMap::new();
         for &(name, node) in &joints {
             let (parent, moved) = (self.end(node, "parent")?, self.end(node, "child")?);
             for link in [parent, moved] {
@@ -81,15 +105,30 @@ impl<'a> Reader<'a> {
                     return Err(self.error(node, format!("joint `{name}` names link `{link}`, which the file does not describe; add <link name=\"{link}\"> or correct the name")));
                 }
             }
-            if let Some(first) = parent_of.insert(moved, name) {
+            if let Some(first) = above.insert(
+                moved,
+                Above {
+                    joint: name,
+                    parent,
+                },
+            ) {
+                let first = first.joint;
                 return Err(self.error(node, format!("link `{moved}` is the child of joint `{first}` and of joint `{name}`, a closed loop; only a serial chain from base to tip can be read")));
             }
             children.entry(parent).or_default().push(node);
         }
-        let base = self.base(root, &parent_of)?;
+        for &(_, node) in &joints {
+            if let Some(names) = loop_above(self.end(node, "child")?, &above) {
+                return Err(self.error(node, format!("joints {names} form a closed loop; only a serial chain from base to tip can be read, so let one of them leave a link outside of it")));
+            }
+        }
+        let base = self.base(root, &above)?;
         let mut bodies = Vec::new();
         let mut outgoing = self.rigid_body(base, &links, &children)?.outgoing;
         while let Some((joint, to_joint)) = outgoing {
+            if bodies.len() == MAX_JOINTS {
+                return Err(self.error(joint, format!("this is movable joint {} of the chain, but a robot has at most {MAX_JOINTS}", MAX_JOINTS + 1)));
+            }
             let (body, next) = self.body(joint, to_joint, &links, &children, &reductions)?;
             bodies.push(body);
             outgoing = next;
@@ -112,15 +151,15 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn base(&self, root: Xml<'a>, parent_of: &HashMap<&str, &str>) -> Result<&'a str, RobotError> {
+    fn base(&self, root: Xml<'a>, above: &HashMap<&str, Above>) -> Result<&'a str, RobotError> {
         let mut roots = Vec::new();
         for (name, node) in self.named("link")? {
-            if !parent_of.contains_key(name) {
+            if !above.contains_key(name) {
                 roots.push((name, node));
             }
         }
         match roots.as_slice() {
-            [] => Err(self.error(root, "there is no base link (a link that is no joint's child); only a serial chain from base to tip can be read".into())),
+            [] => Err(self.error(root, "the robot has no link; it needs a base link and one for each joint to move".into())),
             [(name, _)] => Ok(name),
             [(first, _), (second, node), ..] => Err(self.error(*node, format!("links `{first}` and `{second}` are both no joint's child; connect them by a fixed joint so that there is one base"))),
         }

@@ -128,7 +128,10 @@ impl<'a> Reader<'a> {
     }
 
     /// Gear ratio by joint name; 1 is the customary placeholder for "none" and says nothing.
-    pub(super) fn reductions(&self) -> Result<HashMap<&'a str, f64>, RobotError> {
+    pub(super) fn reductions(
+        &self,
+        known: &[(&'a str, Xml<'a>)],
+    ) -> Result<HashMap<&'a str, f64>, RobotError> {
         let mut found = HashMap::new();
         for transmission in self
             .document
@@ -136,6 +139,16 @@ impl<'a> Reader<'a> {
             .children()
             .filter(|n| n.has_tag_name("transmission"))
         {
+            let joints: Vec<Xml<'a>> = transmission
+                .children()
+                .filter(|n| n.has_tag_name("joint"))
+                .collect();
+            for joint in &joints {
+                let name = self.attribute(*joint, "name")?;
+                if known.iter().all(|(other, _)| *other != name) {
+                    return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
+                }
+            }
             let Some(reduction) = transmission
                 .descendants()
                 .find(|n| n.has_tag_name("mechanicalReduction"))
@@ -150,10 +163,6 @@ impl<'a> Reader<'a> {
             if value == 0.0 {
                 return Err(self.error(reduction, "<mechanicalReduction> is 0, but it must be motor turns per joint turn, different from 0".into()));
             }
-            let joints: Vec<Xml<'a>> = transmission
-                .children()
-                .filter(|n| n.has_tag_name("joint"))
-                .collect();
             match joints.as_slice() {
                 [joint] if value != 1.0 => {
                     found.insert(self.attribute(*joint, "name")?, value);
