@@ -309,3 +309,41 @@ fn a_recording_is_not_overwritten_and_a_strange_joint_is_not_moved() {
         .arg(at("elbow.toml"));
     names(&refuse(&mut command), &["elbow"]);
 }
+
+/// What one option asks for another rules out: said, not passed over.
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("motion.toml");
+    let excite = |options: &[&str]| {
+        let mut command = rig();
+        command.arg("excite").args(options).arg("--robot");
+        command.arg(robot("one-link.toml")).arg("--out").arg(&out);
+        refuse(&mut command)
+    };
+    names(&excite(&["--joint", "link"]), &["--joint link", "--kind"]);
+    for (option, value) in [
+        ("--criterion", "cond"),
+        ("--parameters", "all"),
+        ("--scaling", "sizes"),
+        ("--torque-noise", "0.1"),
+        ("--harmonics", "5"),
+        ("--period", "4"),
+        ("--ramp", "1"),
+        ("--periods", "5"),
+        ("--starts", "24"),
+        ("--seed", "1"),
+    ] {
+        let said = excite(&["--kind", "chirp", option, value]);
+        names(&said, &[option, "chirp", "--kind fourier"]);
+    }
+    assert!(!out.exists());
+    let path = recording(folder.path(), |_, _| ());
+    let learn =
+        |options: &[&str]| refuse(identify(&robot("one-link.toml"), &path, &out).args(options));
+    names(&learn(&["--window", "0.5"]), &["0.5 s", "--model integral"]);
+    names(
+        &learn(&["--estimator", "ols", "--prior-uncertainty", "0.1"]),
+        &["0.1", "ols", "--estimator ridge"],
+    );
+}

@@ -54,6 +54,19 @@ pub(crate) enum KindArg {
     Sweep,
 }
 
+impl KindArg {
+    /// The motion of one joint that it is; none for the optimal one of all joints.
+    fn staged(self) -> Option<StagedKind> {
+        match self {
+            Self::Fourier => None,
+            Self::Chirp => Some(StagedKind::Chirp),
+            Self::Staircase => Some(StagedKind::Staircase),
+            Self::Reversals => Some(StagedKind::Reversals),
+            Self::Sweep => Some(StagedKind::Sweep),
+        }
+    }
+}
+
 /// Designs a motion within the robot's limits that tells its parameters apart.
 ///
 /// The limits stand in the robot description under [joint.limits], and [[workspace]] for points of the links. The
@@ -69,43 +82,43 @@ pub(crate) struct Args {
     /// Kind of motion; all but fourier move one joint
     #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
     pub(crate) kind: KindArg,
-    /// What is optimised (fourier)
-    #[arg(long, value_enum, default_value_t = CriterionArg::Cond)]
-    pub(crate) criterion: CriterionArg,
-    /// Which parameters the motion is to tell apart (fourier)
-    #[arg(long, value_enum, default_value_t = ParametersArg::All)]
-    pub(crate) parameters: ParametersArg,
-    /// By what the columns of the regressor are divided before it is judged (fourier)
-    #[arg(long, value_enum, default_value_t = ScalingArg::Sizes)]
-    pub(crate) scaling: ScalingArg,
+    /// What is optimised [default: cond] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) criterion: Option<CriterionArg>,
+    /// Which parameters the motion is to tell apart [default: all] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) parameters: Option<ParametersArg>,
+    /// By what the columns of the regressor are divided before it is judged [default: sizes] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) scaling: Option<ScalingArg>,
     /// Standard deviation of each joint's torque, comma between them, N*m or N [default: taken as a share of its
     /// torque limit that is the same for all joints] (fourier)
     #[arg(long, value_delimiter = ',')]
     pub(crate) torque_noise: Option<Vec<f64>>,
-    /// Harmonics per joint, 1 to 8 (fourier)
-    #[arg(long, default_value_t = 5)]
-    pub(crate) harmonics: usize,
+    /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
+    #[arg(long)]
+    pub(crate) harmonics: Option<usize>,
     /// Period of the slowest harmonic, s [default: from the limits] (fourier)
     #[arg(long)]
     pub(crate) period: Option<f64>,
     /// Rise from rest to full amplitude and fall back to rest, each, s [default: one period] (fourier)
     #[arg(long)]
     pub(crate) ramp: Option<f64>,
-    /// Whole periods at full amplitude (fourier)
-    #[arg(long, default_value_t = 5)]
-    pub(crate) periods: u16,
+    /// Whole periods at full amplitude [default: 5] (fourier)
+    #[arg(long)]
+    pub(crate) periods: Option<u16>,
     /// Joint positions at the beginning, comma between them, rad or m [default: free for fourier, else mid-range]
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) start: Option<Vec<f64>>,
     /// The joint that moves [default: the first] (all but fourier)
     #[arg(long)]
     pub(crate) joint: Option<String>,
-    /// Random starts of the optimiser: more find better motions and take longer (fourier)
-    #[arg(long, default_value_t = 24)]
-    pub(crate) starts: u32,
-    /// Seed of the random starts (fourier)
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    /// Random starts of the optimiser: more find better motions and take longer [default: 24] (fourier)
+    #[arg(long)]
+    pub(crate) starts: Option<u32>,
+    /// Seed of the random starts [default: 1] (fourier)
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
     /// Samples a second in a .csv, Hz
     #[arg(long, default_value_t = 1000.0)]
     pub(crate) rate: f64,
@@ -114,23 +127,49 @@ pub(crate) struct Args {
     pub(crate) force: bool,
 }
 
+impl Args {
+    /// Refuses what this kind of motion would leave unused.
+    fn refuse_unused(&self) -> Result<(), CommandError> {
+        let of_fourier = [
+            ("--criterion", self.criterion.is_some()),
+            ("--parameters", self.parameters.is_some()),
+            ("--scaling", self.scaling.is_some()),
+            ("--torque-noise", self.torque_noise.is_some()),
+            ("--harmonics", self.harmonics.is_some()),
+            ("--period", self.period.is_some()),
+            ("--ramp", self.ramp.is_some()),
+            ("--periods", self.periods.is_some()),
+            ("--starts", self.starts.is_some()),
+            ("--seed", self.seed.is_some()),
+        ];
+        let unused = of_fourier.iter().find(|(_, given)| *given);
+        match (self.kind.staged(), &self.joint, unused) {
+            (None, Some(joint), _) => Err(CommandError::Sentence(format!(
+                "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
+            ))),
+            (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
+                "{option} belongs to --kind fourier, but a {} is sized by the limits alone; leave it out, or give --kind fourier.",
+                kind.name()
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// A description or options that do not serve, no motion within the limits, a file that cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    args.refuse_unused()?;
     if args.out.exists() && !args.force {
         return Err(CommandError::Exists {
             path: args.out.clone(),
         });
     }
     let robot = described(&args.robot, ui)?.robot;
-    let kind = match args.kind {
-        KindArg::Fourier => return optimal(args, &robot, ui),
-        KindArg::Chirp => StagedKind::Chirp,
-        KindArg::Staircase => StagedKind::Staircase,
-        KindArg::Reversals => StagedKind::Reversals,
-        KindArg::Sweep => StagedKind::Sweep,
+    let Some(kind) = args.kind.staged() else {
+        return optimal(args, &robot, ui);
     };
     let (file, notes) = staged(&robot, kind, args.joint.as_deref(), args.start.as_deref())?;
     file.save(&args.out, &robot, args.rate)?;
@@ -147,28 +186,32 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
 }
 
 fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
+    let default = Options::default();
     let options = Options {
         criterion: match args.criterion {
-            CriterionArg::Cond => Criterion::ConditionNumber,
-            CriterionArg::MinSingular => Criterion::SmallestSingularValue,
-            CriterionArg::DOptimal => Criterion::Determinant,
+            None => default.criterion,
+            Some(CriterionArg::Cond) => Criterion::ConditionNumber,
+            Some(CriterionArg::MinSingular) => Criterion::SmallestSingularValue,
+            Some(CriterionArg::DOptimal) => Criterion::Determinant,
         },
         parameters: match args.parameters {
-            ParametersArg::All => Parameters::All,
-            ParametersArg::Links => Parameters::Links,
+            None => default.parameters,
+            Some(ParametersArg::All) => Parameters::All,
+            Some(ParametersArg::Links) => Parameters::Links,
         },
         scaling: match args.scaling {
-            ScalingArg::Sizes => Scaling::Sizes,
-            ScalingArg::None => Scaling::None,
+            None => default.scaling,
+            Some(ScalingArg::Sizes) => Scaling::Sizes,
+            Some(ScalingArg::None) => Scaling::None,
         },
         torque_noise: args.torque_noise.clone(),
-        harmonics: args.harmonics,
+        harmonics: args.harmonics.unwrap_or(default.harmonics),
         period: args.period,
-        periods: args.periods,
+        periods: args.periods.unwrap_or(default.periods),
         ramp: args.ramp,
         start: args.start.clone(),
-        starts: args.starts,
-        seed: args.seed,
+        starts: args.starts.unwrap_or(default.starts),
+        seed: args.seed.unwrap_or(default.seed),
         threads: None,
     };
     let mut progress = ui.progress("designing the motion", 1);

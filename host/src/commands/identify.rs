@@ -164,8 +164,8 @@ pub(crate) struct Args {
     /// How often each --data counts, in their order; 1 where not given
     #[arg(long, allow_negative_numbers = true)]
     weight: Vec<f64>,
-    /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for ridge and consistent
-    /// [default: ridge: what makes the data most likely; consistent: 2]
+    /// Relative uncertainty of the description's inertial values (0.1 = 10 %), for iv, output-error, ridge and consistent,
+    /// and of several joints for the bodies that are written [default: ridge: what makes the data most likely; else 2]
     #[arg(long, allow_negative_numbers = true)]
     prior_uncertainty: Option<f64>,
     /// Take the description as it is: do not look for springs, ripple or a base that is not level
@@ -180,7 +180,7 @@ pub(crate) struct Args {
     /// Leave out rows slower than this, rad/s or m/s, where friction has no sign yet; 0 keeps all, or "auto"
     #[arg(long, default_value = "auto", value_parser = speed, allow_negative_numbers = true)]
     min_speed: Choice<f64>,
-    /// Length of the integral model's windows, s [default: chosen from the motion]
+    /// Length of the windows, s [default: chosen from the motion] (integral)
     #[arg(long, allow_negative_numbers = true)]
     window: Option<f64>,
     /// How much later a recorded torque acts, s (half a sample for a command held until the next one)

@@ -17,6 +17,7 @@ use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
 use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
+use crate::robot::Robot;
 
 /// Weights of recordings: beyond it the other recordings are lost in rounding.
 const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
@@ -25,8 +26,8 @@ const NORMAL_95: f64 = 1.96;
 /// A residual that is so many times that of the weighted fit calls for a warning.
 const MUCH_MORE: f64 = 1.2;
 
-/// Refuses settings that mean nothing.
-pub(super) fn check(options: &Options) -> Result<(), IdentifyError> {
+/// Refuses settings that mean nothing, or nothing beside the others.
+pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyError> {
     if let Some(&weight) = options
         .recording_weights
         .iter()
@@ -35,7 +36,18 @@ pub(super) fn check(options: &Options) -> Result<(), IdentifyError> {
         return Err(IdentifyError::Weight(weight));
     }
     match options.prior_uncertainty {
-        Some(u) if !(u.is_finite() && u > 0.0) => Err(IdentifyError::PriorUncertainty(u)),
+        Some(u) if !(u.is_finite() && u > 0.0) => return Err(IdentifyError::PriorUncertainty(u)),
+        // The standard parameters of several joints have the description's values as their prior, whichever the estimator.
+        Some(uncertainty) if robot.joints.len() == 1 && !options.estimator.has_prior() => {
+            return Err(IdentifyError::UnusedUncertainty {
+                uncertainty,
+                estimator: options.estimator.name(),
+            });
+        }
+        _ => {}
+    }
+    match (options.window, options.model) {
+        (Some(window), ModelKind::Differential) => Err(IdentifyError::UnusedWindow(window)),
         _ => Ok(()),
     }
 }

@@ -158,6 +158,14 @@ impl Estimator {
         }
     }
 
+    /// Whether the description's values enter its estimate.
+    pub fn has_prior(self) -> bool {
+        matches!(
+            self,
+            Self::Iv | Self::OutputError | Self::Ridge | Self::Consistent
+        )
+    }
+
     /// As the command line and `identification.json` name it.
     pub fn name(self) -> &'static str {
         match self {
@@ -224,14 +232,14 @@ pub struct Options {
     pub loss: Loss,
     /// Filters, decimation, masks.
     pub prepare: PrepareOptions,
-    /// Length of the integral model's windows, s; chosen from the motion where absent.
+    /// Length of the integral model's windows, s; chosen from the motion where absent. The differential model has none.
     pub window: Option<f64>,
     /// Seed of the random states from which the base parameters are found.
     pub seed: u64,
     /// How many times each training recording counts; those beyond the list count once.
     pub recording_weights: Vec<f64>,
-    /// Relative uncertainty of the description's inertial values, for `ridge` and `consistent`; where absent, `ridge`
-    /// takes what makes the data most likely and `consistent` takes 2.
+    /// Relative uncertainty of the description's inertial values, for [`Estimator::has_prior`] and, of several joints, for
+    /// the standard parameters; where absent, `ridge` takes what makes the data most likely and all else takes 2.
     pub prior_uncertainty: Option<f64>,
     /// Which estimators are compared besides; none for no comparison.
     pub compare: Vec<Estimator>,
@@ -377,6 +385,21 @@ pub enum IdentifyError {
         "The description's relative uncertainty is given as {0}; it must be above zero (0.1 means 10 %)."
     )]
     PriorUncertainty(f64),
+    /// An uncertainty of the description for an estimate that it does not enter.
+    #[error(
+        "The description's relative uncertainty is given as {uncertainty}, but {estimator} of one joint takes nothing from the description; give --estimator ridge or consistent, or leave --prior-uncertainty out."
+    )]
+    UnusedUncertainty {
+        /// What was given.
+        uncertainty: f64,
+        /// The estimator's name.
+        estimator: &'static str,
+    },
+    /// A window for a model without windows.
+    #[error(
+        "A window of {0} s is given, but the differential model has no windows; give --model integral, or leave --window out."
+    )]
+    UnusedWindow(f64),
     /// A friction map cannot be drawn.
     #[error("{0}")]
     FrictionMap(String),

@@ -50,7 +50,7 @@ pub fn identify(
     holdout: &[&dyn Recording],
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
-    further::check(options)?;
+    further::check(robot, options)?;
     let mut known = None;
     for _ in 0..=MOST_LOOKS {
         match solve(robot, training, holdout, options, known.as_ref())? {

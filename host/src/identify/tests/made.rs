@@ -445,6 +445,38 @@ fn faults_are_sentences() {
     assert!(window.contains("window of 5 s"), "{window}");
 }
 
+#[test]
+fn settings_that_would_change_nothing_are_refused() {
+    let none: [&dyn crate::prepare::Recording; 0] = [];
+    let said = |robot: &Robot, options: &Options| {
+        identify(robot, &none, &none, options)
+            .unwrap_err()
+            .to_string()
+    };
+    let windowed = Options {
+        window: Some(0.5),
+        ..Default::default()
+    };
+    let text = said(&pendulum(), &windowed);
+    assert!(
+        text.contains("0.5 s") && text.contains("--model integral"),
+        "{text}"
+    );
+    let two = Robot::new("two", vec![joint(JointKind::Revolute, 0.0); 2]);
+    for estimator in Estimator::ALL {
+        let options = Options {
+            estimator,
+            prior_uncertainty: Some(0.1),
+            ..Default::default()
+        };
+        let text = said(&pendulum(), &options);
+        let refused = text.contains(&format!("but {} of one joint", estimator.name()));
+        assert_eq!(refused, !estimator.has_prior(), "{text}");
+        let text = said(&two, &options);
+        assert!(text.contains("No training recording"), "{text}");
+    }
+}
+
 /// Pieces far shorter than the recording, cut anywhere: the same result as in one piece, for both models.
 #[test]
 fn streaming_gives_the_same_parameters() {
