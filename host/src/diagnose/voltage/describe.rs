@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::plant::{NAMES, NOMINAL, Plant};
-use super::search::{Model, Trial, on_the_voltage};
+use super::search::{EQUAL, Model, Trial, on_the_voltage};
 use crate::diagnose::judge::closed;
 use crate::diagnose::outcome::{
     Absorbed, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value, Verdict,
@@ -15,8 +15,6 @@ use rig_shared::effects::Effect;
 
 /// Over this many floors something is left.
 const LEFT: f64 = 1.2;
-/// Rivals within this share of the best on recordings not fitted to are supported as well.
-const EQUAL: f64 = 0.03;
 
 /// Everything that was found.
 pub(super) struct Told<'a> {

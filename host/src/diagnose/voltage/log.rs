@@ -150,5 +150,8 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
     for log in &mut list {
         log.law = Law::of(log);
     }
+    // What is found must not hang on the order of the files, and folds dealt in this order have weak and strong motions each.
+    let strength = |log: &Log| log.u.iter().map(|u| u * u).sum::<f64>() / log.u.len() as f64;
+    list.sort_by(|a, b| (strength(a).total_cmp(&strength(b))).then_with(|| a.label.cmp(&b.label)));
     Ok(list)
 }

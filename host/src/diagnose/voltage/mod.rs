@@ -100,17 +100,14 @@ pub fn diagnose_voltage(
     } else {
         models.iter().map(|m| judge.freely(m)).collect()
     };
-    // An effect that spoils a motion it was not fitted to does not stand, nor do those that came after it.
-    let spoilt = holdout
-        .windows(2)
-        .position(|pair| pair[1] > (1.0 + WORSE) * pair[0]);
-    if let Some(k) = spoilt {
-        holdout.truncate(k + 1);
+    let standing = standing(&holdout);
+    if standing + 1 < holdout.len() {
+        holdout.truncate(standing + 1);
         let taken = models
-            .drain(k + 1..)
+            .drain(standing + 1..)
             .next()
             .and_then(|m| m.effects.last().copied());
-        rounds.truncate(k + 1);
+        rounds.truncate(standing + 1);
         for trial in rounds.iter_mut().flatten() {
             if trial.refused.is_empty() && Some(trial.kind) == taken {
                 trial.refused = "makes the motion of the recordings held back worse".into();
@@ -133,6 +130,20 @@ pub fn diagnose_voltage(
     let result = (found.diagnosis(), found.robot(&plant));
     progress(1.0);
     Ok(result)
+}
+
+/// The last of the models, each with one effect more, that does not spoil a motion it was not fitted to: an effect may make
+/// that worse where the next one mends it. `holdout` has the RMS of each.
+fn standing(holdout: &[f64]) -> usize {
+    let mut least = f64::INFINITY;
+    let mut last = 0;
+    for (k, rms) in holdout.iter().enumerate() {
+        if *rms <= (1.0 + WORSE) * least {
+            last = k;
+        }
+        least = least.min(*rms);
+    }
+    last
 }
 
 /// Motion of the recordings in which the effects change the simulation most, without effects and with all of them.

@@ -10,8 +10,8 @@ use super::plant::{NOMINAL, Plant};
 use crate::prepare::each_of;
 use crate::robot::Robot;
 
-/// Folds of the cross-validation at most.
-const FOLDS: usize = 4;
+/// Folds of the cross-validation at most: up to so many recordings each is left out once.
+const FOLDS: usize = 8;
 /// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
 const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
@@ -20,6 +20,8 @@ const PIECE: f64 = 2.0;
 const LEAST_GAIN: f64 = 0.03;
 /// Level of the signed-rank test over the pieces.
 const LEVEL: f64 = 0.05;
+/// Candidates within this share of the best on recordings not fitted to are as good.
+pub(super) const EQUAL: f64 = 0.03;
 /// Candidates of a round that go to the cross-validation, the best by training error first.
 const SHORT_LIST: usize = 3;
 /// Effects at most.
@@ -44,7 +46,7 @@ pub(super) struct Trial {
     pub train: f64,
     /// RMS on blocks not fitted to; none where it did not come so far.
     pub unseen: Option<f64>,
-    /// Signed-rank test, corrected for the candidates that came to it.
+    /// Signed-rank test; candidates are tested in a fixed sequence, which needs no correction for their number.
     pub p_value: f64,
     /// Why it was not taken; empty for the one that was.
     pub refused: String,
@@ -357,25 +359,20 @@ impl Search<'_> {
                     .map(|(b, a)| (b[0] / a[0]).ln())
                     .collect();
                 let wins = gains.iter().filter(|g| **g > 0.0).count();
-                trial.p_value = (count as f64 * signed_rank(&gains)).min(1.0);
-                trial.refused = if !(rms <= (1.0 - LEAST_GAIN) * whole) {
-                    "takes less than 3 % off the motion of recordings it was not fitted to".into()
-                } else if trial.p_value > LEVEL {
+                trial.p_value = signed_rank(&gains);
+                trial.refused = if trial.p_value > LEVEL {
                     format!(
                         "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
                         gains.len()
                     )
+                } else if !(rms <= (1.0 - LEAST_GAIN) * whole) {
+                    "takes less than 3 % off the motion of recordings it was not fitted to".into()
                 } else {
                     String::new()
                 };
             });
-            let best = (trials.iter().enumerate())
-                .filter(|(_, t)| t.refused.is_empty())
-                .min_by(|(_, a), (_, b)| {
-                    let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
-                    of(a).total_cmp(&of(b))
-                })
-                .map(|(k, _)| k);
+            in_sequence(&mut trials[..count]);
+            let best = taken(&trials);
             for (k, trial) in trials.iter_mut().enumerate() {
                 if trial.refused.is_empty() && Some(k) != best {
                     trial.refused = "another takes away more".into();
@@ -389,6 +386,28 @@ impl Search<'_> {
         }
         models
     }
+}
+
+/// Each candidate is tested at the full level as long as all before it, which fit better, have passed: so the chance of any
+/// false one stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training error,
+/// of which the pieces not fitted to know little.
+fn in_sequence(trials: &mut [Trial]) {
+    let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
+    for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
+        if trial.refused.is_empty() {
+            trial.refused = "one that fits better may be chance".into();
+        }
+    }
+}
+
+/// Which of the candidates that passed comes in: of those about as good on what they were not fitted to, the one that fits best.
+fn taken(trials: &[Trial]) -> Option<usize> {
+    let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
+    let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
+    let least = passed().map(|(_, t)| of(t)).fold(f64::INFINITY, f64::min);
+    let near = passed().filter(|(_, t)| of(t) <= (1.0 + EQUAL) * least);
+    near.min_by(|(_, a), (_, b)| a.train.total_cmp(&b.train))
+        .map(|(k, _)| k)
 }
 
 /// RMS over pieces.
