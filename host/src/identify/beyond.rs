@@ -24,6 +24,9 @@ const SETTLED: f64 = 0.25;
 /// of the motion repeats, does not become less: the longest recording would have a term for all of it. On simulated arms
 /// without any term the best took 1 to 8 % (IRp-6, TX40; 600 to 1400 s), on the LWR4+ those that were taken 15 to 76 %.
 const MATERIAL: f64 = 0.1;
+/// Share of a joint's torque, as RMS, beyond which what is left is not for a spring or ripple of that joint to explain: with a
+/// wrong zero, axis or length in the description everything that goes with the position seems to help.
+const MOST_LEFT: f64 = 0.3;
 /// Candidates of the description's relative uncertainty in the search.
 const STEPS: usize = 9;
 
@@ -153,7 +156,13 @@ pub(super) fn beyond(
             let left = data.left(&terms, &tried.base_values(&found.standard));
             let share = (without.iter().zip(&left)).map(|(without, with)| 1.0 - with / without);
             let material = share.fold(f64::NEG_INFINITY, f64::max) >= MATERIAL;
-            if pulls && material && best.as_ref().is_none_or(|b| found.evidence > b.0) {
+            let holds = match term {
+                Term::Position { joint, .. } => {
+                    left[*joint] <= MOST_LEFT * MOST_LEFT * data.squares(*joint)
+                }
+                Term::Tilt => true,
+            };
+            if pulls && material && holds && best.as_ref().is_none_or(|b| found.evidence > b.0) {
                 best = Some((found.evidence, *term, tried));
             }
         }

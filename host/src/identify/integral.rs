@@ -5,7 +5,7 @@ use rig_shared::scalar::Real;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::model::{Belongs, Equation, Plan, Rows, Tally, failed};
-use super::momentum::momentum_rows;
+use super::momentum::{as_trapezia_see, momentum_rows};
 use crate::prepare::{LowPass, Motion, PrepareError};
 
 /// What forms the rows of one recording.
@@ -38,7 +38,7 @@ impl<'a> Integral<'a> {
 /// The torque passes the position's filter, and so does the sign of the velocity: what the filter takes from
 /// one side it takes from the other. Each window is divided by √(W·∫Σ(loudness·q̇)²), which makes the residuals of
 /// all windows equally uncertain (noise of the torque enters the work multiplied by the velocity) and gives
-/// them the unit of a torque.
+/// them the unit of a torque. Energy is taken as the trapezia see it that sum the work ([`as_trapezia_see`]).
 fn integral_rows(
     motion: &Motion,
     plan: &Plan,
@@ -102,22 +102,33 @@ fn integral_rows(
         qd: vec![Vec::new(); n],
         ..Default::default()
     };
+    let energy = |k: usize, out: &mut [f64]| -> Result<(), PrepareError> {
+        let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
+        let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
+        energy_regressor(plan.chain, &q, &qd, &mut out[..standard]).map_err(failed)?;
+        if !plan.transmission.is_simple() {
+            plan.transmission
+                .motor_energy_columns(&q, &qd, &mut out[standard..])
+                .map_err(failed)?;
+        }
+        Ok(())
+    };
+    let mut around = [(); 3].map(|()| vec![0.0; width]);
     let (mut before, mut after) = (vec![0.0; width], vec![0.0; width]);
-    for start in motion.usable.0..motion.usable.1 {
+    // The row before a window and the one after it are looked at as well.
+    for start in motion.usable.0.max(1)..motion.usable.1 {
         let end = start + plan.window;
         if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64)
-            || end >= motion.sound_end
+            || end + 1 >= motion.sound_end
         {
             continue;
         }
         for (k, out) in [(start, &mut before), (end, &mut after)] {
-            let q: Vec<f64> = motion.joints.iter().map(|j| j.q[k]).collect();
-            let qd: Vec<f64> = motion.joints.iter().map(|j| j.qd[k]).collect();
-            energy_regressor(plan.chain, &q, &qd, &mut out[..standard]).map_err(failed)?;
-            if !plan.transmission.is_simple() {
-                plan.transmission
-                    .motor_energy_columns(&q, &qd, &mut out[standard..])
-                    .map_err(failed)?;
+            for (row, into) in (k - 1..).zip(&mut around) {
+                energy(row, into)?;
+            }
+            for (c, out) in out.iter_mut().enumerate() {
+                *out = as_trapezia_see([around[0][c], around[1][c], around[2][c]]);
             }
         }
         let moved = activity[end] - activity[start];

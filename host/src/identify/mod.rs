@@ -35,6 +35,7 @@ mod further;
 mod grouping;
 mod instrumental;
 mod integral;
+mod lag;
 mod least;
 mod likelihood;
 mod linear;

@@ -205,7 +205,8 @@ fn make_rows(
         ModelKind::Integral => {
             let maker = Integral::new(plan)?;
             let work = |motion: Motion| counted(&motion, |tally| maker.rows(&motion, tally));
-            worked_motion(recording, treatment, plan.window, &work, &mut give)?;
+            // A window's quadrature looks one row beyond it.
+            worked_motion(recording, treatment, plan.window + 1, &work, &mut give)?;
         }
     }
     Ok(total)

@@ -8,6 +8,10 @@
 //!
 //! The torque and the signs of the velocities pass the position's filter, as for the energy; each row is divided by
 //! the window's duration and so is a mean torque.
+//!
+//! Torque and loss are summed by trapezia, alike, so that jumps of friction err on both sides and cancel. What they sum a smooth
+//! rate to differs from its integral by dt²/12·(its slope at the end less that at the start) (Euler and Maclaurin), so that
+//! the momentum is taken as trapezia see it: [`as_trapezia_see`].
 
 use std::collections::VecDeque;
 
@@ -161,6 +165,12 @@ impl<'a> Maker<'a> {
     }
 }
 
+/// What trapezia sum the rate of a smooth quantity to, from its values at the row before, at the row and after it:
+/// x + dt²/12·ẍ.
+pub(super) fn as_trapezia_see([before, now, after]: [f64; 3]) -> f64 {
+    now + (after - 2.0 * now + before) / 12.0
+}
+
 /// A window that is under way.
 struct Open {
     start: usize,
@@ -184,8 +194,9 @@ pub(super) fn momentum_rows(
         qd: vec![Vec::new(); n],
         ..Default::default()
     };
-    let (first, last) = (motion.usable.0, motion.sound_end);
-    if first >= motion.usable.1 {
+    // The row before the first and the one after the last are looked at as well.
+    let (first, last) = (motion.usable.0.max(1), motion.sound_end.saturating_sub(1));
+    if first >= motion.usable.1.min(last) {
         return Ok(result);
     }
     let filtered_sign = |speeds: &mut dyn Iterator<Item = f64>| {
@@ -232,32 +243,40 @@ pub(super) fn momentum_rows(
         momentum: vec![0.0; n * p],
         loss: vec![0.0; n * p],
     };
-    let (mut now, mut before) = (empty(), empty());
+    let (mut before, mut now, mut after) = (empty(), empty(), empty());
     let mut sum = vec![0.0; n * p];
     let mut open: VecDeque<Open> = VecDeque::new();
     let (mut q, mut qd) = (vec![0.0; n], vec![0.0; n]);
     let (mut sign, mut motor_sign) = (vec![0.0; n], vec![0.0; n]);
-    let duration = plan.window as f64 * dt;
-    for k in first..last {
+    let mut look = |k: usize, out: &mut Instant| {
         for j in 0..n {
             (q[j], qd[j]) = (motion.joints[j].q[k], motion.joints[j].qd[k]);
             sign[j] = signs[j][k];
             motor_sign[j] = motor_signs.get(j).map_or(0.0, |s| s[k]);
         }
-        std::mem::swap(&mut now, &mut before);
-        maker.at(&q, &qd, &sign, &motor_sign, &mut now)?;
+        maker.at(&q, &qd, &sign, &motor_sign, out)
+    };
+    look(first - 1, &mut now)?;
+    look(first, &mut after)?;
+    let duration = plan.window as f64 * dt;
+    for k in first..last {
+        std::mem::swap(&mut before, &mut now);
+        std::mem::swap(&mut now, &mut after);
+        look(k + 1, &mut after)?;
         if k > first {
             for ((sum, a), b) in sum.iter_mut().zip(&before.loss).zip(&now.loss) {
                 *sum += 0.5 * dt * (a + b);
             }
         }
+        let momentum =
+            |e: usize| as_trapezia_see([before.momentum[e], now.momentum[e], after.momentum[e]]);
         let due = open.front().is_some_and(|o| o.start + plan.window == k);
         if let Some(done) = if due { open.pop_front() } else { None } {
             for (j, equation) in result.equations.iter_mut().enumerate() {
                 let of = j * p..(j + 1) * p;
-                equation.x.extend(of.map(|e| {
-                    (now.momentum[e] - done.momentum[e] + sum[e] - done.sum[e]) / duration
-                }));
+                equation.x.extend(
+                    of.map(|e| (momentum(e) - done.momentum[e] + sum[e] - done.sum[e]) / duration),
+                );
                 equation
                     .y
                     .push((torque[j][k] - torque[j][done.start]) / duration);
@@ -288,7 +307,7 @@ pub(super) fn momentum_rows(
         if k < motion.usable.1 && (motion.offset + k as u64).is_multiple_of(plan.stride as u64) {
             open.push_back(Open {
                 start: k,
-                momentum: now.momentum.clone(),
+                momentum: (0..n * p).map(momentum).collect(),
                 sum: sum.clone(),
             });
         }

@@ -124,8 +124,12 @@ pub(super) fn recommend(
         }
     }
     let shift = of(written).and_then(|row| row.largest_shift);
+    // Agreement says nothing of instruments that noise may have passed into.
+    let doubted =
+        written == Estimator::Iv && !matches!(verdict, Some(Verdict::NoSign | Verdict::Immaterial));
     if let (Some(shift), Some(error)) = (shift.filter(|s| *s < AGREES), error(written))
         && written != Estimator::Weighted
+        && !doubted
         && error <= (1.0 + WORSE) * plain
     {
         return (

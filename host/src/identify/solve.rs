@@ -13,6 +13,7 @@ use super::excitation::{excited, not_excited};
 use super::factor::TriangularFactor;
 use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
+use super::lag::Lag;
 use super::linear::{classical, least_squares, spread};
 use super::model::{Plan, Tally, each_rows};
 use super::problem::Problem;
@@ -373,6 +374,10 @@ fn solve(
         Some(residuals(&held, &holdout_surveys, whole.as_deref())?)
     };
 
+    let remembered: Vec<f64> = (train.iter())
+        .map(|r| memory_of(&r.autocorrelation, r.rows))
+        .collect();
+    let lag = Lag::of(&problem, &remembered)?;
     let combination = &data.combination * &base.combination;
     let columns: Vec<usize> = data.kept.iter().map(|&k| base.columns[k]).collect();
     let base_parameters: Vec<BaseParameter> = (0..columns.len())
@@ -402,10 +407,7 @@ fn solve(
             full: &full,
             factors: &factors,
             memory: match options.model {
-                ModelKind::Differential => train
-                    .iter()
-                    .map(|r| memory_of(&r.autocorrelation, r.rows))
-                    .collect(),
+                ModelKind::Differential => remembered,
                 ModelKind::Integral => vec![estimate.memory_rows],
             },
             parameters: &base_parameters,
@@ -435,6 +437,7 @@ fn solve(
             ));
         }
     }
+    warnings.extend(lag.map(|lag| lag.said(treatment.dt())));
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -484,7 +487,7 @@ fn solve(
         }
         if report.relative_error > 0.3 {
             warnings.push(format!(
-                "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to.",
+                "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to. Look at its zero, axis and lengths in the description, at the order of the columns, and at the robot for what no rigid model has.",
                 100.0 * report.relative_error
             ));
         }

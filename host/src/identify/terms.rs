@@ -197,6 +197,11 @@ impl Evidence {
         self.parts.iter().enumerate().map(of).collect()
     }
 
+    /// Squares of the torque of a joint.
+    pub(super) fn squares(&self, joint: usize) -> f64 {
+        self.parts[joint].right_side_squares()
+    }
+
     /// All joints' rows at their weights, with the columns of `terms` behind the base's.
     pub(super) fn joined(&self, terms: &[Term]) -> Seen {
         let p = self.parts.first().map_or(0, TriangularFactor::columns) - TERMS;

@@ -63,12 +63,12 @@ pub(super) struct Fault {
 pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     use Step::{At, Key};
     for (i, g) in robot.gravity.iter().enumerate() {
-        if !g.is_finite() {
+        if !sound(*g) {
             return Err(fault(
                 &[Key("gravity"), At(i)],
                 "gravity",
                 g,
-                "it must be three finite numbers, in m/s²",
+                &format!("it must be three finite numbers, in m/s², at most {LARGEST:e}"),
             ));
         }
     }
@@ -123,9 +123,27 @@ fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
     Fault {
         way: way.to_vec(),
         what: what.into(),
-        found: found.to_string(),
+        found: written(*found),
         right: right.into(),
     }
+}
+
+/// A number as a person writes it.
+pub(super) fn written(value: f64) -> String {
+    if sound(value) || !value.is_finite() {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// Largest number of a description, in the units that it is written in: beyond what any robot has, far within what products of
+/// such numbers can be computed with.
+pub(super) const LARGEST: f64 = 1e12;
+
+/// Whether `value` is a number that products can be computed with.
+pub(super) fn sound(value: f64) -> bool {
+    value.abs() <= LARGEST
 }
 
 /// What a number must be.
@@ -133,6 +151,8 @@ fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
 pub(super) enum Must {
     Finite,
     Positive,
+    /// Greater than 0, of whatever size: a limit that nothing reaches is none.
+    Limit,
     NotNegative,
     NotZero,
 }
@@ -147,24 +167,25 @@ pub(super) fn number(
 ) -> Result<(), Fault> {
     let (good, right) = match must {
         Must::Finite => (true, "a finite number"),
-        Must::Positive => (value > 0.0, "greater than 0"),
+        Must::Positive | Must::Limit => (value > 0.0, "greater than 0"),
         Must::NotNegative => (value >= 0.0, "0 or greater"),
         Must::NotZero => (value != 0.0, "different from 0"),
     };
-    if good && value.is_finite() {
+    let large = !matches!(must, Must::Limit) && value.is_finite() && !sound(value);
+    if good && value.is_finite() && !large {
         return Ok(());
     }
     let what = format!("the {what} of joint `{}`", joint.name);
-    Err(fault(
-        way,
-        &what,
-        &value,
-        &format!("it must be {right}, in {unit}"),
-    ))
+    let right = if large {
+        format!("it must be at most {LARGEST:e} in {unit}")
+    } else {
+        format!("it must be {right}, in {unit}")
+    };
+    Err(fault(way, &what, &value, &right))
 }
 
 fn check_joint(joint: &Joint) -> Result<(), Fault> {
-    use Must::{Finite, NotNegative, NotZero, Positive};
+    use Must::{Finite, Limit, NotNegative, NotZero};
     use Step::{At, Key};
     let (angle, force) = match joint.kind {
         JointKind::Revolute => ("rad", "N·m"),
@@ -218,7 +239,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             &way("velocity"),
             "velocity limit",
             &format!("{angle}/s"),
-            Positive,
+            Limit,
             limits.velocity,
         )?;
         if let Some(v) = limits.acceleration {
@@ -227,12 +248,12 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
                 &way("acceleration"),
                 "acceleration limit",
                 &format!("{angle}/s²"),
-                Positive,
+                Limit,
                 v,
             )?;
         }
         if let Some(v) = limits.torque {
-            number(joint, &way("torque"), "torque limit", force, Positive, v)?;
+            number(joint, &way("torque"), "torque limit", force, Limit, v)?;
         }
     }
     if let Some(friction) = &joint.friction {

@@ -2,7 +2,7 @@
 
 use rig_shared::transmission::TransmissionError;
 
-use super::check::{Fault, Must, Step, number};
+use super::check::{Fault, LARGEST, Must, Step, number, sound, written};
 use super::{Drive, Joint, Robot, Screw};
 
 /// A dead centre this close to the crank's range is within it, rad: the ratio there is hardly a hundredth of the best.
@@ -85,14 +85,14 @@ fn finite(
     unit: &str,
     place: impl Fn() -> Vec<Step>,
 ) -> Result<(), Fault> {
-    if value.is_finite() {
+    if sound(value) {
         return Ok(());
     }
     Err(Fault {
         way: place(),
         what: format!("the ratio of joint `{name}` in the drive of joint `{joint}`"),
-        found: value.to_string(),
-        right: format!("it must be a finite number, in {unit}"),
+        found: written(value),
+        right: format!("it must be a finite number, at most {LARGEST:e}, in {unit}"),
     })
 }
 

@@ -6,7 +6,7 @@ use rig_shared::transmission::{
     DriveKind, DriveMap, MOTOR_COLUMNS, Transmission, TransmissionError, motor_column,
 };
 
-use super::{JointKind, Robot, Screw};
+use super::{Joint, JointKind, Robot, Screw};
 
 /// The numbers of one drive.
 struct Numbers {
@@ -44,7 +44,10 @@ impl Robot {
                 zero: n.zero,
             })
             .collect();
-        Transmission::new(&maps)
+        let drives = Transmission::new(&maps)?;
+        let own = |joint: &Joint| (joint.drive.as_ref()).is_some_and(|d| d.joint_inertia != 0.0);
+        let stated = (self.joints.iter().enumerate()).filter(|(_, joint)| own(joint));
+        Ok(stated.fold(drives, |drives, (k, _)| drives.with_joint_inertia(k)))
     }
 
     fn numbers(&self, k: usize) -> Numbers {

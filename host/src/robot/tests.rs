@@ -88,7 +88,7 @@ fn everything_optional_survives_writing() {
 
 #[test]
 fn wrong_toml_is_named_by_line_and_mend() {
-    let cases: [(&str, &str, &[&str]); 16] = [
+    let cases: [(&str, &str, &[&str]); 17] = [
         (
             "mass",
             "mass = -1.0",
@@ -135,6 +135,11 @@ fn wrong_toml_is_named_by_line_and_mend() {
             &["linear", "revolute", "prismatic"],
         ),
         ("velocity", "velocity = 0.0", &["velocity limit", "rad/s"]),
+        (
+            "first_moment",
+            "first_moment = [1e200, 0.0, 0.0]",
+            &["first_moment of joint `link` is 1e200", "at most 1e12"],
+        ),
         (
             "gravity",
             "gravity = [0.0, nan, -9.81]",

@@ -24,8 +24,9 @@
 //! For a coupled drive the values are those seen at its own joint, and what the motor adds to the diagonal of another
 //! joint belongs to that joint's `Ia` and `fv`: the convention under which the coupled wrists of the Stäubli arms are
 //! published (Gautier 1991; Khalil & Dombre 2002, ch. 12). For a varying drive the values are the motor's own. `Ia` of
-//! the joint of a coupled or varying drive states the same as `Iam` and is left out, save where another motor puts
-//! something there ([`Transmission::has_joint_inertia`]).
+//! the joint of a coupled or varying drive is left out, as where nothing but the motor turns there `Iam` states it, save where another
+//! motor puts something there or gear and shaft have an inertia of their own
+//! ([`Transmission::has_joint_inertia`], [`Transmission::with_joint_inertia`]).
 //!
 //! Leaves out: more or fewer motors than joints, play and elasticity of gears, mass of the screws and rods (which turn
 //! with the links they lie along), friction of the screws that grows with the load, the gyroscopic torque of rotors; and
@@ -403,9 +404,19 @@ impl<T: Real> Transmission<T> {
         self.motors.iter().all(|m| m.screw.is_none())
     }
 
-    /// Whether the column `Ia` of a joint (from 0) belongs to the regressor: it does for a simple drive, and where
-    /// another, coupled motor adds to the joint's diagonal; elsewhere `Iam` stands for it and the column is to be
-    /// taken as zero. `false` past the end.
+    /// The same drives with an inertia of gear and shaft that turns with `joint` (from 0) and not with a motor, so that
+    /// [`Self::has_joint_inertia`]; nothing changes past the end.
+    #[must_use]
+    pub fn with_joint_inertia(mut self, joint: usize) -> Self {
+        if let Some(own) = self.joint_inertia.get_mut(joint) {
+            *own = true;
+        }
+        self
+    }
+
+    /// Whether the column `Ia` of a joint (from 0) belongs to the regressor: it does for a simple drive, where
+    /// another, coupled motor adds to the joint's diagonal, and [`Self::with_joint_inertia`]; elsewhere `Iam` stands for it
+    /// and the column is to be taken as zero. `false` past the end.
     pub fn has_joint_inertia(&self, joint: usize) -> bool {
         self.joint_inertia.get(joint).copied().unwrap_or(false)
     }

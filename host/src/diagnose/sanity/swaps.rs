@@ -27,6 +27,8 @@ pub(super) enum Mixed {
     Torques([usize; 2]),
     /// Positions of two joints swapped.
     Positions([usize; 2]),
+    /// Both: the joints stand in another order than in the description.
+    Joints([usize; 2]),
     /// A torque counted the other way round.
     Torque(usize),
     /// A position counted the other way round.
@@ -62,7 +64,9 @@ impl Judge<'_> {
         for mixed in candidates(&moving) {
             let after = self.left(&self.undone(&rows, mixed))?;
             let concerned: Vec<usize> = match mixed {
-                Mixed::Torques(pair) | Mixed::Positions(pair) => pair.to_vec(),
+                Mixed::Torques(pair) | Mixed::Positions(pair) | Mixed::Joints(pair) => {
+                    pair.to_vec()
+                }
                 Mixed::Torque(j) | Mixed::Position(j) => vec![j],
             };
             let mean = |left: &[f64]| {
@@ -130,6 +134,18 @@ impl Judge<'_> {
         match found.mixed {
             Mixed::Torques(pair) => swapped(About::Torque, "tau", "q", pair),
             Mixed::Positions(pair) => swapped(About::Motion, "q", "tau", pair),
+            Mixed::Joints([i, j]) => self.say(
+                "swap",
+                About::Motion,
+                i,
+                format!(
+                    "The columns of joint {} ({}) and joint {} ({}) stand in each other's place, all of them: exchanged, {model}; number them in the order of the description.",
+                    i + 1,
+                    self.robot.joints[i].name,
+                    j + 1,
+                    self.robot.joints[j].name
+                ),
+            ),
             Mixed::Torque(j) => turned(About::Torque, "tau", "q", j),
             Mixed::Position(j) => turned(About::Motion, "q", "tau", j),
         }
@@ -141,6 +157,10 @@ impl Judge<'_> {
         let scale =
             |column: &mut Vec<f64>, factor: f64| column.iter_mut().for_each(|v| *v *= factor);
         match mixed {
+            Mixed::Joints(pair) => {
+                rows = self.undone(&rows, Mixed::Torques(pair));
+                rows = self.undone(&rows, Mixed::Positions(pair));
+            }
             Mixed::Torque(j) => scale(&mut rows.tau[j], -1.0),
             Mixed::Position(j) => rows = rows.rescaled(Some(j), -1.0),
             Mixed::Torques([i, j]) => {
@@ -246,7 +266,10 @@ impl Found {
 
     /// Whether two joints' columns are swapped.
     pub(super) fn is_swap(&self) -> bool {
-        matches!(self.mixed, Mixed::Torques(_) | Mixed::Positions(_))
+        matches!(
+            self.mixed,
+            Mixed::Torques(_) | Mixed::Positions(_) | Mixed::Joints(_)
+        )
     }
 }
 
@@ -261,7 +284,12 @@ fn candidates(moving: &[usize]) -> Vec<Mixed> {
     for (k, &i) in moving.iter().enumerate() {
         all.extend([Mixed::Torque(i), Mixed::Position(i)]);
         for &j in &moving[k + 1..] {
-            all.extend([Mixed::Torques([i, j]), Mixed::Positions([i, j])]);
+            let pair = [i, j];
+            all.extend([
+                Mixed::Torques(pair),
+                Mixed::Positions(pair),
+                Mixed::Joints(pair),
+            ]);
         }
     }
     all

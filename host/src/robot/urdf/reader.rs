@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
+use crate::robot::check::{LARGEST, sound};
 use crate::robot::error::{Place, RobotError};
 
 /// A file being read.
@@ -109,7 +110,12 @@ impl<'a> Reader<'a> {
         text: &str,
     ) -> Result<f64, RobotError> {
         match text.trim().parse::<f64>() {
-            Ok(v) if v.is_finite() => Ok(v),
+            // A limit that nothing reaches is none.
+            Ok(v) if sound(v) || v.is_finite() && node.tag_name().name() == "limit" => Ok(v),
+            Ok(v) if v.is_finite() => Err(self.error(
+                node,
+                format!("{what} is {v:e}, but it must be at most {LARGEST:e}"),
+            )),
             _ if text.contains("${") => {
                 Err(self.error(node, format!("{what} is \"{text}\", {EXPAND}")))
             }
