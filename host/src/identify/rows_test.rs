@@ -353,3 +353,27 @@ fn the_integral_model_is_right_at_a_low_rate() {
     let (worst, of) = worst_error(&robot, &made, ModelKind::Integral, [1e-3, 1e-4]);
     assert!(worst < 1.0, "{worst} at {of}");
 }
+
+/// A command held until the next, recorded where it begins to act: half a sample before it acts on average.
+#[test]
+fn a_torque_recorded_before_it_acts_is_said() {
+    let robot = robot(EDDA_TEMPLATE);
+    for (lead, said) in [(2, true), (0, false)] {
+        let mut made = recording_at(1000.0, &robot, 40.0, 0);
+        let every = 4;
+        for block in &mut made.blocks {
+            let picked = |column: &[f64], from: usize| -> Vec<f64> {
+                let rows = column.len() / every - 1;
+                (0..rows).map(|k| column[every * k + from]).collect()
+            };
+            block.t = picked(&block.t, 0);
+            for joint in &mut block.joints {
+                joint.q = picked(&joint.q, 0);
+                joint.tau = picked(&joint.tau, lead);
+            }
+        }
+        let found = identify(&robot, &[&made], &[], &Options::default()).unwrap();
+        let warned = (found.warnings.iter()).any(|w| w.contains("--torque-lead 0.002"));
+        assert_eq!(warned, said, "{:?}", found.warnings);
+    }
+}
