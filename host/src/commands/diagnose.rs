@@ -174,10 +174,17 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     for (k, step) in found.steps.iter().enumerate() {
         lines.push(effect(k + 1, step));
         lines.extend(step.parameters.iter().map(|(name, value)| {
+            let unit = match value.unit.as_str() {
+                "1" => String::new(),
+                unit => format!(" {unit}"),
+            };
+            if value.std.is_infinite() {
+                let value = format_significant(value.value, 4);
+                return format!("    {name} = {value}{unit} (not determined)");
+            }
             format!(
-                "    {name} = {} {}",
-                format_value(value.value, value.std),
-                value.unit
+                "    {name} = {}{unit}",
+                format_value(value.value, value.std)
             )
         }));
     }
