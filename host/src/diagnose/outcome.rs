@@ -336,7 +336,7 @@ pub struct Diagnosis {
     pub motion_how: String,
     /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
     pub torque_lead: Vec<f64>,
-    /// Where the gap sits, most of it first.
+    /// Where the gap sits, most of it first; empty where it goes with no coordinate more than chance would have it.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
     /// The description's own effects, in its order.
