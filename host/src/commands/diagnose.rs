@@ -194,8 +194,14 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         } else {
             "on the training data; none were held back"
         };
+        let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
+            format!(
+                ", from the description as it stands; of what fitting it again leaves, the effects close {} %",
+                format_significant(100.0 * own, 3)
+            )
+        });
         lines.push(format!(
-            "gap closed: {} %, {on}",
+            "gap closed: {} %, {on}{refit}",
             format_significant(100.0 * share, 3)
         ));
     }

@@ -123,9 +123,14 @@ fn effects(d: &Diagnosis) -> String {
     } else {
         "on the recordings of the fit; none were held back"
     };
-    let share = d.gap_closed.map_or(String::new(), |share| {
-        format!(", and close {} of the gap {on}", percent(share))
-    });
+    let share = match (d.gap_closed, d.closed_by_effects()) {
+        (_, Some(own)) => format!(
+            ", and close {} of the gap that fitting the description again leaves {on}",
+            percent(own)
+        ),
+        (Some(share), None) => format!(", and close {} of the gap {on}", percent(share)),
+        (None, None) => String::new(),
+    };
     let verb = if names.len() == 1 { "was" } else { "were" };
     format!(
         "{} {verb} missing{}.",
@@ -140,26 +145,28 @@ fn effects(d: &Diagnosis) -> String {
 
 /// RMS of a joint from the refitted description to the last model.
 fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
-    let (list, on) = if w.holdout.is_empty() {
-        (&w.train, "on the training data")
-    } else {
-        (&w.holdout, "on the hold-out")
+    let [described, refitted, effects @ ..] = w.judged() else {
+        return None;
     };
-    let (first, last) = (list.first()?, list.last()?);
-    let unit = format_unit(&w.unit);
-    let from = if d.steps.is_empty() {
-        format!("The torque residual of joint {} is", w.joint)
+    let on = if w.holdout.is_empty() {
+        "on the training data"
     } else {
-        format!(
-            "The torque residual of joint {} {} from {} to",
-            w.joint,
-            if last > first { "rises" } else { "falls" },
-            number(*first)
-        )
+        "on the hold-out"
+    };
+    let unit = format_unit(&w.unit);
+    let last = match effects.last().filter(|_| !d.steps.is_empty()) {
+        Some(last) => format!(
+            ", {} with the effect{} found as well",
+            number(*last),
+            if effects.len() == 1 { "" } else { "s" }
+        ),
+        None => String::new(),
     };
     Some(format!(
-        "{from} {} {unit} RMS {on}; the noise floor is {} {unit}.",
-        number(*last),
+        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; the noise floor is {} {unit}.",
+        w.joint,
+        number(*described),
+        number(*refitted),
         number(w.floor),
     ))
 }
