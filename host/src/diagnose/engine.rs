@@ -2,7 +2,7 @@
 
 mod steps;
 
-use rig_shared::effects::{Kind, Periodic};
+use rig_shared::effects::Kind;
 
 use self::steps::{change_step, refuse, steps};
 use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
@@ -24,6 +24,7 @@ use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
 use super::search::{Search, is_gear, with};
 use super::stated::{Now, Stated, candidate};
+use super::waves::is_of_the_motor;
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
@@ -380,8 +381,7 @@ fn perhaps_nothing(
 /// Orders over the motor's turn of the waves among effects of a joint.
 fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
     let wave = |p: &Profile| {
-        let about = p.candidate.kind.periodic();
-        let motor = matches!(about, Some(Periodic::Motor | Periodic::MotorTimesDrive));
+        let motor = is_of_the_motor(p.candidate.kind);
         (p.candidate.joint == joint && motor).then_some(p.shapes[0])
     };
     found.iter().filter_map(wave).collect()

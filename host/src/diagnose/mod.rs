@@ -44,6 +44,7 @@ mod stated;
 pub mod testable;
 mod transmission;
 pub mod voltage;
+mod waves;
 mod winding;
 
 pub use drive_off::sensor_zeros;
