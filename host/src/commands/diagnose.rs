@@ -59,7 +59,8 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load(ui)?;
+    let description = args.robot.describe(ui)?;
+    let robot = description.robot;
     refuse_shared(&args.data, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
@@ -75,6 +76,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let options = Options {
         seed: args.seed,
         sensor_zeros: zeros(&robot, args, ui)?,
+        no_offsets: description.urdf.is_some(),
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);

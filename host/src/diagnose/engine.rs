@@ -23,6 +23,7 @@ use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
 use super::search::{Search, is_gear, with};
+use super::sentences::offsets;
 use super::stated::{Now, Stated, candidate};
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
@@ -47,6 +48,8 @@ pub fn diagnose(
         return Err(DiagnoseError::NoRecording);
     }
     let mut stated = Stated::of(robot);
+    // What the sensors read with the drive off gives a constant its name: then it is searched for.
+    stated.no_offsets = options.no_offsets && options.sensor_zeros.is_empty();
     loop {
         // Each time around more of the description's effects are held.
         match attempt(robot, &stated, training, holdout, options, progress) {
@@ -352,6 +355,7 @@ fn attempt(
     diagnosis
         .words
         .extend(read_off(robot, &options.sensor_zeros));
+    diagnosis.words.extend(offsets(&bench, after));
     diagnosis.words.extend(held(&bench, &open));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
