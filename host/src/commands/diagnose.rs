@@ -59,7 +59,8 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
-    let robot = args.robot.load(ui)?;
+    let description = args.robot.describe(ui)?;
+    let robot = description.robot;
     refuse_shared(&args.data, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
@@ -75,6 +76,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let options = Options {
         seed: args.seed,
         sensor_zeros: zeros(&robot, args, ui)?,
+        no_offsets: description.urdf.is_some(),
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);
@@ -174,10 +176,17 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     for (k, step) in found.steps.iter().enumerate() {
         lines.push(effect(k + 1, step));
         lines.extend(step.parameters.iter().map(|(name, value)| {
+            let unit = match value.unit.as_str() {
+                "1" => String::new(),
+                unit => format!(" {unit}"),
+            };
+            if value.std.is_infinite() {
+                let value = format_significant(value.value, 4);
+                return format!("    {name} = {value}{unit} (not determined)");
+            }
             format!(
-                "    {name} = {} {}",
-                format_value(value.value, value.std),
-                value.unit
+                "    {name} = {}{unit}",
+                format_value(value.value, value.std)
             )
         }));
     }
@@ -187,8 +196,14 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         } else {
             "on the training data; none were held back"
         };
+        let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
+            format!(
+                ", from the description as it stands; of what fitting it again leaves, the effects close {} %",
+                format_significant(100.0 * own, 3)
+            )
+        });
         lines.push(format!(
-            "gap closed: {} %, {on}",
+            "gap closed: {} %, {on}{refit}",
             format_significant(100.0 * share, 3)
         ));
     }

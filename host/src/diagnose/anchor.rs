@@ -26,11 +26,13 @@ pub(super) struct Anchor {
     pub(super) stated: bool,
     /// Whether the direction of gravity is held.
     pub(super) gravity_held: bool,
+    /// Free constant torques of a description that could not state them, so that no value of theirs contradicts it.
+    unstated: Vec<usize>,
 }
 
 impl Anchor {
-    /// For a robot.
-    pub(super) fn of(robot: &Robot, nominal: &Nominal) -> Self {
+    /// For a robot; `no_offsets` where its description could not state a constant torque.
+    pub(super) fn of(robot: &Robot, nominal: &Nominal, no_offsets: bool) -> Self {
         let n = robot.joints.len();
         let prior = nominal.stated(robot);
         let inertial = robot
@@ -38,7 +40,7 @@ impl Anchor {
             .iter()
             .all(|j| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
         let friction = robot.joints.iter().all(|j| j.friction.is_some());
-        let mut held = Vec::new();
+        let (mut held, mut unstated) = (Vec::new(), Vec::new());
         let mut free: Vec<Direction> = Vec::new();
         let mut gravity = Direction::new();
         let of_gravity = |c: usize| {
@@ -51,7 +53,10 @@ impl Anchor {
             let offset = c < n * COLUMNS
                 && c % COLUMNS == column::OFFSET
                 && robot.joints[c / COLUMNS].friction.is_some();
-            if offset {
+            if offset && no_offsets {
+                unstated.push(k);
+                free.push(vec![(k, 1.0)]);
+            } else if offset {
                 held.push(k);
             } else if of_gravity(c) {
                 held.push(k);
@@ -75,6 +80,7 @@ impl Anchor {
             held,
             stated: inertial && friction,
             gravity_held,
+            unstated,
         }
     }
 
@@ -83,6 +89,11 @@ impl Anchor {
         let alone = |d: &Direction| matches!(d.as_slice(), [(k, _)] if parameters.contains(k));
         self.free.retain(|direction| !alone(direction));
         self.held.extend(parameters);
+    }
+
+    /// Whether a free direction is a constant torque that the description could not state.
+    pub(super) fn is_unstated(&self, direction: usize) -> bool {
+        matches!(self.free[direction].as_slice(), [(k, _)] if self.unstated.contains(k))
     }
 
     /// Columns of the free directions.

@@ -4,7 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rig_shared::effects::Kind;
+
+use super::outcome::Step;
 use super::scenario::{Arm, ArmScenario, Fault};
+use super::waves::is_of_the_motor;
 use super::{Diagnosis, Options, diagnose};
 use crate::data::{Source, data_dir};
 use crate::prepare::Recording;
@@ -330,6 +334,43 @@ fn real_arms() {
             real.told(name);
         }
     }
+}
+
+/// A wave of 3 m along an axis that travels 0.25 m holds any offset, and a motor's angle that nobody has described is none.
+#[test]
+fn the_real_slide_gets_no_wave_that_it_does_not_travel_and_keeps_its_parameters() {
+    let Some(real) = emps() else {
+        return;
+    };
+    let diagnosis = real.told("emps");
+    for (effect, _) in named(&diagnosis) {
+        let along = Kind::named(effect, None).unwrap();
+        assert!(
+            !is_of_the_motor(along) && along != Kind::PositionFriction,
+            "{effect}"
+        );
+    }
+    for name in ["cogging", "gear_eccentricity", "position_friction"] {
+        let lacking = diagnosis.not_testable.iter().find(|n| n.effect == name);
+        assert!(lacking.is_some(), "{name}");
+    }
+    let motion = |pick: fn(&[f64; 2]) -> f64, step: Option<&Step>| {
+        step.and_then(|s| s.motion_rms).map(|pair| pick(&pair))
+    };
+    let steps = &diagnosis.steps;
+    if let Some((before, after)) =
+        motion(|p| p[0], steps.first()).zip(motion(|p| p[1], steps.last()))
+    {
+        assert!(after <= before, "{before} {after}");
+    }
+    // Published: 20.3935 and −3.1648 N.
+    let near = |name: &str, value: f64, least: f64| {
+        let found = diagnosis.absorbed.iter().find(|a| a.parameter == name);
+        let now = found.unwrap().after;
+        assert!((now - value).abs() < least, "{name} {now}");
+    };
+    near("fc1", 20.4, 6.0);
+    near("off1", -3.2, 1.0);
 }
 
 #[test]

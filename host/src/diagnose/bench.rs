@@ -55,7 +55,7 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, DiagnoseError> {
         let robot = &stated.robot;
         let nominal = Nominal::of(robot)?;
-        let anchor = Anchor::of(robot, &nominal);
+        let anchor = Anchor::of(robot, &nominal, stated.no_offsets);
         Ok(Self {
             robot,
             stated,

@@ -54,21 +54,25 @@ pub(super) fn change(
     let prior = anchor.prior_coefficients();
     let mut frozen = refit.frozen(anchor);
     frozen.subtract(known);
+    // A constant torque that the description could not state is no change of it.
+    let (unstated, all): (Vec<usize>, Vec<usize>) =
+        (0..free.len()).partition(|k| anchor.is_unstated(*k));
+    let constants = unstated.iter().map(|k| (&free[*k], after.values[*k]));
+    frozen.subtract(&combined(known.len(), constants));
     let evidence = |picked: &[usize]| {
         let columns: Vec<Vec<f64>> = picked.iter().map(|k| frozen.weighted(&free[*k])).collect();
         let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
         frozen.evidence(&columns, &open)
     };
     // All, a payload's, all in one ratio, each alone: what may be tried counts, not what was until one spoke.
-    let tried = 3 + free.len();
+    let tried = 3 + all.len();
     let corrected = |e: &Evidence| e.corrected(tried);
-    let all: Vec<usize> = (0..free.len()).collect();
     let whole = evidence(&all)?;
     if whole.gain < LEAST_GAIN || corrected(&whole) > SIGNIFICANT {
         return None;
     }
-    let moved_most = (0..free.len())
-        .map(|k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(f64::MIN_POSITIVE))
+    let moved_most = (all.iter())
+        .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(f64::MIN_POSITIVE))
         .fold(0.0, f64::max);
     if moved_most < LEAST_CHANGE {
         return None;
@@ -106,7 +110,7 @@ pub(super) fn change(
         [(b, _)] => bench.nominal.base.expression(*b),
         _ => "gravity".into(),
     };
-    for k in 0..free.len() {
+    for &k in &all {
         if let Some(e) = evidence(&[k])
             && speaks(&e)
         {
@@ -123,7 +127,7 @@ pub(super) fn change(
             });
         }
     }
-    let moved: Vec<String> = (0..free.len())
+    let moved: Vec<String> = (all.iter().copied())
         .filter(|&k| (after.values[k] - prior[k]).abs() > 4.0 * after.std(k))
         .map(name)
         .collect();

@@ -2,7 +2,7 @@
 
 mod steps;
 
-use rig_shared::effects::{Kind, Periodic};
+use rig_shared::effects::Kind;
 
 use self::steps::{change_step, refuse, steps};
 use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
@@ -23,7 +23,9 @@ use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
 use super::search::{Search, is_gear, with};
+use super::sentences::offsets;
 use super::stated::{Now, Stated, candidate};
+use super::waves::is_of_the_motor;
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
@@ -46,6 +48,8 @@ pub fn diagnose(
         return Err(DiagnoseError::NoRecording);
     }
     let mut stated = Stated::of(robot);
+    // What the sensors read with the drive off gives a constant its name: then it is searched for.
+    stated.no_offsets = options.no_offsets && options.sensor_zeros.is_empty();
     loop {
         // Each time around more of the description's effects are held.
         match attempt(robot, &stated, training, holdout, options, progress) {
@@ -351,6 +355,7 @@ fn attempt(
     diagnosis
         .words
         .extend(read_off(robot, &options.sensor_zeros));
+    diagnosis.words.extend(offsets(&bench, after));
     diagnosis.words.extend(held(&bench, &open));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
@@ -380,8 +385,7 @@ fn perhaps_nothing(
 /// Orders over the motor's turn of the waves among effects of a joint.
 fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
     let wave = |p: &Profile| {
-        let about = p.candidate.kind.periodic();
-        let motor = matches!(about, Some(Periodic::Motor | Periodic::MotorTimesDrive));
+        let motor = is_of_the_motor(p.candidate.kind);
         (p.candidate.joint == joint && motor).then_some(p.shapes[0])
     };
     found.iter().filter_map(wave).collect()

@@ -125,8 +125,12 @@ pub(super) fn detectable(
             continue;
         }
         let mut sizes: Vec<(f64, usize)> = Vec::new();
-        let columns = found.search.cached(c, &grid(candidate.kind))?;
+        let points = grid(candidate.kind);
+        let columns = found.search.cached(c, &points)?;
         for place in places(candidate.kind) {
+            if !found.search.shows(candidate, &points[place]) {
+                continue;
+            }
             let Some(projected) = last.distinct(&columns[place]) else {
                 continue;
             };

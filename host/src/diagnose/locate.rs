@@ -28,6 +28,8 @@ const VELOCITY: &str = "velocity";
 const POSITION: &str = "position";
 const ACCELERATION: &str = "acceleration";
 const DRIVE: &str = "torque of the drive";
+/// What goes with a coordinate at this probability or more goes with it by chance.
+const BY_CHANCE: f64 = 0.05;
 /// Share of the explained squares that the interval has to hold.
 const MOST_OF_IT: f64 = 0.75;
 
@@ -183,7 +185,8 @@ pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<us
     (place, edges)
 }
 
-/// Where the residual of a joint sits, most of the excess over `floor` first. `block` is the block of each row.
+/// Where the residual of a joint sits, most of the excess over `floor` first; nowhere where it goes with each coordinate no more
+/// than chance would have it. `block` is the block of each row.
 pub(super) fn locate(
     rows: &Rows,
     coordinates: &[Coordinate],
@@ -249,6 +252,7 @@ pub(super) fn locate(
     for (place, p) in places.iter_mut().zip(probabilities(&processes, seed)) {
         place.p_value = p;
     }
+    places.retain(|place| place.p_value < BY_CHANCE);
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }

@@ -44,6 +44,7 @@ mod stated;
 pub mod testable;
 mod transmission;
 pub mod voltage;
+mod waves;
 mod winding;
 
 pub use drive_off::sensor_zeros;
@@ -66,6 +67,9 @@ pub struct Options {
     pub seed: u64,
     /// What the sensors read with the drive off, by [`sensor_zeros`]; empty where it was not recorded.
     pub sensor_zeros: Vec<[f64; 2]>,
+    /// Whether the description comes from a format without a place for a constant torque, so that its having none says
+    /// nothing: the constant is then fitted beside the friction, as in an identification.
+    pub no_offsets: bool,
 }
 
 /// Why a diagnosis is not possible.

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+/// Shares of a gap that differ by less are written alike.
+const SAME_SHARE: f64 = 5e-4;
+
 /// What became of the gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -315,6 +318,17 @@ pub struct Tried {
     pub refused: String,
 }
 
+impl Waterfall {
+    /// The models' RMS on the recordings held back, else on those of the fit.
+    pub(crate) fn judged(&self) -> &[f64] {
+        if self.holdout.is_empty() {
+            &self.train
+        } else {
+            &self.holdout
+        }
+    }
+}
+
 /// The result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -336,14 +350,15 @@ pub struct Diagnosis {
     pub motion_how: String,
     /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
     pub torque_lead: Vec<f64>,
-    /// Where the gap sits, most of it first.
+    /// Where the gap sits, most of it first; empty where it goes with no coordinate more than chance would have it.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
     /// The description's own effects, in its order.
     pub described: Vec<Described>,
     /// What was found beside them, in that order.
     pub steps: Vec<Step>,
-    /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found.
+    /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found. Of what fitting the
+    /// description again leaves; of what it leaves as it stands where its own values are said to have changed.
     pub gap_closed: Option<f64>,
     /// Nominal parameters that had been lying.
     pub absorbed: Vec<Absorbed>,
@@ -367,4 +382,24 @@ pub struct Diagnosis {
     /// Curves for plots.
     #[serde(skip)]
     pub curves: Vec<Curves>,
+}
+
+impl Diagnosis {
+    /// Share that the effects close of the gap which fitting the description's parameters again leaves, where [`Self::gap_closed`]
+    /// counts that fitting in; none where it is of the effects alone.
+    pub(crate) fn closed_by_effects(&self) -> Option<f64> {
+        let (mut gap, mut closed) = (0.0, 0.0);
+        for w in &self.waterfall {
+            // A changed value that has an effect's name is a step, and no model of its own.
+            if let [_, refitted, .., last] = w.judged()
+                && self.residual == Residual::Torque
+                && w.models.len() >= self.steps.len() + 2
+            {
+                gap += (refitted - w.floor) / w.floor;
+                closed += (refitted - last) / w.floor;
+            }
+        }
+        let own = (gap > 0.0).then(|| closed / gap)?;
+        (self.gap_closed).and_then(|all| ((all - own).abs() > SAME_SHARE).then_some(own))
+    }
 }

@@ -48,8 +48,11 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
             found.floors[j],
             found.seed,
         );
+        // What goes with nothing is drawn over the first, the velocity.
         let most = places.first().map(|p| p.coordinate.clone());
-        let coordinate = (all.iter()).find(|c| Some(&c.name) == most.as_ref());
+        let coordinate = (all.iter())
+            .find(|c| Some(&c.name) == most.as_ref())
+            .or(all.first());
         list.extend(coordinate.map(|c| Map {
             // Without a step its law would be the sum of all.
             law: Vec::new(),

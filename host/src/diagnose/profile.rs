@@ -234,7 +234,8 @@ impl Search<'_> {
         Some(share)
     }
 
-    /// A candidate at its best shapes; none where it is no column of its own or its signs are impossible.
+    /// A candidate at its best shapes; none where it is no column of its own, its signs are impossible, or the motion spans none
+    /// of its waves. What it starts from it keeps.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -256,8 +257,11 @@ impl Search<'_> {
             if let Some(share) = self.explained(fit, c, &columns) {
                 best = Some((share, shapes, columns));
             }
-        } else {
+        } else if points.iter().any(|s| self.shows(&self.library[c], s)) {
             for (shapes, columns) in points.iter().zip(self.cached(c, &points)?) {
+                if !self.shows(&self.library[c], shapes) {
+                    continue;
+                }
                 let Some(share) = self.explained(fit, c, &columns) else {
                     continue;
                 };

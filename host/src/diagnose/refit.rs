@@ -237,7 +237,7 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
     };
     let left = known.inverse();
     (anchor.free.iter().enumerate())
-        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER)
+        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER && !anchor.is_unstated(*k))
         .filter_map(|(_, direction)| match direction.as_slice() {
             [(b, _)] => Some(*b),
             _ => None,

@@ -13,6 +13,7 @@ use super::judge::equal;
 use super::profile::{LEAST_GAIN, Profile, grid};
 use super::rows::Column;
 use super::runs::resolution;
+use super::waves;
 use crate::robot::Placed;
 
 mod begin;
@@ -45,6 +46,8 @@ pub(super) struct Search<'a> {
     pub(super) threads: usize,
     /// Joint by joint.
     pub(super) resolution: Vec<f64>,
+    /// Lowest to highest position, joint by joint, rad or m.
+    spans: Vec<f64>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
@@ -60,6 +63,9 @@ impl<'a> Search<'a> {
             resolution: (0..source.nominal.joints())
                 .map(|joint| resolution(source.runs, joint))
                 .collect(),
+            spans: (0..source.nominal.joints())
+                .map(|joint| waves::span(source.runs, joint))
+                .collect(),
             source,
             library,
             described,
@@ -74,6 +80,12 @@ impl<'a> Search<'a> {
         self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         cache.retain(|c, _| !depends_on_model(self.library[*c].kind));
+    }
+
+    /// Whether the motion spans a candidate with these shapes where it is a wave.
+    pub(super) fn shows(&self, candidate: &Candidate, shapes: &[f64; SHAPES]) -> bool {
+        let joint = &self.source.robot.joints[candidate.joint];
+        waves::shown(candidate.kind, joint, shapes, self.spans[candidate.joint])
     }
 
     /// Columns of the points of a candidate's grid.
@@ -153,7 +165,10 @@ impl<'a> Search<'a> {
     pub(super) fn trials(&self) -> usize {
         (self.library.iter())
             .filter(|c| is_first_law(c.kind))
-            .map(|c| grid(c.kind).len())
+            .map(|c| {
+                let shown = grid(c.kind).into_iter().filter(|s| self.shows(c, s));
+                shown.count()
+            })
             .sum()
     }
 

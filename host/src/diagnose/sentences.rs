@@ -1,10 +1,15 @@
 //! A diagnosis in sentences.
 
+use rig_shared::effects::Kind;
+use rig_shared::multibody::COLUMNS;
+
+use super::bench::Bench;
 use super::finish::Found;
 use super::floor::repeats;
 use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
 use super::profile::Profile;
-use crate::report::{format_significant, format_unit};
+use super::solve::Solution;
+use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::Joint;
 
 /// From so many standard deviations on a parameter has moved.
@@ -58,6 +63,7 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     if !d.steps.is_empty() {
         words.push(effects(d));
     }
+    words.extend(constant(d));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
     words.extend(worse_refitted(d));
     words.extend(motion(d));
@@ -123,9 +129,14 @@ fn effects(d: &Diagnosis) -> String {
     } else {
         "on the recordings of the fit; none were held back"
     };
-    let share = d.gap_closed.map_or(String::new(), |share| {
-        format!(", and close {} of the gap {on}", percent(share))
-    });
+    let share = match (d.gap_closed, d.closed_by_effects()) {
+        (_, Some(own)) => format!(
+            ", and close {} of the gap that fitting the description again leaves {on}",
+            percent(own)
+        ),
+        (Some(share), None) => format!(", and close {} of the gap {on}", percent(share)),
+        (None, None) => String::new(),
+    };
     let verb = if names.len() == 1 { "was" } else { "were" };
     format!(
         "{} {verb} missing{}.",
@@ -138,28 +149,71 @@ fn effects(d: &Diagnosis) -> String {
     )
 }
 
-/// RMS of a joint from the refitted description to the last model.
-fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
-    let (list, on) = if w.holdout.is_empty() {
-        (&w.train, "on the training data")
-    } else {
-        (&w.holdout, "on the hold-out")
-    };
-    let (first, last) = (list.first()?, list.last()?);
-    let unit = format_unit(&w.unit);
-    let from = if d.steps.is_empty() {
-        format!("The torque residual of joint {} is", w.joint)
-    } else {
+/// What an identification makes of effects that may be a constant torque.
+fn constant(d: &Diagnosis) -> Option<String> {
+    let constant = Kind::TorqueOffset.about().name;
+    let joints: Vec<String> = (d.steps.iter())
+        .filter(|s| s.set.len() > 1 && s.set.iter().any(|name| name == constant))
+        .map(|s| s.joint.clone())
+        .collect();
+    (!joints.is_empty()).then(|| {
         format!(
-            "The torque residual of joint {} {} from {} to",
-            w.joint,
-            if last > first { "rises" } else { "falls" },
-            number(*first)
+            "At joint {} a constant torque does as well. `rig identify` fits one as the offset of the joint's friction: a diagnosis that starts from its identified.toml counts it in.",
+            listed(&joints)
         )
+    })
+}
+
+/// Constant torques that were fitted beside the friction of a description without a place for them, as far as they are any.
+pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
+    let base = &bench.nominal.base.columns;
+    let found: Vec<String> = (bench.anchor.free.iter().enumerate())
+        .filter(|(k, _)| bench.anchor.is_unstated(*k))
+        .filter(|(k, _)| after.values[*k].abs() > MOVED * after.std(*k))
+        .filter_map(|(k, direction)| {
+            let (b, _) = direction.first()?;
+            let joint = bench.robot.joints.get(base[*b] / COLUMNS)?;
+            Some(format!(
+                "{} {} at joint {}",
+                format_value(after.values[k], after.std(k)),
+                effort(joint),
+                joint.name
+            ))
+        })
+        .collect();
+    (!found.is_empty()).then(|| {
+        format!(
+            "The description has no place for a constant torque, so one was fitted beside each joint's friction, and stands in model.toml as its offset: {}.",
+            listed(&found)
+        )
+    })
+}
+
+/// RMS of a joint as the description stands, with its parameters fitted again, and with the effects: what fitting again takes
+/// away is no merit of theirs.
+fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
+    let [described, refitted, effects @ ..] = w.judged() else {
+        return None;
+    };
+    let on = if w.holdout.is_empty() {
+        "on the training data"
+    } else {
+        "on the hold-out"
+    };
+    let unit = format_unit(&w.unit);
+    let last = match effects.last().filter(|_| !d.steps.is_empty()) {
+        Some(last) => format!(
+            ", {} with the effect{} found as well",
+            number(*last),
+            if effects.len() == 1 { "" } else { "s" }
+        ),
+        None => String::new(),
     };
     Some(format!(
-        "{from} {} {unit} RMS {on}; the noise floor is {} {unit}.",
-        number(*last),
+        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; the noise floor is {} {unit}.",
+        w.joint,
+        number(*described),
+        number(*refitted),
         number(w.floor),
     ))
 }

@@ -58,6 +58,8 @@ impl Way {
 pub(super) struct Stated {
     /// The description without them; payloads are masses of their links.
     pub(super) robot: Robot,
+    /// Whether its format has no place for a constant torque.
+    pub(super) no_offsets: bool,
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
@@ -85,6 +87,7 @@ impl Stated {
             .collect();
         Self {
             robot: plain,
+            no_offsets: false,
             effects,
         }
     }

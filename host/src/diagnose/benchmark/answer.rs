@@ -84,6 +84,7 @@ impl Method for Diagnose {
                 .map(|log| crate::diagnose::sensor_zeros(log))
                 .transpose()?
                 .unwrap_or_default(),
+            no_offsets: false,
         };
         let (diagnosis, _) = crate::diagnose::diagnose(
             &made.robot,

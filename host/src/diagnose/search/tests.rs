@@ -4,6 +4,7 @@
 
 use rig_shared::effects::Kind;
 
+use crate::diagnose::outcome::Verdict;
 use crate::diagnose::scenario::{Effect, Hidden, Scenario};
 use crate::diagnose::{Diagnosis, Options};
 
@@ -71,4 +72,48 @@ fn presliding_is_no_delay_besides() {
     let effect = Effect::Presliding { stroke: 0.007 };
     let (diagnosis, _) = diagnosed(effect, 5, false);
     assert_eq!(names(&diagnosis), ["presliding"]);
+}
+
+#[test]
+fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
+    let effect = Effect::TorqueOffset { torque: 0.15 };
+    let made = Scenario {
+        seconds: [30.0, 20.0],
+        ..Scenario::new(vec![Hidden { joint: 0, effect }], 101)
+    }
+    .make()
+    .unwrap();
+    let options = |no_offsets| Options {
+        without: vec![Kind::Backlash, Kind::JointElasticity],
+        no_offsets,
+        ..Options::default()
+    };
+    let (stated, _) = made.diagnosed(&made.robot, &options(false));
+    assert_eq!(stated.steps.len(), 1);
+    let (open, model) = made.diagnosed(&made.robot, &options(true));
+    assert!(open.steps.is_empty(), "{:?}", names(&open));
+    // No change either: there was nothing to change.
+    assert_eq!(open.verdict, stated_without_a_constant());
+    let offset = model.joints[0].friction.as_ref().unwrap().offset;
+    assert!((offset.abs() - 0.15).abs() < 0.01, "{offset}");
+    let said = (open.words.iter()).any(|w| w.contains("no place for a constant torque"));
+    assert!(said, "{:?}", open.words);
+    for place in open.places.iter().chain(&stated.places) {
+        assert!(place.p_value < 0.05, "{place:?}");
+    }
+}
+
+/// The verdict on the same rig without the constant.
+fn stated_without_a_constant() -> Verdict {
+    let made = Scenario {
+        seconds: [30.0, 20.0],
+        ..Scenario::new(Vec::new(), 101)
+    }
+    .make()
+    .unwrap();
+    let options = Options {
+        without: vec![Kind::Backlash, Kind::JointElasticity],
+        ..Options::default()
+    };
+    made.diagnosed(&made.robot, &options).0.verdict
 }

@@ -13,8 +13,9 @@ use rig_shared::effects::{Channel, Confusion, Kind, Need};
 
 use super::Run;
 use super::outcome::NotTestable;
+use super::waves;
 use crate::report::format_unit;
-use crate::robot::{JointKind, Robot};
+use crate::robot::{Joint, JointKind, Robot};
 
 use evidence::Evidence;
 
@@ -57,10 +58,23 @@ pub fn not_testable(kind: Kind, robot: &Robot, joint: usize, runs: &[Run]) -> Op
             "record a motion of this joint".to_owned(),
         ));
     }
-    about.needs.iter().find_map(|need| {
-        lacking(*need, robot, joint, runs, &evidence)
-            .map(|(why, experiment)| found(why, experiment))
-    })
+    (about.needs.iter())
+        .find_map(|need| lacking(*need, robot, joint, runs, &evidence))
+        .or_else(|| unspanned(kind, own, evidence.range[1] - evidence.range[0]))
+        .map(|(why, experiment)| found(why, experiment))
+}
+
+/// What a motion that spans so much lacks for a wave along the position.
+fn unspanned(kind: Kind, joint: &Joint, span: f64) -> Option<(String, String)> {
+    let shortest = waves::none_shown(kind, joint, span)?;
+    let unit = joint.kind.units().0;
+    let least = waves::SPANNED * shortest;
+    Some((
+        format!(
+            "the joint moves over {span:.3} {unit}; the shortest wave that is looked for is {shortest:.3} {unit} long, and over less than {least:.3} {unit} it looks like other friction or a constant"
+        ),
+        format!("a motion over {least:.3} {unit} or more, as far as the limits allow"),
+    ))
 }
 
 /// What no recording of torque and motion tells apart from the effect, and what does; without the pairs that the
@@ -142,9 +156,14 @@ fn lacking(
                 .filter(|r| *r > 0.0);
             let Some(ratio) = ratio else {
                 return Some((
-                    "the description states no gear ratio, so that the motor's angle is not known"
+                    "no drive with a gear ratio is described, so that the motor's angle is not known"
                         .to_owned(),
-                    "give [joint.drive] with gear_ratio".to_owned(),
+                    if revolute {
+                        "give [joint.drive] with gear_ratio"
+                    } else {
+                        "give [joint.drive] with gear_ratio, for a screw 2π over its lead in m"
+                    }
+                    .to_owned(),
                 ));
             };
             let slow = speed / ratio;

@@ -193,3 +193,25 @@ fn a_description_without_values_is_no_prior() {
             .contains("inertial")
     );
 }
+
+#[test]
+fn a_slide_lacks_a_described_drive_or_the_way() {
+    let slide = Robot::from_toml(crate::robot::EMPS, Path::new("emps.toml")).unwrap();
+    let runs = [run(60.0, |t| 0.125 + 0.12 * (0.5 * t).sin())];
+    let lacking = |kind: Kind| not_testable(kind, &slide, 0, &runs).unwrap();
+    for kind in [Kind::Cogging, Kind::GearEccentricity] {
+        let found = lacking(kind);
+        assert!(found.why.contains("no drive"), "{}", found.why);
+        assert!(
+            found.experiment.contains("gear_ratio"),
+            "{}",
+            found.experiment
+        );
+    }
+    let found = lacking(Kind::PositionFriction);
+    assert!(
+        found.why.contains("0.240 m") && found.why.contains("1.571 m long"),
+        "{}",
+        found.why
+    );
+}

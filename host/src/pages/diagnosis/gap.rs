@@ -182,7 +182,8 @@ fn figures(found: &Diagnosis) -> Block {
 
 /// Where the gap sits.
 pub(super) fn places(found: &Diagnosis) -> Option<Section> {
-    if found.places.is_empty() {
+    // Of a position that runs freely nothing is located, nor of recordings at fault.
+    if found.residual != Residual::Torque || found.waterfall.is_empty() {
         return None;
     }
     let texts: Vec<String> = texts(&found.places);
@@ -191,6 +192,12 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
         "Where the gap sits",
         "Before any effect is added: what the residual of the refitted model depends on. Noise depends on nothing; whatever does is something that the model lacks.",
     );
+    if found.places.is_empty() {
+        return Some(section.with(Block::Text(
+            "No coordinate alone explains it: the residual goes with none of them more than chance would have it (p < 0.05)."
+                .to_owned(),
+        )));
+    }
     if !texts.is_empty() {
         section = section.with(Block::List(texts));
     }
@@ -237,7 +244,7 @@ pub(super) fn table(caption: &str, places: &[Place]) -> Block {
                 ]
             })
             .collect(),
-        note: "Share: how much of the gap this one quantity accounts for; quantities that move together account for the same part, so shares do not add up. p is corrected for the number of quantities looked at.".into(),
+        note: "Share: how much of the gap this one quantity accounts for; quantities that move together account for the same part, so shares do not add up. p is corrected for the number of quantities looked at; those that are 0.05 or more, as chance makes them, are left out.".into(),
     })
 }
 

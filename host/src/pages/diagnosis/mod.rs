@@ -90,10 +90,18 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
             .push(Fact::new("Found", words::several(names.len(), "effect")).note(names.join("; ")));
     }
     if let Some(share) = found.gap_closed {
+        let refit = (found.closed_by_effects()).map_or(String::new(), |own| {
+            format!(
+                "; counted from the description as it stands, the effects close {} % of what fitting it again leaves",
+                parts::percent(own)
+            )
+        });
         facts.push(
             Fact::new("Gap closed", parts::percent(share))
                 .unit("%")
-                .note(format!("of the residual above the noise floor, {judged}")),
+                .note(format!(
+                    "of the residual above the noise floor, {judged}{refit}"
+                )),
         );
     }
     if let Some(ratio) = left_over(found) {

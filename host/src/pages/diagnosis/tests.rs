@@ -144,3 +144,13 @@ fn without_a_holdout_every_figure_says_so() {
     assert!(text.contains("no data were held back"));
     assert!(!text.contains("Held back") && !text.contains("on data held back;"));
 }
+
+#[test]
+fn a_gap_that_goes_with_nothing_is_said_to() {
+    let mut found = made_up::explained();
+    let said = |found: &Diagnosis| page(found).contains("No coordinate alone explains it");
+    assert!(!said(&found));
+    found.places.clear();
+    assert!(said(&found));
+    assert!(!said(&made_up::data_fault()));
+}
