@@ -6,7 +6,7 @@ use rig_shared::transmission::{
     DriveKind, DriveMap, MOTOR_COLUMNS, Transmission, TransmissionError, motor_column,
 };
 
-use super::{Joint, JointKind, Robot, Screw};
+use super::{JointKind, Robot, Screw};
 
 /// The numbers of one drive.
 struct Numbers {
@@ -42,12 +42,10 @@ impl Robot {
                     .and_then(|d| d.screw.as_ref())
                     .map(|s| s.map(&n.weights)),
                 zero: n.zero,
+                joint_inertia: (joint.drive.as_ref()).is_some_and(|d| d.joint_inertia != 0.0),
             })
             .collect();
-        let drives = Transmission::new(&maps)?;
-        let own = |joint: &Joint| (joint.drive.as_ref()).is_some_and(|d| d.joint_inertia != 0.0);
-        let stated = (self.joints.iter().enumerate()).filter(|(_, joint)| own(joint));
-        Ok(stated.fold(drives, |drives, (k, _)| drives.with_joint_inertia(k)))
+        Transmission::new(&maps)
     }
 
     fn numbers(&self, k: usize) -> Numbers {

@@ -26,7 +26,7 @@
 //! published (Gautier 1991; Khalil & Dombre 2002, ch. 12). For a varying drive the values are the motor's own. `Ia` of
 //! the joint of a coupled or varying drive is left out, as where nothing but the motor turns there `Iam` states it, save where another
 //! motor puts something there or gear and shaft have an inertia of their own
-//! ([`Transmission::has_joint_inertia`], [`Transmission::with_joint_inertia`]).
+//! ([`Transmission::has_joint_inertia`], [`DriveMap::joint_inertia`]).
 //!
 //! Leaves out: more or fewer motors than joints, play and elasticity of gears, mass of the screws and rods (which turn
 //! with the links they lie along), friction of the screws that grows with the load, the gyroscopic torque of rotors; and
@@ -100,6 +100,8 @@ pub struct DriveMap<'a> {
     pub screw: Option<ScrewMap<'a>>,
     /// Constant added, rad.
     pub zero: f64,
+    /// Whether gear and shaft have an inertia that turns with the joint and not with the motor.
+    pub joint_inertia: bool,
 }
 
 /// What a motor's row of the Jacobian looks like.
@@ -369,7 +371,7 @@ impl<T: Real> Transmission<T> {
                 .iter()
                 .enumerate()
                 .any(|(m, d)| m != k && d.screw.is_none() && d.ratios.get(k) != Some(&0.0));
-            let _ = joint_inertia.push(kind == DriveKind::Simple || foreign);
+            let _ = joint_inertia.push(kind == DriveKind::Simple || foreign || drive.joint_inertia);
         }
         Ok(Self {
             motors,
@@ -404,18 +406,8 @@ impl<T: Real> Transmission<T> {
         self.motors.iter().all(|m| m.screw.is_none())
     }
 
-    /// The same drives with an inertia of gear and shaft that turns with `joint` (from 0) and not with a motor, so that
-    /// [`Self::has_joint_inertia`]; nothing changes past the end.
-    #[must_use]
-    pub fn with_joint_inertia(mut self, joint: usize) -> Self {
-        if let Some(own) = self.joint_inertia.get_mut(joint) {
-            *own = true;
-        }
-        self
-    }
-
     /// Whether the column `Ia` of a joint (from 0) belongs to the regressor: it does for a simple drive, where
-    /// another, coupled motor adds to the joint's diagonal, and [`Self::with_joint_inertia`]; elsewhere `Iam` stands for it
+    /// another, coupled motor adds to the joint's diagonal, and with [`DriveMap::joint_inertia`]; elsewhere `Iam` stands for it
     /// and the column is to be taken as zero. `false` past the end.
     pub fn has_joint_inertia(&self, joint: usize) -> bool {
         self.joint_inertia.get(joint).copied().unwrap_or(false)

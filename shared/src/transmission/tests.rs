@@ -41,6 +41,7 @@ fn build<T: Real>(numbers: &[Numbers]) -> Transmission<T> {
                     },
                 ),
             zero: d.zero,
+            joint_inertia: false,
         })
         .collect();
     Transmission::new(&maps).unwrap()
@@ -348,6 +349,7 @@ fn what_a_screw_cannot_reach_and_dead_centres_are_refused_by_name() {
         ratios: &[1.0, 1.0],
         screw: None,
         zero,
+        joint_inertia: false,
     };
     let flat = Transmission::<f64>::new(&[twice(0.0), twice(1.0)]).unwrap();
     assert_eq!(
@@ -358,6 +360,7 @@ fn what_a_screw_cannot_reach_and_dead_centres_are_refused_by_name() {
         ratios: &[0.0, 2.0],
         screw: None,
         zero: 0.0,
+        joint_inertia: false,
     };
     assert_eq!(
         Transmission::<f64>::new(&[idle, twice(0.0)]).unwrap_err(),
@@ -516,11 +519,13 @@ fn the_coupled_wrist_has_the_columns_of_the_published_model() {
             ratios: &[45.0, 0.0],
             screw: None,
             zero: 0.0,
+            joint_inertia: false,
         },
         DriveMap {
             ratios: &[32.0, 32.0],
             screw: None,
             zero: 0.0,
+            joint_inertia: false,
         },
     ])
     .unwrap();

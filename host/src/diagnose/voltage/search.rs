@@ -391,7 +391,7 @@ impl Search<'_> {
 /// Each candidate is tested at the full level as long as all before it, which fit better, have passed: so the chance of any
 /// false one stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training error,
 /// of which the pieces not fitted to know little.
-fn in_sequence(trials: &mut [Trial]) {
+pub(super) fn in_sequence(trials: &mut [Trial]) {
     let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
     for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
         if trial.refused.is_empty() {
@@ -401,7 +401,7 @@ fn in_sequence(trials: &mut [Trial]) {
 }
 
 /// Which of the candidates that passed comes in: of those about as good on what they were not fitted to, the one that fits best.
-fn taken(trials: &[Trial]) -> Option<usize> {
+pub(super) fn taken(trials: &[Trial]) -> Option<usize> {
     let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
     let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
     let least = passed().map(|(_, t)| of(t)).fold(f64::INFINITY, f64::min);

@@ -119,6 +119,59 @@ fn where_nothing_is_missing_nothing_is_found() {
 }
 
 #[test]
+fn recordings_stand_in_one_order_whatever_order_they_are_given_in() {
+    let runs: Vec<InMemory> = (0..4).map(|k| pendulum(k, 0.1)).collect();
+    let labels = |order: [usize; 4]| -> Vec<String> {
+        let given = order.map(|k| &runs[k] as &dyn Recording);
+        logs(&given)
+            .unwrap()
+            .into_iter()
+            .map(|log| log.label)
+            .collect()
+    };
+    assert_eq!(labels([0, 1, 2, 3]), labels([2, 0, 3, 1]));
+}
+
+#[test]
+fn an_effect_may_spoil_what_the_next_one_mends() {
+    assert_eq!(standing(&[1.0, 0.5, 0.6]), 1);
+    assert_eq!(standing(&[1.0, 1.5, 0.4]), 2);
+    assert_eq!(standing(&[1.0, 1.5, 1.2]), 0);
+    assert_eq!(standing(&[1.0, 1.01]), 1);
+    assert_eq!(standing(&[]), 0);
+}
+
+#[test]
+fn candidates_pass_until_the_first_that_may_be_chance_and_the_best_fitting_of_equals_comes_in() {
+    // RMS on the fit and off it, p-value: in the order of the fit, as the search has them.
+    let trials = |list: &[[f64; 3]]| -> Vec<search::Trial> {
+        let one = |[train, unseen, p_value]: &[f64; 3]| search::Trial {
+            kind: Kind::Stribeck,
+            model: None,
+            train: *train,
+            unseen: Some(*unseen),
+            p_value: *p_value,
+            refused: if *p_value > 0.05 {
+                "chance".into()
+            } else {
+                String::new()
+            },
+        };
+        let mut all: Vec<search::Trial> = list.iter().map(one).collect();
+        search::in_sequence(&mut all);
+        all
+    };
+    let taken = |list: &[[f64; 3]]| search::taken(&trials(list));
+    assert_eq!(taken(&[[1.0, 2.0, 0.01], [1.1, 1.5, 0.04]]), Some(1));
+    assert_eq!(taken(&[[1.0, 1.52, 0.01], [1.1, 1.5, 0.04]]), Some(0));
+    assert_eq!(taken(&[[1.0, 2.0, 0.06], [1.1, 1.5, 0.001]]), None);
+    assert_eq!(
+        taken(&[[1.0, 2.0, 0.01], [1.1, 1.9, 0.2], [1.2, 1.0, 0.01]]),
+        Some(0)
+    );
+}
+
+#[test]
 fn signed_ranks_have_their_exact_chances() {
     // Every gain: one of 2^5 patterns. All but the smallest: two of them. None: all.
     let p = |gains: &[f64]| search::signed_rank(gains);
