@@ -135,7 +135,7 @@ pub enum Implausible {
     },
     /// Time in milliseconds or in a smaller unit.
     #[error("t looks like {} (its steps are {step:.4}); give it in s", unit_of_steps(*step))]
-    Milliseconds {
+    NotSeconds {
         /// Median step.
         step: f64,
     },
@@ -154,7 +154,7 @@ impl Implausible {
             Self::EffortTooLarge { joint, .. } | Self::EffortTooSmall { joint, .. } => {
                 format!("tau{joint}")
             }
-            Self::Milliseconds { .. } => "t".into(),
+            Self::NotSeconds { .. } => "t".into(),
         }
     }
 }
@@ -173,7 +173,7 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     if let Some(&step) = steps.get(steps.len() / 2)
         && step >= 0.2
     {
-        found.push(Implausible::Milliseconds { step });
+        found.push(Implausible::NotSeconds { step });
     }
     for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
         check_joint(k, &block.t, columns, joint, &mut found);

@@ -114,7 +114,7 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
         ..Block::default()
     };
     plausibility(&block, robot).first().map(|found| {
-        let Implausible::Milliseconds { step } = found else {
+        let Implausible::NotSeconds { step } = found else {
             return fault(runs, "clock", About::Recording, "", found.to_string());
         };
         let unit = unit_of_steps(*step);
@@ -154,7 +154,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
                 Implausible::EffortTooLarge { joint, .. }
                 | Implausible::EffortTooSmall { joint, .. } => (*joint, About::TorqueScale),
-                Implausible::Milliseconds { .. } | Implausible::ReferenceScale { .. } => continue,
+                Implausible::NotSeconds { .. } | Implausible::ReferenceScale { .. } => continue,
             };
             let joint = joint.saturating_sub(1);
             if found.iter().any(|(j, _)| *j == joint) {

@@ -4,13 +4,11 @@ use super::fit::{WINDOW, start};
 use super::log::Log;
 use super::plant::Plant;
 use super::{DiagnoseError, floor};
-use crate::data::{Implausible, plausibility};
+use crate::data::{Implausible, JUDGED_ROWS, plausibility};
 use crate::diagnose::outcome::{About, DataFault};
-use crate::prepare::Recording;
+use crate::prepare::{Recording, first_block};
 use crate::robot::Robot;
 
-/// Rows of a recording that are looked at for units.
-const ROWS: usize = 65_536;
 /// Windows of a fit that the training recordings have to give.
 const FEWEST_WINDOWS: f64 = 5.0;
 /// Steps of the encoder that the joint has to move by at least.
@@ -36,15 +34,11 @@ pub(super) fn faults(
     };
     let mut found = Vec::new();
     for source in given.iter().copied().flatten() {
-        let mut first = None;
-        source.each_block(ROWS, &mut |block| {
-            first.get_or_insert(block);
-            Ok(())
-        })?;
+        let first = first_block(*source, JUDGED_ROWS)?;
         let wrong = first.map(|block| plausibility(&block, robot));
         found.extend(wrong.into_iter().flatten().map(|what| {
             let kind = match what {
-                Implausible::Milliseconds { .. } => "clock",
+                Implausible::NotSeconds { .. } => "clock",
                 Implausible::Jump { .. } => "jump",
                 _ => "unit",
             };
