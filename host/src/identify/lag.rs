@@ -11,9 +11,8 @@
 use std::f64::consts::PI;
 
 use super::IdentifyError;
-use super::ModelKind;
 use super::factor::TriangularFactor;
-use super::model::{Rows, each_rows};
+use super::model::Rows;
 use super::problem::Problem;
 
 /// Standard deviations from which a lag counts.
@@ -49,27 +48,18 @@ impl Lag {
         let treatment = problem.plan.treatment;
         let period = treatment.decimation as f64 * treatment.dt();
         let mut row = vec![0.0; p + 1];
-        let mut instant = 0;
-        for (recording, weight) in problem.training.iter().zip(problem.recording_weights()) {
-            let model = ModelKind::Differential;
-            each_rows(*recording, problem.plan, model, &mut |rows| {
-                for i in 0..rows.t.len() {
-                    instant += 1;
-                    if instant % step != 0 || !has_neighbours(rows, i, period) {
-                        continue;
-                    }
-                    for (equation, factor) in rows.equations.iter().zip(&mut factors) {
-                        if !equation.keep[i] {
-                            continue;
-                        }
-                        row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
-                        row[p] = rate(&equation.y, i) / period;
-                        factor.push(&row, equation.y[i], weight);
-                    }
-                }
-                Ok(())
-            })?;
-        }
+        problem.each_instant(step, &mut |rows, i, weight| {
+            if !has_neighbours(rows, i, period) {
+                return Ok(());
+            }
+            let equations = rows.equations.iter().zip(&mut factors);
+            for (equation, factor) in equations.filter(|(equation, _)| equation.keep[i]) {
+                row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
+                row[p] = rate(&equation.y, i) / period;
+                factor.push(&row, equation.y[i], weight);
+            }
+            Ok(())
+        })?;
         let own = factors
             .iter()
             .zip(memory)

@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use super::base::{Base, Independent};
 use super::covariance::Estimate;
 use super::linear::spread;
-use super::model::Plan;
+use super::model::{Plan, Rows, each_rows};
 use super::parts::{Parts, Refit};
-use super::{IdentifyError, Options};
-use crate::prepare::{Recording, Survey};
+use super::{IdentifyError, ModelKind, Options};
+use crate::prepare::{PrepareError, Recording, Survey};
 use crate::robot::Robot;
 
 /// The weighted fit and all that led to it.
@@ -39,6 +39,33 @@ impl Problem<'_> {
     /// Factor that the rows of each training recording are multiplied by.
     pub(super) fn recording_weights(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.training.len()).map(|r| self.options.row_weight(r))
+    }
+
+    /// Every `step`-th instant of the training recordings: its rows of the differential model, which of them it is, and the
+    /// recording's weight.
+    pub(super) fn each_instant(
+        &self,
+        step: u64,
+        take: &mut dyn FnMut(&Rows, usize, f64) -> Result<(), PrepareError>,
+    ) -> Result<(), IdentifyError> {
+        let mut instant = 0;
+        for (recording, weight) in self.training.iter().zip(self.recording_weights()) {
+            each_rows(
+                *recording,
+                self.plan,
+                ModelKind::Differential,
+                &mut |rows| {
+                    for i in 0..rows.t.len() {
+                        instant += 1;
+                        if instant % step == 0 {
+                            take(rows, i, weight)?;
+                        }
+                    }
+                    Ok(())
+                },
+            )?;
+        }
+        Ok(())
     }
 
     /// Weights by which rows count as what they are worth when the residual remembers its past: σ·√memory as unit.

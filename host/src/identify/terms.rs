@@ -129,41 +129,34 @@ impl Evidence {
         let mut parts = vec![TriangularFactor::new(p + TERMS); joints];
         let mut sums = vec![[[0.0; 2]; TERMS]; joints];
         let mut row = vec![0.0; p + TERMS];
-        let mut instant = 0;
-        for (recording, weight) in problem.training.iter().zip(problem.recording_weights()) {
-            let differential = ModelKind::Differential;
-            each_rows(*recording, problem.plan, differential, &mut |rows| {
-                for i in 0..rows.t.len() {
-                    instant += 1;
-                    if instant % step != 0 || rows.equations.iter().all(|e| !e.keep[i]) {
-                        continue;
-                    }
-                    let turned = match &mut tilt {
-                        Some(tilt) => Some(tilt.at(&rows.q, i)?),
-                        None => None,
-                    };
-                    for (j, equation) in rows.equations.iter().enumerate() {
-                        if !equation.keep[i] {
-                            continue;
-                        }
-                        row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
-                        let mut at = p;
-                        for periods in std::iter::once(None).chain(PERIODS.map(Some)) {
-                            at += terms_of(periods, rows.q[j][i], &mut row[at..]);
-                        }
-                        for (k, value) in row[at..].iter_mut().enumerate() {
-                            *value = turned.map_or(0.0, |torque| torque[k][j]);
-                        }
-                        parts[j].push(&row, equation.y[i], weight);
-                        for (sum, value) in sums[j].iter_mut().zip(&row[p..]) {
-                            sum[0] += value;
-                            sum[1] += value * value;
-                        }
-                    }
+        problem.each_instant(step, &mut |rows, i, weight| {
+            if rows.equations.iter().all(|e| !e.keep[i]) {
+                return Ok(());
+            }
+            let turned = match &mut tilt {
+                Some(tilt) => Some(tilt.at(&rows.q, i)?),
+                None => None,
+            };
+            for (j, equation) in rows.equations.iter().enumerate() {
+                if !equation.keep[i] {
+                    continue;
                 }
-                Ok(())
-            })?;
-        }
+                row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
+                let mut at = p;
+                for periods in std::iter::once(None).chain(PERIODS.map(Some)) {
+                    at += terms_of(periods, rows.q[j][i], &mut row[at..]);
+                }
+                for (k, value) in row[at..].iter_mut().enumerate() {
+                    *value = turned.map_or(0.0, |torque| torque[k][j]);
+                }
+                parts[j].push(&row, equation.y[i], weight);
+                for (sum, value) in sums[j].iter_mut().zip(&row[p..]) {
+                    sum[0] += value;
+                    sum[1] += value * value;
+                }
+            }
+            Ok(())
+        })?;
         let spread = parts
             .iter()
             .zip(&sums)
