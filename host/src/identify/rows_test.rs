@@ -288,12 +288,13 @@ fn threads_change_no_bit() {
 }
 
 /// Largest error of the base parameters identified from `made`, in units of `share` of the value plus `least` of a
-/// coefficient of one, and where.
+/// coefficient of one, and where; among the parameters has to be one with `named` in it.
 fn worst_error(
     robot: &Robot,
     made: &InMemory,
     model: ModelKind,
     [share, least]: [f64; 2],
+    named: &str,
 ) -> (f64, String) {
     let (links, motors) = parameters(robot.joints.len());
     let truth = [links.as_flattened(), motors.as_flattened()].concat();
@@ -303,6 +304,12 @@ fn worst_error(
     };
     let found = identify(robot, &[made], &[], &options).unwrap();
     assert!(found.not_excited.is_empty(), "{:?}", found.not_excited);
+    let names: Vec<&str> = found
+        .base_parameters
+        .iter()
+        .map(|b| b.expression.as_str())
+        .collect();
+    assert!(names.iter().any(|name| name.contains(named)), "{names:?}");
     let mut worst = (0.0f64, String::new());
     for (k, b) in found.base_parameters.iter().enumerate() {
         let row = found.details.combination.row(k);
@@ -328,7 +335,7 @@ fn parameters_of_coupled_motors_come_back_through_both_models() {
     for robot in [robot(TX40), with_joint_inertia()] {
         let made = recording(&robot, 60.0, 0);
         for model in [ModelKind::Differential, ModelKind::Integral] {
-            let (worst, of) = worst_error(&robot, &made, model, [0.01, 1e-3]);
+            let (worst, of) = worst_error(&robot, &made, model, [0.01, 1e-3], "fvm6");
             assert!(worst < 1.0, "{} {model:?}: {worst} at {of}", robot.name);
         }
     }
@@ -350,7 +357,7 @@ fn an_inertia_beside_a_coupled_motor_is_a_parameter_where_it_is_stated() {
 fn the_integral_model_is_right_at_a_low_rate() {
     let robot = robot(EDDA_TEMPLATE);
     let made = recording_at(50.0, &robot, 60.0, 0);
-    let (worst, of) = worst_error(&robot, &made, ModelKind::Integral, [1e-3, 1e-4]);
+    let (worst, of) = worst_error(&robot, &made, ModelKind::Integral, [1e-3, 1e-4], "fc2");
     assert!(worst < 1.0, "{worst} at {of}");
 }
 
