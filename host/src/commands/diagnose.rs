@@ -14,7 +14,7 @@ use crate::diagnose::{DiagnoseError, Options, diagnose, sensor_zeros};
 use crate::files::{folder, write_whole};
 use crate::pages::{self, Context};
 use crate::prepare::Recording;
-use crate::report::{self, format_significant, format_value};
+use crate::report::{self, format_significant};
 use crate::robot::Robot;
 
 /// Says what the model lacks: where prediction and recording disagree, which physical effect is missing, what it takes
@@ -180,14 +180,7 @@ fn summary(found: &Diagnosis) -> Vec<String> {
                 "1" => String::new(),
                 unit => format!(" {unit}"),
             };
-            if value.std.is_infinite() {
-                let value = format_significant(value.value, 4);
-                return format!("    {name} = {value}{unit} (not determined)");
-            }
-            format!(
-                "    {name} = {}{unit}",
-                format_value(value.value, value.std)
-            )
+            format!("    {name} = {}", value.said(&unit))
         }));
     }
     if let Some(share) = found.gap_closed {

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::report::{format_significant, format_value};
+
 /// Shares of a gap that differ by less are written alike.
 const SAME_SHARE: f64 = 5e-4;
 
@@ -62,6 +64,20 @@ pub struct Value {
     pub std: f64,
     /// ASCII
     pub unit: String,
+}
+
+impl Value {
+    /// With its standard deviation and `unit` behind it, or said not to be determined.
+    pub(crate) fn said(&self, unit: &str) -> String {
+        if self.std.is_infinite() {
+            format!(
+                "{}{unit} (not determined)",
+                format_significant(self.value, 4)
+            )
+        } else {
+            format!("{}{unit}", format_value(self.value, self.std))
+        }
+    }
 }
 
 /// One effect that was found.

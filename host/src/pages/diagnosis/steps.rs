@@ -2,9 +2,7 @@
 
 use super::{gap, parts, words};
 use crate::diagnose::outcome::{Diagnosis, Residual, Step};
-use crate::report::{
-    Block, Column, NoteKind, Section, Table, format_p_value, format_significant, format_value,
-};
+use crate::report::{Block, Column, NoteKind, Section, Table, format_p_value};
 
 /// What the figure of a step shows.
 const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something. The line is the effect's law, fitted to the data. The dots after should lie on zero.";
@@ -79,15 +77,10 @@ fn parameters(step: &Step) -> Block {
                         .find(|p| p.name == name)
                         .map(|p| p.meaning)
                 });
-                let value_and_std = if value.std.is_infinite() {
-                    format!("{} (not determined)", format_significant(value.value, 4))
-                } else {
-                    format_value(value.value, value.std)
-                };
                 vec![
                     name.clone(),
                     words::or_dash(meaning.unwrap_or(if name == SHARE { SHARE_MEANS } else { "" })),
-                    value_and_std,
+                    value.said(""),
                     parts::unit(&value.unit),
                 ]
             })
