@@ -21,6 +21,16 @@ pub enum ExciteError {
         /// Its name.
         joint: String,
     },
+    /// Limits that bound nothing.
+    #[error(
+        "the limits of joint \"{joint}\" let it move at {velocity:e} (SI units), and a motion is sized by them; give the velocity, or the acceleration, that its drive can do"
+    )]
+    Boundless {
+        /// Its name.
+        joint: String,
+        /// What the limits allow, rad/s or m/s.
+        velocity: f64,
+    },
     /// An option outside its range.
     #[error("the {name} is {value}, but {right}")]
     Option {

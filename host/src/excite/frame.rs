@@ -14,7 +14,7 @@ use super::schedule::{JointMotion, Schedule};
 use super::workspace::{Plane, planes_of};
 use super::{Criterion, ExciteError, Options, Parameters, Scaling};
 use crate::identify::{Base, ModelKind};
-use crate::robot::Robot;
+use crate::robot::{Robot, sound};
 use crate::simulate::{Model, SimulateError};
 
 /// States from which the size of a column is estimated; it serves as a unit and need not be precise.
@@ -70,6 +70,9 @@ pub(super) struct Frame {
     pub criterion: Criterion,
 }
 
+/// Highest velocity that a motion is sized by, rad/s or m/s: beyond what the joint of any robot does.
+const FASTEST: f64 = 1e4;
+
 /// A period whose harmonics can use the limits: the fundamental slow enough to sweep the position range at the
 /// velocity limit, and the fastest harmonic no faster than where velocity and acceleration limits meet; the longest
 /// over the joints, rounded up to 0.1 s.
@@ -103,15 +106,34 @@ pub(super) fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), Exc
                 joint.name
             ));
         }
-        if limits.acceleration.is_none() {
+        // A number that no drive reaches stands for "no limit" in many descriptions; a row weighed by it would be lost.
+        let reachable = |limit: &f64| sound(*limit);
+        let acceleration = limits.acceleration.filter(reachable);
+        if acceleration.is_none() {
             boundless.push(joint.name.as_str());
+        }
+        // From rest over the whole range and back to rest, at the highest acceleration, is as fast as a joint gets.
+        let within = acceleration.map_or(f64::INFINITY, |a| (a * (high - low)).sqrt());
+        let velocity = limits.velocity.min(within);
+        if velocity > FASTEST {
+            return Err(ExciteError::Boundless {
+                joint: joint.name.clone(),
+                velocity,
+            });
+        }
+        if velocity < limits.velocity {
+            notes.push(format!(
+                "Joint \"{}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
+                 sized by the {velocity:.3} that it can reach (SI units).",
+                joint.name
+            ));
         }
         list.push(Bounds {
             low,
             high,
-            velocity: limits.velocity,
-            acceleration: limits.acceleration,
-            torque: limits.torque,
+            velocity,
+            acceleration,
+            torque: limits.torque.filter(reachable),
         });
     }
     if !boundless.is_empty() {

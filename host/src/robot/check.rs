@@ -142,7 +142,7 @@ pub(super) fn written(value: f64) -> String {
 pub(super) const LARGEST: f64 = 1e12;
 
 /// Whether `value` is a number that products can be computed with.
-pub(super) fn sound(value: f64) -> bool {
+pub(crate) fn sound(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 

@@ -275,3 +275,28 @@ fn round(weight: f64) -> Round {
         steps: 1,
     }
 }
+
+/// Absurdly large numbers stand for "no limit" in descriptions of others: what a joint can do within its range is what
+/// a motion is sized by then.
+#[test]
+fn limits_that_nothing_reaches_do_not_size_a_motion() {
+    let known = designed(&one_link(), &quick(Criterion::ConditionNumber));
+    let mut robot = one_link();
+    {
+        let limits = robot.joints[0].limits.as_mut().unwrap();
+        limits.velocity = 1e200;
+        limits.torque = Some(1e308);
+    }
+    let found = designed(&robot, &quick(Criterion::ConditionNumber));
+    assert!(found.values.condition_number < 2.0 * known.values.condition_number);
+    let said = found.notes.join("\n");
+    assert!(said.contains("cannot reach its velocity limit"), "{said}");
+    assert!(said.contains("No torque limit"), "{said}");
+
+    robot.joints[0].limits.as_mut().unwrap().acceleration = Some(1e300);
+    let refused = design(&robot, &quick(Criterion::ConditionNumber), |_, _| ()).unwrap_err();
+    assert!(
+        matches!(&refused, ExciteError::Boundless { joint, .. } if *joint == robot.joints[0].name),
+        "{refused}"
+    );
+}
