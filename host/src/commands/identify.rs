@@ -89,8 +89,8 @@ pub(crate) enum Compare {
     None,
 }
 
-/// Bytes of recordings up to which a comparison takes a second or two.
-const COMPARED_BYTES: u64 = 12 << 20;
+/// Bytes of recordings up to which a comparison takes a few seconds.
+const COMPARED_BYTES: u64 = 32 << 20;
 /// Half-widths of a 95 % interval by which friction has to lie below zero: five standard deviations. A few seconds of a motion
 /// leave friction and the rest of a joint hard to tell apart, and of many joints one may then come out below zero by chance.
 const CLEARLY: f64 = 2.5;
@@ -301,7 +301,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         match found {
             Ok(found) => {
                 said = found.remarks;
-                said.extend(chosen_inertias(&robot, &identification));
+                said.extend(chosen(&robot, &identification));
                 urdf = Some(found.text);
             }
             Err(error) => remarks.push(format!("No identified.urdf was written: {error}")),
@@ -349,23 +349,32 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Drive inertias that stand in the files and were identified in a sum only.
-fn chosen_inertias(robot: &Robot, found: &Identification) -> Option<String> {
-    let set = found.standard_parameters.as_ref()?;
-    let joints = robot.joints.iter().enumerate();
-    let chosen: Vec<&str> = joints
-        .filter(|(j, _)| {
-            let own = set.parameters.get(j * COLUMNS + column::DRIVE_INERTIA);
-            own.is_some_and(|own| !own.determined && own.value != 0.0)
+/// Drive inertias and constant torques that stand in the files and were identified in a sum only.
+fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
+    let in_a_sum = |place: usize| -> Option<String> {
+        let set = found.standard_parameters.as_ref()?;
+        let joints = robot.joints.iter().enumerate();
+        let names: Vec<&str> = joints
+            .filter(|(j, _)| {
+                let own = set.parameters.get(j * COLUMNS + place);
+                own.is_some_and(|own| !own.determined && own.value != 0.0)
+            })
+            .map(|(_, joint)| joint.name.as_str())
+            .collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    };
+    let kinds = [
+        (column::DRIVE_INERTIA, "drive inertias", "inertias of links"),
+        (column::OFFSET, "constant torques", "weights of links"),
+    ];
+    let one = |(place, what, with)| {
+        in_a_sum(place).map(|names| {
+            format!(
+                "The {what} of {names} are a choice: only their sums with {with} are identified, and the split nearest to the description was taken. Use them with the links of this file only."
+            )
         })
-        .map(|(_, joint)| joint.name.as_str())
-        .collect();
-    (!chosen.is_empty()).then(|| {
-        format!(
-            "The drive inertias of {} are a choice: only their sums with inertias of links are identified, and the split nearest to the description was taken. Use them with the links of this file only.",
-            chosen.join(", ")
-        )
-    })
+    };
+    kinds.into_iter().filter_map(one).collect()
 }
 
 /// Friction that drives the motion at every speed is no friction: the torque has the wrong sign.

@@ -28,6 +28,18 @@ pub(crate) struct RobotArg {
 }
 
 impl RobotArg {
+    /// Where a URDF was given and a description of what it has no place for stands beside it: a word of that.
+    pub(crate) fn fuller(&self) -> Option<String> {
+        let urdf = self.path.extension().is_some_and(|end| end == "urdf");
+        let beside = self.path.with_extension("toml");
+        (urdf && beside.is_file()).then(|| {
+            format!(
+                "A URDF has no place for inertia of drives, constant torques and effects, which are missing in this prediction; {} has them.",
+                beside.display()
+            )
+        })
+    }
+
     /// Loads it.
     ///
     /// # Errors

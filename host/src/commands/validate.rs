@@ -37,6 +37,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in inputs.warnings() {
         ui.remark(&warning);
     }
+    if let Some(fuller) = args.robot.fuller() {
+        ui.remark(&fuller);
+    }
     for sentence in inputs.strange_references(&robot)? {
         ui.remark(&format!(
             "{sentence}. A controller of the description follows them as they are."

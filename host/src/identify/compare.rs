@@ -1,5 +1,6 @@
 //! Estimators side by side, judged alike, and which result to trust.
 
+use crate::robot::Robot;
 use serde::Serialize;
 
 use super::consistent::consistent;
@@ -33,8 +34,8 @@ const PULL_OF_DISTANCE: f64 = 1e-4;
 pub struct Compared {
     /// Which.
     pub estimator: Estimator,
-    /// Per joint, RMS of the residual over RMS of the torque, every stretch predicted from the others; null where
-    /// the estimator failed.
+    /// Per joint, RMS of the residual over RMS of the torque, every stretch predicted from the others, null of a joint whose
+    /// torque is not used; null where the estimator failed.
     pub cross_validated_relative_error: Option<Vec<f64>>,
     /// The same on the hold-out, where given.
     pub holdout_relative_error: Option<Vec<f64>>,
@@ -306,6 +307,7 @@ pub(super) fn compare(
             recommended.name()
         );
     }
+    recommendation += &beyond_use(problem.robot, &rows, recommended);
     Ok(Comparison {
         folds: parts.count,
         repeated_holdout: held.map_or_else(Vec::new, |held| held.repeated.clone()),
@@ -314,6 +316,26 @@ pub(super) fn compare(
         recommended,
         recommendation,
     })
+}
+
+/// Joints whose torque held back the `recommended` result predicts worse than no model, in words; empty if there are none.
+fn beyond_use(robot: &Robot, rows: &[Compared], recommended: Estimator) -> String {
+    let row = rows.iter().find(|row| row.estimator == recommended);
+    let errors = row.and_then(|row| row.holdout_relative_error.as_ref());
+    let useless: Vec<String> = errors
+        .into_iter()
+        .flatten()
+        .zip(&robot.joints)
+        .filter(|(error, _)| **error >= 1.0)
+        .map(|(error, joint)| format!("{} ({:.0} %)", joint.name, 100.0 * error))
+        .collect();
+    if useless.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Trust nothing of {}: there it is farther from the torque held back than no model at all.",
+        useless.join(", ")
+    )
 }
 
 /// Geometric mean of the relative errors over the joints that have one, so that strong and weak ones count alike.

@@ -29,6 +29,8 @@ const SETTLED: [f64; 2] = [1e-2, 1e-13];
 const NOTHING_TO_GAIN: f64 = 1e-11;
 /// … or after so many steps in turn that have gained no more than that: rounding moves the point about.
 const MOST_STANDING: usize = 4;
+/// Shares of its diagonal that may be added to a Hessian, one after another.
+const ROUNDING: [f64; 5] = [0.0, 1e-14, 1e-12, 1e-10, 1e-8];
 /// Pull of an offset towards its prior: only decides where the data say nothing.
 const OFFSET_PULL: f64 = 1e-6;
 
@@ -204,17 +206,38 @@ pub(super) fn scaled_cholesky(
     Some((h.cholesky()?, scale))
 }
 
+/// [`scaled_cholesky`] of what is positive definite but for rounding, which close to the edge of the cone may hide that: as
+/// little is added to the diagonal as makes it so.
+fn steadied(
+    h: &DMatrix<f64>,
+) -> Result<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>), IdentifyError> {
+    let diagonal = h.diagonal();
+    ROUNDING
+        .iter()
+        .find_map(|share| {
+            let mut more = h.clone();
+            more.set_diagonal(&(&diagonal * (1.0 + share)));
+            scaled_cholesky(more)
+        })
+        .ok_or_else(broken)
+}
+
+fn broken() -> IdentifyError {
+    IdentifyError::Inconsistent {
+        why: "rounding hides the way".into(),
+    }
+}
+
 fn not_settled() -> IdentifyError {
-    IdentifyError::Unsettled {
-        what: "The physically consistent fit",
-        passes: MOST_STEPS,
+    IdentifyError::Inconsistent {
+        why: format!("{MOST_STEPS} Newton steps did not settle it"),
     }
 }
 
 /// Solves the problem.
 ///
 /// # Errors
-/// [`IdentifyError::Unsettled`].
+/// [`IdentifyError::Inconsistent`].
 pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, IdentifyError> {
     let space = Coordinates::new(
         &Quadratic {
@@ -230,9 +253,8 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
     };
     // Strong enough that the first Newton step is short.
     let first = {
-        let (_, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
-        let (cholesky, scale) =
-            scaled_cholesky(space.lift.transpose() * bent).ok_or_else(not_settled)?;
+        let (_, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(broken)?;
+        let (cholesky, scale) = steadied(&(space.lift.transpose() * bent))?;
         let gradient = space
             .singular
             .component_mul(&space.misfit(&c))
@@ -242,16 +264,15 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
     let mut strength = first.max(prior.strength);
     let mut standing = 0;
     for steps in 0..MOST_STEPS {
-        let (slope, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
+        let (slope, bent) = slopes(prior, pi.as_slice(), &space.lift).ok_or_else(broken)?;
         let gradient = space.singular.component_mul(&space.misfit(&c))
             + space.lift.transpose() * slope * strength;
-        let (cholesky, scale) =
-            scaled_cholesky(space.hessian(&bent, strength)).ok_or_else(not_settled)?;
+        let (cholesky, scale) = steadied(&space.hessian(&bent, strength))?;
         let step = -cholesky
             .solve(&gradient.component_mul(&scale))
             .component_mul(&scale);
         let decrement = -gradient.dot(&step) / strength;
-        let before = value(&c, &pi, strength).ok_or_else(not_settled)?;
+        let before = value(&c, &pi, strength).ok_or_else(broken)?;
         let mut length = 1.0;
         let mut moved = false;
         while length > 1e-10 {
@@ -269,20 +290,19 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
         }
         let last = strength <= prior.strength;
         let nothing = decrement * strength <= NOTHING_TO_GAIN * (1.0 + before.abs());
-        let after = value(&c, &pi, strength).ok_or_else(not_settled)?;
+        let after = value(&c, &pi, strength).ok_or_else(broken)?;
         let gained = before - after > NOTHING_TO_GAIN * (1.0 + before.abs());
         standing = if gained { 0 } else { standing + 1 };
         let stands = standing >= MOST_STANDING;
         if decrement <= SETTLED[usize::from(last)] || nothing || !moved || stands {
             standing = 0;
             if last {
-                let bent = believed(prior, pi.as_slice(), &space.lift).ok_or_else(not_settled)?;
+                let bent = believed(prior, pi.as_slice(), &space.lift).ok_or_else(broken)?;
                 // L·Lᵀ = S·H·S: H⁻¹ = S·L⁻ᵀ·L⁻¹·S.
-                let (cholesky, scale) = scaled_cholesky(space.hessian(&bent, prior.strength))
-                    .ok_or_else(not_settled)?;
+                let (cholesky, scale) = steadied(&space.hessian(&bent, prior.strength))?;
                 let mut whiten = DMatrix::from_diagonal(&scale);
                 if !cholesky.l_dirty().solve_lower_triangular_mut(&mut whiten) {
-                    return Err(not_settled());
+                    return Err(broken());
                 }
                 return Ok(Consistent {
                     squares: space.misfit(&c).norm_squared(),

@@ -3,12 +3,14 @@
 //! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
 //! after it (Franklin, Powell and Workman 1998, section 4.3). A torque l earlier than it acts differs from it by l·τ̇, which
 //! friction and inertia take up, each by more than its interval. So the torque's own rate stands beside all parameters here,
-//! and what it explains is said. By symmetric differences, noise of the torque has no part in it.
+//! and what it explains is said. Rows about a reversal have no part in it: torque and the error of a friction's law leap there
+//! together. By symmetric differences, noise of the torque has no part in it.
 //!
 //! Leaves out: lags that differ from joint to joint; what is more than a few samples, of which only that it is there is told; noise of
 //! the position, which a controller feeds back into the torque and which makes a lead look up to some times longer.
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 use super::IdentifyError;
 use super::factor::TriangularFactor;
@@ -17,6 +19,8 @@ use super::problem::Problem;
 
 /// Standard deviations from which a lag counts.
 const SEEN: f64 = 5.0;
+/// … and for all joints but the one that says most.
+const SEEN_BY_THE_OTHERS: f64 = 3.0;
 /// Share of a sample of the recording below which it is not worth a word.
 const LEAST: f64 = 0.1;
 /// Instants that are looked at, evenly spread over all recordings.
@@ -49,11 +53,13 @@ impl Lag {
         let period = treatment.decimation as f64 * treatment.dt();
         let mut row = vec![0.0; p + 1];
         problem.each_instant(step, &mut |rows, i, weight| {
-            if !has_neighbours(rows, i, period) {
+            let Some(about) = neighbours(rows, i, period) else {
                 return Ok(());
-            }
+            };
             let equations = rows.equations.iter().zip(&mut factors);
-            for (equation, factor) in equations.filter(|(equation, _)| equation.keep[i]) {
+            for (equation, factor) in
+                equations.filter(|(e, _)| e.keep[about.clone()].iter().all(|k| *k))
+            {
                 row[..p].copy_from_slice(&equation.x[i * p..(i + 1) * p]);
                 row[p] = rate(&equation.y, i) / period;
                 factor.push(&row, equation.y[i], weight);
@@ -64,8 +70,7 @@ impl Lag {
             .iter()
             .zip(memory)
             .filter_map(|(factor, memory)| own(factor, (memory / step as f64).max(1.0)));
-        Ok(together(&own.collect::<Vec<_>>())
-            .filter(|lag| lag.lead.abs() >= (SEEN * lag.std).max(LEAST * treatment.dt())))
+        Ok(shown(&own.collect::<Vec<_>>()).filter(|lag| lag.lead.abs() >= LEAST * treatment.dt()))
     }
 
     /// In words; `sample` is the recording's, s.
@@ -95,12 +100,12 @@ impl Lag {
     }
 }
 
-/// Whether the rows about row `i` follow each other without a gap.
-fn has_neighbours(rows: &Rows, i: usize, period: f64) -> bool {
-    let span = 2 * NEIGHBOURS;
-    i >= NEIGHBOURS
-        && (rows.t.get(i + NEIGHBOURS))
-            .is_some_and(|t| t - rows.t[i - NEIGHBOURS] < (span as f64 + 0.5) * period)
+/// The rows about row `i`, where they follow each other without a gap.
+fn neighbours(rows: &Rows, i: usize, period: f64) -> Option<RangeInclusive<usize>> {
+    let first = i.checked_sub(NEIGHBOURS)?;
+    let last = i + NEIGHBOURS;
+    let span = rows.t.get(last)? - rows.t[first];
+    (span < (2.0 * NEIGHBOURS as f64 + 0.5) * period).then_some(first..=last)
 }
 
 /// Rate of change at row `i`, a row.
@@ -124,6 +129,20 @@ fn own(factor: &TriangularFactor, memory: f64) -> Option<[f64; 2]> {
     let column = r[c * width + c];
     let deviation = r[y * width + y].powi(2) / freedom * memory / column.powi(2);
     (freedom > 0.0 && column != 0.0).then(|| [r[y * width + c] / column, deviation])
+}
+
+/// One lead that all show: every joint but the one that says most must still show it, where there are several. A law of one
+/// joint that is not quite right looks like a lead there alone.
+fn shown(own: &[[f64; 2]]) -> Option<Lag> {
+    let all = together(own)?;
+    let seen = |lag: &Lag, times: f64| lag.lead.abs() >= times * lag.std;
+    let loudest = (0..own.len()).min_by(|&a, &b| own[a][1].total_cmp(&own[b][1]))?;
+    let others = [&own[..loudest], &own[loudest + 1..]].concat();
+    let agreed = together(&others).is_none_or(|rest| {
+        seen(&rest, SEEN_BY_THE_OTHERS)
+            && rest.lead.is_sign_positive() == all.lead.is_sign_positive()
+    });
+    (seen(&all, SEEN) && agreed).then_some(all)
 }
 
 /// One lead for all: mean by inverse variance, its variance widened by what the joints differ (Birge 1932).
@@ -158,5 +177,20 @@ mod tests {
         let other = together(&[[2e-3, 1e-10], [0.0, 1e-10]]).unwrap_or(same);
         assert!((other.lead - 1e-3).abs() < 1e-12 && other.std > 0.9e-3);
         assert_eq!(together(&[]), None);
+    }
+
+    #[test]
+    fn one_joint_alone_does_not_make_a_lead() {
+        assert!(shown(&[[1e-3, 1e-10]]).is_some());
+        assert!(shown(&[[1e-3, 1e-10], [0.9e-3, 1e-8], [1.1e-3, 1e-8]]).is_some());
+        // As an arm with screws shows whose torque and motion are of one instant.
+        let geared = [
+            [0.826e-3, 1.3e-9],
+            [-0.105e-3, 1.0e-7],
+            [1.230e-3, 6.4e-8],
+            [0.034e-3, 2.6e-8],
+        ];
+        assert_eq!(shown(&geared), None);
+        assert_eq!(shown(&[[1e-3, 1e-10], [-0.9e-3, 1e-9]]), None);
     }
 }

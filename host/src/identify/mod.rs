@@ -343,7 +343,8 @@ pub enum IdentifyError {
     },
     /// A window that no integral model can have.
     #[error(
-        "A window of {window} s is not possible for the integral model; it must last between {least} s and {most} s here."
+        "A window of {} s is not possible for the integral model; it must last between {least} s and {most} s here.",
+        crate::report::format_significant(*window, 6)
     )]
     Window {
         /// Asked for, s.
@@ -352,6 +353,14 @@ pub enum IdentifyError {
         least: f64,
         /// Longest possible, s.
         most: f64,
+    },
+    /// A physically consistent fit that comes to no end.
+    #[error(
+        "The physically consistent fit found no end: {why}. A prior uncertainty nearer to 1 (--prior-uncertainty) or a description nearer to the robot would help."
+    )]
+    Inconsistent {
+        /// What stopped it.
+        why: String,
     },
     /// An iteration that does not end.
     #[error(

@@ -201,7 +201,8 @@ impl Parts {
             .collect()
     }
 
-    /// Cross-validated RMS of each joint's torque residual: every stretch predicted from all the others.
+    /// Cross-validated RMS of each joint's torque residual: every stretch predicted from all the others; not a number where
+    /// no torque of the joint is used.
     pub(super) fn cross_validated(&self, full: &Refit) -> Vec<f64> {
         let joints = self.judged.first().map_or(0, Vec::len);
         (0..joints)
@@ -211,7 +212,7 @@ impl Parts {
                     squares += part[j].residual_squares(values);
                     rows += part[j].rows();
                 }
-                (squares / rows.max(1) as f64).sqrt()
+                (squares / rows as f64).sqrt()
             })
             .collect()
     }

@@ -1,5 +1,7 @@
 //! The way from recordings to an [`Identification`].
 
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -28,7 +30,8 @@ use crate::effects::Effects;
 use crate::prepare::{
     Choice, PrepareError, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads,
 };
-use crate::robot::Robot;
+use crate::report::format_significant;
+use crate::robot::{Joint, JointKind, Robot};
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
 const ROWS_A_PARAMETER: usize = 10;
@@ -36,6 +39,10 @@ const ROWS_A_PARAMETER: usize = 10;
 const HALF_POWER: f64 = 0.443;
 /// Looks at what the description does not state: one finds it, each further one fits it together with all parameters.
 const MOST_LOOKS: usize = 8;
+/// Share of a joint's range, by judgement, up to which its motion may be a gear that twists: 0.4 degrees of a turn.
+const CREEP: f64 = 1e-3;
+/// Samples of a lead beyond which it is questioned: drives and buses take a few.
+const MOST_LED: f64 = 10.0;
 /// Reweighting stops when no parameter moves by more than this share of its standard deviation …
 const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
@@ -63,6 +70,23 @@ pub fn identify(
         what: "The search for what the description does not state",
         passes: MOST_LOOKS,
     })
+}
+
+/// How far the joint at `place` moves in any recording, in words, where that is but a creep.
+fn creep(joint: &Joint, surveys: &[Survey], place: usize) -> Option<String> {
+    let travel = surveys
+        .iter()
+        .map(|survey| survey.joints[place].position)
+        .map(|[low, high]| high - low)
+        .fold(0.0, f64::max);
+    let limits = joint.limits.as_ref().map(|limits| limits.position);
+    let range = limits.map_or(f64::INFINITY, |[low, high]| high - low);
+    let (range, unit) = match joint.kind {
+        JointKind::Revolute => (range.min(TAU), "rad"),
+        JointKind::Prismatic => (range, "m"),
+    };
+    (range.is_finite() && travel < CREEP * range)
+        .then(|| format!("{} {unit}", format_significant(travel, 2)))
 }
 
 /// An identification, or what it has to begin anew with.
@@ -438,6 +462,13 @@ fn solve(
         }
     }
     warnings.extend(lag.map(|lag| lag.said(treatment.dt())));
+    let led = treatment.torque_lead / treatment.dt();
+    if led.abs() > MOST_LED {
+        warnings.push(format!(
+            "--torque-lead shifts the torque by {} samples, where a command that is held acts half a sample late: it is given in s.",
+            format_significant(led, 3)
+        ));
+    }
     let row_period = match options.model {
         ModelKind::Differential => treatment.decimation,
         ModelKind::Integral => plan.stride,
@@ -469,6 +500,11 @@ fn solve(
                 surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0])
             ));
             continue;
+        }
+        if let Some(way) = creep(&robot.joints[j], &surveys, j) {
+            warnings.push(format!(
+                "Joint {name} moves by {way} in all training recordings, less than {CREEP} of its range. That may be no more than its drive or gear giving way: friction and inertia of such a motion are not those of one that turns the joint. Record a larger motion of it, or make it fixed in the description.",
+            ));
         }
         let unjudged = |which: &str| {
             format!(

@@ -15,6 +15,7 @@ use super::prior::{Hints, Prior};
 use super::problem::{Fitted, Problem};
 use super::pseudo_inertia::{INERTIAL, least_eigenvalue};
 use crate::prepare::Survey;
+use crate::report::format_significant;
 use crate::robot::Robot;
 
 /// Relative uncertainty of the description's inertial values where none is given: right to a factor of about three. On
@@ -239,8 +240,15 @@ pub(super) fn consistent_fit(
         covariance: Some(covariance),
         regressor,
         said: vec![format!(
-            "Convex problem solved in {} Newton steps. Intervals are those of the posterior: the description counts as right to a factor of about three.",
-            whole.steps
+            "Convex problem solved in {} Newton steps. Intervals are those of the posterior: the description's inertial values count as right to {} times their size.",
+            whole.steps,
+            format_significant(
+                problem
+                    .options
+                    .prior_uncertainty
+                    .unwrap_or(DESCRIBED_UNCERTAINTY),
+                2
+            )
         )],
         warnings: Vec::new(),
         doubtful: None,

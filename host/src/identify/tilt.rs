@@ -5,7 +5,7 @@
 //! with its own first moments, and moves joints that turn about the vertical: one degree under 25 N·m of another joint is
 //! 0.4 N·m there.
 //!
-//! Leaves out: angles so large that their cosine differs from one; where the first joint's axis is level, an error of
+//! Leaves out: that gravity keeps its size when it turns, which masses and gains make up for; where the first joint's axis is level, an error of
 //! its zero, which does the same as a turn of gravity about it.
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
@@ -26,13 +26,13 @@ pub struct BaseTilt {
     pub std: f64,
     /// Logarithm of how many times more likely the data are with it.
     pub log_evidence: f64,
-    /// About the two level axes, rad.
+    /// About the two level axes: what gravity gains sideways, over its size.
     #[serde(skip)]
     pub(super) angles: [f64; 2],
 }
 
 impl BaseTilt {
-    /// From the two angles and their covariance.
+    /// From what gravity gains along the two level axes, over its size, and the covariance of that.
     pub(super) fn of(
         axes: &Axes,
         angles: [f64; 2],
@@ -40,14 +40,16 @@ impl BaseTilt {
         log_evidence: f64,
     ) -> Self {
         let along = Vector2::from(angles);
-        let angle = along.norm();
+        // What is fitted is how far gravity's tip moves sideways, over its length: the tangent of the angle.
+        let tangent = along.norm();
         let level = axes.level[0] * angles[0] + axes.level[1] * angles[1];
         let turned = (axes.gravity / axes.size + level).normalize() * axes.size;
-        let unit = along / angle.max(f64::MIN_POSITIVE);
+        let unit = along / tangent.max(f64::MIN_POSITIVE);
+        let variance = (unit.transpose() * covariance * unit)[0].max(0.0);
         Self {
             gravity: turned.into(),
-            angle,
-            std: (unit.transpose() * covariance * unit)[0].max(0.0).sqrt(),
+            angle: tangent.atan(),
+            std: variance.sqrt() / (1.0 + tangent * tangent),
             log_evidence,
             angles,
         }
@@ -126,5 +128,24 @@ impl TiltColumns {
                 .map_err(super::model::failed)?;
         }
         Ok(&self.torque)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_tilt_is_the_angle_that_gravity_turns_by() {
+        let Some(axes) = Axes::of([0.0, 0.0, -9.81]) else {
+            unreachable!("there is gravity");
+        };
+        let covariance = Matrix2::identity() * 1e-6;
+        let tilt = BaseTilt::of(&axes, [0.6_f64.tan(), 0.0], &covariance, 100.0);
+        let down = Vector3::new(0.0, 0.0, -1.0);
+        let turned = Vector3::from(tilt.gravity).angle(&down);
+        assert!((turned - 0.6).abs() < 1e-12 && (tilt.angle - 0.6).abs() < 1e-12);
+        let wider = BaseTilt::of(&axes, [0.6_f64.tan() + 1e-3, 0.0], &covariance, 100.0);
+        assert!((wider.angle - tilt.angle - tilt.std).abs() < 1e-6);
     }
 }

@@ -130,7 +130,8 @@ pub enum PrepareError {
     },
     /// A cut-off that no filter can have.
     #[error(
-        "A cut-off of {cutoff} Hz is not possible at {rate} Hz; it must lie between 0 and {nyquist} Hz."
+        "A cut-off of {} Hz is not possible at {rate} Hz; it must lie between 0 and {nyquist} Hz.",
+        crate::report::format_significant(*cutoff, 6)
     )]
     Cutoff {
         /// Asked for, Hz.
