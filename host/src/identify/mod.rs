@@ -344,7 +344,7 @@ pub enum IdentifyError {
     /// A window that no integral model can have.
     #[error(
         "A window of {} s is not possible for the integral model; it must last between {least} s and {most} s here.",
-        crate::report::format_significant(*window, 6)
+        crate::robot::written(*window)
     )]
     Window {
         /// Asked for, s.

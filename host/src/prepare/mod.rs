@@ -131,7 +131,7 @@ pub enum PrepareError {
     /// A cut-off that no filter can have.
     #[error(
         "A cut-off of {} Hz is not possible at {rate} Hz; it must lie between 0 and {nyquist} Hz.",
-        crate::report::format_significant(*cutoff, 6)
+        crate::robot::written(*cutoff)
     )]
     Cutoff {
         /// Asked for, Hz.

@@ -129,8 +129,9 @@ fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
 }
 
 /// A number as a person writes it.
-pub(super) fn written(value: f64) -> String {
-    if sound(value) || !value.is_finite() {
+pub(crate) fn written(value: f64) -> String {
+    let small = value != 0.0 && value.abs() < 1.0 / LARGEST;
+    if (sound(value) && !small) || !value.is_finite() {
         value.to_string()
     } else {
         format!("{value:e}")

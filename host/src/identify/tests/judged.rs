@@ -308,6 +308,46 @@ fn ridge_goes_from_the_description_to_the_data() {
     }
 }
 
+/// Of little or much belief in the description alike: close to the edge of what a body can be, rounding may make a Hessian look
+/// indefinite that is not.
+#[test]
+fn a_consistent_fit_ends_whatever_the_description_counts_for() {
+    let robot = arm(3, 31);
+    let recording = record(
+        &robot,
+        12.0,
+        200.0,
+        Noise {
+            position: 1e-6,
+            torque: 0.05,
+            ..Default::default()
+        },
+        3,
+    );
+    let run = |uncertainty| {
+        identify(
+            &robot,
+            &[&recording],
+            &[],
+            &Options {
+                estimator: Estimator::Consistent,
+                prior_uncertainty: Some(uncertainty),
+                ..Default::default()
+            },
+        )
+    };
+    let usual = run(2.0).unwrap();
+    for uncertainty in [1e-8, 1e-4, 30.0, 1e4] {
+        let found = run(uncertainty);
+        let found = found.unwrap_or_else(|error| panic!("{uncertainty}: {error}"));
+        // The description is right here, so that belief in it takes nothing away.
+        for (a, b) in found.base_parameters.iter().zip(&usual.base_parameters) {
+            let apart = (a.value - b.value).abs();
+            assert!(apart < 4.0 * b.std + 1e-9, "{uncertainty}: {a:?} {b:?}");
+        }
+    }
+}
+
 /// Little motion and much noise: least squares gives links that cannot exist, the consistent fit never does, and it
 /// predicts other motions better.
 #[test]

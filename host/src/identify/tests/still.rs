@@ -151,3 +151,54 @@ fn a_recording_in_which_nothing_moves_is_refused() {
         .to_string();
     assert!(said.contains("no other joint moves"), "{said}");
 }
+
+/// What is not used has no error, and a mean of errors is that of the joints that have one.
+#[test]
+fn a_joint_that_stands_still_is_no_perfect_prediction() {
+    let robot = arm(3, 3);
+    let options = Options {
+        compare: vec![Estimator::Weighted, Estimator::Consistent],
+        ..Default::default()
+    };
+    let found = identify(&robot, &[&record(&robot, 1, 1)], &[], &options).unwrap();
+    let comparison = found.comparison.unwrap();
+    for row in &comparison.estimators {
+        let errors = row.cross_validated_relative_error.as_ref().unwrap();
+        assert!(
+            errors[1].is_nan() && errors[0] > 0.0 && errors[2] > 0.0,
+            "{errors:?}"
+        );
+    }
+    assert!(
+        !comparison.recommendation.contains("0.00 %"),
+        "{}",
+        comparison.recommendation
+    );
+}
+
+/// A gear that twists under a brake: followed by the motor's encoder, it is no motion of the joint.
+#[test]
+fn a_joint_that_only_creeps_is_said_and_nothing_of_it_recommended() {
+    let robot = arm(3, 3);
+    let mut creeping = record(&robot, 1, 1);
+    let block = &mut creeping.blocks[0];
+    let torque = block.joints[1].tau.clone();
+    for (q, tau) in block.joints[1].q.iter_mut().zip(&torque) {
+        *q += tau / 2e4;
+    }
+    let moving = record(&robot, 0, 2);
+    let options = Options {
+        compare: vec![Estimator::Weighted],
+        ..Default::default()
+    };
+    let found = identify(&robot, &[&creeping], &[&moving], &options).unwrap();
+    let said = format!("Joint {} moves by 0.00", robot.joints[1].name);
+    assert!(
+        found.warnings.iter().any(|w| w.starts_with(&said)),
+        "{:?}",
+        found.warnings
+    );
+    let recommendation = found.comparison.unwrap().recommendation;
+    let nothing = format!("Trust nothing of {}", robot.joints[1].name);
+    assert!(recommendation.contains(&nothing), "{recommendation}");
+}
