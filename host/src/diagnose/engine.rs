@@ -1,10 +1,12 @@
 //! The workflow from recordings to a verdict.
 
 mod steps;
+mod unbelieved;
 
 use rig_shared::effects::Kind;
 
 use self::steps::{change_step, refuse, steps};
+use self::unbelieved::unbelieved;
 use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, Loaded, library};
 use super::change::change;
@@ -22,7 +24,7 @@ use super::profile::Profile;
 use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
-use super::search::{Search, is_gear, with};
+use super::search::{Search, with};
 use super::sentences::offsets;
 use super::stated::{Now, Stated, candidate};
 use super::waves::is_of_the_motor;
@@ -65,9 +67,6 @@ pub fn diagnose(
         }
     }
 }
-
-/// Probability above which an effect may be nothing: its 95 % interval holds zero.
-const NOTHING: f64 = 0.05;
 
 /// What came of one way to treat the description's effects.
 enum Attempt {
@@ -203,10 +202,8 @@ fn attempt(
         refuse(robot, &mut tried, &stand.remove(k), why);
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
     }
-    // Nor is a name one that its own deviation allows to be nothing.
-    while let Some(k) = perhaps_nothing(&refit, &search, &judge, &judged.chosen)? {
+    while let Some((k, why)) = unbelieved(&refit, &search, &judge, &judged.chosen)? {
         let mut stand = judged.chosen;
-        let why = "by its own deviation it could as well be nothing";
         refuse(robot, &mut tried, &stand.remove(k), why);
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
     }
@@ -360,26 +357,6 @@ fn attempt(
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
-}
-
-/// The effect found, not a gear, that is likeliest to be nothing of those which [`NOTHING`] leaves open.
-fn perhaps_nothing(
-    refit: &Refit,
-    search: &Search,
-    judge: &Judge,
-    chosen: &[Profile],
-) -> Result<Option<usize>, DiagnoseError> {
-    let found = search.count_given(chosen)..chosen.len();
-    if found.is_empty() {
-        return Ok(None);
-    }
-    let joint = refit.joint(&search.source, chosen, &judge.pairs, judge.coordinates)?;
-    Ok(found
-        .filter(|k| !is_gear(chosen[*k].candidate.kind))
-        .map(|k| (k, joint.of_nothing(chosen, refit.free.len(), k)))
-        .filter(|(_, p)| *p > NOTHING)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(k, _)| k))
 }
 
 /// Orders over the motor's turn of the waves among effects of a joint.

@@ -298,12 +298,17 @@ impl Joint {
     /// Probability that the gains of the `k`-th effect are nothing but error (Wald 1943), by the covariance that its
     /// intervals are of.
     pub(super) fn of_nothing(&self, chosen: &[Profile], free: usize, k: usize) -> f64 {
-        let at = free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>();
-        let count = chosen[k].columns.len();
-        let gains = DVector::from_column_slice(&self.solution.values[at..at + count]);
+        let gains = DVector::from_column_slice(self.gains(chosen, free, k));
+        let (at, count) = (place(chosen, free, k), gains.len());
         let own = (self.solution.covariance.view((at, at), (count, count))).into_owned();
         let wald = own.cholesky().map(|c| gains.dot(&c.solve(&gains)));
         (wald.zip(ChiSquared::new(count as f64).ok())).map_or(1.0, |(wald, law)| law.sf(wald))
+    }
+
+    /// Gains of the `k`-th effect beside all others.
+    pub(super) fn gains(&self, chosen: &[Profile], free: usize, k: usize) -> &[f64] {
+        let at = place(chosen, free, k);
+        &self.solution.values[at..at + chosen[k].columns.len()]
     }
 
     /// Gains and shapes of the `k`-th effect with their standard deviations.
@@ -316,7 +321,7 @@ impl Joint {
     ) -> BTreeMap<String, Value> {
         let profile = &chosen[k];
         let kind = profile.candidate.kind;
-        let at = free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>();
+        let at = place(chosen, free, k);
         let gains = (source.gains(kind).into_iter().enumerate()).map(|(g, gain)| {
             (
                 gain,
@@ -337,6 +342,11 @@ impl Joint {
             })
             .collect()
     }
+}
+
+/// Where the coefficients of the `k`-th effect begin, behind the `free` nominal directions.
+fn place(chosen: &[Profile], free: usize, k: usize) -> usize {
+    free + chosen[..k].iter().map(|p| p.columns.len()).sum::<usize>()
 }
 
 #[cfg(test)]

@@ -71,9 +71,16 @@ fn recorded(seed: u64, unknown: f64) -> [InMemory; 2] {
     })
 }
 
-/// Error of the drag and of the viscous friction in standard deviations, by the intervals of a result and by those of a
-/// sandwich over the blocks of the nominal residual.
-fn errors(robot: &Robot, seed: u64, unknown: f64) -> [[f64; 2]; 2] {
+/// What one recording gives.
+struct Outcome {
+    /// Error of the drag and of the viscous friction in standard deviations, by the intervals of a result and by those of a
+    /// sandwich over the blocks of the nominal residual.
+    errors: [[f64; 2]; 2],
+    /// Probability that the drag is nothing, and a wave with the position that is not there, each beside the other.
+    nothing: [f64; 2],
+}
+
+fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
     let runs = recorded(seed, unknown);
     let training: Vec<&dyn Recording> = runs.iter().map(|r| r as &dyn Recording).collect();
     let stated = Stated::of(robot);
@@ -81,18 +88,27 @@ fn errors(robot: &Robot, seed: u64, unknown: f64) -> [[f64; 2]; 2] {
     let loaded = bench.load(&training).unwrap();
     let refit = Refit::of(&bench, &loaded.rows).unwrap();
     let source = (bench.source(&loaded, &bench.anchor.values(&refit.before.values))).unwrap();
-    let candidate = Candidate {
-        kind: Kind::QuadraticDrag,
-        joint: 0,
-        other: None,
+    let profile = |kind, shapes: [f64; SHAPES]| {
+        let candidate = Candidate {
+            kind,
+            joint: 0,
+            other: None,
+        };
+        Profile {
+            candidate,
+            shapes,
+            columns: Arc::new(source.columns(&candidate, &shapes).unwrap()),
+            evidence: Evidence::default(),
+            vanished: None,
+        }
     };
-    let chosen = [Profile {
-        candidate,
-        shapes: [0.0; SHAPES],
-        columns: Arc::new(source.columns(&candidate, &[0.0; SHAPES]).unwrap()),
-        evidence: Evidence::default(),
-        vanished: None,
-    }];
+    let mut third = [0.0; SHAPES];
+    third[0] = 3.0;
+    let both = [
+        profile(Kind::QuadraticDrag, [0.0; SHAPES]),
+        profile(Kind::PositionFriction, third),
+    ];
+    let chosen = &both[..1];
     let pairs = floor::repeats(&loaded.runs);
     assert_eq!(pairs.len(), 1);
     let free = refit.free.len();
@@ -102,20 +118,25 @@ fn errors(robot: &Robot, seed: u64, unknown: f64) -> [[f64; 2]; 2] {
         )
         .unwrap();
     let along = coordinates(&loaded.rows, &loaded.runs, &source.predicted, robot, 0, &[]);
-    let joint = refit.joint(&source, &chosen, &pairs, &[along]).unwrap();
-    [&joint.solution, &refit.solution(&chosen).unwrap()].map(|s| {
-        [
-            (s.values[free] - DRAG) / s.std(free),
-            (s.values[viscous] - 0.3) / s.std(viscous),
-        ]
-    })
+    let along = [along];
+    let joint = refit.joint(&source, chosen, &pairs, &along).unwrap();
+    let beside = refit.joint(&source, &both, &pairs, &along).unwrap();
+    Outcome {
+        errors: [&joint.solution, &refit.solution(chosen).unwrap()].map(|s| {
+            [
+                (s.values[free] - DRAG) / s.std(free),
+                (s.values[viscous] - 0.3) / s.std(viscous),
+            ]
+        }),
+        nothing: [0, 1].map(|k| beside.of_nothing(&both, free, k)),
+    }
 }
 
 /// Share of the intervals that hold the truth, the same two ways.
 fn held(unknown: f64) -> [f64; 2] {
     let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
     let all: Vec<[[f64; 2]; 2]> = (0..SEEDS)
-        .map(|seed| errors(&robot, seed, unknown))
+        .map(|seed| outcome(&robot, seed, unknown).errors)
         .collect();
     [0, 1].map(|way| {
         let of = all.iter().flat_map(|e| e[way]);
@@ -136,4 +157,17 @@ fn what_repeats_with_the_motion_counts_once() {
     println!("held {own}, {blocks} by the blocks of the nominal residual");
     // Twelve clusters of a torque that no parameter has: nine of ten, where each run by itself had given eight.
     assert!(own >= 0.86 && own > blocks + 0.03, "{own} {blocks}");
+}
+
+#[test]
+fn what_is_there_is_not_nothing_and_what_is_not_seldom_something() {
+    let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
+    let all: Vec<[f64; 2]> = (0..SEEDS)
+        .map(|seed| outcome(&robot, seed, 0.0).nothing)
+        .collect();
+    assert!(all.iter().all(|[drag, _]| *drag < 1e-6), "{all:?}");
+    let something = all.iter().filter(|[_, wave]| *wave < 0.05).count() as f64;
+    println!("something {something} of {SEEDS}");
+    // One in twenty, and no more than three of its deviations above.
+    assert!(something / (SEEDS as f64) < 0.05 + 3.0 * (0.05 * 0.95 / SEEDS as f64).sqrt());
 }

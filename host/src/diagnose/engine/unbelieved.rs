@@ -1,0 +1,54 @@
+//! Effects that all effects fitted together take back.
+
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::judge::Judge;
+use crate::diagnose::profile::Profile;
+use crate::diagnose::refit::{Joint, Refit};
+use crate::diagnose::search::{Search, is_gear};
+
+/// Probability above which an effect may be nothing: its 95 % interval holds zero.
+const NOTHING: f64 = 0.05;
+/// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
+/// true gears of the emulated rig come out from 0.7 to 1.1.
+const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
+
+/// The effect found that is least to be believed beside the others, and why; none where all are.
+///
+/// # Errors
+/// [`DiagnoseError`] of the fit.
+pub(super) fn unbelieved(
+    refit: &Refit,
+    search: &Search,
+    judge: &Judge,
+    chosen: &[Profile],
+) -> Result<Option<(usize, &'static str)>, DiagnoseError> {
+    let found = search.count_given(chosen)..chosen.len();
+    if found.is_empty() {
+        return Ok(None);
+    }
+    let joint = refit.joint(&search.source, chosen, &judge.pairs, judge.coordinates)?;
+    let free = refit.free.len();
+    let nothing = (found.clone())
+        .filter(|k| !is_gear(chosen[*k].candidate.kind))
+        .map(|k| (k, joint.of_nothing(chosen, free, k)))
+        .filter(|(_, p)| *p > NOTHING)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, _)) = nothing {
+        return Ok(Some((
+            k,
+            "by its own deviation it could as well be nothing",
+        )));
+    }
+    let overdone = found
+        .filter(|k| is_gear(chosen[*k].candidate.kind))
+        .find(|k| share(&joint, chosen, free, *k) > MOST_OF_A_TWIST);
+    Ok(overdone.map(|k| {
+        let why = "it would change more torque than mass and load of the link have";
+        (k, why)
+    }))
+}
+
+/// Share of the torque that a gear's twist changes.
+fn share(joint: &Joint, chosen: &[Profile], free: usize, k: usize) -> f64 {
+    joint.gains(chosen, free, k).first().copied().unwrap_or(0.0)
+}
