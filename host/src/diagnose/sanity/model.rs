@@ -40,7 +40,7 @@ pub(super) const TRIAL: usize = 500;
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
     pub(super) robot: &'a Robot,
-    runs: &'a [&'a Run],
+    pub(super) runs: &'a [&'a Run],
     pub(super) form: Form,
     pub(super) rows: Rows,
     pub(super) order: Vec<usize>,
@@ -85,7 +85,7 @@ impl<'a> Judge<'a> {
             return Ok(clipped);
         }
         let mixed = self.mixed()?;
-        if let Some(swap) = mixed.as_ref().filter(|m| m.is_swap()) {
+        if let Some(swap) = mixed.as_ref().filter(|m| m.ends_search()) {
             return Ok(vec![self.said(swap)]);
         }
         let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();

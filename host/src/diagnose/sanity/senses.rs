@@ -24,7 +24,7 @@ pub(super) type Scales = (Option<Measured>, Option<Measured>);
 
 /// What the description says of rows, joint by joint; no friction.
 pub(super) struct Described {
-    weight: Vec<Vec<f64>>,
+    pub(super) weight: Vec<Vec<f64>>,
     /// Weight and all that links and rotors need beside it.
     pub(super) all: Vec<Vec<f64>>,
     /// The motors' columns, see [`Rows::of_motors`].
@@ -178,12 +178,23 @@ impl Judge<'_> {
 
     /// What the description says of these rows.
     pub(super) fn described(&self, data: &Rows) -> Result<Described, DiagnoseError> {
+        self.described_under(data, self.robot.gravity)
+    }
+
+    /// What it would say under another gravity, m/s² in frame 0.
+    pub(super) fn described_under(
+        &self,
+        data: &Rows,
+        gravity: [f64; 3],
+    ) -> Result<Described, DiagnoseError> {
         let (n, rows) = (self.robot.joints.len(), data.len());
         let mut parameters = self.robot.standard_parameters();
         for row in &mut parameters {
             row[column::VISCOUS..].fill(0.0);
         }
-        let chain = chain_of(self.robot).map_err(model_error)?;
+        let mut turned = self.robot.clone();
+        turned.gravity = gravity;
+        let chain = chain_of(&turned).map_err(model_error)?;
         let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
         let (mut weight, mut all) = (vec![0.0; n * rows], vec![0.0; n * rows]);
         model.gravity(&data.q, &mut weight).map_err(model_error)?;

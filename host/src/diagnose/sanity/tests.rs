@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod mounts;
 mod windows;
 
 use std::path::{Path, PathBuf};
