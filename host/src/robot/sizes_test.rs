@@ -124,3 +124,16 @@ fn toml_in_another_unit_is_refused_by_line() {
         &format!("centre of mass of the link of joint `{third}` from its axis is"),
     );
 }
+
+#[test]
+fn angles_beyond_a_turn_are_refused_by_line() {
+    let good = inertial("0.1 0 0", 3.0, 0.04);
+    let said = urdf("0.3 0 0.2' rpy='-90 0 0", &good).unwrap_err();
+    assert!(
+        said.starts_with("arm.urdf:7:")
+            && said.contains("`rpy` of <origin> is \"-90 0 0\"")
+            && said.contains("were these degrees, it would be \"-1.570796 0.000000 0.000000\""),
+        "{said}"
+    );
+    assert!(urdf("0.3 0 0.2' rpy='-6.2832 0 3.14", &good).is_ok());
+}
