@@ -11,6 +11,7 @@ use super::model::{Judge, model_error};
 use super::names;
 use super::rows::Rows;
 use crate::batch::ModelBatch;
+use crate::data::reference_scale;
 use crate::identify::chain_of;
 use crate::robot::Joint;
 
@@ -113,6 +114,10 @@ impl Judge<'_> {
         }
         let n = j + 1;
         let which = match self.scales(&self.rows, j, described).0 {
+            // A witness that needs no description.
+            _ if self.reference_against(j) => {
+                format!("ref{n} runs against q{n} as well, so reverse q{n}")
+            }
             Some(gravity) if gravity.value > 0.0 => {
                 format!("gravity has the right sense, so reverse q{n}")
             }
@@ -128,6 +133,14 @@ impl Judge<'_> {
                 -loss.value, inertia.value
             ),
         )))
+    }
+
+    /// Whether the joint's reference is counted against its position.
+    pub(super) fn reference_against(&self, j: usize) -> bool {
+        let longest = self.runs.iter().max_by_key(|run| run.len());
+        let joint = longest.and_then(|run| run.joints.get(j));
+        let scale = joint.and_then(|own| reference_scale(&own.q_raw, own.reference.as_ref()?));
+        scale.is_some_and(|s| s < 0.0)
     }
 
     /// Measured gravity and measured inertia over the description's, where the description states them and the motion

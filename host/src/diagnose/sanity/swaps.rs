@@ -136,6 +136,9 @@ impl Judge<'_> {
         let turned = |about: About, column: &str, other: &str, j: usize| {
             let n = j + 1;
             let or = match found.twin {
+                _ if column == "q" && self.reference_against(j) => {
+                    format!(", against which ref{n} runs as well,")
+                }
                 true => format!(" (or {other}{n})"),
                 false => String::new(),
             };
