@@ -99,6 +99,9 @@ impl<'a> Judge<'a> {
         // What states any joint's torque states the last's.
         let described = self.stated(&self.rows, n.saturating_sub(1))?;
         let described = described.as_ref();
+        if let Some(unit) = self.thousandfold(described) {
+            return Ok(vec![unit]);
+        }
         let mut found = Vec::new();
         for j in 0..n {
             found.extend(self.against_description(j, described)?);

@@ -6,6 +6,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
+use super::columns::fault;
 use super::fit::{Fit, Measured, about_mean};
 use super::model::{Judge, model_error};
 use super::names;
@@ -13,10 +14,14 @@ use super::rows::Rows;
 use crate::batch::ModelBatch;
 use crate::data::reference_scale;
 use crate::identify::chain_of;
+use crate::report::{format_significant, format_unit};
 use crate::robot::Joint;
 
 /// Parameters change by less than this factor; units and ratios by more.
 const CHANGE: f64 = 5.0;
+/// Factors between torques and description that are this far from a thousand or less are a thousand: what stand-in masses
+/// are off by.
+const THOUSAND_APART: f64 = 2.5;
 /// Standard deviations that a sign must stand from zero.
 const CLEAR: f64 = 4.0;
 
@@ -241,6 +246,54 @@ impl Judge<'_> {
         })
     }
 
+    /// Torques of several joints that are all a thousand times as large or as small as the description needs: no description is
+    /// that far off everywhere.
+    pub(super) fn thousandfold(&self, described: Option<&Described>) -> Option<DataFault> {
+        let mut shown = Vec::new();
+        let mut weighed = false;
+        for j in 0..self.robot.joints.len() {
+            let (gravity, inertia) = self.scales(&self.rows, j, described);
+            weighed |= gravity.is_some();
+            shown.extend(gravity.or(inertia).map(|m| (j, m.value)));
+        }
+        let near = |unit: f64| {
+            let apart = |f: f64| (f / unit).abs().ln().abs() < THOUSAND_APART.ln();
+            (shown.iter()).all(|(j, f)| apart(*f) && !names::is_ratio(&self.robot.joints[*j], *f))
+        };
+        // A rotor that is not described makes inertia look larger, never weight.
+        if shown.len() < 2 || !weighed {
+            return None;
+        }
+        let (_, unit) = self.robot.joints[shown[0].0].kind.units();
+        let unit = format_unit(unit);
+        let what = match (near(1000.0), near(1e-3)) {
+            (true, _) => format!("as m{unit} for {unit} or mA for A would be"),
+            (_, true) => format!(
+                "as k{unit} for {unit}, A for mA, or masses of the description in g would make it"
+            ),
+            _ => return None,
+        };
+        let least = shown
+            .iter()
+            .map(|(_, f)| f.abs())
+            .fold(f64::INFINITY, f64::min);
+        let most = shown.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
+        let columns: Vec<String> = shown.iter().map(|(j, _)| format!("tau{}", j + 1)).collect();
+        let (last, others) = columns.split_last()?;
+        Some(fault(
+            self.runs,
+            "unit",
+            About::Torque,
+            "",
+            format!(
+                "{} and {last} are {} to {} times what the description's gravity and inertia need, {what}; give torques in {unit}, at the joints.",
+                others.join(", "),
+                format_significant(least, 4),
+                format_significant(most, 4)
+            ),
+        ))
+    }
+
     /// Factors between the recording and the description that no change of the robot makes.
     pub(super) fn against_description(
         &self,
@@ -271,7 +324,10 @@ impl Judge<'_> {
                     kind,
                     About::TorqueScale,
                     j,
-                    format!("tau{n} is {factor:.4} times what the description's {of} needs, {what}."),
+                    format!(
+                        "tau{n} is {} times what the description's {of} needs, {what}.",
+                        format_significant(factor, 4)
+                    ),
                 )
             })
         };

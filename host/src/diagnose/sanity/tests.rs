@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod mounts;
+mod scales;
 mod windows;
 
 use std::path::{Path, PathBuf};
