@@ -317,6 +317,11 @@ impl Judge<'_> {
             let name = names::of_torque(joint, factor);
             // Between a parameter's change and what has a name there is room for an odd robot.
             (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
+                // On a light last link a tool weighs many times what the link does.
+                let tool = match factor {
+                    1.0..100.0 => "as a tool or payload that the description does not state would make it, or ",
+                    _ => "",
+                };
                 let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit".to_owned());
                 let nearest = what.split(", or").next().unwrap_or_default();
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
@@ -325,7 +330,7 @@ impl Judge<'_> {
                     About::TorqueScale,
                     j,
                     format!(
-                        "tau{n} is {} times what the description's {of} needs, {what}.",
+                        "tau{n} is {} times what the description's {of} needs, {tool}{what}.",
                         format_significant(factor, 4)
                     ),
                 )

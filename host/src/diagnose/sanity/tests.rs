@@ -371,6 +371,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     only(&robot, &tau(1000.0), "unit", 0, "");
     only(&robot, &tau(1e-3), "unit", 0, "");
     only(&robot, &tau(9.549), "unit", 0, "rpm");
+    only(&robot, &tau(9.549), "unit", 0, "a tool or payload that");
     // A reference that runs against the position is a witness against it.
     let against = injured(&runs, |r| {
         let joint = &mut r.joints[0];
