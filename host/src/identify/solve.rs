@@ -103,7 +103,10 @@ fn solve(
         sources
     };
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
-        return Err(IdentifyError::NoTorque { joint: j + 1 });
+        return Err(IdentifyError::NoTorque {
+            joint: j + 1,
+            still: surveys.iter().all(|s| s.joints[j].still()),
+        });
     }
     let limits: Vec<Option<f64>> = robot
         .joints
@@ -465,7 +468,7 @@ fn solve(
         let name = &robot.joints[j].name;
         if surveys.iter().all(|s| s.joints[j].still()) {
             warnings.push(format!(
-                "Joint {name} stands still at {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more.",
+                "Joint {name} stands still at {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves.",
                 surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0])
             ));
             continue;

@@ -151,3 +151,22 @@ fn a_recording_in_which_nothing_moves_is_refused() {
         .to_string();
     assert!(said.contains("no other joint moves"), "{said}");
 }
+
+#[test]
+fn a_finger_without_torque_that_stands_still_may_be_fixed() {
+    let robot = arm(2, 3);
+    let mut finger = record(&robot, 1, 1);
+    finger.blocks[0].joints[1].tau.fill(0.0);
+    let said = |recording: &InMemory| {
+        let found = identify(&robot, &[recording], &[], &Options::default());
+        found.unwrap_err().to_string()
+    };
+    assert!(
+        said(&finger).contains("type=\"fixed\" in the URDF"),
+        "{}",
+        said(&finger)
+    );
+    let mut moving = record(&robot, 0, 1);
+    moving.blocks[0].joints[1].tau.fill(0.0);
+    assert!(!said(&moving).contains("fixed"), "{}", said(&moving));
+}
