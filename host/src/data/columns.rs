@@ -259,9 +259,15 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
         };
     };
     let name = &robot.joints[first - 1].name;
+    // Some joints are recorded, as beside a gripper.
+    let unmoved = if joint.len() < joints {
+        format!("where joint `{name}` never moves, make it type=\"fixed\" in the URDF; ")
+    } else {
+        String::new()
+    };
     Err(if motor.len() == joints {
         format!(
-            "there is no column `q{first}` (position of joint `{name}`, in rad or m); the columns are {}",
+            "there is no column `q{first}` (position of joint `{name}`, in rad or m); {unmoved}the columns are {}",
             shown(names)
         )
     } else {

@@ -16,7 +16,7 @@ mod writer;
 pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
 pub use plausibility::{Implausible, plausibility, strange_references};
-pub(crate) use plausibility::{unit_of_steps, velocity_scale};
+pub(crate) use plausibility::{reference_scale, unit_of_steps, velocity_scale};
 pub use source::{Blocks, KEPT_WARNINGS, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 

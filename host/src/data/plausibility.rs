@@ -340,7 +340,7 @@ pub fn strange_references(block: &Block, robot: &Robot) -> Vec<Implausible> {
 
 /// Spread of the reference over that of the position, below zero where they run against each other; none where they are
 /// not the same motion.
-fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
+pub(crate) fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
     let count = q.len().max(1) as f64;
     let (mean_q, mean_ref) = (
         q.iter().sum::<f64>() / count,

@@ -101,6 +101,23 @@ fn an_encoder_on_the_link_has_a_column_of_its_own() {
 }
 
 #[test]
+fn a_joint_without_columns_beside_others_may_be_one_that_never_moves() {
+    let folder = Folder::new();
+    let path = folder.file("t,q1,tau1\n0,0.5,1\n0.001,0.25,2\n");
+    let mut robot = rig();
+    let mut finger = robot.joints[0].clone();
+    finger.name = "finger".into();
+    robot.joints.push(finger);
+    let said = read(&path, &robot).unwrap_err().to_string();
+    assert!(
+        said.contains("no column `q2` (position of joint `finger`")
+            && said
+                .contains("where joint `finger` never moves, make it type=\"fixed\" in the URDF"),
+        "{said}"
+    );
+}
+
+#[test]
 fn wrong_recordings_are_named_by_line_and_column() {
     let folder = Folder::new();
     let rows = "0,0,0\n0.1,0,0\n";

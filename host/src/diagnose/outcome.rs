@@ -234,7 +234,7 @@ pub struct Remainder {
 /// Something about a recording that no physics explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
-    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `saturation`, `jump`, `too-short`, `not-moving`.
+    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `gravity`, `saturation`, `jump`, `too-short`, `not-moving`.
     pub kind: String,
     /// Which columns.
     #[serde(skip)]

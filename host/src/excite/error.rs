@@ -13,13 +13,14 @@ use crate::simulate::SimulateError;
 /// Why there is no trajectory.
 #[derive(Debug, thiserror::Error)]
 pub enum ExciteError {
-    /// A joint without limits.
+    /// Joints without limits.
     #[error(
-        "joint \"{joint}\" has no [joint.limits], and a motion is only designed within limits; give position and velocity at least"
+        "{} no limits, and a motion is only designed within limits; give position and velocity at least, as [joint.limits] in TOML, as <limit lower=\"…\" upper=\"…\" velocity=\"…\" effort=\"…\"/> in a URDF",
+        limitless(joints)
     )]
     NoLimits {
-        /// Its name.
-        joint: String,
+        /// Their names.
+        joints: Vec<String>,
     },
     /// Limits that bound nothing.
     #[error(
@@ -126,4 +127,13 @@ pub enum ExciteError {
         /// Line, or number of the message, from 1.
         row: u64,
     },
+}
+
+/// The joints, and that they have.
+fn limitless(joints: &[String]) -> String {
+    let list = joints.join("\", \"");
+    match joints.len() {
+        1 => format!("joint \"{list}\" has"),
+        _ => format!("joints \"{list}\" have"),
+    }
 }

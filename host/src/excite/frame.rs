@@ -94,10 +94,12 @@ pub(super) fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), Exc
     let mut notes = Vec::new();
     let mut list = Vec::new();
     let mut boundless = Vec::new();
+    let mut limitless = Vec::new();
     for joint in &robot.joints {
-        let limits = joint.limits.as_ref().ok_or_else(|| ExciteError::NoLimits {
-            joint: joint.name.clone(),
-        })?;
+        let Some(limits) = joint.limits.as_ref() else {
+            limitless.push(joint.name.clone());
+            continue;
+        };
         let [mut low, mut high] = limits.position;
         if !low.is_finite() || !high.is_finite() {
             (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
@@ -135,6 +137,9 @@ pub(super) fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), Exc
             acceleration,
             torque: limits.torque.filter(reachable),
         });
+    }
+    if !limitless.is_empty() {
+        return Err(ExciteError::NoLimits { joints: limitless });
     }
     if !boundless.is_empty() {
         notes.push(format!(

@@ -315,11 +315,13 @@ pub enum IdentifyError {
     },
     /// The torque is zero throughout.
     #[error(
-        "The torque of joint {joint} is zero throughout; record the torque or the motor current."
+        "The torque of joint {joint} is zero throughout; record the torque or the motor current{}.", if *.still { ", or make the joint, which stands still, type=\"fixed\" in the URDF" } else { "" }
     )]
     NoTorque {
         /// Number of the joint, from 1.
         joint: usize,
+        /// Whether it stands still throughout.
+        still: bool,
     },
     /// The fit is singular.
     #[error(

@@ -30,7 +30,7 @@ use crate::effects::Effects;
 use crate::prepare::{
     Choice, PrepareError, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads,
 };
-use crate::report::format_significant;
+use crate::report::{format_significant, format_unit};
 use crate::robot::{Joint, JointKind, Robot};
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
@@ -127,7 +127,10 @@ fn solve(
         sources
     };
     if let Some(j) = (0..joints).find(|&j| surveys.iter().all(|s| s.joints[j].torque_rms == 0.0)) {
-        return Err(IdentifyError::NoTorque { joint: j + 1 });
+        return Err(IdentifyError::NoTorque {
+            joint: j + 1,
+            still: surveys.iter().all(|s| s.joints[j].still()),
+        });
     }
     let limits: Vec<Option<f64>> = robot
         .joints
@@ -494,32 +497,42 @@ fn solve(
     }
     for (j, report) in train.iter().enumerate() {
         let name = &robot.joints[j].name;
+        let (length, effort) = robot.joints[j].kind.units();
         if surveys.iter().all(|s| s.joints[j].still()) {
             warnings.push(format!(
-                "Joint {name} stands still at {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more.",
-                surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0])
+                "Joint {name} stands still at {} {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves.",
+                surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0]),
+                length
             ));
             continue;
         }
-        if let Some(way) = creep(&robot.joints[j], &surveys, j) {
+        if let Some(way) = creep(&robot.joints[j], &surveys, j).filter(|_| report.rows > 0) {
             warnings.push(format!(
                 "Joint {name} moves by {way} in all training recordings, less than {CREEP} of its range. That may be no more than its drive or gear giving way: friction and inertia of such a motion are not those of one that turns the joint. Record a larger motion of it, or make it fixed in the description.",
             ));
         }
-        let unjudged = |which: &str| {
+        let unjudged = |which: &str, surveys: &[Survey]| {
+            let slowest = format_significant(treatment.speed_threshold[j], 2);
+            if surveys
+                .iter()
+                .all(|s| s.joints[j].only_noise(s.sample_rate))
+            {
+                return format!(
+                    "Joint {name} stands still in the {which} but for the noise of its encoder: no row is faster than {slowest} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
+                );
+            }
             format!(
-                "Joint {name}: every row of the {which} was left out (slower than {:.4}, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed.",
-                treatment.speed_threshold[j]
+                "Joint {name}: every row of the {which} was left out (slower than {slowest} {length}/s, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed."
             )
         };
         if report.rows == 0 {
-            warnings.push(unjudged("training data"));
+            warnings.push(unjudged("training data", &surveys));
         }
         if holdout_residuals
             .as_ref()
             .is_some_and(|held| held[j].rows == 0)
         {
-            warnings.push(unjudged("hold-out"));
+            warnings.push(unjudged("hold-out", &holdout_surveys));
         }
         if report.relative_error > 0.3 {
             warnings.push(format!(
@@ -533,8 +546,9 @@ fn solve(
             && held.rms > 1.5 * report.rms
         {
             warnings.push(format!(
-                "Joint {name}: the residual on the hold-out ({:.4}) is {:.1} times that on the training data.",
-                held.rms,
+                "Joint {name}: the residual on the hold-out ({} {}) is {:.1} times that on the training data.",
+                format_significant(held.rms, 4),
+                format_unit(effort),
                 held.rms / report.rms
             ));
         }

@@ -146,6 +146,13 @@ impl JointSurvey {
     pub fn still(&self) -> bool {
         self.position[0] == self.position[1]
     }
+
+    /// Whether the position spreads no further than white noise of its spectrum's floor does, sampled at `sample_rate` Hz: by
+    /// six standard deviations to both sides, which one row in 10⁹ leaves.
+    pub fn only_noise(&self, sample_rate: f64) -> bool {
+        let noise = (0.5 * self.spectrum.floor * sample_rate).sqrt();
+        self.position[1] - self.position[0] <= 12.0 * noise
+    }
 }
 
 impl Survey {

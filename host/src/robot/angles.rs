@@ -105,7 +105,8 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
             && (angle - exact).abs() > ROUNDING
         {
             said.push(format!(
-                "{}: the axis of joint `{}` stands at {} rad to {other}, {}.",
+                "{}:{}: the axis of joint `{}` stands at {} rad to {other}, {}.",
+                chain.file,
                 body.place,
                 body.joint,
                 format_significant(angle, 8),
@@ -128,7 +129,8 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
                 && (angle - exact).abs() > ROUNDING
             {
                 said.push(format!(
-                    "{}: about the axis of prismatic joint `{}`, joint `{}` stands at {} rad to the axes before, {}.",
+                    "{}:{}: about the axis of prismatic joint `{}`, joint `{}` stands at {} rad to the axes before, {}.",
+                    chain.file,
                     body.place,
                     chain.bodies[k - 1].joint,
                     body.joint,
@@ -145,12 +147,12 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
 }
 
 /// The multiple of π/2 that theta of a prismatic joint stands for, as TOML takes it, with a sentence where it is another.
-pub(super) fn squared_theta(body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
+pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
     let exact = meant(theta)?;
     let off = (theta - exact).abs();
     let said = (off > ROUNDING).then(|| {
         format!(
-            "{}: theta of prismatic joint `{}` is {theta} rad, {}.",
+            "{file}:{}: theta of prismatic joint `{}` is {theta} rad, {}.",
             body.place,
             body.joint,
             taken(off, exact)

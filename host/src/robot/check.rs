@@ -10,6 +10,7 @@ use rig_shared::multibody::MAX_JOINTS;
 
 use super::check_drives::{check_drive, check_transmission};
 use super::effects::check_effects;
+use super::sizes::oversized;
 use super::workspace::check_workspace;
 use super::{Joint, JointKind, Robot};
 
@@ -110,6 +111,13 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             f.way.splice(0..0, [Key("joint"), At(i)]);
             f
         })?;
+    }
+    // What was identified may be known in combinations only, and is read back as it is.
+    if robot.identified.is_none()
+        && let Some((i, mut fault)) = oversized(&robot.joints)
+    {
+        fault.way.splice(0..0, [Key("joint"), At(i)]);
+        return Err(fault);
     }
     check_transmission(robot)?;
     check_workspace(robot)?;

@@ -141,7 +141,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         };
         let mut theta = snap_angle(angle_about(x_before, x, z));
         if body.kind == JointKind::Prismatic
-            && let Some((exact, said)) = squared_theta(body, theta)
+            && let Some((exact, said)) = squared_theta(&chain.file, body, theta)
         {
             theta = exact;
             remarks.extend(said);
@@ -149,7 +149,8 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         let d = snap_length((origin - foot).dot(&z));
         if a.abs().max(d.abs()) > FAR * reach {
             remarks.push(format!(
-                "{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
+                "{}:{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
+                chain.file,
                 body.place,
                 body.joint,
                 format_significant(a.abs().max(d.abs()), 3)

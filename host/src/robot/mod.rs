@@ -19,6 +19,7 @@ mod effects;
 mod error;
 mod numbers;
 mod screw;
+mod sizes;
 mod text;
 mod urdf;
 mod workspace;
@@ -294,7 +295,9 @@ impl Robot {
     /// Every joint keeps the URDF's zero and positive sense: z of its frame is the URDF axis.
     pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
         let chain = urdf::read(text, path)?;
-        Ok(dh::convert(&chain).robot)
+        let robot = dh::convert(&chain).robot;
+        urdf::check_sizes(&chain, &robot.joints, path)?;
+        Ok(robot)
     }
 
     /// The description as TOML with units in comments; [`Robot::from_toml`] reads it back equal.

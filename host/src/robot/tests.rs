@@ -65,6 +65,7 @@ fn everything_optional_survives_writing() {
     joint.limits.as_mut().unwrap().position = [f64::NEG_INFINITY, f64::INFINITY];
     joint.drive.as_mut().unwrap().torque_constant = 0.0;
     joint.drive.as_mut().unwrap().gear_ratio = -1.0 / 3.0;
+    joint.inertial.as_mut().unwrap().mass = 1e9;
     joint.inertial.as_mut().unwrap().inertia =
         [1e-300, -0.0, 0.1 + 0.2, 5e11, -1e-7, 123_456_789.0];
     joint.controller = Some(Controller {

@@ -12,6 +12,7 @@
 
 mod columns;
 mod fit;
+mod gravity;
 mod link;
 mod model;
 mod names;

@@ -40,7 +40,7 @@ pub(super) const TRIAL: usize = 500;
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
     pub(super) robot: &'a Robot,
-    runs: &'a [&'a Run],
+    pub(super) runs: &'a [&'a Run],
     pub(super) form: Form,
     pub(super) rows: Rows,
     pub(super) order: Vec<usize>,
@@ -85,7 +85,7 @@ impl<'a> Judge<'a> {
             return Ok(clipped);
         }
         let mixed = self.mixed()?;
-        if let Some(swap) = mixed.as_ref().filter(|m| m.is_swap()) {
+        if let Some(swap) = mixed.as_ref().filter(|m| m.ends_search()) {
             return Ok(vec![self.said(swap)]);
         }
         let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();
@@ -99,6 +99,9 @@ impl<'a> Judge<'a> {
         // What states any joint's torque states the last's.
         let described = self.stated(&self.rows, n.saturating_sub(1))?;
         let described = described.as_ref();
+        if let Some(unit) = self.thousandfold(described) {
+            return Ok(vec![unit]);
+        }
         let mut found = Vec::new();
         for j in 0..n {
             found.extend(self.against_description(j, described)?);

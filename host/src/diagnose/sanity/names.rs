@@ -11,6 +11,13 @@ fn ratio(joint: &Joint) -> Option<f64> {
     (ratio > 1.5 || (ratio > 0.0 && ratio < 0.67)).then_some(ratio)
 }
 
+/// Whether a torque that is recorded `factor` times too large may be one that the joint's ratio was left out of or applied
+/// twice to.
+pub(super) fn is_ratio(joint: &Joint, factor: f64) -> bool {
+    let apart = |r: f64| (factor.abs() / r).ln().abs() <= 1.6f64.ln();
+    ratio(joint).is_some_and(|r| apart(r) || apart(1.0 / r))
+}
+
 /// Names of a factor within `tolerance` of it, the nearest first, joined; none where there is none.
 fn of(factor: f64, tolerance: f64, list: &[Named]) -> Option<String> {
     let apart = |f: &f64| (factor.abs() / f).ln().abs();

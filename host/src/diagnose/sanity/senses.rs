@@ -6,16 +6,22 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
+use super::columns::fault;
 use super::fit::{Fit, Measured, about_mean};
 use super::model::{Judge, model_error};
 use super::names;
 use super::rows::Rows;
 use crate::batch::ModelBatch;
+use crate::data::reference_scale;
 use crate::identify::chain_of;
+use crate::report::{format_significant, format_unit};
 use crate::robot::Joint;
 
 /// Parameters change by less than this factor; units and ratios by more.
 const CHANGE: f64 = 5.0;
+/// Factors between torques and description that are this far from a thousand or less are a thousand: what stand-in masses
+/// are off by.
+const THOUSAND_APART: f64 = 2.5;
 /// Standard deviations that a sign must stand from zero.
 const CLEAR: f64 = 4.0;
 
@@ -24,7 +30,7 @@ pub(super) type Scales = (Option<Measured>, Option<Measured>);
 
 /// What the description says of rows, joint by joint; no friction.
 pub(super) struct Described {
-    weight: Vec<Vec<f64>>,
+    pub(super) weight: Vec<Vec<f64>>,
     /// Weight and all that links and rotors need beside it.
     pub(super) all: Vec<Vec<f64>>,
     /// The motors' columns, see [`Rows::of_motors`].
@@ -113,6 +119,10 @@ impl Judge<'_> {
         }
         let n = j + 1;
         let which = match self.scales(&self.rows, j, described).0 {
+            // A witness that needs no description.
+            _ if self.reference_against(j) => {
+                format!("ref{n} runs against q{n} as well, so reverse q{n}")
+            }
             Some(gravity) if gravity.value > 0.0 => {
                 format!("gravity has the right sense, so reverse q{n}")
             }
@@ -128,6 +138,14 @@ impl Judge<'_> {
                 -loss.value, inertia.value
             ),
         )))
+    }
+
+    /// Whether the joint's reference is counted against its position.
+    pub(super) fn reference_against(&self, j: usize) -> bool {
+        let longest = self.runs.iter().max_by_key(|run| run.len());
+        let joint = longest.and_then(|run| run.joints.get(j));
+        let scale = joint.and_then(|own| reference_scale(&own.q_raw, own.reference.as_ref()?));
+        scale.is_some_and(|s| s < 0.0)
     }
 
     /// Measured gravity and measured inertia over the description's, where the description states them and the motion
@@ -178,12 +196,23 @@ impl Judge<'_> {
 
     /// What the description says of these rows.
     pub(super) fn described(&self, data: &Rows) -> Result<Described, DiagnoseError> {
+        self.described_under(data, self.robot.gravity)
+    }
+
+    /// What it would say under another gravity, m/s² in frame 0.
+    pub(super) fn described_under(
+        &self,
+        data: &Rows,
+        gravity: [f64; 3],
+    ) -> Result<Described, DiagnoseError> {
         let (n, rows) = (self.robot.joints.len(), data.len());
         let mut parameters = self.robot.standard_parameters();
         for row in &mut parameters {
             row[column::VISCOUS..].fill(0.0);
         }
-        let chain = chain_of(self.robot).map_err(model_error)?;
+        let mut turned = self.robot.clone();
+        turned.gravity = gravity;
+        let chain = chain_of(&turned).map_err(model_error)?;
         let model = ModelBatch::new(&chain, &parameters).map_err(model_error)?;
         let (mut weight, mut all) = (vec![0.0; n * rows], vec![0.0; n * rows]);
         model.gravity(&data.q, &mut weight).map_err(model_error)?;
@@ -217,6 +246,54 @@ impl Judge<'_> {
         })
     }
 
+    /// Torques of several joints that are all a thousand times as large or as small as the description needs: no description is
+    /// that far off everywhere.
+    pub(super) fn thousandfold(&self, described: Option<&Described>) -> Option<DataFault> {
+        let mut shown = Vec::new();
+        let mut weighed = false;
+        for j in 0..self.robot.joints.len() {
+            let (gravity, inertia) = self.scales(&self.rows, j, described);
+            weighed |= gravity.is_some();
+            shown.extend(gravity.or(inertia).map(|m| (j, m.value)));
+        }
+        let near = |unit: f64| {
+            let apart = |f: f64| (f / unit).abs().ln().abs() < THOUSAND_APART.ln();
+            (shown.iter()).all(|(j, f)| apart(*f) && !names::is_ratio(&self.robot.joints[*j], *f))
+        };
+        // A rotor that is not described makes inertia look larger, never weight.
+        if shown.len() < 2 || !weighed {
+            return None;
+        }
+        let (_, unit) = self.robot.joints[shown[0].0].kind.units();
+        let unit = format_unit(unit);
+        let what = match (near(1000.0), near(1e-3)) {
+            (true, _) => format!("as m{unit} for {unit} or mA for A would be"),
+            (_, true) => format!(
+                "as k{unit} for {unit}, A for mA, or masses of the description in g would make it"
+            ),
+            _ => return None,
+        };
+        let least = shown
+            .iter()
+            .map(|(_, f)| f.abs())
+            .fold(f64::INFINITY, f64::min);
+        let most = shown.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
+        let columns: Vec<String> = shown.iter().map(|(j, _)| format!("tau{}", j + 1)).collect();
+        let (last, others) = columns.split_last()?;
+        Some(fault(
+            self.runs,
+            "unit",
+            About::Torque,
+            "",
+            format!(
+                "{} and {last} are {} to {} times what the description's gravity and inertia need, {what}; give torques in {unit}, at the joints.",
+                others.join(", "),
+                format_significant(least, 4),
+                format_significant(most, 4)
+            ),
+        ))
+    }
+
     /// Factors between the recording and the description that no change of the robot makes.
     pub(super) fn against_description(
         &self,
@@ -240,6 +317,11 @@ impl Judge<'_> {
             let name = names::of_torque(joint, factor);
             // Between a parameter's change and what has a name there is room for an odd robot.
             (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
+                // On a light last link a tool weighs many times what the link does.
+                let tool = match factor {
+                    1.0..100.0 => "as a tool or payload that the description does not state would make it, or ",
+                    _ => "",
+                };
                 let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit".to_owned());
                 let nearest = what.split(", or").next().unwrap_or_default();
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
@@ -247,7 +329,10 @@ impl Judge<'_> {
                     kind,
                     About::TorqueScale,
                     j,
-                    format!("tau{n} is {factor:.4} times what the description's {of} needs, {what}."),
+                    format!(
+                        "tau{n} is {} times what the description's {of} needs, {tool}{what}.",
+                        format_significant(factor, 4)
+                    ),
                 )
             })
         };

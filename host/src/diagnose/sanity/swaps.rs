@@ -1,4 +1,5 @@
-//! Columns of two joints that stand in each other's place, and columns counted the other way round.
+//! Columns of two joints that stand in each other's place, columns counted the other way round, and gravity of another
+//! direction.
 //!
 //! Each such fault is undone in turn and the torques of all joints are explained anew; what makes the data by far the most
 //! likely is named.
@@ -33,6 +34,8 @@ pub(super) enum Mixed {
     Torque(usize),
     /// A position counted the other way round.
     Position(usize),
+    /// None of the columns, but gravity of another direction, m/s² in frame 0.
+    Gravity([f64; 3]),
 }
 
 /// A fault, and shares of the torques' variance that are left of the joints it concerns, as recorded and without it.
@@ -61,14 +64,28 @@ impl Judge<'_> {
             return Ok(None);
         }
         let mut all: Vec<Found> = Vec::new();
-        for mixed in candidates(&moving) {
-            let after = self.left(&self.undone(&rows, mixed))?;
+        let gravity = match self.states_from(0) {
+            true => self.gravity_shown(&rows)?.map(Mixed::Gravity),
+            false => None,
+        };
+        for mixed in candidates(&moving).into_iter().chain(gravity) {
+            let after = match mixed {
+                Mixed::Gravity(other) => self.left_of_description(&rows, other)?,
+                _ => self.left(&self.undone(&rows, mixed))?,
+            };
             let concerned: Vec<usize> = match mixed {
+                Mixed::Gravity(_) => (moving.iter().copied())
+                    .filter(|j| before[*j] > POOR && after[*j] < 0.5 * before[*j])
+                    .collect(),
                 Mixed::Torques(pair) | Mixed::Positions(pair) | Mixed::Joints(pair) => {
                     pair.to_vec()
                 }
                 Mixed::Torque(j) | Mixed::Position(j) => vec![j],
             };
+            // One joint's gravity is turned by its own columns as well.
+            if concerned.len() < 2 && matches!(mixed, Mixed::Gravity(_)) {
+                continue;
+            }
             let mean = |left: &[f64]| {
                 concerned.iter().map(|j| left[*j]).sum::<f64>() / concerned.len() as f64
             };
@@ -119,6 +136,9 @@ impl Judge<'_> {
         let turned = |about: About, column: &str, other: &str, j: usize| {
             let n = j + 1;
             let or = match found.twin {
+                _ if column == "q" && self.reference_against(j) => {
+                    format!(", against which ref{n} runs as well,")
+                }
                 true => format!(" (or {other}{n})"),
                 false => String::new(),
             };
@@ -148,6 +168,7 @@ impl Judge<'_> {
             ),
             Mixed::Torque(j) => turned(About::Torque, "tau", "q", j),
             Mixed::Position(j) => turned(About::Motion, "q", "tau", j),
+            Mixed::Gravity(other) => self.gravity_said(other, found.left),
         }
     }
 
@@ -161,6 +182,7 @@ impl Judge<'_> {
                 rows = self.undone(&rows, Mixed::Torques(pair));
                 rows = self.undone(&rows, Mixed::Positions(pair));
             }
+            Mixed::Gravity(_) => {}
             Mixed::Torque(j) => scale(&mut rows.tau[j], -1.0),
             Mixed::Position(j) => rows = rows.rescaled(Some(j), -1.0),
             Mixed::Torques([i, j]) => {
@@ -190,7 +212,7 @@ impl Judge<'_> {
     /// numbers to fit, else by one set of parameters for all joints.
     fn left(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
         if self.states_from(0) {
-            self.left_of_description(rows)
+            self.left_of_description(rows, self.robot.gravity)
         } else {
             self.left_of_parameters(rows)
         }
@@ -221,9 +243,13 @@ impl Judge<'_> {
         Ok((0..n).map(own).collect())
     }
 
-    fn left_of_description(&self, rows: &Rows) -> Result<Vec<f64>, DiagnoseError> {
+    fn left_of_description(
+        &self,
+        rows: &Rows,
+        gravity: [f64; 3],
+    ) -> Result<Vec<f64>, DiagnoseError> {
         let n = self.robot.joints.len();
-        let Described { all, motors, .. } = self.described(rows)?;
+        let Described { all, motors, .. } = self.described_under(rows, gravity)?;
         let share = |j: usize| {
             let friction = friction(&rows.qd[j], motors.get(j));
             let order: Vec<usize> = (0..friction.ncols()).collect();
@@ -264,12 +290,9 @@ impl Found {
         }
     }
 
-    /// Whether two joints' columns are swapped.
-    pub(super) fn is_swap(&self) -> bool {
-        matches!(
-            self.mixed,
-            Mixed::Torques(_) | Mixed::Positions(_) | Mixed::Joints(_)
-        )
+    /// Whether all else that is wrong may follow from it: columns of two joints that are swapped, and gravity.
+    pub(super) fn ends_search(&self) -> bool {
+        !matches!(self.mixed, Mixed::Torque(_) | Mixed::Position(_))
     }
 }
 

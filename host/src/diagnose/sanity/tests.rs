@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod mounts;
+mod scales;
 mod windows;
 
 use std::path::{Path, PathBuf};
@@ -195,7 +197,7 @@ fn faults_of_a_real_slide_are_named() {
         return;
     };
     only(&robot, &tau(&runs, 0, -1.0), "sign", 0, "reverse one");
-    only(&robot, &q(&runs, 0, -1.0), "sign", 0, "reverse one");
+    only(&robot, &q(&runs, 0, -1.0), "sign", 0, "so reverse q1");
     only(&robot, &tau(&runs, 0, 1000.0), "unit", 0, "too large");
     only(&robot, &q(&runs, 0, 1000.0), "unit", 0, "outside");
     jumps(&robot, &runs, 0);
@@ -369,6 +371,20 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     only(&robot, &tau(1000.0), "unit", 0, "");
     only(&robot, &tau(1e-3), "unit", 0, "");
     only(&robot, &tau(9.549), "unit", 0, "rpm");
+    only(&robot, &tau(9.549), "unit", 0, "a tool or payload that");
+    // A reference that runs against the position is a witness against it.
+    let against = injured(&runs, |r| {
+        let joint = &mut r.joints[0];
+        times(&mut joint.tau, -1.0);
+        joint.reference = Some(joint.q_raw.iter().map(|q| -q).collect());
+    });
+    only(
+        &robot,
+        &against,
+        "sign",
+        0,
+        "ref1 runs against q1 as well, so reverse q1",
+    );
     only(&robot, &tau(1.0 / 50.0), "ratio", 0, "before its gear");
     // The sweep's few degrees leave the factor open, so that only its existence is certain there.
     let wide = |factor: f64| -> Vec<Run> {

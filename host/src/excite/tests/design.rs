@@ -237,7 +237,22 @@ fn what_cannot_be_designed_is_said() {
     let said = text(&robot, &quick(Criterion::ConditionNumber));
     assert!(said.contains("torque") && said.contains("link"), "{said}");
     robot.joints[0].limits = None;
-    assert!(text(&robot, &Options::default()).contains("[joint.limits]"));
+    let said = text(&robot, &Options::default());
+    assert!(said.contains("joint \"link\" has no limits"), "{said}");
+    assert!(
+        said.contains("[joint.limits]") && said.contains("<limit"),
+        "{said}"
+    );
+    let path = std::path::Path::new("irp6.toml");
+    let mut arm = Robot::from_toml(crate::robot::IRP6_TEMPLATE, path).unwrap();
+    arm.joints[1].limits = None;
+    arm.joints[3].limits = None;
+    let said = text(&arm, &Options::default());
+    let names = format!(
+        "joints \"{}\", \"{}\" have",
+        arm.joints[1].name, arm.joints[3].name
+    );
+    assert!(said.contains(&names), "{said}");
     let wrong = Options {
         harmonics: 9,
         ..Options::default()

@@ -202,3 +202,50 @@ fn a_joint_that_only_creeps_is_said_and_nothing_of_it_recommended() {
     let nothing = format!("Trust nothing of {}", robot.joints[1].name);
     assert!(recommendation.contains(&nothing), "{recommendation}");
 }
+
+#[test]
+fn a_joint_that_moves_by_its_encoder_s_noise_alone_is_said_to_stand_still() {
+    let robot = arm(4, 3);
+    let mut chance = Chance::new(5);
+    let mut training = record(&robot, 2, 1);
+    for q in &mut training.blocks[0].joints[2].q {
+        *q += 2e-6 * chance.normal();
+    }
+    let found = identify(&robot, &[&training], &[], &Options::default()).unwrap();
+    let name = &robot.joints[2].name;
+    let own: Vec<&String> = (found.warnings.iter())
+        .filter(|w| w.starts_with(&format!("Joint {name}")))
+        .collect();
+    let words = format!(
+        "Joint {name} stands still in the training data but for the noise of its encoder: no row is faster than "
+    );
+    assert!(
+        own.iter()
+            .any(|w| w.starts_with(&words) && w.contains(" rad/s")),
+        "{own:?}"
+    );
+    assert!(
+        own.iter()
+            .all(|w| !w.contains("--min-speed") && !w.contains("0.0000")),
+        "{own:?}"
+    );
+}
+
+#[test]
+fn a_finger_without_torque_that_stands_still_may_be_fixed() {
+    let robot = arm(2, 3);
+    let mut finger = record(&robot, 1, 1);
+    finger.blocks[0].joints[1].tau.fill(0.0);
+    let said = |recording: &InMemory| {
+        let found = identify(&robot, &[recording], &[], &Options::default());
+        found.unwrap_err().to_string()
+    };
+    assert!(
+        said(&finger).contains("type=\"fixed\" in the URDF"),
+        "{}",
+        said(&finger)
+    );
+    let mut moving = record(&robot, 0, 1);
+    moving.blocks[0].joints[1].tau.fill(0.0);
+    assert!(!said(&moving).contains("fixed"), "{}", said(&moving));
+}

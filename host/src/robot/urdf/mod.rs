@@ -17,8 +17,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::error::RobotError;
-use super::{JointFriction, JointKind, JointLimits};
+use super::error::{Place, RobotError};
+use super::sizes::oversized;
+use super::{Joint, JointFriction, JointKind, JointLimits};
 use reader::{Reader, parsed};
 
 pub use original::Original;
@@ -30,8 +31,8 @@ pub use write::Urdf;
 #[derive(Debug)]
 pub(in crate::robot) struct Body {
     pub joint: String,
-    /// File, line and column of the joint.
-    pub place: String,
+    /// Line and column of the joint.
+    pub place: Place,
     /// The link that the joint moves.
     pub link: String,
     /// Links of this body that have an `<inertial>`: the one that the joint moves, and what is fixed to it.
@@ -52,6 +53,8 @@ pub(in crate::robot) struct Body {
 #[derive(Debug)]
 pub(in crate::robot) struct Chain {
     pub name: String,
+    /// Name of the file.
+    pub file: String,
     /// The base link.
     pub base: String,
     pub bodies: Vec<Body>,
@@ -68,4 +71,18 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
         remarks: RefCell::default(),
     }
     .chain()
+}
+
+/// Refuses a chain whose links, as `joints` describe them, no robot has.
+pub(super) fn check_sizes(chain: &Chain, joints: &[Joint], path: &Path) -> Result<(), RobotError> {
+    match oversized(joints) {
+        None => Ok(()),
+        Some((k, fault)) => Err(RobotError::Value {
+            path: path.into(),
+            place: chain.bodies[k].place,
+            what: fault.what,
+            found: fault.found,
+            right: fault.right,
+        }),
+    }
 }

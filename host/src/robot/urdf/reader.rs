@@ -1,11 +1,13 @@
 //! Elements and numbers of a URDF file, each refused by its line where it is wrong.
 
 use std::cell::RefCell;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
+use crate::robot::angles::WRITTEN;
 use crate::robot::check::{LARGEST, sound};
 use crate::robot::error::{Place, RobotError};
 
@@ -170,6 +172,17 @@ impl<'a> Reader<'a> {
         };
         let xyz = self.vector(origin, "xyz")?.unwrap_or_else(Vector3::zeros);
         let rpy = self.vector(origin, "rpy")?.unwrap_or_else(Vector3::zeros);
+        // As alpha in TOML: no one writes so many turns, and 2π rounded up is one.
+        if rpy.amax() > TAU + WRITTEN {
+            let [r, p, y] = rpy.map(f64::to_radians).into();
+            return Err(self.error(
+                origin,
+                format!(
+                    "`rpy` of <origin> is \"{}\", but it must be three angles within a turn, in rad; were these degrees, it would be \"{r:.6} {p:.6} {y:.6}\"",
+                    origin.attribute("rpy").unwrap_or_default()
+                ),
+            ));
+        }
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), rpy.z)
             * Rotation3::from_axis_angle(&Vector3::y_axis(), rpy.y)
             * Rotation3::from_axis_angle(&Vector3::x_axis(), rpy.x);

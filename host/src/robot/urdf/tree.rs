@@ -145,6 +145,7 @@ impl<'a> Reader<'a> {
         }
         Ok(Chain {
             name: root.attribute("name").unwrap_or("robot").to_owned(),
+            file: self.path.display().to_string(),
             base: base.to_owned(),
             bodies,
             remarks: self.remarks.take(),
@@ -246,7 +247,7 @@ impl<'a> Reader<'a> {
         })?;
         let body = Body {
             joint: name.to_owned(),
-            place: format!("{}:{}", self.path.display(), self.place(node)),
+            place: self.place(node),
             link: link.to_owned(),
             heavy: rigid.heavy,
             kind,

@@ -6,7 +6,9 @@ use nalgebra::Matrix3;
 
 use super::reader::{Reader, Xml, child};
 use super::spatial::SpatialInertia;
+use crate::report::format_significant;
 use crate::robot::error::RobotError;
+use crate::robot::sizes::too_wide;
 use crate::robot::{JointFriction, JointLimits};
 
 /// Round effort limits from here on are taken for placeholders, N·m or N.
@@ -47,10 +49,19 @@ impl<'a> Reader<'a> {
             }
             values
         };
+        let inertia = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
+        if let Some(why) = too_wide(inertia.amax(), mass) {
+            return Err(self.error(
+                i,
+                format!(
+                    "the inertia of link `{name}` is up to {} kg·m², but {why}",
+                    format_significant(inertia.amax(), 4)
+                ),
+            ));
+        }
         let pose = self.origin(node)?;
         let r = pose.rotation.to_rotation_matrix();
-        let about_centre =
-            r * Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz) * r.transpose();
+        let about_centre = r * inertia * r.transpose();
         Ok(Some(SpatialInertia::from_centre(
             mass,
             pose.translation.vector,

@@ -4,7 +4,7 @@ use super::*;
 use crate::excite::SampledReference;
 
 /// The TX40 with friction of its own in every motor, its coupled sixth too, on a motion of `seconds`.
-fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
+pub(super) fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
     let described = text("tx40.toml", TX40);
     let mut robot = described.clone();
     for (k, joint) in robot.joints.iter_mut().enumerate() {

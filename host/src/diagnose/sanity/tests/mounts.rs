@@ -1,0 +1,47 @@
+//! Arms that hang or stand otherwise than described.
+
+use super::windows::simulated_wrist;
+use super::*;
+
+/// The description as if the arm stood on a ground along which gravity points so.
+fn described(robot: &Robot, gravity: [f64; 3]) -> Robot {
+    let mut robot = robot.clone();
+    robot.gravity = gravity;
+    robot
+}
+
+/// The one fault that is found is of gravity and says so.
+fn gravity_alone(robot: &Robot, runs: &[Run], words: [&str; 2]) {
+    let found = faults(robot, runs).unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    println!("{}", found[0].text);
+    assert_eq!(
+        (found[0].kind.as_str(), found[0].joint.as_str()),
+        ("gravity", "")
+    );
+    for word in words {
+        assert!(found[0].text.contains(word), "{word}: {}", found[0].text);
+    }
+}
+
+#[test]
+fn an_arm_that_hangs_or_is_mounted_on_a_wall_is_said_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut arms = vec![simulated_wrist(folder.path(), 20.0, 1)];
+    if let Some((robot, mut runs)) = one("kuka") {
+        runs.retain(|run| run.recording == 0);
+        arms.push((robot, runs));
+    }
+    for (robot, runs) in &arms {
+        let g = 9.81;
+        let ceiling = described(robot, [0.0, 0.0, g]);
+        gravity_alone(&ceiling, runs, ["by 1", "hang upside down"]);
+        for wall in [[g, 0.0, 0.0], [0.0, -g, 0.0]] {
+            gravity_alone(&described(robot, wall), runs, ["elsewhere", "on a wall"]);
+        }
+        // A base that is not level is for the search behind.
+        let leaning = described(robot, [0.3 * g, 0.0, -0.95 * g]);
+        let found = faults(&leaning, runs).unwrap();
+        assert!(found.iter().all(|f| f.kind != "gravity"), "{found:?}");
+    }
+}
