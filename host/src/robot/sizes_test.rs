@@ -32,7 +32,7 @@ fn a_urdf_in_another_unit_is_refused_by_line() {
         (
             urdf("0 0 0", &inertial("0.1 0 0", 3.0, 0.04e9)),
             "arm.urdf:5:",
-            "the inertia of link `fore` is up to 4.000·10⁷ kg·m², but at a mass of 3 kg that is a radius of gyration of 3651 m",
+            "the inertia of link `fore` is up to 4.000·10⁷ kg·m², but at a mass of 3.000 kg that is a radius of gyration of 3651 m",
         ),
         (
             urdf("300 0 0.2", &good),
