@@ -1,9 +1,11 @@
 //! Effects that all effects fitted together take back.
 
+use std::f64::consts::TAU;
+
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::judge::Judge;
 use crate::diagnose::profile::Profile;
-use crate::diagnose::refit::{Joint, Refit};
+use crate::diagnose::refit::Refit;
 use crate::diagnose::search::{Search, is_gear};
 
 /// Probability above which an effect may be nothing: its 95 % interval holds zero.
@@ -39,16 +41,24 @@ pub(super) fn unbelieved(
             "by its own deviation it could as well be nothing",
         )));
     }
-    let overdone = found
-        .filter(|k| is_gear(chosen[*k].candidate.kind))
-        .find(|k| share(&joint, chosen, free, *k) > MOST_OF_A_TWIST);
-    Ok(overdone.map(|k| {
-        let why = "it would change more torque than mass and load of the link have";
-        (k, why)
-    }))
+    for k in found.filter(|k| is_gear(chosen[*k].candidate.kind)) {
+        let shares = joint.gains(chosen, free, k);
+        if shares.iter().any(|share| *share > MOST_OF_A_TWIST) {
+            let why = "it would change more torque than mass and load of the link have";
+            return Ok(Some((k, why)));
+        }
+        if resonance(search, &chosen[k])? > 0.5 / judge.rows.period {
+            let why = "it would resonate beyond the band of the data, where other laws of fast motion look alike";
+            return Ok(Some((k, why)));
+        }
+    }
+    Ok(None)
 }
 
-/// Share of the torque that a gear's twist changes.
-fn share(joint: &Joint, chosen: &[Profile], free: usize, k: usize) -> f64 {
-    joint.gains(chosen, free, k).first().copied().unwrap_or(0.0)
+/// Frequency at which the link swings on its gear while the motor stands, Hz.
+fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
+    let shapes = gear.candidate.kind.about().shapes;
+    let stiffness = (shapes.iter().zip(&gear.shapes)).find(|(shape, _)| shape.name == "stiffness");
+    let mass = search.source.mass(gear.candidate.joint, 0)?;
+    Ok(stiffness.map_or(0.0, |(_, stiffness)| (stiffness / mass).sqrt() / TAU))
 }
