@@ -5,8 +5,8 @@
 //! with its own first moments, and moves joints that turn about the vertical: one degree under 25 N·m of another joint is
 //! 0.4 N·m there.
 //!
-//! Leaves out: that gravity keeps its size when it turns, which masses and gains make up for; where the first joint's axis is level, an error of
-//! its zero, which does the same as a turn of gravity about it.
+//! Leaves out: that gravity keeps its size when it turns, which masses and gains make up for; where the first joint's axis
+//! is level, an error of its zero, which does the same as a turn of gravity about it.
 
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 use rig_shared::multibody::{COLUMNS, Chain, gravity_vector};

@@ -1,6 +1,6 @@
 //! Arms that hang or stand otherwise than described.
 
-use super::windows::simulated_wrist;
+use super::windows::sound_arms;
 use super::*;
 
 /// The description as if the arm stood on a ground along which gravity points so.
@@ -27,12 +27,7 @@ fn gravity_alone(robot: &Robot, runs: &[Run], words: [&str; 2]) {
 #[test]
 fn an_arm_that_hangs_or_is_mounted_on_a_wall_is_said_once() {
     let folder = tempfile::tempdir().unwrap();
-    let mut arms = vec![simulated_wrist(folder.path(), 20.0, 1)];
-    if let Some((robot, mut runs)) = one("kuka") {
-        runs.retain(|run| run.recording == 0);
-        arms.push((robot, runs));
-    }
-    for (robot, runs) in &arms {
+    for (robot, runs) in &sound_arms(folder.path()) {
         let g = 9.81;
         let ceiling = described(robot, [0.0, 0.0, g]);
         gravity_alone(&ceiling, runs, ["by 1", "hang upside down"]);

@@ -1,17 +1,12 @@
 //! Torques of a whole arm in another unit.
 
-use super::windows::simulated_wrist;
+use super::windows::sound_arms;
 use super::*;
 
 #[test]
 fn torques_that_are_all_a_thousand_times_too_large_or_small_are_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let mut arms = vec![simulated_wrist(folder.path(), 20.0, 1)];
-    if let Some((robot, mut runs)) = one("kuka") {
-        runs.retain(|run| run.recording == 0);
-        arms.push((robot, runs));
-    }
-    for (mut robot, runs) in arms {
+    for (mut robot, runs) in sound_arms(folder.path()) {
         // A limit or friction would say it before.
         for joint in &mut robot.joints {
             joint.limits = None;

@@ -3,8 +3,18 @@
 use super::*;
 use crate::excite::SampledReference;
 
+/// Recordings with nothing wrong of whole arms: one simulated, and a real one where it is at hand.
+pub(super) fn sound_arms(folder: &Path) -> Vec<(Robot, Vec<Run>)> {
+    let mut arms = vec![simulated_wrist(folder, 20.0, 1)];
+    if let Some((robot, mut runs)) = one("kuka") {
+        runs.retain(|run| run.recording == 0);
+        arms.push((robot, runs));
+    }
+    arms
+}
+
 /// The TX40 with friction of its own in every motor, its coupled sixth too, on a motion of `seconds`.
-pub(super) fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
+fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
     let described = text("tx40.toml", TX40);
     let mut robot = described.clone();
     for (k, joint) in robot.joints.iter_mut().enumerate() {
