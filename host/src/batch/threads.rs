@@ -1,6 +1,7 @@
 //! Work on a recording shared among threads.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use super::BLOCK;
@@ -36,4 +37,34 @@ pub fn over_threads<R: Send>(
         }
         results
     })
+}
+
+/// Runs `work` on each of `items` pieces of unequal length, at most `threads` at a time, and gives the results in their order.
+///
+/// With one thread `work` runs in the calling thread. A panic in `work` goes on in the caller.
+pub fn each_by<R: Send>(threads: usize, items: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let mine = || {
+        let mut done = Vec::new();
+        loop {
+            let item = next.fetch_add(1, Ordering::Relaxed);
+            if item >= items {
+                return done;
+            }
+            done.push((item, work(item)));
+        }
+    };
+    let mut done = thread::scope(|scope| {
+        let others: Vec<_> = (1..threads.min(items)).map(|_| scope.spawn(mine)).collect();
+        let mut all = mine();
+        for other in others {
+            match other.join() {
+                Ok(more) => all.extend(more),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        all
+    });
+    done.sort_by_key(|(item, _)| *item);
+    done.into_iter().map(|(_, result)| result).collect()
 }

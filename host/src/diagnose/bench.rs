@@ -1,5 +1,6 @@
 //! What stays the same during a diagnosis: the robot, its nominal model, how recordings are treated.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use rig_shared::effects::{Channel, Kind};
@@ -128,6 +129,7 @@ impl<'a> Bench<'a> {
             values: values.to_vec(),
             delays: vec![DELAY; self.robot.joints.len()],
             driven: Mutex::default(),
+            seen: HashMap::new(),
             slopes: Mutex::default(),
         })
     }
@@ -144,8 +146,9 @@ impl<'a> Bench<'a> {
         chosen: &[Profile],
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let (nominal, gains) = coefficients.split_at(self.anchor.free.len());
-        let source =
-            (self.source(loaded, &self.anchor.values(nominal))?).loaded_by(chosen, gains)?;
+        let source = (self.source(loaded, &self.anchor.values(nominal))?)
+            .loaded_by(chosen, gains)?
+            .following(&loaded.rows, chosen, gains)?;
         let rows = &loaded.rows;
         let mut columns = self.anchor.columns(rows);
         for profile in chosen {
@@ -176,6 +179,7 @@ impl<'a> Bench<'a> {
                 columns: Arc::new(vec![Column::new(); gains.len()]),
                 evidence: Evidence::default(),
                 vanished: None,
+                followed: None,
             });
             coefficients.extend(gains);
         }

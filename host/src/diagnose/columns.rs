@@ -10,12 +10,15 @@ use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::profile::Profile;
-use super::rows::{Column, Nominal, Thinning, links_of, motion_of};
+use super::rows::{Column, Nominal, Thinning};
 use super::runs::Run;
 use super::search::is_gear;
 use super::slopes::Slopes;
-use super::transmission::{ABREAST, Driven, Load};
+use super::transmission::{ABREAST, Driven, Seen};
+use crate::batch::each_by;
 use crate::robot::{Robot, unit_of};
+
+mod gears;
 
 /// What columns are formed from.
 pub(super) struct Source<'a> {
@@ -35,7 +38,9 @@ pub(super) struct Source<'a> {
     pub(super) delays: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
-    /// Slopes of the torque, likewise.
+    /// What the recorded torque tells of gears whose links are followed, by run and joint.
+    pub(super) seen: HashMap<(usize, usize), Seen>,
+    /// Slopes of the torque, by run and joint, once they have been asked for.
     pub(super) slopes: Mutex<HashMap<(usize, usize), Arc<Slopes>>>,
 }
 
@@ -153,97 +158,52 @@ impl Source<'_> {
         candidate: &Candidate,
         shapes: &[[f64; SHAPES]],
     ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
-        let none: Column = vec![None; self.nominal.joints()];
-        let mut all = vec![vec![none; self.gains(candidate.kind).len()]; shapes.len()];
-        for r in 0..self.runs.len() {
-            for (some, columns) in shapes.chunks(ABREAST).zip(all.chunks_mut(ABREAST)) {
-                let full = self.at_full_rate(candidate, some, r)?;
-                let (mut places, mut signals) = (Vec::new(), Vec::new());
-                for (s, of_shapes) in full.into_iter().enumerate() {
-                    for (g, column) in of_shapes.into_iter().enumerate() {
-                        for (j, signal) in column.into_iter().enumerate() {
-                            if let Some(signal) = signal {
-                                places.push((s, g, j));
-                                signals.push(signal);
-                            }
-                        }
-                    }
-                }
-                for ((s, g, j), thin) in places.into_iter().zip(self.thinning.thinned(&signals)) {
-                    columns[s][g][j].get_or_insert_default().extend(thin);
-                }
-            }
-        }
-        Ok(all)
+        let parts = (0..self.runs.len()).map(|r| self.of_run(candidate, shapes, r));
+        joined(parts)
     }
 
-    /// What a gear adds to the torque of its joint over a run, one signal for each of the shapes: nothing where it is none.
-    fn twisted(
+    /// One column a gain, the runs shared among threads.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn columns_by(
+        &self,
+        threads: usize,
+        candidate: &Candidate,
+        shapes: &[f64; SHAPES],
+    ) -> Result<Vec<Column>, DiagnoseError> {
+        let one = std::slice::from_ref(shapes);
+        let parts = each_by(threads, self.runs.len(), |r| self.of_run(candidate, one, r));
+        Ok(joined(parts)?.into_iter().next().unwrap_or_default())
+    }
+
+    /// For each of several shapes one column a gain, along one run.
+    fn of_run(
         &self,
         candidate: &Candidate,
         shapes: &[[f64; SHAPES]],
         r: usize,
-    ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
-        let run = &self.runs[r];
-        // An encoder on the link has seen what the gear does.
-        if let Some(excess) = self.measured(candidate.joint, r)? {
-            return Ok(vec![excess; shapes.len()]);
+    ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
+        let none: Column = vec![None; self.nominal.joints()];
+        let mut all = vec![vec![none; self.gains(candidate.kind).len()]; shapes.len()];
+        for (some, columns) in shapes.chunks(ABREAST).zip(all.chunks_mut(ABREAST)) {
+            let full = self.at_full_rate(candidate, some, r)?;
+            let (mut places, mut signals) = (Vec::new(), Vec::new());
+            for (s, of_shapes) in full.into_iter().enumerate() {
+                for (g, column) in of_shapes.into_iter().enumerate() {
+                    for (j, signal) in column.into_iter().enumerate() {
+                        if let Some(signal) = signal {
+                            places.push((s, g, j));
+                            signals.push(signal);
+                        }
+                    }
+                }
+            }
+            for ((s, g, j), thin) in places.into_iter().zip(self.thinning.thinned(&signals)) {
+                columns[s][g][j] = Some(thin);
+            }
         }
-        let driven = self.driven(candidate.joint, r)?;
-        let load = Load {
-            period: 1.0 / run.rate,
-            speed: &run.joints[candidate.joint].qd,
-            load: &self.predicted[r].load[candidate.joint],
-            friction: self.friction(candidate.joint),
-        };
-        Ok((driven.excess(candidate.kind, shapes, &load).into_iter())
-            .map(|excess| excess.unwrap_or_else(|| vec![0.0; run.len()]))
-            .collect())
-    }
-
-    /// What the links' measured motion adds to the torque of a joint over a run beside that of rigid gears; none where its
-    /// link has no encoder.
-    fn measured(&self, joint: usize, r: usize) -> Result<Option<Vec<f64>>, DiagnoseError> {
-        let run = &self.runs[r];
-        let own = &run.joints[joint];
-        let Some([_, _, acceleration]) = &own.link else {
-            return Ok(None);
-        };
-        let inertial = |[q, v, a]: [Vec<Vec<f64>>; 3]| self.inertial(joint, [&q, &v, &a]);
-        let (rigid, measured) = (inertial(motion_of(run))?, inertial(links_of(run))?);
-        let drive = self.drive_inertia(joint);
-        let moved = acceleration
-            .iter()
-            .zip(&own.qdd)
-            .map(|(l, m)| drive * (l - m));
-        Ok(Some(
-            (measured.iter().zip(&rigid).zip(moved))
-                .map(|((with, without), drive)| with - without - drive)
-                .collect(),
-        ))
-    }
-
-    /// Torque on the gear of a joint over a run for the links' measured motion.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn load_of_link(&self, joint: usize, r: usize) -> Result<Vec<f64>, DiagnoseError> {
-        let mut load = self.predicted[r].load[joint].clone();
-        for (to, more) in load
-            .iter_mut()
-            .zip(self.measured(joint, r)?.iter().flatten())
-        {
-            *to += more;
-        }
-        Ok(load)
-    }
-
-    /// Inertia that the gear of a joint carries, over a run on average.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn mass(&self, joint: usize, r: usize) -> Result<f64, DiagnoseError> {
-        Ok(self.driven(joint, r)?.mean_mass())
+        Ok(all)
     }
 
     /// Coulomb friction of a joint, as identified; 0 where it came out below that.
@@ -404,16 +364,6 @@ impl Source<'_> {
         Ok(slopes)
     }
 
-    fn driven(&self, joint: usize, r: usize) -> Result<Arc<Driven>, DiagnoseError> {
-        let mut known = self.driven.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(driven) = known.get(&(r, joint)) {
-            return Ok(driven.clone());
-        }
-        let driven = Arc::new(Driven::of(self, joint, &self.runs[r])?);
-        known.insert((r, joint), driven.clone());
-        Ok(driven)
-    }
-
     /// Torque of a joint without friction and offset for a motion.
     ///
     /// # Errors
@@ -493,6 +443,27 @@ impl Source<'_> {
         }
         Ok(columns)
     }
+}
+
+/// Columns of runs, one run behind the other.
+fn joined(
+    parts: impl IntoIterator<Item = Result<Vec<Vec<Column>>, DiagnoseError>>,
+) -> Result<Vec<Vec<Column>>, DiagnoseError> {
+    let mut parts = parts.into_iter();
+    let mut all = parts.next().transpose()?.unwrap_or_default();
+    for part in parts {
+        for (to, from) in all
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .zip(part?.into_iter().flatten().flatten())
+        {
+            if let Some(from) = from {
+                to.get_or_insert_default().extend(from);
+            }
+        }
+    }
+    Ok(all)
 }
 
 fn add(to: &mut [Vec<f64>], from: &[Vec<f64>]) {

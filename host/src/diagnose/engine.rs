@@ -1,10 +1,12 @@
 //! The workflow from recordings to a verdict.
 
+mod follow;
 mod steps;
 mod unbelieved;
 
 use rig_shared::effects::Kind;
 
+pub(super) use self::follow::Follower;
 use self::steps::{change_step, refuse, steps};
 use self::unbelieved::unbelieved;
 use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
@@ -180,8 +182,10 @@ fn attempt(
             )
         })
         .collect();
+    let follower = Follower::new(&bench, loaded, &refit, &search);
     let judge = Judge {
         robot,
+        follower: &follower,
         search: &search,
         rows: &loaded.rows,
         coordinates: &coordinates,
@@ -218,6 +222,13 @@ fn attempt(
     named.sort_by_key(|(profile, _)| search.rank_of(&profile.candidate));
     let (chosen, said): (Vec<_>, Vec<_>) = named.into_iter().unzip();
     judged.chosen = chosen;
+    let mut source = &search.source;
+    let followed;
+    if let Some(chosen) = follower.followed(&judged.chosen, &judged.floors)? {
+        judged = judge.as_found(chosen);
+        followed = follower.source(&judged.chosen)?;
+        source = &followed;
+    }
     let described = search.count_described(&judged.chosen);
     let replay = match &sealed {
         Some(sealed) => Replay::of(&bench, &refit, values, sealed),
@@ -240,7 +251,7 @@ fn attempt(
             .or_else(|| not_carried_over(robot, &named, &judged.floors));
     }
     let Judged { chosen, floors, .. } = &judged;
-    let joint = refit.joint(&search.source, chosen, &judge.pairs, &coordinates)?;
+    let joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
     let after = &joint.solution;
     let before = refit.solution(&chosen[..described])?;
     let across = {

@@ -180,7 +180,7 @@ impl<'a> Fit<'a> {
 
     /// Takes a known torque off what is to be explained.
     pub(super) fn subtract(&mut self, column: &Column) {
-        let known = self.weighted(column);
+        let known = self.projected(self.weighted(column));
         axpy(-1.0, &known, &mut self.residual);
         self.folded = OnceLock::new();
     }

@@ -89,6 +89,11 @@ pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64>
     white.then(|| (third / 20.0 / count as f64 * passed).sqrt())
 }
 
+/// Standard deviation of a sample of white noise whose RMS on rows so many `samples` apart is `noise`.
+pub(super) fn of_a_sample(noise: f64, samples: f64) -> f64 {
+    noise * (samples / PASSED).max(1.0).sqrt()
+}
+
 /// Time over which a joint's residual is correlated, s: the integral of its autocorrelation up to the first zero, the
 /// longest over the joints.
 pub(super) fn memory(rows: &Rows, residuals: &[Vec<f64>]) -> f64 {

@@ -4,6 +4,7 @@ use rig_shared::effects::Kind;
 
 use super::DiagnoseError;
 use super::burst::{Burst, burst};
+use super::engine::Follower;
 use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, locate};
@@ -52,6 +53,8 @@ pub(super) struct Judge<'a, 'r> {
     pub(super) robot: &'a Robot,
     /// The library on the training data.
     pub(super) search: &'a Search<'r>,
+    /// Of links behind gears.
+    pub(super) follower: &'a Follower<'a, 'r>,
     /// The training data.
     pub(super) rows: &'a Rows,
     /// Their coordinates, joint by joint.
@@ -86,11 +89,17 @@ impl Judge<'_, '_> {
         // Beside something unknown, a name that closes less of the gap than it leaves is a guess at it, unless nothing else
         // comes near.
         while judged.much_left {
-            let Judged { chosen, floors, .. } = &judged;
+            let chosen = &judged.chosen;
+            let followed = self.follower.followed(chosen, &judged.floors)?;
+            let followed = followed.map(|list| self.as_found(list));
+            if followed.as_ref().is_some_and(|judged| !judged.much_left) {
+                break;
+            }
+            let last = followed.as_ref().unwrap_or(&judged);
             let closes = |k: usize| {
-                let j = chosen[k].candidate.joint;
-                let rms = |but| with(self.base, chosen, but).rms(j);
-                closed([rms(Some(k)), rms(None)], floors[j])
+                let j = last.chosen[k].candidate.joint;
+                let rms = |but| with(self.base, &last.chosen, but).rms(j);
+                closed([rms(Some(k)), rms(None)], last.floors[j])
             };
             // What the description states is no guess of the search.
             let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
@@ -123,7 +132,8 @@ impl Judge<'_, '_> {
             .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
 
-    fn as_found(&self, chosen: Vec<Profile>) -> Judged {
+    /// What stands with these effects.
+    pub(super) fn as_found(&self, chosen: Vec<Profile>) -> Judged {
         let fit = with(self.base, &chosen, None);
         let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
             .map(|j| self.burst(&fit, j))

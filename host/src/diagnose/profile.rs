@@ -5,8 +5,8 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use super::DiagnoseError;
-use super::columns::Candidate;
-use super::fit::{Evidence, Fit};
+use super::columns::{Candidate, Source};
+use super::fit::{Evidence, Fit, dot_self};
 use super::lead::slack;
 use super::rows::Column;
 use super::search::{Search, is_gear};
@@ -59,6 +59,17 @@ pub(super) struct Profile {
     /// A shape that has run to the least of what is searched, where a law is its limit of none; a gain that has left what
     /// physics allows.
     pub(super) vanished: Option<&'static str>,
+    /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
+    pub(super) followed: Option<Followed>,
+}
+
+/// How a link is followed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Followed {
+    /// RMS on the rows of what counts as noise of the torque, N·m.
+    pub(super) noise: f64,
+    /// Shapes that the link driven by the motor's motion alone has shown.
+    pub(super) driven: [f64; SHAPES],
 }
 
 impl Profile {
@@ -316,6 +327,7 @@ impl Search<'_> {
             columns: best.2,
             evidence,
             vanished,
+            followed: None,
         }))
     }
 
@@ -370,6 +382,51 @@ impl Search<'_> {
                 }
             }
         }
+    }
+
+    /// Shapes from a start on, and their columns, that leave least of the residual where their torque is known: beside the other
+    /// columns, without gains.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn fitted_as_known(
+        &self,
+        source: &Source,
+        fit: &Fit,
+        candidate: &Candidate,
+        start: &[f64; SHAPES],
+    ) -> Result<([f64; SHAPES], Vec<Column>), DiagnoseError> {
+        let scales = candidate.kind.about().shapes;
+        let at: Vec<f64> = (scales.iter().zip(start))
+            .map(|(shape, value)| coordinate(shape, *value))
+            .collect();
+        let steps: Vec<f64> = (scales.iter())
+            .map(|shape| match shape.scale {
+                Scale::Logarithmic if is_distance(shape) => 0.03,
+                Scale::Logarithmic => 0.2,
+                Scale::Linear | Scale::Whole => 0.05,
+            })
+            .collect();
+        let mut simplex = Simplex::new(&at, &steps);
+        let mut best: Option<(f64, [f64; SHAPES], Vec<Column>)> = None;
+        while let Some(x) = simplex.asks() {
+            let mut shapes = [0.0; SHAPES];
+            for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
+                *to = value_at(shape, x);
+            }
+            let columns = source.columns_by(self.threads, candidate, &shapes)?;
+            let mut left = fit.clone();
+            for column in &columns {
+                left.subtract(column);
+            }
+            let squares = dot_self(left.left());
+            simplex.told(squares);
+            if best.as_ref().is_none_or(|b| squares < b.0) {
+                best = Some((squares, shapes, columns));
+            }
+        }
+        best.map(|(_, shapes, columns)| (shapes, columns))
+            .ok_or_else(|| DiagnoseError::Model("its gear has no shape to begin with.".into()))
     }
 
     /// Golden section over one shape about the best point.

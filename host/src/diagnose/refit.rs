@@ -68,10 +68,26 @@ impl<'r> Refit<'r> {
         })
     }
 
-    /// The free nominal columns, then those of the effects.
-    fn columns<'c>(&'c self, chosen: &'c [Profile]) -> Vec<&'c Column> {
-        let effects = chosen.iter().flat_map(|p| p.columns.iter());
-        self.free.iter().chain(effects).collect()
+    /// Columns of the free nominal directions, then of the effects.
+    fn columns<'c>(&'c self, chosen: &'c [Profile]) -> Columns<'c> {
+        let mut columns = Columns {
+            fitted: self.free.iter().collect(),
+            known: Vec::new(),
+            places: Vec::new(),
+        };
+        for profile in chosen {
+            for column in profile.columns.iter() {
+                if profile.followed.is_some() {
+                    columns
+                        .places
+                        .push(columns.fitted.len() + columns.known.len());
+                    columns.known.push(column);
+                } else {
+                    columns.fitted.push(column);
+                }
+            }
+        }
+        columns
     }
 
     /// Coefficients of the free nominal directions and of the effects' columns.
@@ -79,9 +95,12 @@ impl<'r> Refit<'r> {
     /// # Errors
     /// [`DiagnoseError::Model`] where the motion does not tell them apart.
     pub(super) fn solution(&self, chosen: &[Profile]) -> Result<Solution, DiagnoseError> {
-        solve(&self.plain, &self.columns(chosen), &[]).ok_or_else(|| {
-            DiagnoseError::Model("its parameters with the effects are not all excited.".into())
-        })
+        let columns = self.columns(chosen);
+        solve(&columns.beside(&self.plain), &columns.fitted, &[])
+            .map(|solution| solution.with_known(&columns.places))
+            .ok_or_else(|| {
+                DiagnoseError::Model("its parameters with the effects are not all excited.".into())
+            })
     }
 
     /// Nominal parameters, gains and shapes together; `pairs` are runs that repeat each other.
@@ -108,8 +127,13 @@ impl<'r> Refit<'r> {
             .collect();
         let failed =
             || DiagnoseError::Model("its parameters with the effects are not all excited.".into());
-        let solution =
-            jackknifed(&plain, &strata, &self.columns(chosen), &[]).ok_or_else(failed)?;
+        let columns = self.columns(chosen);
+        let plain = columns.beside(&plain);
+        let solved = |slopes: &[Column]| {
+            let solution = jackknifed(&plain, &strata, &columns.fitted, slopes)?;
+            Some(solution.with_known(&columns.places))
+        };
+        let solution = solved(&[]).ok_or_else(failed)?;
         let mut stds = vec![[0.0; SHAPES]; chosen.len()];
         let mut slopes = Vec::new();
         let mut places = Vec::new();
@@ -130,12 +154,13 @@ impl<'r> Refit<'r> {
                 }
             }
         }
-        let Some(linearised) = jackknifed(&plain, &strata, &self.columns(chosen), &slopes) else {
+        let Some(linearised) = solved(&slopes) else {
             return Ok(Joint { solution, stds });
         };
         for (s, (k, place)) in places.into_iter().enumerate() {
             if !is_of_contact(chosen[k].candidate.kind, place) {
-                stds[k][place] = linearised.std(solution.values.len() + s);
+                let std = linearised.std(solution.values.len() + s);
+                stds[k][place] = std.hypot(between_ways(&chosen[k], place));
             }
         }
         Ok(Joint {
@@ -188,6 +213,25 @@ impl<'r> Refit<'r> {
             .collect();
         list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
         list
+    }
+}
+
+/// Columns that are fitted, and those of a known torque.
+struct Columns<'c> {
+    fitted: Vec<&'c Column>,
+    known: Vec<&'c Column>,
+    /// Where the known ones are among all.
+    places: Vec<usize>,
+}
+
+impl Columns<'_> {
+    /// A fit of what the known ones leave.
+    fn beside<'r>(&self, plain: &Fit<'r>) -> Fit<'r> {
+        let mut plain = plain.clone();
+        for column in &self.known {
+            plain.subtract(column);
+        }
+        plain
     }
 }
 
@@ -250,6 +294,15 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
 fn is_of_contact(kind: Kind, place: usize) -> bool {
     let name = kind.about().shapes[place].name;
     kind == Kind::Backlash && matches!(name, "stiffness" | "damping")
+}
+
+/// What play comes out differently by, seen by the motor's motion alone and by following the link. Either law errs where teeth
+/// touch, by more than stretches and strata show, and mostly to opposite sides.
+fn between_ways(profile: &Profile, place: usize) -> f64 {
+    let is_play = profile.candidate.kind == Kind::Backlash
+        && profile.candidate.kind.about().shapes[place].name == "gap";
+    let driven = profile.followed.filter(|_| is_play);
+    driven.map_or(0.0, |f| f.driven[place] - profile.shapes[place])
 }
 
 /// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics
@@ -322,7 +375,9 @@ impl Joint {
         let profile = &chosen[k];
         let kind = profile.candidate.kind;
         let at = place(chosen, free, k);
-        let gains = (source.gains(kind).into_iter().enumerate()).map(|(g, gain)| {
+        let fitted =
+            (source.gains(kind).into_iter().enumerate()).filter(|_| profile.followed.is_none());
+        let gains = fitted.map(|(g, gain)| {
             (
                 gain,
                 self.solution.values[at + g],

@@ -380,6 +380,18 @@ impl Rows {
         self.torque.len()
     }
 
+    /// Of each of a run's `samples`, whether the row nearest to it is used; before the first row and behind the last none is.
+    pub(super) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
+        let keep = &self.keep[joint][self.starts[run]..self.starts[run + 1]];
+        let Thinning { step, trimmed, .. } = self.thinning;
+        (0..samples)
+            .map(|k| {
+                let row = (k + step / 2).checked_sub(trimmed).map(|past| past / step);
+                row.is_some_and(|row| keep.get(row).copied().unwrap_or(false))
+            })
+            .collect()
+    }
+
     /// Rows used of a joint.
     pub(super) fn used(&self, joint: usize) -> usize {
         self.keep[joint].iter().filter(|k| **k).count()

@@ -1,7 +1,6 @@
 //! Which effect, one after the other: each candidate at its best, gates; then joint refinement, removal and exchange.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rig_shared::effects::SHAPES;
@@ -14,6 +13,7 @@ use super::profile::{LEAST_GAIN, Profile, grid};
 use super::rows::Column;
 use super::runs::resolution;
 use super::waves;
+use crate::batch::each_by;
 use crate::robot::Placed;
 
 mod begin;
@@ -118,40 +118,19 @@ impl<'a> Search<'a> {
         fit: &Fit,
         without: &[Candidate],
     ) -> Result<Vec<Profile>, DiagnoseError> {
-        let next = AtomicUsize::new(0);
-        let work = || -> Result<Vec<Profile>, DiagnoseError> {
-            let mut found = Vec::new();
-            loop {
-                let c = next.fetch_add(1, Ordering::Relaxed);
-                let Some(candidate) = self.library.get(c) else {
-                    return Ok(found);
-                };
+        let open: Vec<usize> = (0..self.library.len())
+            .filter(|c| {
+                let candidate = &self.library[*c];
                 // A second law under one name is no second effect.
-                if !is_first_law(candidate.kind) {
-                    continue;
-                }
-                let taken = without.iter().any(|w| rivals(w, candidate));
-                if taken {
-                    continue;
-                }
-                found.extend(self.profile(fit, c, None)?);
-            }
-        };
-        let mut profiles = Vec::new();
-        std::thread::scope(|scope| {
-            let others: Vec<_> = (1..self.threads.max(1))
-                .map(|_| scope.spawn(work))
-                .collect();
-            let mut all = work()?;
-            for other in others {
-                match other.join() {
-                    Ok(found) => all.extend(found?),
-                    Err(panic) => std::panic::resume_unwind(panic),
-                }
-            }
-            profiles = all;
-            Ok::<(), DiagnoseError>(())
-        })?;
+                is_first_law(candidate.kind) && !without.iter().any(|w| rivals(w, candidate))
+            })
+            .collect();
+        let mut profiles = each_by(self.threads, open.len(), |k| {
+            self.profile(fit, open[k], None)
+        })
+        .into_iter()
+        .filter_map(Result::transpose)
+        .collect::<Result<Vec<_>, _>>()?;
         profiles.sort_by(|a, b| {
             b.evidence
                 .gain
@@ -371,7 +350,11 @@ pub(super) fn with<'f>(base: &Fit<'f>, chosen: &[Profile], but: Option<usize>) -
             continue;
         }
         for column in profile.columns.iter() {
-            fit.push(column);
+            if profile.followed.is_some() {
+                fit.subtract(column);
+            } else {
+                fit.push(column);
+            }
         }
     }
     fit

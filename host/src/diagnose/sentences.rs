@@ -9,6 +9,7 @@ use super::floor::repeats;
 use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
 use super::profile::Profile;
 use super::solve::Solution;
+use super::transmission::STRETCH;
 use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::Joint;
 
@@ -282,8 +283,16 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
         }
         _ => String::new(),
     };
+    let followed = if profile.followed.is_some() {
+        format!(
+            " In these figures of its residual the torque of the gear is predicted {} ms at a time: twist and speed of the link at their beginning are read off the torque recorded before.",
+            1e3 * STRETCH
+        )
+    } else {
+        String::new()
+    };
     format!(
-        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{runner}",
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{runner}{followed}",
         percent(e.gain),
         format_significant(e.gain_sigmas, 2)
     )

@@ -19,6 +19,18 @@ impl Solution {
     pub(super) fn std(&self, k: usize) -> f64 {
         self.covariance[(k, k)].max(0.0).sqrt()
     }
+
+    /// The same with coefficients of 1 that are known at these places, in rising order, of the longer list.
+    pub(super) fn with_known(mut self, places: &[usize]) -> Self {
+        for &place in places {
+            self.values.insert(place, 1.0);
+            self.covariance = self
+                .covariance
+                .insert_row(place, 0.0)
+                .insert_column(place, 0.0);
+        }
+        self
+    }
 }
 
 /// Fits `columns` to the torque; `slopes` are derivatives with respect to parameters that do not enter linearly: they take

@@ -17,6 +17,10 @@ use super::columns::Source;
 use super::rows::motion_of;
 use super::runs::Run;
 
+mod observer;
+
+pub(super) use observer::{STRETCH, Seen};
+
 /// Sets of shapes that go side by side.
 pub(super) const ABREAST: usize = 4;
 /// Steps a sample, at least: contact begins and ends within one.
@@ -132,45 +136,74 @@ impl Driven {
         steps: usize,
         of: &Load,
     ) -> Option<Vec<T>> {
-        let [gap, stiffness, damping] = kind.transmission(shapes)?;
+        let gear = kind.transmission(shapes)?;
         let share = kind.link_friction(shapes)?;
+        let mut twist = Twist::at_rest(gear, *of.load.first()?);
+        let mut out = Vec::with_capacity(of.load.len());
+        out.push(T::ZERO);
+        out.extend((1..of.load.len()).map(|k| self.sample(gear, share, steps, of, k, &mut twist)));
+        Some(out)
+    }
+
+    /// The torque on average from sample `k` − 1 to `k`, with the twist going on.
+    #[inline]
+    fn sample<T: Real>(
+        &self,
+        [gap, stiffness, damping]: [T; 3],
+        share: T,
+        steps: usize,
+        of: &Load,
+        k: usize,
+        twist: &mut Twist<T>,
+    ) -> T {
         let number = T::from_f64;
         let [viscous, coulomb] = of.friction.map(|f| share * number(f.max(0.0)));
-        let first = *of.load.first()?;
         let per_step = 1.0 / steps as f64;
         let h = of.period * per_step;
         let half = number(0.5 * h);
-        // At rest on the side that the load presses to.
-        let mut x = number(0.5 * first.signum()) * gap + number(first) / stiffness;
-        let mut v = T::ZERO;
-        let mut out = Vec::with_capacity(of.load.len());
-        out.push(T::ZERO);
-        for k in 1..of.load.len() {
-            let (from, to) = (of.load[k - 1], of.load[k]);
-            let (before, after) = (of.speed[k - 1], of.speed[k]);
-            let slope = number(self.slope[k]);
-            // Divisions once a sample: a step waits for the one before it, and they would be most of the wait.
-            let per_torque = number(h / self.mass[k]);
-            let slides = T::ONE / (T::ONE + viscous * per_torque);
-            let sticks = coulomb * per_torque;
-            let mut sum = T::ZERO;
-            for s in 0..steps {
-                let part = (s as f64 + 0.5) * per_step;
-                // Half a step of the twist, the torque in the middle, the other half: second order.
-                let middle = x + half * v;
-                let torque = transmitted(gap, stiffness, damping, middle, v);
-                let pull = number(from + part * (to - from)) - slope * middle - torque;
-                // The link's own velocity after the step, before and after its friction.
-                let motor = number(before + part * (after - before));
-                let slid = (motor - v - per_torque * pull) * slides;
-                v = motor - slid + slid.clamp_to(-sticks, sticks);
-                x = middle + half * v;
-                sum += torque;
-            }
-            let rigid = viscous * number(after) + coulomb * number(after.signum());
-            out.push(sum * number(per_step) - number(0.5 * (from + to)) - rigid);
+        let (from, to) = (of.load[k - 1], of.load[k]);
+        let (before, after) = (of.speed[k - 1], of.speed[k]);
+        let slope = number(self.slope[k]);
+        // Divisions once a sample: a step waits for the one before it, and they would be most of the wait.
+        let per_torque = number(h / self.mass[k]);
+        let slides = T::ONE / (T::ONE + viscous * per_torque);
+        let sticks = coulomb * per_torque;
+        let Twist { mut x, mut v } = *twist;
+        let mut sum = T::ZERO;
+        for s in 0..steps {
+            let part = (s as f64 + 0.5) * per_step;
+            // Half a step of the twist, the torque in the middle, the other half: second order.
+            let middle = x + half * v;
+            let torque = transmitted(gap, stiffness, damping, middle, v);
+            let pull = number(from + part * (to - from)) - slope * middle - torque;
+            // The link's own velocity after the step, before and after its friction.
+            let motor = number(before + part * (after - before));
+            let slid = (motor - v - per_torque * pull) * slides;
+            v = motor - slid + slid.clamp_to(-sticks, sticks);
+            x = middle + half * v;
+            sum += torque;
         }
-        Some(out)
+        *twist = Twist { x, v };
+        let rigid = viscous * number(after) + coulomb * number(after.signum());
+        sum * number(per_step) - number(0.5 * (from + to)) - rigid
+    }
+}
+
+/// Twist and its rate, rad and rad/s.
+#[derive(Clone, Copy, Debug)]
+struct Twist<T> {
+    x: T,
+    v: T,
+}
+
+impl<T: Real> Twist<T> {
+    /// At rest on the side that a load presses to.
+    fn at_rest([gap, stiffness, _]: [T; 3], load: f64) -> Self {
+        let number = T::from_f64;
+        Self {
+            x: number(0.5 * load.signum()) * gap + number(load) / stiffness,
+            v: T::ZERO,
+        }
     }
 }
 

@@ -21,6 +21,7 @@ fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
             ..Evidence::default()
         },
         vanished: None,
+        followed: None,
     }
 }
 

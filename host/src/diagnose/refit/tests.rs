@@ -100,6 +100,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
             columns: Arc::new(source.columns(&candidate, &shapes).unwrap()),
             evidence: Evidence::default(),
             vanished: None,
+            followed: None,
         }
     };
     let mut third = [0.0; SHAPES];

@@ -71,6 +71,7 @@ impl<'a> Search<'a> {
                 shapes,
                 evidence: Evidence::default(),
                 vanished: None,
+                followed: None,
             });
         }
         if chosen.is_empty() {

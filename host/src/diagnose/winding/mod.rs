@@ -153,6 +153,7 @@ fn winding(
         columns: std::sync::Arc::new(dead(k).to_vec()),
         evidence,
         vanished: None,
+        followed: None,
     });
     let refused = match &profile {
         _ if options.without.contains(&Kind::DriveDeadzone) => Some("it was left out".to_owned()),
