@@ -91,8 +91,7 @@ fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let made_up = Profile {
         candidate,
         shapes,
-        // As it was found: it would stand if following it left less than this.
-        columns: Arc::new(vec![vec![None]]),
+        columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
         evidence: Evidence::default(),
         vanished: None,
         followed: None,
@@ -100,7 +99,14 @@ fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let rigid = refit.base.rms(0);
     let follower = Follower::new(&bench, &loaded, &refit, &search);
     let chosen = follower.followed(&[made_up], &[rigid]).unwrap().unwrap();
-    [rigid, with(&refit.base, &chosen, None).rms(0)]
+    // Where it stays driven, following leaves more.
+    let stands = chosen[0].followed.is_some();
+    let followed = if stands {
+        with(&refit.base, &chosen, None).rms(0)
+    } else {
+        rigid
+    };
+    [rigid, followed]
 }
 
 /// What is heard of the torque up to the beginning of a stretch must not pass for a law of the gear within it.
