@@ -92,17 +92,22 @@ impl Judge<'_, '_> {
             let chosen = &judged.chosen;
             let followed = self.follower.followed(chosen, &judged.floors)?;
             let followed = followed.map(|list| self.as_found(list));
-            if followed.as_ref().is_some_and(|judged| !judged.much_left) {
-                break;
-            }
-            let last = followed.as_ref().unwrap_or(&judged);
+            // What the driven law of a gear leaves is no reason to doubt the names of its joint; other joints are as they were.
+            let on = |joint: usize| {
+                let gear = |p: &Profile| p.candidate.joint == joint && p.followed.is_some();
+                followed
+                    .as_ref()
+                    .filter(|last| last.chosen.iter().any(gear))
+            };
             let closes = |k: usize| {
-                let j = last.chosen[k].candidate.joint;
+                let j = chosen[k].candidate.joint;
+                let last = on(j).unwrap_or(&judged);
                 let rms = |but| with(self.base, &last.chosen, but).rms(j);
                 closed([rms(Some(k)), rms(None)], last.floors[j])
             };
             // What the description states is no guess of the search.
             let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
+                .filter(|k| on(chosen[*k].candidate.joint).is_none_or(|last| last.much_left))
                 .map(|k| (k, closes(k)))
                 .filter(|(_, share)| *share < HALF)
                 .collect();

@@ -285,7 +285,7 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     };
     let followed = if profile.followed.is_some() {
         format!(
-            " In these figures of its residual the torque of the gear is predicted {} ms at a time: twist and speed of the link at their beginning are read off the torque recorded before.",
+            " In these figures of its residual the torque of the gear is predicted over stretches of half a swing of the link, at least {} ms: twist and speed of the link at their beginning are read off the torque recorded before.",
             1e3 * STRETCH
         )
     } else {

@@ -6,7 +6,7 @@
 //! torque on the link that nobody knows (first-order Gauss-Markov), its reading is what the recorded torque leaves for the
 //! gear. The zone without contact is replaced by the line that is nearest over what the twist may be (Gelb and Vander Velde
 //! 1968, the describing function of a random input). The torque that comes out is *predicted*: it begins anew from the
-//! filter's state every [`STRETCH`], and hears nothing of the torque recorded from there on.
+//! filter's state every [`SWING`] of the link, [`STRETCH`] at least, and hears nothing of the torque recorded from there on.
 //!
 //! Leaves out: what the twist of one joint does to the others; the friction's own uncertainty while the link sticks.
 
@@ -17,9 +17,12 @@ use statrs::function::erf::erf;
 
 use super::{Driven, Load, Twist};
 
-/// Time between two beginnings of the prediction, s: a torque on the link of [`LASTS`] is forgotten by its end, and a model
+/// Least time between two beginnings of the prediction, s: a torque on the link of [`LASTS`] is forgotten by its end, and a model
 /// without a gear gains nothing by beginning anew as often.
 pub(in crate::diagnose) const STRETCH: f64 = 0.05;
+/// … and, as a share of the period in which the link swings on its gear: over less of it the state at the beginning would be all
+/// that is predicted.
+const SWING: f64 = 0.5;
 /// Time between two readings, s; the torque is averaged over it.
 const READ_EVERY: f64 = 0.002;
 /// Correlation time of the unknown torque on the link, s.
@@ -155,7 +158,9 @@ impl Driven {
         let gear = kind.transmission(shapes)?;
         let share = kind.link_friction(shapes)?;
         let rate = 1.0 / of.period;
-        let stretch = ((STRETCH * rate).round() as usize).max(1);
+        let swing = TAU * (self.mean_mass() / gear[1]).sqrt();
+        let stretch = (SWING * swing).max(STRETCH);
+        let stretch = ((stretch * rate).round() as usize).max(1);
         let every = ((READ_EVERY * rate).round() as usize).max(1);
         let noise = seen.noise * seen.noise / every as f64;
         let mut belief = self.at_first(gear, seen.unrest, of)?;
