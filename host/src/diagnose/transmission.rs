@@ -136,26 +136,22 @@ impl Driven {
         steps: usize,
         of: &Load,
     ) -> Option<Vec<T>> {
-        let gear = kind.transmission(shapes)?;
-        let share = kind.link_friction(shapes)?;
-        let mut twist = Twist::at_rest(gear, *of.load.first()?);
+        let gear = Gear::of(kind, shapes, steps)?;
+        let mut twist = Twist::at_rest(&gear, *of.load.first()?);
         let mut out = Vec::with_capacity(of.load.len());
         out.push(T::ZERO);
-        out.extend((1..of.load.len()).map(|k| self.sample(gear, share, steps, of, k, &mut twist)));
+        out.extend((1..of.load.len()).map(|k| self.sample(&gear, of, k, &mut twist)));
         Some(out)
     }
 
     /// The torque on average from sample `k` − 1 to `k`, with the twist going on.
     #[inline]
-    fn sample<T: Real>(
-        &self,
-        [gap, stiffness, damping]: [T; 3],
-        share: T,
-        steps: usize,
-        of: &Load,
-        k: usize,
-        twist: &mut Twist<T>,
-    ) -> T {
+    fn sample<T: Real>(&self, gear: &Gear<T>, of: &Load, k: usize, twist: &mut Twist<T>) -> T {
+        let Gear {
+            law: [gap, stiffness, damping],
+            share,
+            steps,
+        } = *gear;
         let number = T::from_f64;
         let [viscous, coulomb] = of.friction.map(|f| share * number(f.max(0.0)));
         let per_step = 1.0 / steps as f64;
@@ -189,6 +185,27 @@ impl Driven {
     }
 }
 
+/// A gear of certain shapes.
+#[derive(Clone, Copy, Debug)]
+struct Gear<T> {
+    /// Gap, stiffness and damping, as [`transmitted`] takes them.
+    law: [T; 3],
+    /// Of the joint's friction that acts on the link.
+    share: T,
+    /// Steps a sample.
+    steps: usize,
+}
+
+impl<T: Real> Gear<T> {
+    fn of(kind: Kind, shapes: &[T; SHAPES], steps: usize) -> Option<Self> {
+        Some(Self {
+            law: kind.transmission(shapes)?,
+            share: kind.link_friction(shapes)?,
+            steps,
+        })
+    }
+}
+
 /// Twist and its rate, rad and rad/s.
 #[derive(Clone, Copy, Debug)]
 struct Twist<T> {
@@ -198,8 +215,9 @@ struct Twist<T> {
 
 impl<T: Real> Twist<T> {
     /// At rest on the side that a load presses to.
-    fn at_rest([gap, stiffness, _]: [T; 3], load: f64) -> Self {
+    fn at_rest(gear: &Gear<T>, load: f64) -> Self {
         let number = T::from_f64;
+        let [gap, stiffness, _] = gear.law;
         Self {
             x: number(0.5 * load.signum()) * gap + number(load) / stiffness,
             v: T::ZERO,

@@ -27,13 +27,13 @@ const TEETH: [f64; 2] = [2000.0, 8.0];
 /// Follows links behind gears on the training data.
 pub(in crate::diagnose) struct Follower<'a, 'r> {
     /// Robot and treatment.
-    pub(in crate::diagnose) bench: &'a Bench<'a>,
+    bench: &'a Bench<'a>,
     /// The training data.
-    pub(in crate::diagnose) loaded: &'a Loaded,
+    loaded: &'a Loaded,
     /// The refitted nominal model on them.
-    pub(in crate::diagnose) refit: &'a Refit<'r>,
+    refit: &'a Refit<'r>,
     /// The library on them.
-    pub(in crate::diagnose) search: &'a Search<'r>,
+    search: &'a Search<'r>,
     /// Effects as they came last, and as they went: it takes seconds.
     last: RefCell<Option<(Vec<Driven>, Vec<Profile>)>>,
 }

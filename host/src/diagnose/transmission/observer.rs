@@ -15,7 +15,7 @@ use std::f64::consts::{SQRT_2, TAU};
 use rig_shared::effects::{Kind, SHAPES};
 use statrs::function::erf::erf;
 
-use super::{Driven, Load, Twist};
+use super::{Driven, Gear, Load, Twist};
 
 /// Least time between two beginnings of the prediction, s: a torque on the link of [`LASTS`] is forgotten by its end, and a model
 /// without a gear gains nothing by beginning anew as often.
@@ -154,30 +154,28 @@ impl Driven {
         of: &Load,
         seen: &Seen,
     ) -> Option<Vec<f64>> {
-        let steps = self.steps(kind, shapes, of)?;
-        let gear = kind.transmission(shapes)?;
-        let share = kind.link_friction(shapes)?;
+        let gear = Gear::of(kind, shapes, self.steps(kind, shapes, of)?)?;
         let rate = 1.0 / of.period;
-        let swing = TAU * (self.mean_mass() / gear[1]).sqrt();
+        let swing = TAU * (self.mean_mass() / gear.law[1]).sqrt();
         let stretch = (SWING * swing).max(STRETCH);
         let stretch = ((stretch * rate).round() as usize).max(1);
         let every = ((READ_EVERY * rate).round() as usize).max(1);
         let noise = seen.noise * seen.noise / every as f64;
-        let mut belief = self.at_first(gear, seen.unrest, of)?;
+        let mut belief = Self::at_first(&gear, seen.unrest, of)?;
         let mut ahead = belief.twist;
         let (mut sum, mut count) = (0.0, 0.0);
         let mut out = Vec::with_capacity(of.load.len());
         out.push(0.0);
         for k in 1..of.load.len() {
-            out.push(self.sample(gear, share, steps, of, k, &mut ahead));
-            self.filtered(&mut belief, gear, share, steps, of, seen, k);
-            let [viscous, coulomb] = of.friction.map(|f| share * f.max(0.0));
+            out.push(self.sample(&gear, of, k, &mut ahead));
+            self.filtered(&mut belief, &gear, of, seen.unrest, k);
+            let [viscous, coulomb] = of.friction.map(|f| gear.share * f.max(0.0));
             let rigid = of.load[k] + viscous * of.speed[k] + coulomb * of.speed[k].signum();
             sum += seen.torque[k] + rigid;
             count += 1.0;
             if k % every == 0 {
                 if seen.sure[k] {
-                    self.read(&mut belief, gear, sum / count, noise, seen.unrest, k);
+                    self.read(&mut belief, &gear, sum / count, [noise, seen.unrest], k);
                 }
                 (sum, count) = (0.0, 0.0);
             }
@@ -188,9 +186,11 @@ impl Driven {
         out.iter().all(|t| t.is_finite()).then_some(out)
     }
 
-    fn at_first(&self, gear: [f64; 3], unrest: f64, of: &Load) -> Option<Belief> {
-        let twist = Twist::at_rest(gear, *of.load.first()?);
-        let wound = AT_FIRST * (of.load.first()?.abs() / gear[1] + 0.5 * gear[0]) + LEAST_TWIST;
+    fn at_first(gear: &Gear<f64>, unrest: f64, of: &Load) -> Option<Belief> {
+        let load = *of.load.first()?;
+        let twist = Twist::at_rest(gear, load);
+        let [gap, stiffness, _] = gear.law;
+        let wound = AT_FIRST * (load.abs() / stiffness + 0.5 * gap) + LEAST_TWIST;
         Some(Belief {
             twist,
             torque: 0.0,
@@ -203,17 +203,12 @@ impl Driven {
     }
 
     /// A sample on, without a reading.
-    #[allow(clippy::too_many_arguments)]
-    fn filtered(
-        &self,
-        belief: &mut Belief,
-        [gap, stiffness, damping]: [f64; 3],
-        share: f64,
-        steps: usize,
-        of: &Load,
-        seen: &Seen,
-        k: usize,
-    ) {
+    fn filtered(&self, belief: &mut Belief, gear: &Gear<f64>, of: &Load, unrest: f64, k: usize) {
+        let Gear {
+            law: [gap, stiffness, damping],
+            share,
+            steps,
+        } = *gear;
         let per_step = 1.0 / steps as f64;
         let h = of.period * per_step;
         let per_torque = h / self.mass[k];
@@ -221,7 +216,7 @@ impl Driven {
         let slides = 1.0 / (1.0 + viscous * per_torque);
         let sticks = coulomb * per_torque;
         let keeps = (-h / LASTS).exp();
-        let stirred = seen.unrest * seen.unrest * (1.0 - keeps * keeps);
+        let stirred = unrest * unrest * (1.0 - keeps * keeps);
         let from = belief.twist.x;
         let contact = Contact::of(0.5 * gap, from, belief.covariance[0][0]);
         let pulls = stiffness * contact.slope + self.slope[k];
@@ -260,16 +255,17 @@ impl Driven {
         }
     }
 
-    /// Takes in that the gear was seen to transmit `torque`.
+    /// Takes in that the gear was seen to transmit `torque`, with noise of that variance and such a deviation of the torque on the
+    /// link.
     fn read(
         &self,
         belief: &mut Belief,
-        [gap, stiffness, damping]: [f64; 3],
+        gear: &Gear<f64>,
         torque: f64,
-        noise: f64,
-        unrest: f64,
+        [noise, unrest]: [f64; 2],
         k: usize,
     ) {
+        let [gap, stiffness, damping] = gear.law;
         let half = 0.5 * gap;
         let expected = |belief: &Belief| {
             let contact = Contact::of(half, belief.twist.x, belief.covariance[0][0]);
