@@ -17,8 +17,7 @@ use statrs::function::erf::erf;
 
 use super::{Driven, Gear, Load, Twist};
 
-/// Least time between two beginnings of the prediction, s: a torque on the link of [`LASTS`] is forgotten by its end, and a model
-/// without a gear gains nothing by beginning anew as often.
+/// Least time between two beginnings of the prediction, s: as long as a torque on the link lasts.
 pub(in crate::diagnose) const STRETCH: f64 = 0.05;
 /// … and, as a share of the period in which the link swings on its gear: over less of it the state at the beginning would be all
 /// that is predicted.
@@ -283,13 +282,9 @@ impl Driven {
             let touches = torque.abs() > FLANK * noise.sqrt();
             if touches && belief.twist.x * torque.signum() <= half {
                 belief.twist.x = torque.signum() * (half + LEAST_TWIST);
-                for j in 0..3 {
-                    belief.covariance[0][j] = 0.0;
-                    belief.covariance[j][0] = 0.0;
-                    belief.covariance[2][j] *= f64::from(u8::from(j == 2));
-                    belief.covariance[j][2] *= f64::from(u8::from(j == 2));
-                }
-                belief.covariance[0][0] = (KNOWN_BY_FLANK * half).powi(2);
+                let [_, [_, rate, _], [_, _, torque]] = belief.covariance;
+                let known = (KNOWN_BY_FLANK * half).powi(2);
+                belief.covariance = [[known, 0.0, 0.0], [0.0, rate, 0.0], [0.0, 0.0, torque]];
             }
             (error, slopes, variance) = expected(belief);
         }
