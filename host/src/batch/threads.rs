@@ -6,7 +6,7 @@ use std::thread;
 
 use super::BLOCK;
 
-/// Cuts `samples` into at most `threads` stretches of nearly equal length, runs `work` on each in its own thread and
+/// Cuts `samples` into at most `threads` stretches of nearly equal length, runs `work` on each, as many at a time, and
 /// gives the results in the order of the stretches. Cuts lie on multiples of [`BLOCK`], so a result does not
 /// depend on the number of threads save through the caller's own way of joining the parts.
 ///
@@ -20,29 +20,13 @@ pub fn over_threads<R: Send>(
     let parts = threads.clamp(1, blocks.max(1));
     let cut = |part: usize| (blocks * part / parts * BLOCK).min(samples);
     let range = |part: usize| cut(part)..cut(part + 1);
-    if parts == 1 {
-        return vec![work(0..samples)];
-    }
-    thread::scope(|scope| {
-        let work = &work;
-        let others: Vec<_> = (1..parts)
-            .map(|part| scope.spawn(move || work(range(part))))
-            .collect();
-        let mut results = vec![work(range(0))];
-        for other in others {
-            match other.join() {
-                Ok(result) => results.push(result),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        results
-    })
+    each_by(parts, parts, |part| work(range(part)))
 }
 
 /// Runs `work` on each of `items` pieces of unequal length, at most `threads` at a time, and gives the results in their order.
 ///
 /// With one thread `work` runs in the calling thread. A panic in `work` goes on in the caller.
-pub fn each_by<R: Send>(threads: usize, items: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+pub fn each_by<R: Send>(items: usize, threads: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let mine = || {
         let mut done = Vec::new();
@@ -67,4 +51,25 @@ pub fn each_by<R: Send>(threads: usize, items: usize, work: impl Fn(usize) -> R 
     });
     done.sort_by_key(|(item, _)| *item);
     done.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_the_order_of_the_pieces_whoever_did_them() {
+        let squares: Vec<usize> = (0..50).map(|k| k * k).collect();
+        for threads in [0, 1, 2, 7, 80] {
+            assert_eq!(each_by(50, threads, |k| k * k), squares);
+        }
+        assert!(each_by(0, 4, |k| k).is_empty());
+        let stretches = over_threads(5 * BLOCK + 3, 3, |range| range);
+        assert_eq!(stretches.len(), 3);
+        let end = stretches.iter().fold(0, |end, range| {
+            assert_eq!(range.start, end);
+            range.end
+        });
+        assert_eq!(end, 5 * BLOCK + 3);
+    }
 }

@@ -173,7 +173,7 @@ impl Source<'_> {
         shapes: &[f64; SHAPES],
     ) -> Result<Vec<Column>, DiagnoseError> {
         let one = std::slice::from_ref(shapes);
-        let parts = each_by(threads, self.runs.len(), |r| self.of_run(candidate, one, r));
+        let parts = each_by(self.runs.len(), threads, |r| self.of_run(candidate, one, r));
         Ok(joined(parts)?.into_iter().next().unwrap_or_default())
     }
 

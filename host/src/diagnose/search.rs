@@ -125,7 +125,7 @@ impl<'a> Search<'a> {
                 is_first_law(candidate.kind) && !without.iter().any(|w| rivals(w, candidate))
             })
             .collect();
-        let mut profiles = each_by(self.threads, open.len(), |k| {
+        let mut profiles = each_by(open.len(), self.threads, |k| {
             self.profile(fit, open[k], None)
         })
         .into_iter()

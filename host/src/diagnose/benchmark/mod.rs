@@ -13,10 +13,10 @@ mod table;
 mod tests;
 mod wilson;
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::DiagnoseError;
+use crate::batch::each_by;
 pub use answer::{Answer, Diagnose, Method, Named, Proposed, exact_class, is_right};
 pub use cases::{Case, Group, Plan};
 pub use follow::Followed;
@@ -36,30 +36,14 @@ pub fn run(
     threads: usize,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Vec<Outcome>>, DiagnoseError> {
-    let next = AtomicUsize::new(0);
     let done = AtomicUsize::new(0);
-    let results: Mutex<Vec<Option<Result<Vec<Outcome>, DiagnoseError>>>> =
-        Mutex::new((0..cases.len()).map(|_| None).collect());
-    std::thread::scope(|scope| {
-        for _ in 0..threads.clamp(1, cases.len().max(1)) {
-            scope.spawn(|| {
-                while let Some((k, case)) = {
-                    let k = next.fetch_add(1, Ordering::Relaxed);
-                    cases.get(k).map(|case| (k, case))
-                } {
-                    let outcomes = ask(case, methods);
-                    // A thread that panicked takes the whole run down at the end of the scope.
-                    if let Ok(mut results) = results.lock() {
-                        results[k] = Some(outcomes);
-                    }
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
-                }
-            });
-        }
+    let results = each_by(cases.len(), threads, |k| {
+        let outcomes = ask(&cases[k], methods);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
+        outcomes
     });
     let mut lists: Vec<Vec<Outcome>> = methods.iter().map(|_| Vec::new()).collect();
-    let results = results.into_inner().unwrap_or_else(|e| e.into_inner());
-    for outcomes in results.into_iter().flatten() {
+    for outcomes in results {
         for (list, outcome) in lists.iter_mut().zip(outcomes?) {
             list.push(outcome);
         }

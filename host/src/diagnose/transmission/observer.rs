@@ -298,6 +298,31 @@ mod tests {
 
     use super::*;
 
+    /// Against the product of matrices that it spares.
+    #[test]
+    fn what_is_known_after_a_step_is_what_its_transition_makes_of_it() {
+        let (h, keeps, slopes) = (0.3, 0.8, [-0.7, 0.4, -0.2]);
+        let before = nalgebra::matrix![2.0, 0.3, -0.5; 0.3, 1.0, 0.4; -0.5, 0.4, 0.7];
+        let [a, b, c] = slopes;
+        let transition = nalgebra::matrix![
+            1.0 + h * a, h * (1.0 + b), h * c;
+            a, b, c;
+            0.0, 0.0, keeps
+        ];
+        let mut belief = Belief {
+            twist: Twist { x: 0.0, v: 0.0 },
+            torque: 0.0,
+            covariance: before.transpose().into(),
+        };
+        belief.stepped(h, slopes, keeps);
+        let after = transition * before * transition.transpose();
+        for i in 0..3 {
+            for j in 0..3 {
+                assert!((belief.covariance[i][j] - after[(i, j)]).abs() < 1e-12);
+            }
+        }
+    }
+
     #[test]
     fn contact_as_a_line_is_the_law_where_the_twist_is_known_and_a_mean_where_it_is_not() {
         for (twist, bend) in [(0.3, 0.0), (1.5, 0.5), (-2.0, -1.0)] {
