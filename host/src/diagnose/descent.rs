@@ -61,9 +61,11 @@ impl Descent {
             models: vec![Vec::new(); n],
         };
         for count in described..=chosen.len() {
-            let fit = with(&refit.base, &chosen[..count], None);
+            let part = &chosen[..count];
+            let [_, base] = refit.footing(part);
+            let fit = with(base, part, None);
             for (j, list) in train.models.iter_mut().enumerate() {
-                list.push(fit.rms(j));
+                list.push(fit.even_rms(j));
             }
         }
         let Some(sealed) = sealed else {

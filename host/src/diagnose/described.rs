@@ -41,7 +41,7 @@ pub(super) fn by_description(
             continue;
         }
         let joint = chosen[k].candidate.joint;
-        let floor = judged.floors[joint];
+        let floor = judged.quiet[joint];
         let own = left(&chosen, joint);
         if own < BEYOND_FLOOR * floor {
             continue;

@@ -26,7 +26,7 @@ use super::profile::Profile;
 use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
-use super::search::{Search, with};
+use super::search::{Search, same, with};
 use super::sentences::offsets;
 use super::stated::{Now, Stated, candidate};
 use super::waves::is_of_the_motor;
@@ -314,7 +314,11 @@ fn attempt(
         noise_floor_how: String::new(),
         motion_how: replay.told(chosen, described)?,
         torque_lead: lead,
-        places: judge.places(floors, &chosen[..described]),
+        places: judge.places(
+            refit.footing(&chosen[..described])[1],
+            floors,
+            &chosen[..described],
+        ),
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
         described: stood,
         steps,
@@ -414,6 +418,9 @@ fn held(bench: &Bench, open: &[usize]) -> Option<String> {
     })
 }
 
+/// How often all else is searched beside gears, whose own shapes it may move.
+const BESIDE_GEARS: usize = 2;
+
 /// A search from the refitted nominal model on.
 struct Pass<'a> {
     refit: Refit<'a>,
@@ -453,7 +460,24 @@ impl<'a> Pass<'a> {
             crate::prepare::threads(options.threads),
         );
         search.measured = gears(&across);
-        let (found, tried) = searched(bench, loaded, &refit, &mut search, progress)?;
+        let (mut found, mut tried) = searched(bench, loaded, &refit, &mut search, None, progress)?;
+        let mut refit = refit;
+        for _ in 0..BESIDE_GEARS {
+            let loud = search.loud(&found);
+            if loud.is_empty() {
+                break;
+            }
+            search.settle_gears(refit.even(), &mut found)?;
+            refit = refit.quieted(&found, &|j| loud.contains(&j));
+            let before = found.clone();
+            let (beside, more) =
+                searched(bench, loaded, &refit, &mut search, Some(found), progress)?;
+            found = beside;
+            tried.extend(more);
+            if same(&before, &found) {
+                break;
+            }
+        }
         Ok(Self {
             refit,
             search,
@@ -464,12 +488,13 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// The effects, and all that was tried.
+/// The effects, beginning with those `found` by then, and all that was tried.
 fn searched<'a>(
     bench: &'a Bench,
     loaded: &'a Loaded,
     refit: &Refit,
     search: &mut Search<'a>,
+    found: Option<Vec<Profile>>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Vec<Profile>, Vec<Tried>), DiagnoseError> {
     let trials = search.trials();
@@ -486,7 +511,7 @@ fn searched<'a>(
     };
     let mut tried = Vec::new();
     let mut sweeps = 0;
-    let found = search.run(&refit.base, &renew, &mut |step, profiles| {
+    let mut told = |step: usize, profiles: &[Profile]| {
         sweeps += 1;
         progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(sweeps)));
         for (k, p) in profiles.iter().enumerate() {
@@ -504,7 +529,11 @@ fn searched<'a>(
                 },
             });
         }
-    })?;
+    };
+    let found = match found {
+        None => search.run(&refit.base, &renew, &mut told)?,
+        Some(found) => search.again(&refit.base, found, &renew, &mut told)?,
+    };
     Ok((found, tried))
 }
 

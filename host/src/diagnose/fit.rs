@@ -1,6 +1,6 @@
 //! Weighted least squares on the rows with columns taken in one by one, and what one more column would explain.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -32,6 +32,8 @@ pub(super) struct Fit<'a> {
     rows: &'a Rows,
     /// Per joint, one over the standard deviation of its residual.
     scale: Vec<f64>,
+    /// What each row of a joint counts beside its others, up to 1; none where all count alike.
+    counts: Vec<Option<Arc<Vec<f64>>>>,
     /// Block of each row of a joint (shared by all joints).
     block: Vec<usize>,
     blocks: usize,
@@ -53,6 +55,7 @@ impl<'a> Fit<'a> {
         let (block, blocks) = blocked(rows, memory);
         let mut fit = Self {
             rows,
+            counts: vec![None; scale.len()],
             scale,
             block,
             blocks,
@@ -60,8 +63,24 @@ impl<'a> Fit<'a> {
             residual: Vec::new(),
             folded: OnceLock::new(),
         };
-        let torque: Column = rows.torque.iter().cloned().map(Some).collect();
-        fit.residual = fit.weighted(&torque);
+        fit.begin();
+        fit
+    }
+
+    fn begin(&mut self) {
+        let torque: Column = self.rows.torque.iter().cloned().map(Some).collect();
+        self.residual = self.weighted(&torque);
+        self.basis.clear();
+        self.folded = OnceLock::new();
+    }
+
+    /// The rows again, nothing taken in, with those of each joint counting so much, none of them 0.
+    pub(super) fn counting(&self, counts: Vec<Option<Arc<Vec<f64>>>>) -> Self {
+        let mut fit = Self {
+            counts,
+            ..self.clone()
+        };
+        fit.begin();
         fit
     }
 
@@ -143,9 +162,15 @@ impl<'a> Fit<'a> {
     }
 
     fn weighted_joint(&self, j: usize, values: &[f64]) -> Vec<f64> {
-        (values.iter().zip(&self.rows.keep[j]))
+        let mut out: Vec<f64> = (values.iter().zip(&self.rows.keep[j]))
             .map(|(value, keep)| if *keep { self.scale[j] * value } else { 0.0 })
-            .collect()
+            .collect();
+        if let Some(counts) = &self.counts[j] {
+            for (x, count) in out.iter_mut().zip(counts.iter()) {
+                *x *= count;
+            }
+        }
+        out
     }
 
     /// What is left of a weighted column beside those taken in.
@@ -185,20 +210,58 @@ impl<'a> Fit<'a> {
         self.folded = OnceLock::new();
     }
 
-    /// RMS of a joint's residual in its own unit, over the rows used.
+    /// RMS of a joint's residual in its own unit, over the rows used, each as it counts.
     pub(super) fn rms(&self, joint: usize) -> f64 {
         let n = self.rows.count;
         let squares = dot_self(&self.residual[joint * n..(joint + 1) * n]);
-        (squares / self.rows.used(joint).max(1) as f64).sqrt() / self.scale[joint]
+        let used = match &self.counts[joint] {
+            None => self.rows.used(joint) as f64,
+            Some(counts) => (counts.iter().zip(&self.rows.keep[joint]))
+                .filter(|(_, keep)| **keep)
+                .map(|(count, _)| count * count)
+                .sum(),
+        };
+        (squares / used.max(f64::MIN_POSITIVE)).sqrt() / self.scale[joint]
+    }
+
+    /// RMS of a joint's residual in its own unit, over the rows used, all alike.
+    pub(super) fn even_rms(&self, joint: usize) -> f64 {
+        let squares = dot_self(&self.residual(joint));
+        (squares / self.rows.used(joint).max(1) as f64).sqrt()
     }
 
     /// Residual of a joint in its own unit; 0 on masked rows.
     pub(super) fn residual(&self, joint: usize) -> Vec<f64> {
         let n = self.rows.count;
-        self.residual[joint * n..(joint + 1) * n]
+        let mut own: Vec<f64> = self.residual[joint * n..(joint + 1) * n]
             .iter()
             .map(|r| r / self.scale[joint])
-            .collect()
+            .collect();
+        if let Some(counts) = &self.counts[joint] {
+            for (r, count) in own.iter_mut().zip(counts.iter()) {
+                *r /= count;
+            }
+        }
+        own
+    }
+
+    /// The same, each row by what it counts, with the RMS of [`Fit::rms`] over all that are used.
+    pub(super) fn counted(&self, joint: usize) -> Vec<f64> {
+        let mut own = self.residual(joint);
+        if let Some(counts) = &self.counts[joint] {
+            for (r, count) in own.iter_mut().zip(counts.iter()) {
+                *r *= count;
+            }
+            let now = (dot_self(&own) / self.rows.used(joint).max(1) as f64).sqrt();
+            let by = self.rms(joint) / now.max(f64::MIN_POSITIVE);
+            own.iter_mut().for_each(|r| *r *= by);
+        }
+        own
+    }
+
+    /// What each row of a joint counts beside its others; none where all count alike.
+    pub(super) fn counts(&self, joint: usize) -> Option<&[f64]> {
+        self.counts[joint].as_deref().map(Vec::as_slice)
     }
 
     /// The weighted residual of all joints.

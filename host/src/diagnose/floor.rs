@@ -47,26 +47,29 @@ fn alike(a: &Run, b: &Run) -> bool {
     })
 }
 
-/// RMS of a joint's noise from residuals of repeated runs: what differs between them over √2. None without a repeat.
+/// RMS of a joint's noise from residuals of repeated runs: what differs between them over √2, where rows count so much (all
+/// alike where nothing is given). None without a repeat.
 pub(super) fn from_repeats(
     rows: &Rows,
     pairs: &[(usize, usize)],
     residual: &[f64],
+    counts: Option<&[f64]>,
     joint: usize,
 ) -> Option<f64> {
-    let (mut squares, mut count) = (0.0, 0_u64);
+    let (mut squares, mut used) = (0.0, 0.0);
     for &(a, b) in pairs {
         let (start_a, start_b) = (rows.starts[a], rows.starts[b]);
         let length = (rows.starts[a + 1] - start_a).min(rows.starts[b + 1] - start_b);
         for k in 0..length {
             let (i, j) = (start_a + k, start_b + k);
             if rows.keep[joint][i] && rows.keep[joint][j] {
-                squares += 0.5 * (residual[i] - residual[j]).powi(2);
-                count += 1;
+                let counted = counts.map_or(1.0, |counts| counts[i] * counts[j]);
+                squares += 0.5 * counted * (residual[i] - residual[j]).powi(2);
+                used += counted;
             }
         }
     }
-    (count > 0).then(|| (squares / count as f64).sqrt())
+    (used > 0.0).then(|| (squares / used).sqrt())
 }
 
 /// RMS on rows `period` s apart of what a joint's torque reading varies by from sample to sample: less noise than that there

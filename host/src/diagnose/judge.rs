@@ -73,6 +73,8 @@ pub(super) struct Judged {
     pub(super) chosen: Vec<Profile>,
     /// Noise floor, joint by joint.
     pub(super) floors: Vec<f64>,
+    /// … of rows as they count.
+    pub(super) quiet: Vec<f64>,
     /// What is left beyond it.
     pub(super) left: Option<Remainder>,
     /// Whether that is so much that names may be guesses at it.
@@ -103,7 +105,7 @@ impl Judge<'_, '_> {
                 let j = chosen[k].candidate.joint;
                 let last = on(j).unwrap_or(&judged);
                 let rms = |but| with(self.base, &last.chosen, but).rms(j);
-                closed([rms(Some(k)), rms(None)], last.floors[j])
+                closed([rms(Some(k)), rms(None)], last.quiet[j])
             };
             // What the description states is no guess of the search.
             let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
@@ -144,22 +146,26 @@ impl Judge<'_, '_> {
             .map(|j| self.burst(&fit, j))
             .collect();
         // Of a joint without its bursts.
-        let quiet = |j: usize| {
+        let calm = |j: usize| {
             let loud = bursts[j].as_ref().map_or(0.0, |burst| burst.share);
             (1.0 - loud).max(0.0).sqrt()
         };
-        let floors: Vec<f64> = (0..bursts.len())
+        let of_repeats =
+            |counts, j| floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), counts, j);
+        let (floors, quiet): (Vec<f64>, Vec<f64>) = (0..bursts.len())
             .map(|j| {
-                floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), j)
-                    .unwrap_or_else(|| fit.rms(j) * quiet(j))
+                (
+                    of_repeats(None, j).unwrap_or_else(|| fit.even_rms(j) * calm(j)),
+                    of_repeats(fit.counts(j), j).unwrap_or_else(|| fit.rms(j) * calm(j)),
+                )
             })
-            .collect();
-        let left = (0..floors.len())
-            .filter_map(|j| self.remainder_of(&fit, &chosen, j, floors[j], bursts[j].as_ref()))
+            .unzip();
+        let left = (0..quiet.len())
+            .filter_map(|j| self.remainder_of(&fit, &chosen, j, quiet[j], bursts[j].as_ref()))
             .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let much_left = (left.as_ref())
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
-        let doubted = || (0..floors.len()).find_map(|j| self.doubt(&fit, &chosen, j, floors[j]));
+        let doubted = || (0..quiet.len()).find_map(|j| self.doubt(&fit, &chosen, j, quiet[j]));
         Judged {
             left: left
                 .or_else(doubted)
@@ -167,12 +173,13 @@ impl Judge<'_, '_> {
             much_left,
             chosen,
             floors,
+            quiet,
         }
     }
 
-    /// Where the residual of the refitted description sits; `described` are its effects.
-    pub(super) fn places(&self, floors: &[f64], described: &[Profile]) -> Vec<Place> {
-        let fit = with(self.base, described, None);
+    /// Where the residual of the refitted description sits, `base`; `described` are its effects.
+    pub(super) fn places(&self, base: &Fit, floors: &[f64], described: &[Profile]) -> Vec<Place> {
+        let fit = with(base, described, None);
         (0..self.rows.joints())
             .flat_map(|j| self.places_of(&fit, j, floors[j]))
             .collect()
@@ -182,7 +189,7 @@ impl Judge<'_, '_> {
         locate(
             self.rows,
             &self.coordinates[joint],
-            &fit.residual(joint),
+            &fit.counted(joint),
             fit.block_of_rows(),
             joint,
             &self.robot.joints[joint].name,
@@ -295,7 +302,7 @@ impl Judge<'_, '_> {
             FAR_BEYOND_READING
         };
         let own = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
-        let rms = fit.rms(joint);
+        let rms = fit.even_rms(joint);
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         (rms > far * own).then(|| Remainder {
             joint: name.clone(),

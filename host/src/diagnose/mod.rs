@@ -30,6 +30,7 @@ pub mod outcome;
 mod pictures;
 mod predicted;
 mod profile;
+mod quiet;
 mod refit;
 mod rows;
 pub mod runs;

@@ -257,8 +257,8 @@ impl Search<'_> {
         start: Option<[f64; SHAPES]>,
     ) -> Result<Option<Profile>, DiagnoseError> {
         let kind = self.library[c].kind;
-        let measured = self.shapes_of(&self.library[c]);
-        let start = measured.or(start);
+        let fixed = self.fixed(&self.library[c]);
+        let start = fixed.or(start);
         let points = grid(kind);
         let mut best: Option<Best> = None;
         let gear = is_gear(kind);
@@ -295,7 +295,7 @@ impl Search<'_> {
         if best.0 * (self.source.nominal.joints() as f64) < hopeless {
             return Ok(None);
         }
-        if gear && measured.is_none() {
+        if gear && fixed.is_none() {
             if followed.is_empty() {
                 followed.push(best.clone());
             }

@@ -1,6 +1,7 @@
 //! Nominal parameters and effects fitted together.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
@@ -17,8 +18,9 @@ use super::locate::Coordinate;
 use super::model::weights;
 use super::outcome::{Absorbed, Value};
 use super::profile::Profile;
+use super::quiet::counts;
 use super::rows::{Column, Rows, combined};
-use super::search::with;
+use super::search::{is_gear, with};
 use super::solve::{Solution, jackknifed, solve};
 
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
@@ -38,6 +40,8 @@ pub(super) struct Refit<'r> {
     pub(super) plain: Fit<'r>,
     /// The free nominal columns taken in.
     pub(super) base: Fit<'r>,
+    /// Both with all rows alike, where those of the others count by what a gear leaves about them.
+    even: Option<[Fit<'r>; 2]>,
     /// Coefficients of the free nominal directions.
     pub(super) before: Solution,
     joints: usize,
@@ -63,9 +67,41 @@ impl<'r> Refit<'r> {
             free,
             plain,
             base,
+            even: None,
             before,
             joints: n,
         })
+    }
+
+    /// The same with rows that count by what these effects leave about them, on the joints `loud`.
+    pub(super) fn quieted(self, chosen: &[Profile], loud: &dyn Fn(usize) -> bool) -> Self {
+        let left = with(&self.base, chosen, None);
+        let counts = (0..self.joints)
+            .map(|j| loud(j).then(|| Arc::new(counts(left.rows(), &left.residual(j), j))))
+            .collect();
+        let plain = self.plain.counting(counts);
+        Self {
+            base: plain.clone().taking(&self.free),
+            plain,
+            even: Some(self.even.unwrap_or([self.plain, self.base])),
+            ..self
+        }
+    }
+
+    /// The free nominal columns taken in, all rows alike.
+    pub(super) fn even(&self) -> &Fit<'r> {
+        self.even.as_ref().map_or(&self.base, |[_, base]| base)
+    }
+
+    /// Rows as they count for a model of these effects: without a gear all alike. First nothing taken in, then the free nominal
+    /// columns.
+    pub(super) fn footing(&self, chosen: &[Profile]) -> [&Fit<'r>; 2] {
+        match &self.even {
+            Some([plain, base]) if !chosen.iter().any(|p| is_gear(p.candidate.kind)) => {
+                [plain, base]
+            }
+            _ => [&self.plain, &self.base],
+        }
     }
 
     /// Columns of the free nominal directions, then of the effects.
@@ -96,7 +132,8 @@ impl<'r> Refit<'r> {
     /// [`DiagnoseError::Model`] where the motion does not tell them apart.
     pub(super) fn solution(&self, chosen: &[Profile]) -> Result<Solution, DiagnoseError> {
         let columns = self.columns(chosen);
-        solve(&columns.beside(&self.plain), &columns.fitted, &[])
+        let [plain, _] = self.footing(chosen);
+        solve(&columns.beside(plain), &columns.fitted, &[])
             .map(|solution| solution.with_known(&columns.places))
             .ok_or_else(|| {
                 DiagnoseError::Model("its parameters with the effects are not all excited.".into())
@@ -117,9 +154,10 @@ impl<'r> Refit<'r> {
         pairs: &[(usize, usize)],
         coordinates: &[Vec<Coordinate>],
     ) -> Result<Joint, DiagnoseError> {
-        let mut beside = with(&self.base, chosen, None);
+        let [plain, base] = self.footing(chosen);
+        let mut beside = with(base, chosen, None);
         let residuals: Vec<Vec<f64>> = (0..self.joints).map(|j| beside.residual(j)).collect();
-        let plain = (self.plain).clustered(floor::memory(self.plain.rows(), &residuals), pairs);
+        let plain = plain.clustered(floor::memory(plain.rows(), &residuals), pairs);
         let strata: Vec<Fit> = (coordinates.iter().enumerate())
             .filter(|(j, _)| self.joints == 1 || chosen.iter().any(|p| p.candidate.joint == *j))
             .flat_map(|(_, of_joint)| of_joint.iter().filter(|c| c.is_of_a_law()))

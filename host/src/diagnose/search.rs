@@ -42,6 +42,8 @@ pub(super) struct Search<'a> {
     pub(super) described: Vec<Placed>,
     /// Gears that encoders on the links have shown, with their shapes: the torque has no say in them.
     pub(super) measured: Vec<(Candidate, [f64; SHAPES])>,
+    /// Gears that the torque has shown, once all else is searched beside them.
+    settled: Vec<(Candidate, [f64; SHAPES])>,
     /// Threads.
     pub(super) threads: usize,
     /// Joint by joint.
@@ -70,6 +72,7 @@ impl<'a> Search<'a> {
             library,
             described,
             measured: Vec::new(),
+            settled: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -163,8 +166,35 @@ impl<'a> Search<'a> {
         renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
         told: &mut dyn FnMut(usize, &[Profile]),
     ) -> Result<Vec<Profile>, DiagnoseError> {
+        let chosen = self.begun(base, renew)?;
+        self.further(base, chosen, renew, told)
+    }
+
+    /// The same from effects on that were found with other rows counting.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn again(
+        &mut self,
+        base: &Fit,
+        mut chosen: Vec<Profile>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+        told: &mut dyn FnMut(usize, &[Profile]),
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        self.renewed(renew(&chosen)?);
+        self.refine_all(base, &mut chosen)?;
+        self.standing(base, &mut chosen)?;
+        self.further(base, chosen, renew, told)
+    }
+
+    fn further(
+        &mut self,
+        base: &Fit,
+        mut chosen: Vec<Profile>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+        told: &mut dyn FnMut(usize, &[Profile]),
+    ) -> Result<Vec<Profile>, DiagnoseError> {
         let trials = self.trials();
-        let mut chosen = self.begun(base, renew)?;
         let most = chosen.len() + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();
         while chosen.len() < most {
@@ -275,7 +305,7 @@ impl<'a> Search<'a> {
         // Something else in the place of an effect that was taken before the last.
         if chosen.len() > 1 {
             for i in 0..chosen.len() - 1 {
-                if self.is_measured(&chosen[i].candidate) {
+                if self.fixed(&chosen[i].candidate).is_some() {
                     continue;
                 }
                 let fit = with(base, chosen, Some(i));
@@ -336,7 +366,8 @@ impl<'a> Search<'a> {
     }
 }
 
-fn same(a: &[Profile], b: &[Profile]) -> bool {
+/// Whether they are the same effects.
+pub(super) fn same(a: &[Profile], b: &[Profile]) -> bool {
     a.len() == b.len()
         && a.iter()
             .all(|p| b.iter().any(|q| q.candidate == p.candidate))

@@ -192,7 +192,7 @@ impl Between<'_, '_> {
         let (last, floor, solved) = loop {
             let last = beside(equation, &base, &laws.found, None);
             let residual = last.residual(0);
-            let floor = floor::from_repeats(rows, &equation.pairs, &residual, 0)
+            let floor = floor::from_repeats(rows, &equation.pairs, &residual, None, 0)
                 .unwrap_or_else(|| equation.short_time(&residual));
             let memory = floor::memory(rows, &[residual]);
             let solved = self.solved(&plain.clustered(memory, &equation.pairs), &base, &laws)?;

@@ -106,7 +106,7 @@ impl<'a, 'r> Follower<'a, 'r> {
             ..
         } = self;
         let joint = chosen[k].candidate.joint;
-        let rms = |chosen: &[Profile]| with(&refit.base, chosen, None).rms(joint);
+        let rms = |chosen: &[Profile]| with(refit.even(), chosen, None).rms(joint);
         let driven = chosen[k].clone();
         let before = rms(chosen);
         let reading = floor::of_reading(&loaded.runs, joint, loaded.rows.period);
@@ -118,7 +118,7 @@ impl<'a, 'r> Follower<'a, 'r> {
         own.shapes = begun(own.candidate.kind, own.shapes);
         for _ in 0..ROUNDS {
             let source = self.source(chosen)?;
-            let beside = with(&refit.base, chosen, Some(k));
+            let beside = with(refit.even(), chosen, Some(k));
             let Profile {
                 candidate, shapes, ..
             } = &chosen[k];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rig_shared::effects::SHAPES;
 
-use super::{Profile, STAYS, Search, in_the_shadow};
+use super::{Profile, STAYS, Search, in_the_shadow, is_gear, with};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::{Candidate, Source};
 use crate::diagnose::fit::{Evidence, Fit};
@@ -26,6 +26,53 @@ impl<'a> Search<'a> {
     /// Whether an encoder on the link has shown it.
     pub(in crate::diagnose) fn is_measured(&self, effect: &Candidate) -> bool {
         self.shapes_of(effect).is_some()
+    }
+
+    /// The shapes of a gear that is not searched for any more.
+    pub(in crate::diagnose) fn fixed(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
+        let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
+        let settled = self.settled.iter().find(own).map(|(_, shapes)| *shapes);
+        self.shapes_of(effect).or(settled)
+    }
+
+    /// Joints on which the torque has shown a gear.
+    pub(in crate::diagnose) fn loud(&self, chosen: &[Profile]) -> Vec<usize> {
+        (chosen.iter().map(|p| &p.candidate))
+            .filter(|c| is_gear(c.kind) && !self.is_measured(c))
+            .map(|c| c.joint)
+            .collect()
+    }
+
+    /// Gears that the torque has shown get their shapes anew beside all else, rows counting as in `base`, and keep them from
+    /// there on.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(in crate::diagnose) fn settle_gears(
+        &mut self,
+        base: &Fit,
+        chosen: &mut [Profile],
+    ) -> Result<(), DiagnoseError> {
+        self.settled.clear();
+        let mut settled = Vec::new();
+        for i in 0..chosen.len() {
+            let Profile {
+                candidate, shapes, ..
+            } = chosen[i];
+            if !is_gear(candidate.kind) || self.is_measured(&candidate) {
+                continue;
+            }
+            let place = self.library.iter().position(|l| *l == candidate);
+            let beside = with(base, chosen, Some(i));
+            if let Some(c) = place
+                && let Some(better) = self.profile(&beside, c, Some(shapes))?
+            {
+                chosen[i] = better;
+            }
+            settled.push((candidate, chosen[i].shapes));
+        }
+        self.settled = settled;
+        Ok(())
     }
 
     /// The description's effects come first, then what encoders on the links have shown.

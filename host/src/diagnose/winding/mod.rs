@@ -197,8 +197,8 @@ fn winding(
             unit: about.gains[0].unit.to_owned(),
         });
     let dead_zone = profile.filter(|_| stands).map(|profile| {
-        let floor =
-            floor::from_repeats(rows, &pairs, &last.residual(0), 0).unwrap_or_else(|| last.rms(0));
+        let floor = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0)
+            .unwrap_or_else(|| last.rms(0));
         let unseen = held.map(|held| {
             [(&before, None), (&after, Some(fade))]
                 .map(|(solution, k)| held.rms(&solution.values, k))
