@@ -224,7 +224,7 @@ fn attempt(
     judged.chosen = chosen;
     let mut source = &search.source;
     let followed;
-    if let Some(chosen) = follower.followed(&judged.chosen, &judged.floors)? {
+    if let Some(chosen) = follower.followed(&judged.chosen, &judged.quiet)? {
         judged = judge.as_found(chosen);
         followed = follower.source(&judged.chosen)?;
         source = &followed;

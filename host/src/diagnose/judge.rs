@@ -92,7 +92,7 @@ impl Judge<'_, '_> {
         // comes near.
         while judged.much_left {
             let chosen = &judged.chosen;
-            let followed = self.follower.followed(chosen, &judged.floors)?;
+            let followed = self.follower.followed(chosen, &judged.quiet)?;
             let followed = followed.map(|list| self.as_found(list));
             // What the driven law of a gear leaves is no reason to doubt the names of its joint; other joints are as they were.
             let on = |joint: usize| {

@@ -61,6 +61,9 @@ pub(super) struct Profile {
     pub(super) vanished: Option<&'static str>,
     /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
     pub(super) followed: Option<Followed>,
+    /// Of a gear, the shapes by the other of two ways, where it was seen both by the motor's motion alone and with its link
+    /// followed.
+    pub(super) otherwise: Option<[f64; SHAPES]>,
 }
 
 /// How a link is followed.
@@ -68,8 +71,6 @@ pub(super) struct Profile {
 pub(super) struct Followed {
     /// RMS on the rows of what counts as noise of the torque, N·m.
     pub(super) noise: f64,
-    /// Shapes that the link driven by the motor's motion alone has shown.
-    pub(super) driven: [f64; SHAPES],
 }
 
 impl Profile {
@@ -328,6 +329,7 @@ impl Search<'_> {
             evidence,
             vanished,
             followed: None,
+            otherwise: None,
         }))
     }
 

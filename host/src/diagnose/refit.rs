@@ -339,8 +339,8 @@ fn is_of_contact(kind: Kind, place: usize) -> bool {
 fn between_ways(profile: &Profile, place: usize) -> f64 {
     let is_play = profile.candidate.kind == Kind::Backlash
         && profile.candidate.kind.about().shapes[place].name == "gap";
-    let driven = profile.followed.filter(|_| is_play);
-    driven.map_or(0.0, |f| f.driven[place] - profile.shapes[place])
+    let otherwise = profile.otherwise.filter(|_| is_play);
+    otherwise.map_or(0.0, |shapes| shapes[place] - profile.shapes[place])
 }
 
 /// Derivative of an effect's torque with respect to one of its shapes, by a difference that stays within what physics

@@ -113,8 +113,8 @@ impl<'a, 'r> Follower<'a, 'r> {
         let own = &mut chosen[k];
         own.followed = Some(Followed {
             noise: reading.unwrap_or(noise[joint]),
-            driven: driven.shapes,
         });
+        own.otherwise = Some(driven.shapes);
         own.shapes = begun(own.candidate.kind, own.shapes);
         for _ in 0..ROUNDS {
             let source = self.source(chosen)?;
@@ -127,7 +127,11 @@ impl<'a, 'r> Follower<'a, 'r> {
             chosen[k].columns = Arc::new(columns);
         }
         if rms(chosen) >= before {
-            chosen[k] = driven;
+            let otherwise = Some(chosen[k].shapes);
+            chosen[k] = Profile {
+                otherwise,
+                ..driven
+            };
         }
         Ok(())
     }

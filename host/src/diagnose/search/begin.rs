@@ -119,6 +119,7 @@ impl<'a> Search<'a> {
                 evidence: Evidence::default(),
                 vanished: None,
                 followed: None,
+                otherwise: None,
             });
         }
         if chosen.is_empty() {

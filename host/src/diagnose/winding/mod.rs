@@ -154,6 +154,7 @@ fn winding(
         evidence,
         vanished: None,
         followed: None,
+        otherwise: None,
     });
     let refused = match &profile {
         _ if options.without.contains(&Kind::DriveDeadzone) => Some("it was left out".to_owned()),

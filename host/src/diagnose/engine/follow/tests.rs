@@ -95,6 +95,7 @@ fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
         evidence: Evidence::default(),
         vanished: None,
         followed: None,
+        otherwise: None,
     };
     let rigid = refit.base.rms(0);
     let follower = Follower::new(&bench, &loaded, &refit, &search);
