@@ -180,6 +180,7 @@ impl<'a> Bench<'a> {
                 evidence: Evidence::default(),
                 vanished: None,
                 followed: None,
+                otherwise: None,
             });
             coefficients.extend(gains);
         }
