@@ -25,6 +25,9 @@ const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 const HOPELESS: f64 = 0.5 * LEAST_GAIN;
 /// … and a gear, from whose starting points the ridge is further away.
 const HOPELESS_GEAR: f64 = 0.02;
+/// Share of critical damping beyond which a gear is no spring: shafts and gears of steel have some hundredths, and what hardly
+/// swings is a lag of friction, with which a spring and all friction on the link are easily confused.
+const MOST_DAMPED: f64 = 0.5;
 /// Points of a grid per decade of a logarithmic range.
 const PER_DECADE: f64 = 4.0;
 /// Steps of a grid over a linear range.
@@ -208,6 +211,12 @@ fn vanished(kind: Kind, shapes: &[f64; SHAPES], resolution: f64) -> Option<&'sta
     (counts && shapes[0] < least).then_some(shape.name)
 }
 
+/// Share of critical damping at which a link of that inertia swings on an elastic gear while the motor stands.
+fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
+    let [stiffness, damping, ..] = *shapes;
+    0.5 * damping / (stiffness * mass).sqrt()
+}
+
 /// Whether a shape is a way that the position shows.
 fn is_distance(shape: &Parameter) -> bool {
     shape.unit == "rad"
@@ -321,7 +330,13 @@ impl Search<'_> {
         let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
             return Ok(None);
         };
-        let vanished = vanished(kind, &best.1, self.resolution[self.library[c].joint]);
+        let joint = self.library[c].joint;
+        let mut vanished = vanished(kind, &best.1, self.resolution[joint]);
+        if kind == Kind::JointElasticity && fixed.is_none() {
+            let mass = self.source.mass(joint, 0)?;
+            vanished = vanished
+                .or_else(|| (damping_ratio(&best.1, mass) > MOST_DAMPED).then_some("swing"));
+        }
         Ok(Some(Profile {
             candidate: self.library[c],
             shapes: best.1,

@@ -6,15 +6,14 @@
 //! the model a row counts by what is left about it, where that is more than about half of all rows (Carroll 1982, Annals of
 //! Statistics 10: weights from smoothed squares of residuals).
 
-use super::rows::Rows;
 use super::transmission::STRETCH;
 
-/// What each row of a joint counts beside the others, up to 1, where this is left of it.
-pub(super) fn counts(rows: &Rows, residual: &[f64], joint: usize) -> Vec<f64> {
-    let keep = &rows.keep[joint];
-    let reach = (STRETCH / rows.period).ceil() as usize;
+/// What each row of a joint counts beside the others, up to 1, where this is left of it: rows `period` s apart, of which those of
+/// `keep` are used, and runs that begin at `starts`.
+pub(super) fn counts(residual: &[f64], keep: &[bool], starts: &[usize], period: f64) -> Vec<f64> {
+    let reach = (STRETCH / period).ceil() as usize;
     let mut loud = vec![0.0; residual.len()];
-    for pair in rows.starts.windows(2) {
+    for pair in starts.windows(2) {
         let (start, end) = (pair[0], pair[1]);
         // Sums of squares and numbers of rows up to each row.
         let mut sums = vec![(0.0, 0.0)];
@@ -41,4 +40,44 @@ pub(super) fn counts(rows: &Rows, residual: &[f64], joint: usize) -> Vec<f64> {
         .map(|loud| if loud > usual { usual / loud } else { 1.0 })
         .map(|count| count.max(f64::EPSILON))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    #[test]
+    fn a_row_counts_by_what_is_left_about_it_in_its_own_run() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+        // Two runs of 1000 rows 10 ms apart; the second begins with a touch, and one row that is not used is wrong altogether.
+        let touch = 1000..1020;
+        let mut residual: Vec<f64> = (0..2000)
+            .map(|k| (rng.random::<f64>() - 0.5) * if touch.contains(&k) { 20.0 } else { 1.0 })
+            .collect();
+        residual[500] = 1e6;
+        let keep: Vec<bool> = (0..2000).map(|k| k != 500).collect();
+        let counts = counts(&residual, &keep, &[0, 1000, 2000], 0.01);
+        for k in touch.start + 6..touch.end - 6 {
+            assert!((0.02..0.1).contains(&counts[k]), "{k}: {}", counts[k]);
+        }
+        // Nothing of it reaches into the run before.
+        let elsewhere = (0..1000).chain(1030..2000);
+        for count in elsewhere.map(|k| counts[k]) {
+            assert!((0.6..=1.0).contains(&count), "{count}");
+        }
+        let whole = counts.iter().filter(|count| **count == 1.0).count();
+        assert!((900..1100).contains(&whole), "{whole}");
+    }
+
+    #[test]
+    fn rows_count_whatever_is_left() {
+        let all = [true; 40];
+        let loudest = [vec![0.0; 39], vec![f64::MAX.sqrt()]].concat();
+        for residual in [vec![0.0; 40], loudest] {
+            let counts = counts(&residual, &all, &[0, 40], 0.01);
+            assert!(counts.iter().all(|count| *count > 0.0 && *count <= 1.0));
+        }
+    }
 }

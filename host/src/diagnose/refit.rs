@@ -77,7 +77,11 @@ impl<'r> Refit<'r> {
     pub(super) fn quieted(self, chosen: &[Profile], loud: &dyn Fn(usize) -> bool) -> Self {
         let left = with(&self.base, chosen, None);
         let counts = (0..self.joints)
-            .map(|j| loud(j).then(|| Arc::new(counts(left.rows(), &left.residual(j), j))))
+            .map(|j| {
+                let rows = left.rows();
+                let own = || counts(&left.residual(j), &rows.keep[j], &rows.starts, rows.period);
+                loud(j).then(|| Arc::new(own()))
+            })
             .collect();
         let plain = self.plain.counting(counts);
         Self {

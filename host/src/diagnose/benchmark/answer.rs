@@ -25,6 +25,8 @@ pub struct Named {
 pub struct Answer {
     /// In the order found.
     pub named: Vec<Named>,
+    /// Whether it names no effect and says that values of the description have changed.
+    pub changed: bool,
     /// Whether it says that something is left that it cannot name.
     pub remainder: bool,
     /// Share of the hold-out's gap that it closes; none where it names nothing.
@@ -98,23 +100,17 @@ impl Method for Diagnose {
 }
 
 impl Answer {
-    /// A change of parameters without a step is that of a payload, the only one that is hidden.
+    /// As a result has it.
     pub fn of(diagnosis: &Diagnosis) -> Self {
-        let mut named: Vec<Named> = (diagnosis.steps.iter())
+        let named: Vec<Named> = (diagnosis.steps.iter())
             .map(|step| Named {
                 effect: step.effect.clone(),
                 set: step.set.clone(),
                 parameters: step.parameters.clone(),
             })
             .collect();
-        if diagnosis.verdict == Verdict::ParameterChange && named.is_empty() {
-            named.push(Named {
-                effect: "payload".into(),
-                set: vec!["payload".into()],
-                parameters: BTreeMap::new(),
-            });
-        }
         Self {
+            changed: diagnosis.verdict == Verdict::ParameterChange && named.is_empty(),
             named,
             remainder: diagnosis.verdict == Verdict::Remainder,
             gap_closed: diagnosis.gap_closed,

@@ -37,6 +37,9 @@ pub struct Outcome {
     pub parameters: Vec<Compared>,
 }
 
+/// The one hidden effect that is a change of the description's values.
+const PAYLOAD: &str = "payload";
+
 impl Outcome {
     fn truth(&self) -> Vec<&'static str> {
         // What was hidden before the phases were drawn anew is no longer in the recording.
@@ -46,11 +49,21 @@ impl Outcome {
         self.hidden.iter().map(|h| h.effect.name()).collect()
     }
 
+    /// Changed values of the description are the name of a payload where one is hidden, and elsewhere no name.
     fn names(&self) -> Vec<&str> {
-        let answer = self.answer.iter();
-        answer
-            .flat_map(|a| a.named.iter().map(|n| n.effect.as_str()))
-            .collect()
+        let Some(answer) = &self.answer else {
+            return Vec::new();
+        };
+        if answer.changed && self.truth().contains(&PAYLOAD) {
+            return vec![PAYLOAD];
+        }
+        answer.named.iter().map(|n| n.effect.as_str()).collect()
+    }
+
+    /// Whether it says that values of the description have changed which have not.
+    fn changed_wrongly(&self) -> bool {
+        let is_so = self.group == Group::WrongDescription || self.truth().contains(&PAYLOAD);
+        !is_so && self.answer.as_ref().is_some_and(|a| a.changed)
     }
 
     /// Whether every hidden effect is above the floor.
@@ -76,14 +89,14 @@ impl Outcome {
         classes(&self.names()) == classes(&self.truth())
     }
 
-    /// Whether it names anything.
+    /// Whether it names anything, or finds values changed that have not.
     pub fn alarmed(&self) -> bool {
-        !self.names().is_empty()
+        !self.names().is_empty() || self.changed_wrongly()
     }
 
-    /// Whether it names anything that is not there.
+    /// Whether it names anything that is not there, or finds values changed that have not.
     pub fn invented(&self) -> bool {
-        self.wrong() > 0
+        self.wrong() > 0 || self.changed_wrongly()
     }
 
     fn wrong(&self) -> usize {

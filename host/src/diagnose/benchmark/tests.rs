@@ -9,8 +9,8 @@ use super::answer::same_by_voltage;
 use super::*;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Noise, Scenario};
 
-/// Says what it was told to, whatever the recording.
-struct Parrot(Vec<&'static str>);
+/// Says what it was told to, whatever the recording: names, and whether values of the description have changed.
+struct Parrot(Vec<&'static str>, bool);
 
 impl Method for Parrot {
     fn name(&self) -> &'static str {
@@ -25,6 +25,7 @@ impl Method for Parrot {
         });
         Ok(Answer {
             named: named.collect(),
+            changed: self.1,
             ..Answer::default()
         })
     }
@@ -50,10 +51,11 @@ fn plan() -> Plan {
 #[test]
 fn answers_are_counted_by_what_was_hidden() {
     let cases = plan().cases().unwrap();
-    let silent = Parrot(Vec::new());
-    let tilt = Parrot(vec!["gravity_tilt"]);
-    let lists = run(&cases, &[&silent, &tilt], 2, &|_, _| {}).unwrap();
-    let [silent, tilt] = [&lists[0], &lists[1]].map(|list| Score::of("", list));
+    let silent = Parrot(Vec::new(), false);
+    let tilt = Parrot(vec!["gravity_tilt"], false);
+    let changed = Parrot(Vec::new(), true);
+    let lists = run(&cases, &[&silent, &tilt, &changed], 2, &|_, _| {}).unwrap();
+    let [silent, tilt, changed] = [&lists[0], &lists[1], &lists[2]].map(|list| Score::of("", list));
     assert_eq!((silent.false_alarm.hits, silent.false_alarm.of), (0, 3));
     assert_eq!((tilt.false_alarm.hits, tilt.false_alarm.of), (3, 3));
     assert_eq!(silent.right_first_any_size.hits, 0);
@@ -70,6 +72,14 @@ fn answers_are_counted_by_what_was_hidden() {
     assert_eq!(tilt.invented_silently.hits, tilt.invented_silently.of);
     assert_eq!(tilt.remainder_flagged.hits, 0);
     assert_eq!(tilt.controls[&Group::OneRunOnly].hits, 2);
+    // A change of the description is no name, but wrong wherever it is not what was hidden.
+    assert_eq!((changed.false_alarm.hits, changed.false_alarm.of), (3, 3));
+    assert_eq!(changed.false_discovery, Some(0.0));
+    assert_eq!(changed.right_first_any_size.hits, 0);
+    assert_eq!(changed.invented_silently.hits, changed.invented_silently.of);
+    assert_eq!(changed.controls[&Group::OneRunOnly].hits, 2);
+    assert_eq!(changed.controls[&Group::WrongDescription].hits, 0);
+    assert_eq!(tilt.controls[&Group::WrongDescription].hits, 2);
 }
 
 #[test]

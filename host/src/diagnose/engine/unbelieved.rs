@@ -62,3 +62,6 @@ fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
     let mass = search.source.mass(gear.candidate.joint, 0)?;
     Ok(stiffness.map_or(0.0, |(_, stiffness)| (stiffness / mass).sqrt() / TAU))
 }
+
+#[cfg(test)]
+mod tests;

@@ -59,6 +59,36 @@ fn a_stiff_gear_is_as_stiff_as_it_is() {
     assert_eq!(model.effects[0].effect.shapes[0], stiffness.value);
 }
 
+/// Touches come at instants that no law predicts, and leave ten times the noise of everything between them.
+#[test]
+fn an_effect_as_large_as_the_noise_is_found_beside_play() {
+    let hidden = [
+        Effect::Backlash { gap: 0.0144 },
+        Effect::Cogging {
+            amplitude: 0.15,
+            order: 24.0,
+            phase: 3.75,
+        },
+    ];
+    let scenario = Scenario {
+        hidden: hidden.map(|effect| Hidden { joint: 0, effect }).into(),
+        ..scenario(None, 811)
+    };
+    let made = scenario.make().unwrap();
+    let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
+    let [play, cogging] = diagnosis.steps.as_slice() else {
+        unreachable!("{:?}", diagnosis.words)
+    };
+    assert_eq!([&*play.effect, &*cogging.effect], ["backlash", "cogging"]);
+    let gap = &play.parameters["gap"];
+    assert!((gap.value / 0.0144 - 1.0).abs() < 0.1, "{gap:?}");
+    assert!((gap.value - 0.0144).abs() < 3.0 * gap.std, "{gap:?}");
+    assert_eq!(cogging.parameters["order"].value, 24.0);
+    let [sine, cosine] = ["sine", "cosine"].map(|name| cogging.parameters[name].value);
+    let amplitude = sine.hypot(cosine);
+    assert!((amplitude / 0.15 - 1.0).abs() < 0.3, "{amplitude}");
+}
+
 /// RMS of the training residual of a rig without a gear that gives: rigid, and with a made-up gear whose link is followed.
 fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let made = scenario(effect, seed).make().unwrap();

@@ -1,0 +1,105 @@
+//! Gears that are none.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use super::*;
+use crate::diagnose::Options;
+use crate::diagnose::bench::{Bench, library};
+use crate::diagnose::columns::Candidate;
+use crate::diagnose::engine::Follower;
+use crate::diagnose::fit::Evidence;
+use crate::diagnose::outcome::Verdict;
+use crate::diagnose::scenario::{Effect, Hidden, Scenario};
+use crate::diagnose::stated::Stated;
+use crate::prepare::Recording;
+use rig_shared::effects::{Kind, SHAPES};
+
+fn scenario(effect: Option<Effect>, seed: u64) -> Scenario {
+    let hidden = effect.map(|effect| Hidden { joint: 0, effect });
+    Scenario {
+        seconds: [30.0, 20.0],
+        ..Scenario::new(hidden.into_iter().collect(), seed)
+    }
+}
+
+/// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
+fn said(stiffness: f64, times: f64) -> Option<&'static str> {
+    let effect = Effect::JointElasticity {
+        stiffness: 700.0,
+        damping: 0.3,
+    };
+    let made = scenario(Some(effect), 5).make().unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let judge = Judge {
+        robot: &made.robot,
+        search: &search,
+        follower: &follower,
+        rows: &loaded.rows,
+        coordinates: &[Vec::new()],
+        pairs: Vec::new(),
+        base: &refit.base,
+        seed: 1,
+    };
+    let candidate = Candidate {
+        kind: Kind::JointElasticity,
+        joint: 0,
+        other: None,
+    };
+    let mut shapes = [0.0; SHAPES];
+    shapes[..3].copy_from_slice(&[stiffness, 0.3, 0.25]);
+    let mut columns = search.source.columns(&candidate, &shapes).unwrap();
+    for value in columns.iter_mut().flatten().flatten().flatten() {
+        *value *= times;
+    }
+    let gear = Profile {
+        candidate,
+        shapes,
+        columns: Arc::new(columns),
+        evidence: Evidence::default(),
+        vanished: None,
+        followed: None,
+        otherwise: None,
+    };
+    let fallen = unbelieved(&refit, &search, &judge, &[gear]).unwrap();
+    fallen.map(|(_, why)| why)
+}
+
+#[test]
+fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_moves_too_much() {
+    assert_eq!(said(700.0, 1.0), None);
+    // Half of its torque is asked for twice.
+    assert!(said(700.0, 0.5).unwrap().contains("mass and load"));
+    // Of 0.15 kg·m² at 1e5 N·m/rad that is 130 Hz, beyond rows of less than 100 Hz.
+    assert!(said(1e5, 1.0).unwrap().contains("band"));
+}
+
+/// Where the rig creeps, its friction lags a little: a link with all friction on it behind a spring of five times critical damping
+/// would explain a tenth of that.
+#[test]
+fn a_gear_that_does_not_swing_is_none() {
+    let made = scenario(None, 900).make().unwrap();
+    let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
+    assert_eq!(
+        diagnosis.verdict,
+        Verdict::NothingMissing,
+        "{:?}",
+        diagnosis.words
+    );
+    let gear = |t: &&crate::diagnose::outcome::Tried| t.effect.contains("elasticity");
+    let tried = diagnosis.tried.iter().find(gear).unwrap();
+    assert!(tried.refused.contains("swing"), "{tried:?}");
+}
