@@ -101,6 +101,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
             evidence: Evidence::default(),
             vanished: None,
             followed: None,
+            otherwise: None,
         }
     };
     let mut third = [0.0; SHAPES];
