@@ -7,7 +7,7 @@ mod unbelieved;
 use rig_shared::effects::Kind;
 
 pub(super) use self::follow::Follower;
-use self::steps::{change_step, refuse, steps};
+use self::steps::{change_step, refuse, refuse_guesses, steps};
 use self::unbelieved::unbelieved;
 use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, Loaded, library};
@@ -198,18 +198,22 @@ fn attempt(
     let trial = Replay::of(&bench, &refit, values, loaded);
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
     let judged = judge.judged(found)?;
+    refuse_guesses(robot, &mut tried, &judged);
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
+    refuse_guesses(robot, &mut tried, &judged);
     // A name that makes the simulated motion worse stands in for something else.
     while let Some(k) = trial.spoiling(&judged.chosen, search.count_given(&judged.chosen))? {
         let mut stand = judged.chosen;
         let why = "explains torque, but the simulated motion gets worse with it";
         refuse(robot, &mut tried, &stand.remove(k), why);
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
+        refuse_guesses(robot, &mut tried, &judged);
     }
     while let Some((k, why)) = unbelieved(&refit, &search, &judge, &judged.chosen)? {
         let mut stand = judged.chosen;
         refuse(robot, &mut tried, &stand.remove(k), why);
         judged = judge.judged(search.possible(&refit.base, stand)?)?;
+        refuse_guesses(robot, &mut tried, &judged);
     }
     let said = settled(
         &zeros(&options.sensor_zeros, &windings, robot.joints.len()),

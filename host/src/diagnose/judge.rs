@@ -77,6 +77,8 @@ pub(super) struct Judged {
     pub(super) quiet: Vec<f64>,
     /// What is left beyond it.
     pub(super) left: Option<Remainder>,
+    /// Names that were no more than guesses at it.
+    pub(super) guesses: Vec<Profile>,
     /// Whether that is so much that names may be guesses at it.
     much_left: bool,
 }
@@ -88,6 +90,7 @@ impl Judge<'_, '_> {
     /// [`DiagnoseError::Model`].
     pub(super) fn judged(&self, found: Vec<Profile>) -> Result<Judged, DiagnoseError> {
         let mut judged = self.as_found(found);
+        let mut guesses = Vec::new();
         // Beside something unknown, a name that closes less of the gap than it leaves is a guess at it, unless nothing else
         // comes near.
         while judged.much_left {
@@ -123,18 +126,20 @@ impl Judge<'_, '_> {
             }
             let Some(guess) = guess else { break };
             let mut stand = judged.chosen;
-            stand.remove(guess);
+            guesses.push(stand.remove(guess));
             judged = self.as_found(self.search.possible(self.base, stand)?);
         }
+        judged.guesses = guesses;
         Ok(judged)
     }
 
-    /// Whether nothing else in its place takes away half as much.
+    /// Whether nothing else in its place takes away half as much. What explains another joint is not in its place.
     fn stands_out(&self, chosen: &[Profile], k: usize) -> Result<bool, DiagnoseError> {
         let own = &chosen[k];
         let name = own.candidate.kind.about().name;
         let rivals = self.search.alternatives(self.base, chosen, k)?;
         Ok((rivals.iter())
+            .filter(|r| r.candidate.joint == own.candidate.joint)
             .filter(|r| r.candidate.kind.about().name != name)
             .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
@@ -170,6 +175,7 @@ impl Judge<'_, '_> {
             left: left
                 .or_else(doubted)
                 .or_else(|| (0..floors.len()).find_map(|j| self.unproven(&fit, &chosen, j))),
+            guesses: Vec::new(),
             much_left,
             chosen,
             floors,

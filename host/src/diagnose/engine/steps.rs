@@ -67,6 +67,14 @@ pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
     }
 }
 
+/// The same of names that were no more than guesses at what is left.
+pub(super) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged) {
+    for guess in &judged.guesses {
+        let why = "closes less of the gap than stays open beside it, and may be a guess at what has no name";
+        refuse(robot, tried, guess, why);
+    }
+}
+
 /// The step of a change that has an effect's name.
 pub(super) fn change_step(
     robot: &Robot,
