@@ -22,6 +22,8 @@ const SPEAKS_FOR_ALL: f64 = 0.9;
 const LEAST_CHANGE: f64 = 0.04;
 /// Least relative change of inertia and gravity both that is a payload's …
 const LEAST_OF_BOTH: f64 = 0.02;
+/// … and where something is left besides, which moves parameters as it likes.
+const LEAST_OF_BOTH_BESIDE: f64 = 0.04;
 /// … and that in standard deviations.
 const LEAST_SIGMAS: f64 = 4.0;
 
@@ -38,12 +40,13 @@ pub(super) struct Change {
     pub(super) p_value: f64,
 }
 
-/// Compares the refit with the description. `known` is the torque that the effects found explain, `without` is not
-/// named.
+/// Compares the refit with the description. `known` is the torque that the effects found explain, `left` whether they leave
+/// something, `without` is not named.
 pub(super) fn change(
     bench: &Bench,
     refit: &Refit,
     known: &Column,
+    left: bool,
     after: &Solution,
     without: &[Kind],
 ) -> Option<Change> {
@@ -78,8 +81,13 @@ pub(super) fn change(
         return None;
     }
     let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
+    let least = if left {
+        LEAST_OF_BOTH_BESIDE
+    } else {
+        LEAST_OF_BOTH
+    };
     if !without.contains(&Kind::Payload)
-        && let Some(load) = payload(bench, after, &prior)
+        && let Some(load) = payload(bench, after, &prior, least)
         && let Some(e) = evidence(&load.1)
         && speaks(&e)
     {
@@ -145,11 +153,13 @@ pub(super) fn change(
     })
 }
 
-/// Mass and distance of a payload on a single link, and the free directions that it moves.
+/// Mass and distance of a payload on a single link that changes gravity and inertia by a share of `least` at least, and the free
+/// directions that it moves.
 fn payload(
     bench: &Bench,
     after: &Solution,
     prior: &[f64],
+    least: f64,
 ) -> Option<(BTreeMap<String, Value>, Vec<usize>)> {
     let (nominal, anchor) = (&bench.nominal, &bench.anchor);
     let [joint] = bench.robot.joints.as_slice() else {
@@ -171,7 +181,7 @@ fn payload(
         after.values[inertia] - prior[inertia],
     );
     let material = |change: f64, k: usize| {
-        change > LEAST_OF_BOTH * prior[k].abs() && change > LEAST_SIGMAS * after.std(k)
+        change > least * prior[k].abs() && change > LEAST_SIGMAS * after.std(k)
     };
     if !(material(dm, moment) && material(dj, inertia)) {
         return None;

@@ -1,16 +1,18 @@
 //! The workflow from recordings to a verdict.
 
 mod follow;
+mod pass;
 mod steps;
 mod unbelieved;
 
 use rig_shared::effects::Kind;
 
 pub(super) use self::follow::Follower;
+use self::pass::Pass;
 use self::steps::{change_step, refuse, refuse_guesses, steps};
 use self::unbelieved::unbelieved;
-use super::across::{Across, across, gears, names_something, refutes, tell as tell_across};
-use super::bench::{Bench, Loaded, library};
+use super::across::{across, names_something, refutes, tell as tell_across};
+use super::bench::{Bench, library};
 use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
@@ -21,20 +23,20 @@ use super::judge::{Judge, Judged, left_of_held, not_carried_over};
 use super::lead::{differ, leads, moved, slack};
 use super::locate::coordinates;
 use super::motion::Replay;
-use super::outcome::{Diagnosis, Residual, Tried, Verdict};
+use super::outcome::{Diagnosis, Residual, Verdict};
 use super::profile::Profile;
 use super::refit::{Refit, open};
 use super::runs::in_sessions;
 use super::sanity::{faults, too_short_to_learn};
-use super::search::{Search, same, with};
+use super::search::with;
 use super::sentences::offsets;
-use super::stated::{Now, Stated, candidate};
+use super::stated::{Now, Stated};
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::report::{format_unit, format_value};
-use crate::robot::{Robot, title_of};
+use crate::robot::Robot;
 
 /// Finds what the model lacks. The second result is the description with the effects and the parameters identified
 /// anew.
@@ -285,7 +287,8 @@ fn attempt(
         word.applied(step);
     }
     let explained = refit.explained(chosen, after);
-    let change = change(&bench, &refit, &explained, after, &options.without);
+    let left = judged.left.is_some();
+    let change = change(&bench, &refit, &explained, left, after, &options.without);
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
     {
         let given = (replay.errors_of(&stated.moving())).map(|errors| errors.rms());
@@ -420,125 +423,6 @@ fn held(bench: &Bench, open: &[usize]) -> Option<String> {
             names.join(", ")
         )
     })
-}
-
-/// How often all else is searched beside gears, whose own shapes it may move.
-const BESIDE_GEARS: usize = 2;
-
-/// A search from the refitted nominal model on.
-struct Pass<'a> {
-    refit: Refit<'a>,
-    search: Search<'a>,
-    found: Vec<Profile>,
-    tried: Vec<Tried>,
-    across: Vec<Across>,
-}
-
-impl<'a> Pass<'a> {
-    fn over(
-        bench: &'a Bench,
-        loaded: &'a Loaded,
-        options: &Options,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Self, DiagnoseError> {
-        let refit = Refit::of(bench, &loaded.rows)?;
-        let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
-        // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
-        let across = across(
-            &source,
-            &bench.anchor,
-            &refit.before,
-            loaded,
-            None,
-            &bench.position_filter()?,
-            options,
-        )?;
-        let mut library = library(bench.robot, &loaded.runs, &options.without);
-        library.retain(|c| !refutes(&across, c));
-        let mut described = bench.stated.free();
-        described.retain(|placed| !refutes(&across, &candidate(placed)));
-        let mut search = Search::new(
-            source,
-            library,
-            described,
-            crate::prepare::threads(options.threads),
-        );
-        search.measured = gears(&across);
-        let (mut found, mut tried) = searched(bench, loaded, &refit, &mut search, None, progress)?;
-        let mut refit = refit;
-        for _ in 0..BESIDE_GEARS {
-            let loud = search.loud(&found);
-            if loud.is_empty() {
-                break;
-            }
-            search.settle_gears(refit.even(), &mut found)?;
-            refit = refit.quieted(&found, &|j| loud.contains(&j));
-            let before = found.clone();
-            let (beside, more) =
-                searched(bench, loaded, &refit, &mut search, Some(found), progress)?;
-            found = beside;
-            tried.extend(more);
-            if same(&before, &found) {
-                break;
-            }
-        }
-        Ok(Self {
-            refit,
-            search,
-            found,
-            tried,
-            across,
-        })
-    }
-}
-
-/// The effects, beginning with those `found` by then, and all that was tried.
-fn searched<'a>(
-    bench: &'a Bench,
-    loaded: &'a Loaded,
-    refit: &Refit,
-    search: &mut Search<'a>,
-    found: Option<Vec<Profile>>,
-    progress: &mut dyn FnMut(f64),
-) -> Result<(Vec<Profile>, Vec<Tried>), DiagnoseError> {
-    let trials = search.trials();
-    // Where the effects' columns stand in for nominal ones, these stay as they were.
-    let renew = |chosen: &[Profile]| {
-        let solution = refit.solution(chosen);
-        let coefficients = solution.as_ref().unwrap_or(&refit.before);
-        let nominal = &coefficients.values[..refit.free.len()];
-        let source = bench.source(loaded, &bench.anchor.values(nominal))?;
-        match &solution {
-            Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
-            Err(_) => Ok(source),
-        }
-    };
-    let mut tried = Vec::new();
-    let mut sweeps = 0;
-    let mut told = |step: usize, profiles: &[Profile]| {
-        sweeps += 1;
-        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(sweeps)));
-        for (k, p) in profiles.iter().enumerate() {
-            tried.push(Tried {
-                effect: title_of(p.candidate.kind),
-                joint: bench.robot.joints[p.candidate.joint].name.clone(),
-                step,
-                gain: p.evidence.gain,
-                gain_sigmas: p.evidence.gain_sigmas,
-                p_value: p.evidence.corrected(trials),
-                refused: match p.refused(trials) {
-                    Some(why) => why,
-                    None if k == 0 => String::new(),
-                    None => "another takes away more".into(),
-                },
-            });
-        }
-    };
-    let found = match found {
-        None => search.run(&refit.base, &renew, &mut told)?,
-        Some(found) => search.again(&refit.base, found, &renew, &mut told)?,
-    };
-    Ok((found, tried))
 }
 
 /// `named`: whether there is an effect that the description does not state.

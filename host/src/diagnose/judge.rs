@@ -11,7 +11,7 @@ use super::locate::{Coordinate, locate};
 use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
-use super::rows::Rows;
+use super::rows::{Rows, combined};
 use super::runs::Run;
 use super::search::{Search, is_gear, shadow, with};
 use super::testable;
@@ -44,6 +44,8 @@ const FAR_BEYOND_READING_OF_GEARS: f64 = 7.0;
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
 const AS_GOOD: f64 = 0.9;
+/// Standard deviation of a torque that counts as constant, as a share of its mean.
+const VARIES: f64 = 0.2;
 /// Standard deviations of a paired difference between blocks.
 const NO_DIFFERENCE: f64 = 2.5;
 
@@ -443,6 +445,10 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
             continue;
         }
         if equal(own, rival) {
+            // With no stiffness a spring is every constant, and no motion would ever tell it from one.
+            if rival.candidate.kind == Kind::Spring && is_constant(own) && is_constant(rival) {
+                continue;
+            }
             names.push(name.to_owned());
         } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
             step.runner_up = Some(name.to_owned());
@@ -451,6 +457,19 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
         }
     }
     step.set = names;
+}
+
+/// Whether an effect's torque on its joint is one constant, as found, but for [`VARIES`] of it.
+fn is_constant(profile: &Profile) -> bool {
+    let joint = profile.candidate.joint;
+    let terms = profile.columns.iter().zip(&profile.evidence.gains);
+    let Some(torque) = combined(joint + 1, terms.map(|(c, g)| (c, *g))).swap_remove(joint) else {
+        return false;
+    };
+    let count = torque.len().max(1) as f64;
+    let mean = torque.iter().sum::<f64>() / count;
+    let variance = torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / count;
+    variance.sqrt() < VARIES * mean.abs()
 }
 
 /// Whether the data support a rival as well as what stands.

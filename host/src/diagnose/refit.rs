@@ -92,6 +92,19 @@ impl<'r> Refit<'r> {
         }
     }
 
+    /// Whether rows count by what a gear leaves about them.
+    pub(super) fn is_quieted(&self) -> bool {
+        self.even.is_some()
+    }
+
+    /// The same with all rows alike.
+    pub(super) fn evened(mut self) -> Self {
+        if let Some([plain, base]) = self.even.take() {
+            (self.plain, self.base) = (plain, base);
+        }
+        self
+    }
+
     /// The free nominal columns taken in, all rows alike.
     pub(super) fn even(&self) -> &Fit<'r> {
         self.even.as_ref().map_or(&self.base, |[_, base]| base)

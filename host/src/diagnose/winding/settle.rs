@@ -6,6 +6,7 @@ use super::Winding;
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
+use crate::diagnose::judge::equal;
 use crate::diagnose::outcome::Step;
 use crate::diagnose::profile::Profile;
 use crate::diagnose::search::{Search, with};
@@ -57,7 +58,8 @@ impl Word {
     }
 }
 
-/// For each effect what is said of it; a constant that is the sensor's gets that name, and one that is not loses it.
+/// For each effect what is said of it; a constant that is the sensor's gets that name, and one that is not loses it. So does
+/// what a constant would explain as well.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -70,33 +72,51 @@ pub(in crate::diagnose) fn settled(
     let mut words = vec![Word::Open; chosen.len()];
     for k in 0..chosen.len() {
         let candidate = chosen[k].candidate;
-        let zero = zeros.get(candidate.joint).copied().flatten();
-        let Some(zero) = zero.filter(|_| CONSTANTS.contains(&candidate.kind)) else {
+        let Some(zero) = zeros.get(candidate.joint).copied().flatten() else {
             continue;
         };
-        let (Some([gain]), Some([std]), Some(column)) = (
-            chosen[k].evidence.gains.first_chunk(),
-            chosen[k].evidence.stds.first_chunk(),
-            (chosen[k].columns.first()).and_then(|c| c[candidate.joint].as_ref()),
-        ) else {
-            continue;
+        let in_its_place = |kind: Kind, chosen: &[Profile]| {
+            let own = |c: &Candidate| c.kind == kind && c.joint == candidate.joint;
+            match search.library.iter().position(own) {
+                Some(c) => search.profile(&with(base, chosen, Some(k)), c, None),
+                None => Ok(None),
+            }
         };
-        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
-        words[k] = Word::of(zero, gain * mean, std * mean.abs());
         let sensor = Kind::CurrentOffset;
-        let name = match words[k] {
-            Word::Sensor => sensor,
-            Word::Torque if candidate.kind == sensor => Kind::TorqueOffset,
-            _ => continue,
-        };
-        let own = |c: &Candidate| c.kind == name && c.joint == candidate.joint;
-        if let Some(c) = search.library.iter().position(own)
-            && let Some(profile) = search.profile(&with(base, chosen, Some(k)), c, None)?
+        if CONSTANTS.contains(&candidate.kind) {
+            let Some([constant, std]) = constant(&chosen[k]) else {
+                continue;
+            };
+            words[k] = Word::of(zero, constant, std);
+            let name = match words[k] {
+                Word::Sensor => sensor,
+                Word::Torque if candidate.kind == sensor => Kind::TorqueOffset,
+                _ => continue,
+            };
+            if let Some(profile) = in_its_place(name, chosen)? {
+                chosen[k] = profile;
+            }
+        } else if !search.is_described(&candidate)
+            && let Some(rival) = in_its_place(sensor, chosen)?
+            && equal(&chosen[k], &rival)
+            && let Some([constant, std]) = constant(&rival)
         {
-            chosen[k] = profile;
+            words[k] = Word::of(zero, constant, std);
+            if words[k] == Word::Sensor {
+                chosen[k] = rival;
+            }
         }
     }
     Ok(words)
+}
+
+/// The constant torque of one of [`CONSTANTS`], on average, and its standard deviation.
+fn constant(profile: &Profile) -> Option<[f64; 2]> {
+    let column = profile.columns.first()?[profile.candidate.joint].as_ref()?;
+    let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+    let [gain] = profile.evidence.gains.first_chunk()?;
+    let [std] = profile.evidence.stds.first_chunk()?;
+    Some([gain * mean, std * mean.abs()])
 }
 
 impl Word {

@@ -1,0 +1,148 @@
+//! A search for effects on the training data: from the refitted model on, and once more beside gears that it has found.
+
+use crate::diagnose::across::{Across, across, gears, refutes};
+use crate::diagnose::bench::{Bench, Loaded, library};
+use crate::diagnose::outcome::Tried;
+use crate::diagnose::profile::Profile;
+use crate::diagnose::refit::Refit;
+use crate::diagnose::search::{Search, same};
+use crate::diagnose::stated::candidate;
+use crate::diagnose::{DiagnoseError, Options};
+use crate::robot::title_of;
+
+/// How often all else is searched beside gears, whose own shapes it may move.
+const BESIDE_GEARS: usize = 2;
+
+/// What a search has found.
+pub(super) struct Pass<'a> {
+    /// The nominal model, rows counting by what gears leave about them.
+    pub(super) refit: Refit<'a>,
+    /// The library, by the last model.
+    pub(super) search: Search<'a>,
+    /// The effects.
+    pub(super) found: Vec<Profile>,
+    /// All that was tried.
+    pub(super) tried: Vec<Tried>,
+    /// What encoders on the links show.
+    pub(super) across: Vec<Across>,
+}
+
+/// What was tried, and how many sweeps that took.
+#[derive(Default)]
+struct Heard {
+    tried: Vec<Tried>,
+    sweeps: i32,
+}
+
+impl<'a> Pass<'a> {
+    /// Over recordings whose torque has been moved to when it acts.
+    pub(super) fn over(
+        bench: &'a Bench,
+        loaded: &'a Loaded,
+        options: &Options,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, DiagnoseError> {
+        let refit = Refit::of(bench, &loaded.rows)?;
+        let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
+        // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
+        let across = across(
+            &source,
+            &bench.anchor,
+            &refit.before,
+            loaded,
+            None,
+            &bench.position_filter()?,
+            options,
+        )?;
+        let mut library = library(bench.robot, &loaded.runs, &options.without);
+        library.retain(|c| !refutes(&across, c));
+        let mut described = bench.stated.free();
+        described.retain(|placed| !refutes(&across, &candidate(placed)));
+        let mut search = Search::new(
+            source,
+            library,
+            described,
+            crate::prepare::threads(options.threads),
+        );
+        search.measured = gears(&across);
+        let mut heard = Heard::default();
+        let mut further = |refit: &Refit, search: &mut Search<'a>, found| {
+            searched(bench, loaded, refit, search, found, &mut heard, progress)
+        };
+        let mut found = further(&refit, &mut search, None)?;
+        let mut refit = refit;
+        for _ in 0..BESIDE_GEARS {
+            let loud = search.loud(&found);
+            if loud.is_empty() {
+                break;
+            }
+            search.settle_gears(refit.even(), &mut found)?;
+            refit = refit.quieted(&found, &|j| loud.contains(&j));
+            let before = found.clone();
+            found = further(&refit, &mut search, Some(found))?;
+            if same(&before, &found) {
+                break;
+            }
+        }
+        if refit.is_quieted() && search.loud(&found).is_empty() {
+            // The gear was none after all.
+            refit = refit.evened();
+            search.settle_gears(refit.even(), &mut found)?;
+            found = further(&refit, &mut search, Some(found))?;
+        }
+        Ok(Self {
+            refit,
+            search,
+            found,
+            tried: heard.tried,
+            across,
+        })
+    }
+}
+
+/// The effects, beginning with those `found` by then.
+fn searched<'a>(
+    bench: &'a Bench,
+    loaded: &'a Loaded,
+    refit: &Refit,
+    search: &mut Search<'a>,
+    found: Option<Vec<Profile>>,
+    heard: &mut Heard,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Profile>, DiagnoseError> {
+    let trials = search.trials();
+    // Where the effects' columns stand in for nominal ones, these stay as they were.
+    let renew = |chosen: &[Profile]| {
+        let solution = refit.solution(chosen);
+        let coefficients = solution.as_ref().unwrap_or(&refit.before);
+        let nominal = &coefficients.values[..refit.free.len()];
+        let source = bench.source(loaded, &bench.anchor.values(nominal))?;
+        match &solution {
+            Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
+            Err(_) => Ok(source),
+        }
+    };
+    let mut told = |step: usize, profiles: &[Profile]| {
+        heard.sweeps += 1;
+        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(heard.sweeps)));
+        for (k, p) in profiles.iter().enumerate() {
+            heard.tried.push(Tried {
+                effect: title_of(p.candidate.kind),
+                joint: bench.robot.joints[p.candidate.joint].name.clone(),
+                step,
+                gain: p.evidence.gain,
+                gain_sigmas: p.evidence.gain_sigmas,
+                p_value: p.evidence.corrected(trials),
+                refused: match p.refused(trials) {
+                    Some(why) => why,
+                    None if k == 0 => String::new(),
+                    None => "another takes away more".into(),
+                },
+            });
+        }
+    };
+    match found {
+        None => search.run(&refit.base, &renew, &mut told),
+        Some(found) => search.again(&refit.base, found, &renew, &mut told),
+    }
+}
