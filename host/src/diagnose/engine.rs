@@ -203,19 +203,20 @@ fn attempt(
     refuse_guesses(robot, &mut tried, &judged);
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     refuse_guesses(robot, &mut tried, &judged);
+    let mut without = |judged: Judged, k: usize, why: &str| -> Result<Judged, DiagnoseError> {
+        let mut stand = judged.chosen;
+        refuse(robot, &mut tried, &stand.remove(k), why);
+        let judged = judge.judged(search.possible(&refit.base, stand)?)?;
+        refuse_guesses(robot, &mut tried, &judged);
+        Ok(judged)
+    };
     // A name that makes the simulated motion worse stands in for something else.
     while let Some(k) = trial.spoiling(&judged.chosen, search.count_given(&judged.chosen))? {
-        let mut stand = judged.chosen;
         let why = "explains torque, but the simulated motion gets worse with it";
-        refuse(robot, &mut tried, &stand.remove(k), why);
-        judged = judge.judged(search.possible(&refit.base, stand)?)?;
-        refuse_guesses(robot, &mut tried, &judged);
+        judged = without(judged, k, why)?;
     }
     while let Some((k, why)) = unbelieved(&refit, &search, &judge, &judged.chosen)? {
-        let mut stand = judged.chosen;
-        refuse(robot, &mut tried, &stand.remove(k), why);
-        judged = judge.judged(search.possible(&refit.base, stand)?)?;
-        refuse_guesses(robot, &mut tried, &judged);
+        judged = without(judged, k, why)?;
     }
     let said = settled(
         &zeros(&options.sensor_zeros, &windings, robot.joints.len()),

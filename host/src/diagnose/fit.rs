@@ -247,16 +247,14 @@ impl<'a> Fit<'a> {
 
     /// The same, each row by what it counts, with the RMS of [`Fit::rms`] over all that are used.
     pub(super) fn counted(&self, joint: usize) -> Vec<f64> {
-        let mut own = self.residual(joint);
-        if let Some(counts) = &self.counts[joint] {
-            for (r, count) in own.iter_mut().zip(counts.iter()) {
-                *r *= count;
-            }
-            let now = (dot_self(&own) / self.rows.used(joint).max(1) as f64).sqrt();
-            let by = self.rms(joint) / now.max(f64::MIN_POSITIVE);
-            own.iter_mut().for_each(|r| *r *= by);
+        if self.counts[joint].is_none() {
+            return self.residual(joint);
         }
-        own
+        let n = self.rows.count;
+        let own = &self.residual[joint * n..(joint + 1) * n];
+        let now = (dot_self(own) / self.rows.used(joint).max(1) as f64).sqrt();
+        let by = self.rms(joint) / now.max(f64::MIN_POSITIVE);
+        own.iter().map(|r| by * r).collect()
     }
 
     /// What each row of a joint counts beside its others; none where all count alike.

@@ -59,8 +59,8 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// What they do.
     pub(super) evidence: Evidence,
-    /// A shape that has run to the least of what is searched, where a law is its limit of none; a gain that has left what
-    /// physics allows.
+    /// A shape that has run to the least of what is searched, where a law is its limit of none; the swing of a link on a gear
+    /// that hardly lets it; a gain that has left what physics allows.
     pub(super) vanished: Option<&'static str>,
     /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
     pub(super) followed: Option<Followed>,

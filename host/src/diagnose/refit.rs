@@ -74,13 +74,13 @@ impl<'r> Refit<'r> {
     }
 
     /// The same with rows that count by what these effects leave about them, on the joints `loud`.
-    pub(super) fn quieted(self, chosen: &[Profile], loud: &dyn Fn(usize) -> bool) -> Self {
+    pub(super) fn quieted(self, chosen: &[Profile], loud: &[usize]) -> Self {
         let left = with(&self.base, chosen, None);
         let counts = (0..self.joints)
             .map(|j| {
                 let rows = left.rows();
                 let own = || counts(&left.residual(j), &rows.keep[j], &rows.starts, rows.period);
-                loud(j).then(|| Arc::new(own()))
+                loud.contains(&j).then(|| Arc::new(own()))
             })
             .collect();
         let plain = self.plain.counting(counts);

@@ -154,8 +154,8 @@ impl<'a> Search<'a> {
             .sum()
     }
 
-    /// Finds effects one by one, after those of the description, which stand first. `base` holds the nominal columns; `told`
-    /// hears of every sweep and of the number of effects found by then; `renew` gives what columns are formed from once they
+    /// Finds effects one by one, after those of the description, which stand first, or after those `found` with rows that counted
+    /// otherwise. `base` holds the nominal columns; `told` hears of every sweep and of the number of effects found by then; `renew` gives what columns are formed from once they
     /// are in.
     ///
     /// # Errors
@@ -163,37 +163,19 @@ impl<'a> Search<'a> {
     pub(super) fn run(
         &mut self,
         base: &Fit,
+        found: Option<Vec<Profile>>,
         renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
         told: &mut dyn FnMut(usize, &[Profile]),
     ) -> Result<Vec<Profile>, DiagnoseError> {
-        let chosen = self.begun(base, renew)?;
-        self.further(base, chosen, renew, told)
-    }
-
-    /// The same from effects on that were found with other rows counting.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn again(
-        &mut self,
-        base: &Fit,
-        mut chosen: Vec<Profile>,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
-        told: &mut dyn FnMut(usize, &[Profile]),
-    ) -> Result<Vec<Profile>, DiagnoseError> {
-        self.renewed(renew(&chosen)?);
-        self.refine_all(base, &mut chosen)?;
-        self.standing(base, &mut chosen)?;
-        self.further(base, chosen, renew, told)
-    }
-
-    fn further(
-        &mut self,
-        base: &Fit,
-        mut chosen: Vec<Profile>,
-        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
-        told: &mut dyn FnMut(usize, &[Profile]),
-    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let mut chosen = match found {
+            None => self.begun(base, renew)?,
+            Some(mut found) => {
+                self.renewed(renew(&found)?);
+                self.refine_all(base, &mut found)?;
+                self.standing(base, &mut found)?;
+                found
+            }
+        };
         let trials = self.trials();
         let most = chosen.len() + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();

@@ -1,7 +1,5 @@
 //! Many starts, the promising ones to the end.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use nalgebra::DVector;
@@ -19,6 +17,7 @@ use super::optimise::{Round, minimise};
 use super::problem::Problem;
 use super::schedule::JointMotion;
 use super::{Criterion, ExciteError, Options};
+use crate::batch::each_by;
 use crate::robot::Robot;
 use crate::simulate::SimulateError;
 
@@ -72,37 +71,23 @@ fn in_parallel<T: Send>(
     work: impl Fn(usize, &dyn Fn()) -> T + Sync,
     mut tick: impl FnMut(),
 ) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));
     std::thread::scope(|scope| {
         let (send, receive) = mpsc::channel::<()>();
-        for _ in 0..threads.min(count) {
-            let send = send.clone();
-            let (next, results, work) = (&next, &results, &work);
-            scope.spawn(move || {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    if index >= count {
-                        return;
-                    }
-                    // The receiver lives until every sender is gone: sending cannot fail.
-                    let result = work(index, &|| {
-                        let _ = send.send(());
-                    });
-                    if let Ok(mut list) = results.lock() {
-                        list.push((index, result));
-                    }
-                }
-            });
-        }
-        drop(send);
+        let work = &work;
+        let all = scope.spawn(move || {
+            each_by(count, threads, |index| {
+                // The receiver lives until the sender is gone: sending cannot fail.
+                work(index, &|| {
+                    let _ = send.send(());
+                })
+            })
+        });
         for () in receive {
             tick();
         }
-    });
-    let mut list = results.into_inner().unwrap_or_default();
-    list.sort_by_key(|(index, _)| *index);
-    list.into_iter().map(|(_, result)| result).collect()
+        all.join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 /// A random motion within the limits of position, velocity and acceleration.

@@ -149,11 +149,7 @@ fn sparse_regression_names_an_eccentric_gear_first() {
 #[test]
 fn a_constant_that_the_library_lacks_is_not_passed_off_as_a_tilt() {
     let effect = Effect::TorqueOffset { torque: 0.15 };
-    let scenario = Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(vec![Hidden { joint: 0, effect }], 5)
-    };
-    let made = scenario.make().unwrap();
+    let made = Scenario::short([effect], 5).make().unwrap();
     let known = Diagnose.answer(&made, &[]).unwrap();
     assert!(is_right(&known.named[0].effect, "torque_offset"));
     assert!(!known.remainder, "{known:?}");

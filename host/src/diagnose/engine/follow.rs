@@ -16,7 +16,7 @@ use crate::diagnose::columns::{Candidate, Source};
 use crate::diagnose::floor;
 use crate::diagnose::profile::{Followed, Profile};
 use crate::diagnose::refit::Refit;
-use crate::diagnose::search::{Search, is_gear, with};
+use crate::diagnose::search::{Search, with};
 
 /// Rounds in which shapes and everything else are fitted in turn.
 const ROUNDS: usize = 2;
@@ -58,9 +58,9 @@ impl<'a, 'r> Follower<'a, 'r> {
         }
     }
 
-    /// Whether a link behind this gear can be followed: no encoder on it says more.
+    /// Whether the link behind this gear is to be followed.
     fn follows(&self, profile: &Profile) -> bool {
-        is_gear(profile.candidate.kind) && !self.search.is_measured(&profile.candidate)
+        self.search.is_gear_by_torque(&profile.candidate)
     }
 
     /// Effects with the links behind gears followed, which have new shapes; none where there is no such gear. `noise` is what

@@ -77,7 +77,7 @@ impl<'a> Pass<'a> {
                 break;
             }
             search.settle_gears(refit.even(), &mut found)?;
-            refit = refit.quieted(&found, &|j| loud.contains(&j));
+            refit = refit.quieted(&found, &loud);
             let before = found.clone();
             found = further(&refit, &mut search, Some(found))?;
             if same(&before, &found) {
@@ -141,8 +141,5 @@ fn searched<'a>(
             });
         }
     };
-    match found {
-        None => search.run(&refit.base, &renew, &mut told),
-        Some(found) => search.again(&refit.base, found, &renew, &mut told),
-    }
+    search.run(&refit.base, found, &renew, &mut told)
 }

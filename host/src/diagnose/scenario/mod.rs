@@ -321,6 +321,20 @@ pub struct Made {
 }
 
 #[cfg(test)]
+impl Scenario {
+    /// 30 s of training run twice and 20 s of hold-out, with these effects in joint 0.
+    pub(super) fn short(effects: impl IntoIterator<Item = Effect>, seed: u64) -> Self {
+        let hidden = effects
+            .into_iter()
+            .map(|effect| Hidden { joint: 0, effect });
+        Self {
+            seconds: [30.0, 20.0],
+            ..Self::new(hidden.collect(), seed)
+        }
+    }
+}
+
+#[cfg(test)]
 #[allow(clippy::unwrap_used)]
 impl Made {
     /// What a diagnosis makes of these recordings and `robot`, with the repeat where there is one.

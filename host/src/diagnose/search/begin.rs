@@ -35,10 +35,15 @@ impl<'a> Search<'a> {
         self.shapes_of(effect).or(settled)
     }
 
+    /// Whether it is a gear of which the torque alone speaks: no encoder on the link says more.
+    pub(in crate::diagnose) fn is_gear_by_torque(&self, effect: &Candidate) -> bool {
+        is_gear(effect.kind) && !self.is_measured(effect)
+    }
+
     /// Joints on which the torque has shown a gear.
     pub(in crate::diagnose) fn loud(&self, chosen: &[Profile]) -> Vec<usize> {
         (chosen.iter().map(|p| &p.candidate))
-            .filter(|c| is_gear(c.kind) && !self.is_measured(c))
+            .filter(|c| self.is_gear_by_torque(c))
             .map(|c| c.joint)
             .collect()
     }
@@ -59,7 +64,7 @@ impl<'a> Search<'a> {
             let Profile {
                 candidate, shapes, ..
             } = chosen[i];
-            if !is_gear(candidate.kind) || self.is_measured(&candidate) {
+            if !self.is_gear_by_torque(&candidate) {
                 continue;
             }
             let place = self.library.iter().position(|l| *l == candidate);

@@ -5,17 +5,12 @@
 use rig_shared::effects::Kind;
 
 use crate::diagnose::outcome::Verdict;
-use crate::diagnose::scenario::{Effect, Hidden, Scenario};
+use crate::diagnose::scenario::{Effect, Scenario};
 use crate::diagnose::{Diagnosis, Options};
 
 /// What is found beside gears, which are not what is asked; `again`: the training motion recorded twice.
 fn diagnosed(effect: Effect, seed: u64, again: bool) -> (Diagnosis, f64) {
-    let mut made = Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(vec![Hidden { joint: 0, effect }], seed)
-    }
-    .make()
-    .unwrap();
+    let mut made = Scenario::short([effect], seed).make().unwrap();
     let options = Options {
         without: vec![Kind::Backlash, Kind::JointElasticity],
         ..Options::default()
@@ -77,12 +72,7 @@ fn presliding_is_no_delay_besides() {
 #[test]
 fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
     let effect = Effect::TorqueOffset { torque: 0.15 };
-    let made = Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(vec![Hidden { joint: 0, effect }], 101)
-    }
-    .make()
-    .unwrap();
+    let made = Scenario::short([effect], 101).make().unwrap();
     let options = |no_offsets| Options {
         without: vec![Kind::Backlash, Kind::JointElasticity],
         no_offsets,
@@ -105,12 +95,7 @@ fn a_constant_that_a_description_cannot_state_is_fitted_beside_its_friction() {
 
 /// The verdict on the same rig without the constant.
 fn stated_without_a_constant() -> Verdict {
-    let made = Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(Vec::new(), 101)
-    }
-    .make()
-    .unwrap();
+    let made = Scenario::short([], 101).make().unwrap();
     let options = Options {
         without: vec![Kind::Backlash, Kind::JointElasticity],
         ..Options::default()

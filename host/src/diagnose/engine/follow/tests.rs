@@ -8,17 +8,9 @@ use crate::diagnose::bench::library;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Evidence;
 use crate::diagnose::outcome::Verdict;
-use crate::diagnose::scenario::{Effect, Hidden, Scenario};
+use crate::diagnose::scenario::{Effect, Scenario};
 use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
-
-fn scenario(effect: Option<Effect>, seed: u64) -> Scenario {
-    let hidden = effect.map(|effect| Hidden { joint: 0, effect });
-    Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(hidden.into_iter().collect(), seed)
-    }
-}
 
 /// The rig's spring hardens, its friction has memory and its link is pushed at random. Driven by the motor's motion alone the
 /// stiffness comes out 7 to 12 % too soft, with 70 to 86 % of the gap closed.
@@ -28,7 +20,7 @@ fn a_stiff_gear_is_as_stiff_as_it_is() {
         stiffness: 1400.0,
         damping: 0.3,
     };
-    let made = scenario(Some(effect), 401).make().unwrap();
+    let made = Scenario::short([effect], 401).make().unwrap();
     let (diagnosis, model) = made.diagnosed(&made.robot, &Options::default());
     let [step] = diagnosis.steps.as_slice() else {
         unreachable!("{:?}", diagnosis.words)
@@ -70,11 +62,7 @@ fn an_effect_as_large_as_the_noise_is_found_beside_play() {
             phase: 3.75,
         },
     ];
-    let scenario = Scenario {
-        hidden: hidden.map(|effect| Hidden { joint: 0, effect }).into(),
-        ..scenario(None, 811)
-    };
-    let made = scenario.make().unwrap();
+    let made = Scenario::short(hidden, 811).make().unwrap();
     let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
     let [play, cogging] = diagnosis.steps.as_slice() else {
         unreachable!("{:?}", diagnosis.words)
@@ -91,7 +79,7 @@ fn an_effect_as_large_as_the_noise_is_found_beside_play() {
 
 /// RMS of the training residual of a rig without a gear that gives: rigid, and with a made-up gear whose link is followed.
 fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
-    let made = scenario(effect, seed).make().unwrap();
+    let made = Scenario::short(effect, seed).make().unwrap();
     let stated = Stated::of(&made.robot);
     let training: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
     let bench = Bench::of(&stated, &training).unwrap();

@@ -10,19 +10,11 @@ use crate::diagnose::bench::{Bench, library};
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::engine::Follower;
 use crate::diagnose::fit::Evidence;
-use crate::diagnose::outcome::Verdict;
-use crate::diagnose::scenario::{Effect, Hidden, Scenario};
+use crate::diagnose::outcome::{Tried, Verdict};
+use crate::diagnose::scenario::{Effect, Scenario};
 use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
 use rig_shared::effects::{Kind, SHAPES};
-
-fn scenario(effect: Option<Effect>, seed: u64) -> Scenario {
-    let hidden = effect.map(|effect| Hidden { joint: 0, effect });
-    Scenario {
-        seconds: [30.0, 20.0],
-        ..Scenario::new(hidden.into_iter().collect(), seed)
-    }
-}
 
 /// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
 fn said(stiffness: f64, times: f64) -> Option<&'static str> {
@@ -30,7 +22,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
         stiffness: 700.0,
         damping: 0.3,
     };
-    let made = scenario(Some(effect), 5).make().unwrap();
+    let made = Scenario::short([effect], 5).make().unwrap();
     let stated = Stated::of(&made.robot);
     let training: [&dyn Recording; 1] = [&made.train];
     let bench = Bench::of(&stated, &training).unwrap();
@@ -88,10 +80,10 @@ fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_mo
 }
 
 /// Where the rig creeps, its friction lags a little: a link with all friction on it behind a spring of five times critical damping
-/// would explain a tenth of that.
+/// would take a tenth off what that leaves.
 #[test]
 fn a_gear_that_does_not_swing_is_none() {
-    let made = scenario(None, 900).make().unwrap();
+    let made = Scenario::short([], 900).make().unwrap();
     let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
     assert_eq!(
         diagnosis.verdict,
@@ -99,7 +91,7 @@ fn a_gear_that_does_not_swing_is_none() {
         "{:?}",
         diagnosis.words
     );
-    let gear = |t: &&crate::diagnose::outcome::Tried| t.effect.contains("elasticity");
+    let gear = |t: &&Tried| t.effect.contains("elasticity");
     let tried = diagnosis.tried.iter().find(gear).unwrap();
     assert!(tried.refused.contains("swing"), "{tried:?}");
 }
