@@ -113,3 +113,47 @@ fn a_servo_is_diagnosed_by_its_voltage() {
     );
     assert!(sentence.contains("motor voltage"), "{sentence}");
 }
+
+/// With a second recording of the rig with nothing that pulls on it: what is gone there comes from outside, what stays does not.
+#[test]
+fn what_pulls_on_the_joint_is_gone_where_it_is_taken_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |name: &str, constant: f64| {
+        let own = folder.path().join(name);
+        fs::create_dir(&own).unwrap();
+        let state = std::cell::Cell::new(name.len() as u64);
+        let noise = || {
+            let next = (state.get().wrapping_mul(6_364_136_223_846_793_005))
+                .wrapping_add(1_442_695_040_888_963_407);
+            state.set(next);
+            (next >> 40) as f64 / (1u64 << 24) as f64 - 0.5
+        };
+        recording(&own, |q, tau| (q, tau + constant + 0.1 * noise()))
+    };
+    let (pulled, free) = (made("pulled", 0.3), made("free", 0.0));
+    let (own, again) = (made("own", 0.3), made("again twice", 0.3));
+    let diagnose = |data: &Path, free: &Path| {
+        let mut command = rig();
+        (command.args(["diagnose", "--robot"])).arg(robot("one-link.toml"));
+        (command.arg("--data").arg(data))
+            .arg("--pulls-off")
+            .arg(free);
+        command.arg("--out").arg(folder.path().join("out"));
+        command
+    };
+    let name = |data: &Path, free: &Path| {
+        succeed(&mut diagnose(data, free));
+        let text = fs::read_to_string(folder.path().join("out/diagnosis.json")).unwrap();
+        let found: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(found["steps"].as_array().unwrap().len(), 1, "{found}");
+        found["steps"][0]["effect"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(name(&pulled, &free), "torque_offset");
+    assert_ne!(name(&own, &again), "torque_offset");
+    let sentence = refuse(&mut diagnose(&pulled, &pulled));
+    assert!(sentence.contains("given twice"), "{sentence}");
+    let copy = folder.path().join("copy.csv");
+    fs::copy(&pulled, &copy).unwrap();
+    let sentence = refuse(&mut diagnose(&pulled, &copy));
+    assert!(sentence.contains("the same samples"), "{sentence}");
+}

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared};
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
 use super::ui::Ui;
 use crate::data::EffortNeed;
+use crate::diagnose::experiment::FILE;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
 use crate::diagnose::voltage::diagnose_voltage;
-use crate::diagnose::{DiagnoseError, Options, diagnose, sensor_zeros};
+use crate::diagnose::{DiagnoseError, Options, Unburdened, diagnose, sensor_zeros};
 use crate::files::{folder, write_whole};
 use crate::pages::{self, Context};
 use crate::prepare::Recording;
@@ -46,6 +47,10 @@ pub(crate) struct Args {
     /// Recording made with the drive off, where torque is measured by the motor's current: what the sensor reads there is its own
     #[arg(long)]
     drive_off: Option<PathBuf>,
+    /// Recording to learn from of the rig with everything taken off that could pull on its joints (hoses, cables, springs): what
+    /// is gone there comes from outside; may be given several times
+    #[arg(long)]
+    pulls_off: Vec<PathBuf>,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -61,17 +66,24 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
-    refuse_shared(&args.data, &args.holdout)?;
+    let learnt: Vec<PathBuf> = args.data.iter().chain(&args.pulls_off).cloned().collect();
+    refuse_twice(&learnt, "give it once")?;
+    refuse_shared(&learnt, &args.holdout)?;
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
-    if let (Some(path), false) = (&args.drive_off, training.any_effort()) {
+    let special = (args.drive_off.iter().map(|path| ("--drive-off", path)))
+        .chain(args.pulls_off.iter().map(|path| ("--pulls-off", path)));
+    if let (Some((option, path)), false) = (special.into_iter().next(), training.any_effort()) {
         return Err(CommandError::Sentence(format!(
-            "--drive-off {} says nothing where a joint goes by its voltage alone; leave it out, or record tau1 or i1 in motion too.",
+            "{option} {} says nothing where a joint goes by its voltage alone; leave it out, or record tau1 or i1 in motion too.",
             path.display()
         )));
     }
-    for warning in training.warnings().chain(holdout.warnings()) {
-        ui.remark(&warning);
+    let unburdened = Inputs::read(&robot, &args.pulls_off)?;
+    let all = [&training, &unburdened, &holdout];
+    let warnings: Vec<String> = all.iter().flat_map(|inputs| inputs.warnings()).collect();
+    for warning in &warnings {
+        ui.remark(warning);
     }
     let options = Options {
         seed: args.seed,
@@ -80,15 +92,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);
+    let (listened, free) = (training.listened(), unburdened.listened());
+    let free: Vec<Unburdened> = free.iter().map(|recording| Unburdened(recording)).collect();
+    let mut learnt = recordings(&listened);
+    learnt.extend(free.iter().map(|recording| recording as &dyn Recording));
     let (found, model) = workflow(
         &robot,
-        &recordings(&training.listened()),
+        &learnt,
         &recordings(&holdout.listened()),
         &options,
         &mut |share| progress.at((1000.0 * share) as u64),
     )?;
     drop(progress);
-    let heard = [training.heard(), holdout.heard()].concat();
+    let heard: Vec<String> = all.iter().flat_map(|inputs| inputs.heard()).collect();
     for warning in &heard {
         ui.remark(warning);
     }
@@ -97,9 +113,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         command: command_line(),
         identified: Some(("model.toml".into(), text.clone())),
         remarks: Vec::new(),
-        warnings: (training.warnings().chain(holdout.warnings()))
-            .chain(heard)
-            .collect(),
+        warnings: warnings.into_iter().chain(heard).collect(),
     };
     let page = report::render(&pages::diagnosis(&found, &context))?;
     let json = serde_json::to_string_pretty(&found).map_err(|error| {
@@ -107,14 +121,25 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     })?;
     folder(&args.out)?;
     let next = found.next_experiment.as_ref();
-    if let Some((name, motion)) = next.and_then(|n| n.file.as_ref().zip(n.trajectory.as_ref())) {
-        write_whole(&args.out.join(name), motion.as_bytes())?;
+    match next.and_then(|n| n.file.as_ref().zip(n.trajectory.as_ref())) {
+        Some((name, motion)) => write_whole(&args.out.join(name), motion.as_bytes())?,
+        None => forget(&args.out.join(FILE))?,
     }
     write_whole(&args.out.join("model.toml"), text.as_bytes())?;
     write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
     write_whole(&args.out.join("report.html"), page.as_bytes())?;
     print(ui, &found, &args.out);
     Ok(())
+}
+
+/// Takes the motion of an earlier result away, which nobody is to take for one of this.
+fn forget(path: &Path) -> Result<(), CommandError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(CommandError::Sentence(
+            format!("{} cannot be removed: {error}.", path.display()),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// One of the two ways from recordings to a verdict.

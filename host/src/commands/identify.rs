@@ -239,7 +239,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     refuse_shared(&args.data, &args.holdout)?;
-    refuse_twice(&args.data)?;
+    refuse_twice(
+        &args.data,
+        "give it once, with --weight where it is to count more",
+    )?;
     if args.weight.len() > args.data.len() {
         return Err(CommandError::Sentence(format!(
             "--weight is given {} times and --data {} times; each weight belongs to the recording of its place.",

@@ -323,7 +323,7 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
         .find(|held| data.iter().any(|path| real(path) == real(held)))
     {
         Some(path) => Err(CommandError::Sentence(format!(
-            "{} is given as --data and as --holdout; judge by a recording that was not learnt from.",
+            "{} is given to learn from and as --holdout; judge by a recording that was not learnt from.",
             path.display()
         ))),
         None => Ok(()),
@@ -331,11 +331,11 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
 }
 
 /// A recording that is learnt from twice makes every interval too narrow.
-pub(crate) fn refuse_twice(data: &[PathBuf]) -> Result<(), CommandError> {
+pub(crate) fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
     for (k, path) in data.iter().enumerate() {
         if data[..k].iter().any(|before| real(before) == real(path)) {
             return Err(CommandError::Sentence(format!(
-                "{} is given twice as --data, which would count its noise as two recordings'; give it once, with --weight where it is to count more.",
+                "{} is given twice to learn from, which would count its noise as two recordings'; {instead}.",
                 path.display()
             )));
         }

@@ -8,6 +8,7 @@
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::rows::{Column, Nominal, Rows, combined};
+use super::stated::Stated;
 use crate::robot::Robot;
 
 /// A free direction in the space of base parameters: parameters and factors.
@@ -31,8 +32,8 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
-    /// For a robot; `no_offsets` where its description could not state a constant torque.
-    pub(super) fn of(robot: &Robot, nominal: &Nominal, no_offsets: bool) -> Self {
+    /// For a robot whose description states what `stated` has.
+    pub(super) fn of(robot: &Robot, nominal: &Nominal, stated: &Stated) -> Self {
         let n = robot.joints.len();
         let prior = nominal.stated(robot);
         let inertial = robot
@@ -50,13 +51,18 @@ impl Anchor {
                 && robot.joints[0].kind == crate::robot::JointKind::Revolute
         };
         for (k, &c) in nominal.base.columns.iter().enumerate() {
-            let offset = c < n * COLUMNS
-                && c % COLUMNS == column::OFFSET
-                && robot.joints[c / COLUMNS].friction.is_some();
-            if offset && no_offsets {
+            let friction = robot
+                .joints
+                .get(c / COLUMNS)
+                .and_then(|j| j.friction.as_ref());
+            let offset = friction.filter(|_| c < n * COLUMNS && c % COLUMNS == column::OFFSET);
+            if offset.is_some() && stated.no_offsets {
                 unstated.push(k);
                 free.push(vec![(k, 1.0)]);
-            } else if offset {
+            } else if offset.is_some_and(|f| f.offset != 0.0 && stated.pulls_told) {
+                // Part of it, or all, may come from outside.
+                free.push(vec![(k, 1.0)]);
+            } else if offset.is_some() {
                 held.push(k);
             } else if of_gravity(c) {
                 held.push(k);
@@ -94,6 +100,12 @@ impl Anchor {
     /// Whether a free direction is a constant torque that the description could not state.
     pub(super) fn is_unstated(&self, direction: usize) -> bool {
         matches!(self.free[direction].as_slice(), [(k, _)] if self.unstated.contains(k))
+    }
+
+    /// Whether the constant torque of a joint is held.
+    pub(super) fn holds_constant(&self, joint: usize, nominal: &Nominal) -> bool {
+        let own = joint * COLUMNS + column::OFFSET;
+        self.held.iter().any(|&k| nominal.base.columns[k] == own)
     }
 
     /// Columns of the free directions.

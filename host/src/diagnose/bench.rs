@@ -36,8 +36,8 @@ pub(super) struct Bench<'a> {
     pub(super) robot: &'a Robot,
     /// The effects that it was given with.
     pub(super) stated: &'a Stated,
-    /// What recordings are freed of.
-    held: Option<(Effects, Chain<f64>)>,
+    /// What recordings are freed of, and those of the rig with nothing that pulls on it.
+    held: [Option<(Effects, Chain<f64>)>; 2],
     /// Its base parameters.
     pub(super) nominal: Nominal,
     /// Which of them are free.
@@ -56,11 +56,11 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, DiagnoseError> {
         let robot = &stated.robot;
         let nominal = Nominal::of(robot)?;
-        let anchor = Anchor::of(robot, &nominal, stated.no_offsets);
+        let anchor = Anchor::of(robot, &nominal, stated);
         Ok(Self {
             robot,
             stated,
-            held: stated.taken_off()?,
+            held: [stated.taken_off(false)?, stated.taken_off(true)?],
             anchor,
             nominal,
             treatment: treatment_of(training, robot)?,
@@ -76,7 +76,7 @@ impl<'a> Bench<'a> {
         let mut runs = Vec::new();
         for (k, &recording) in recordings.iter().enumerate() {
             let rate = self.treatment.sample_rate;
-            runs.extend(match &self.held {
+            runs.extend(match &self.held[usize::from(recording.unburdened())] {
                 Some((effects, chain)) => {
                     let freed =
                         Compensated::new(recording, effects, chain, &self.treatment, false)?;

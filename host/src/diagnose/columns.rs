@@ -10,6 +10,7 @@ use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 use super::DiagnoseError;
 use super::predicted::Predicted;
 use super::profile::Profile;
+use super::pull;
 use super::rows::{Column, Nominal, Thinning};
 use super::runs::Run;
 use super::search::is_gear;
@@ -272,6 +273,10 @@ impl Source<'_> {
         }
         let (run, predicted) = (&self.runs[r], &self.predicted[r]);
         let gains = self.gains(candidate.kind).len();
+        if pull::is_gone(candidate.kind, run) {
+            let nothing = vec![own(vec![0.0; run.len()]); gains];
+            return Ok(vec![nothing; shapes.len()]);
+        }
         let of_one = |shapes: &[f64; SHAPES]| match (candidate.kind, candidate.kind.about().channel)
         {
             (Kind::MeasurementDelay, _) => {

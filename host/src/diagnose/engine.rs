@@ -26,7 +26,7 @@ use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Verdict};
 use super::profile::Profile;
 use super::refit::{Refit, open};
-use super::runs::in_sessions;
+use super::runs::{Run, copies, in_sessions};
 use super::sanity::{faults, too_short_to_learn};
 use super::search::with;
 use super::sentences::offsets;
@@ -54,8 +54,12 @@ pub fn diagnose(
         return Err(DiagnoseError::NoRecording);
     }
     let mut stated = Stated::of(robot);
-    // What the sensors read with the drive off gives a constant its name: then it is searched for.
-    stated.no_offsets = options.no_offsets && options.sensor_zeros.is_empty();
+    // What the sensors read with the drive off gives a constant its name, and so does what is gone with all that pulled on the
+    // rig: then it is searched for.
+    let unburdened = training.iter().filter(|r| r.unburdened()).count();
+    stated.pulls_told = (1..training.len()).contains(&unburdened);
+    let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
+    stated.no_offsets = options.no_offsets && !told;
     loop {
         // Each time around more of the description's effects are held.
         match attempt(robot, &stated, training, holdout, options, progress) {
@@ -97,6 +101,15 @@ fn attempt(
     in_sessions(&mut loaded.runs, &[]);
     if let Some(sealed) = &mut sealed {
         in_sessions(&mut sealed.runs, &loaded.runs);
+    }
+    {
+        let all: Vec<&Run> = (loaded.runs.iter())
+            .chain(sealed.iter().flat_map(|sealed| &sealed.runs))
+            .collect();
+        if let Some((a, b)) = copies(&all) {
+            let [label, again] = [a, b].map(|k| all[k].label.clone());
+            return Err(DiagnoseError::Copy { label, again });
+        }
     }
     let mut wrong = faults(&stated.robot, &loaded.runs)?;
     if wrong.is_empty() {

@@ -18,7 +18,11 @@ pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for a in 0..runs.len() {
         for b in a + 1..runs.len() {
-            if runs[a].recording != runs[b].recording && alike(&runs[a], &runs[b]) {
+            let (a_run, b_run) = (&runs[a], &runs[b]);
+            // What pulls on one and not on the other is no noise.
+            let comparable =
+                a_run.recording != b_run.recording && a_run.unburdened == b_run.unburdened;
+            if comparable && alike(a_run, b_run) {
                 pairs.push((a, b));
             }
         }

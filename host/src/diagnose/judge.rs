@@ -11,11 +11,12 @@ use super::locate::{Coordinate, locate};
 use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
+use super::pull;
 use super::rows::{Rows, combined};
 use super::runs::Run;
 use super::search::{Search, is_gear, shadow, with};
 use super::testable;
-use crate::report::{format_significant, format_unit};
+use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::{Joint, Robot};
 
 /// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
@@ -46,6 +47,8 @@ const SHARE_LEFT: f64 = 0.1;
 const AS_GOOD: f64 = 0.9;
 /// Standard deviation of a torque that counts as constant, as a share of its mean.
 const VARIES: f64 = 0.2;
+/// Standard deviations from which on a change between recordings is certain.
+const CERTAIN: f64 = 5.0;
 /// Standard deviations of a paired difference between blocks.
 const NO_DIFFERENCE: f64 = 2.5;
 
@@ -174,7 +177,8 @@ impl Judge<'_, '_> {
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
         let doubted = || (0..quiet.len()).find_map(|j| self.doubt(&fit, &chosen, j, quiet[j]));
         Judged {
-            left: left
+            left: ((0..quiet.len()).find_map(|j| self.changed_besides(&fit, j)))
+                .or(left)
                 .or_else(doubted)
                 .or_else(|| (0..floors.len()).find_map(|j| self.unproven(&fit, &chosen, j))),
             guesses: Vec::new(),
@@ -271,6 +275,29 @@ impl Judge<'_, '_> {
             text,
             places,
             doubt: false,
+        })
+    }
+
+    /// What differs between the recordings with all that pulls on a joint and those without, where no effect explains it.
+    fn changed_besides(&self, fit: &Fit, joint: usize) -> Option<Remainder> {
+        let rows = self.rows;
+        let runs = self.search.source.runs;
+        let residual = fit.residual(joint);
+        let keep = &rows.keep[joint];
+        let [step, std] = pull::step(&residual, keep, &rows.starts, rows.period, runs)?;
+        let rms = fit.even_rms(joint);
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
+        (step.abs() > CERTAIN * std && step.abs() > QUARTER * rms).then(|| Remainder {
+            joint: name.clone(),
+            rms: 0.5 * step.abs(),
+            ratio: rms / (rms * rms - 0.25 * step * step).max(0.0).sqrt().max(0.1 * rms),
+            text: format!(
+                "Of joint {name} {} {} more are left on average in the recordings with everything taken off that pulls on it than in the others, and no effect explains that: more than that has changed in between, or the recordings stand in each other's place.",
+                format_value(step, std),
+                format_unit(kind.units().1),
+            ),
+            places: Vec::new(),
+            doubt: true,
         })
     }
 
@@ -445,8 +472,9 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
             continue;
         }
         if equal(own, rival) {
-            // With no stiffness a spring is every constant, and no motion would ever tell it from one.
-            if rival.candidate.kind == Kind::Spring && is_constant(own) && is_constant(rival) {
+            // A spring holds every constant: where it takes away no more, nothing asks for its stiffness.
+            let more = rival.evidence.gain > own.evidence.gain;
+            if rival.candidate.kind == Kind::Spring && is_constant(own) && !more {
                 continue;
             }
             names.push(name.to_owned());
@@ -459,13 +487,15 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
     step.set = names;
 }
 
-/// Whether an effect's torque on its joint is one constant, as found, but for [`VARIES`] of it.
+/// Whether an effect's torque on its joint is one constant, as found, but for [`VARIES`] of it and where it is gone.
 fn is_constant(profile: &Profile) -> bool {
     let joint = profile.candidate.joint;
     let terms = profile.columns.iter().zip(&profile.evidence.gains);
-    let Some(torque) = combined(joint + 1, terms.map(|(c, g)| (c, *g))).swap_remove(joint) else {
+    let Some(mut torque) = combined(joint + 1, terms.map(|(c, g)| (c, *g))).swap_remove(joint)
+    else {
         return false;
     };
+    torque.retain(|t| *t != 0.0);
     let count = torque.len().max(1) as f64;
     let mean = torque.iter().sum::<f64>() / count;
     let variance = torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / count;

@@ -7,7 +7,7 @@ use rig_shared::effects::{Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::columns::Candidate;
-use super::experiment::{self, Nominal};
+use super::experiment::{self, Held, Nominal};
 use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
@@ -196,17 +196,22 @@ pub(super) fn next(
             continue;
         };
         let fit = with(found.base, found.chosen, Some(found.described + k));
-        let mut list: Vec<(Effect<f64>, Nominal)> = vec![(effect(profile), nominal)];
+        let mut list: Vec<(Effect<f64>, Nominal)> = vec![(effect(profile, &nominal), nominal)];
         for name in step.set.iter().filter(|name| **name != step.effect) {
             let of_name = |c: &Candidate| c.joint == joint && c.kind.about().name == *name;
             let Some(c) = found.search.library.iter().position(of_name) else {
                 continue;
             };
             if let Some(rival) = found.search.profile(&fit, c, None)? {
-                list.push((effect(&rival), nominal));
+                list.push((effect(&rival, &nominal), nominal));
             }
         }
-        if let Some(proposal) = experiment::next(found.robot, joint, &list, found.floors[joint])? {
+        let held = Held {
+            gravity: found.anchor.gravity_held,
+            constant: found.anchor.holds_constant(joint, found.nominal),
+        };
+        let floor = found.floors[joint];
+        if let Some(proposal) = experiment::next(found.robot, joint, &list, held, floor)? {
             return Ok(Some(NextExperiment {
                 trajectory: proposal.trajectory.map(|t| t.to_toml(found.robot)),
                 ..proposal.experiment
@@ -231,12 +236,16 @@ pub(super) fn next(
         }))
 }
 
-fn effect(profile: &Profile) -> Effect<f64> {
-    Effect::new(
-        profile.candidate.kind,
-        &profile.evidence.gains,
-        &profile.shapes,
-    )
+/// An effect with its estimate. What is fitted of a tilt is an angle, which turns gravity's torque.
+fn effect(profile: &Profile, nominal: &Nominal) -> Effect<f64> {
+    let (kind, gains) = (profile.candidate.kind, &profile.evidence.gains);
+    match (kind, gains.as_slice()) {
+        (Kind::GravityTilt, [angle, ..]) => {
+            let [_, cosine, sine, ..] = nominal;
+            Effect::new(kind, &[angle * sine, -angle * cosine], &[])
+        }
+        _ => Effect::new(kind, gains, &profile.shapes),
+    }
 }
 
 /// Parameters of a joint while the others stand in the middle of their ranges; none for a description without dynamics.

@@ -30,6 +30,7 @@ pub mod outcome;
 mod pictures;
 mod predicted;
 mod profile;
+mod pull;
 mod quiet;
 mod refit;
 mod rows;
@@ -51,6 +52,7 @@ mod winding;
 pub use drive_off::sensor_zeros;
 pub use engine::diagnose;
 pub use outcome::Diagnosis;
+pub use pull::Unburdened;
 pub use runs::{JointRun, Run};
 
 use rig_shared::effects::Kind;
@@ -94,6 +96,16 @@ pub enum DiagnoseError {
         label: String,
         /// Why, a clause.
         what: String,
+    },
+    /// A recording given twice, under two names.
+    #[error(
+        "{again} holds the same samples as {label}: a copy says nothing of the noise, and is no motion that was not learnt from; give it once."
+    )]
+    Copy {
+        /// Name of the first.
+        label: String,
+        /// Name of the second.
+        again: String,
     },
     /// A recording without a voltage.
     #[error(

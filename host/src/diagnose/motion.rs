@@ -15,6 +15,7 @@ use super::DiagnoseError;
 use super::bench::{Bench, Loaded};
 use super::model::with_effects;
 use super::profile::Profile;
+use super::pull;
 use super::refit::Refit;
 use super::runs::Run;
 use crate::robot::{Controller, Robot, title_of};
@@ -154,11 +155,20 @@ impl<'a> Replay<'a> {
         let Some(controller) = &self.controller else {
             return Err(self.how.clone());
         };
-        let model = Model::from_robot(robot).map_err(|e| e.to_string())?;
+        let mut alone = robot.clone();
+        (alone.effects).retain(|e| !pull::is_outside(e.effect.kind));
+        let of = |robot: &Robot| Model::from_robot(robot).map_err(|e| e.to_string());
+        let (model, unburdened) = (of(robot)?, of(&alone)?);
         if let Some(what) = model.effects.unsimulated().into_iter().next() {
             return Err(what);
         }
-        let one = |run: &Run| replayed(robot, &model, controller, run);
+        let one = |run: &Run| {
+            if run.unburdened {
+                replayed(&alone, &unburdened, controller, run)
+            } else {
+                replayed(robot, &model, controller, run)
+            }
+        };
         let all: Result<_, SimulateError> = self.runs.iter().map(one).collect();
         all.map_err(|e| e.to_string())
     }

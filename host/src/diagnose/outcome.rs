@@ -199,7 +199,7 @@ pub struct NextExperiment {
     pub separates: Vec<String>,
     /// What to do, sentences.
     pub text: String,
-    /// File for `rig` to run, beside `diagnosis.json`; none where hands are needed instead.
+    /// File for `rig` to run, beside `diagnosis.json`; none where there is no motion for it.
     pub file: Option<String>,
     /// Distance of the rivals' predictions in standard deviations of the noise, expected.
     pub separation: Option<f64>,

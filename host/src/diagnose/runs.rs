@@ -55,6 +55,8 @@ pub struct Run {
     pub t: Vec<f64>,
     /// Joint by joint.
     pub joints: Vec<JointRun>,
+    /// Whether everything that could pull on the joints from outside had been taken off.
+    pub unburdened: bool,
 }
 
 impl JointRun {
@@ -77,6 +79,18 @@ impl Run {
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
+}
+
+/// Two recordings that hold the same samples of position and effort, by their places among those given.
+pub(super) fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
+    let same = |a: &Run, b: &Run| {
+        a.len() == b.len()
+            && (a.joints.iter().zip(&b.joints)).all(|(a, b)| a.q_raw == b.q_raw && a.tau == b.tau)
+    };
+    (0..runs.len()).find_map(|b| {
+        let first = (0..b).find(|&a| !runs[b].is_empty() && same(runs[a], runs[b]))?;
+        Some((first, b))
+    })
 }
 
 /// The least step between two positions of a joint as recorded, rad or m: of an encoder a count, of a filtered position hardly
@@ -130,6 +144,7 @@ pub fn runs_of(
     position: &LowPass,
 ) -> Result<Vec<Run>, DiagnoseError> {
     let mut gathered = Gathered::new(&recording.label(), number, rate);
+    gathered.empty.unburdened = recording.unburdened();
     recording.each_block(65_536, &mut |block| {
         gathered.push(block);
         Ok(())

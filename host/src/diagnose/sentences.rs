@@ -8,6 +8,7 @@ use super::finish::Found;
 use super::floor::repeats;
 use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
 use super::profile::Profile;
+use super::pull;
 use super::solve::Solution;
 use super::transmission::STRETCH;
 use crate::report::{format_significant, format_unit, format_value};
@@ -291,8 +292,15 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     } else {
         String::new()
     };
+    let gone = if pull::is_outside(profile.candidate.kind)
+        && pull::told_apart(found.search.source.runs)
+    {
+        " It is not there once everything is taken off that pulls on the joint, by the recordings given with --pulls-off; what of a constant is left there is the rig's own, or that of something left on."
+    } else {
+        ""
+    };
     format!(
-        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{runner}{followed}",
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{runner}{followed}",
         percent(e.gain),
         format_significant(e.gain_sigmas, 2)
     )

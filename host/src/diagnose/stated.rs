@@ -16,6 +16,7 @@ use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::outcome::{Described, Fate, Value};
 use super::profile::Profile;
+use super::pull;
 use super::search::{is_gear, with};
 use crate::effects::{Effects, is_torque};
 use crate::report::format_significant;
@@ -60,6 +61,8 @@ pub(super) struct Stated {
     pub(super) robot: Robot,
     /// Whether its format has no place for a constant torque.
     pub(super) no_offsets: bool,
+    /// Whether the recordings tell which part of a stated constant torque comes from outside.
+    pub(super) pulls_told: bool,
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
@@ -88,6 +91,7 @@ impl Stated {
         Self {
             robot: plain,
             no_offsets: false,
+            pulls_told: false,
             effects,
         }
     }
@@ -119,13 +123,18 @@ impl Stated {
             .any(|(_, placed, _)| is_one(placed, effect))
     }
 
-    /// What recordings are freed of; none where nothing is held.
+    /// What recordings are freed of, those of the rig with nothing that pulls on it where `unburdened`; none where nothing is
+    /// held.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] on a description that makes no chain.
-    pub(super) fn taken_off(&self) -> Result<Option<(Effects, Chain<f64>)>, DiagnoseError> {
+    pub(super) fn taken_off(
+        &self,
+        unburdened: bool,
+    ) -> Result<Option<(Effects, Chain<f64>)>, DiagnoseError> {
         let mut robot = self.robot.clone();
-        robot.effects = self.held().cloned().collect();
+        let there = |e: &&RobotEffect| !(unburdened && pull::is_outside(e.effect.kind));
+        robot.effects = self.held().filter(there).cloned().collect();
         if robot.effects.is_empty() {
             return Ok(None);
         }

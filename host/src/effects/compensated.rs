@@ -94,6 +94,10 @@ impl Recording for Compensated<'_> {
         self.inner.passed(share);
     }
 
+    fn unburdened(&self) -> bool {
+        self.inner.unburdened()
+    }
+
     fn each_block(
         &self,
         rows: usize,

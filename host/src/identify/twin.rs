@@ -37,6 +37,10 @@ impl Recording for Doubled<'_> {
         self.inner.label()
     }
 
+    fn unburdened(&self) -> bool {
+        self.inner.unburdened()
+    }
+
     fn each_block(
         &self,
         rows: usize,

@@ -17,6 +17,10 @@ pub trait Recording {
     fn passed(&self, share: f64) {
         let _ = share;
     }
+    /// Whether everything that could pull on the joints from outside had been taken off.
+    fn unburdened(&self) -> bool {
+        false
+    }
 }
 
 /// The first rows of a recording, at most `rows`, as far as they follow without a gap; none where it has none. What comes

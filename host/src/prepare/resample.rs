@@ -184,6 +184,10 @@ impl Recording for Resampled<'_> {
         self.source.label()
     }
 
+    fn unburdened(&self) -> bool {
+        self.source.unburdened()
+    }
+
     fn each_block(
         &self,
         rows: usize,

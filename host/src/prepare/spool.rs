@@ -39,6 +39,10 @@ impl Recording for Spooled<'_> {
         self.source.label()
     }
 
+    fn unburdened(&self) -> bool {
+        self.source.unburdened()
+    }
+
     fn each_block(
         &self,
         rows: usize,
@@ -117,6 +121,10 @@ struct Even<'a>(&'a Spooled<'a>);
 impl Recording for Even<'_> {
     fn label(&self) -> String {
         self.0.label()
+    }
+
+    fn unburdened(&self) -> bool {
+        self.0.unburdened()
     }
     fn each_block(
         &self,

@@ -6,6 +6,7 @@ use rig_shared::effects::Kind;
 use serde::Serialize;
 
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::experiment::PULLS_OFF;
 use crate::diagnose::outcome::{Diagnosis, Value, Verdict};
 use crate::diagnose::scenario::Made;
 
@@ -44,7 +45,7 @@ pub struct Proposed {
     pub kind: String,
     /// Names that it is to separate.
     pub separates: Vec<String>,
-    /// The motion, where the rig can run it with nothing changed by hand; a [`crate::excite::TrajectoryFile`].
+    /// The motion, where the rig can run it as it is, or with what pulls on it taken off; a [`crate::excite::TrajectoryFile`].
     #[serde(skip)]
     pub trajectory: Option<String>,
 }
@@ -71,13 +72,6 @@ impl Method for Diagnose {
     }
 
     fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, DiagnoseError> {
-        let mut training: Vec<&dyn crate::prepare::Recording> = vec![&made.train];
-        if let Some(repeat) = &made.repeat {
-            training.push(repeat);
-        }
-        for more in &made.further {
-            training.push(more);
-        }
         let options = crate::diagnose::Options {
             without: without.to_vec(),
             threads: 1,
@@ -88,13 +82,7 @@ impl Method for Diagnose {
                 .unwrap_or_default(),
             no_offsets: false,
         };
-        let (diagnosis, _) = crate::diagnose::diagnose(
-            &made.robot,
-            &training,
-            &[&made.holdout],
-            &options,
-            &mut |_| {},
-        )?;
+        let (diagnosis, _) = made.diagnose(&made.robot, &options)?;
         Ok(Answer::of(&diagnosis))
     }
 }
@@ -122,7 +110,8 @@ impl Answer {
             next: diagnosis.next_experiment.as_ref().map(|next| Proposed {
                 kind: next.kind.clone(),
                 separates: next.separates.clone(),
-                trajectory: next.trajectory.clone().filter(|_| !next.hands),
+                trajectory: (next.trajectory.clone())
+                    .filter(|_| !next.hands || next.kind == PULLS_OFF),
             }),
         }
     }

@@ -7,14 +7,15 @@ use serde::Serialize;
 use super::answer::{Answer, Method};
 use super::cases::Case;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::experiment::{FILE, OFF_LOG};
+use crate::diagnose::experiment::{FILE, OFF_LOG, PULLS_OFF};
 use crate::diagnose::scenario::Made;
 use crate::excite::TrajectoryFile;
 
 /// What came of a proposed experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Followed {
-    /// What is said with its recording beside the others; none where it asks for hands or has failed.
+    /// What is said with its recording beside the others; none where it asks for more than to take off what pulls on the rig, or
+    /// has failed.
     pub answer: Option<Answer>,
     /// Why it has failed.
     pub failure: Option<String>,
@@ -37,6 +38,7 @@ pub(super) fn follow(
         failure: None,
     };
     let more = match &next.trajectory {
+        Some(trajectory) if next.kind == PULLS_OFF => Some(unburdened(case, made, trajectory)),
         Some(trajectory) => Some(moved(case, made, trajectory)),
         None if next.kind == OFF_LOG => Some(at_rest(case, made)),
         None => None,
@@ -51,11 +53,22 @@ pub(super) fn follow(
 
 /// The recordings with that of the proposed motion.
 fn moved(case: &Case, made: &Made, trajectory: &str) -> Result<Made, DiagnoseError> {
-    let file = TrajectoryFile::from_toml(trajectory, Path::new(FILE))
-        .map_err(|error| DiagnoseError::Scenario(error.to_string()))?;
     let mut more = made.clone();
-    more.further.push(case.scenario.proposed(made, &file)?);
+    (more.further).push(case.scenario.proposed(made, &file(trajectory)?)?);
     Ok(more)
+}
+
+/// The recordings with that of the proposed motion of the rig with what pulls on it taken off.
+fn unburdened(case: &Case, made: &Made, trajectory: &str) -> Result<Made, DiagnoseError> {
+    let mut more = made.clone();
+    let scenario = case.scenario.unburdened();
+    (more.unburdened).push(scenario.proposed(made, &file(trajectory)?)?);
+    Ok(more)
+}
+
+fn file(trajectory: &str) -> Result<TrajectoryFile, DiagnoseError> {
+    TrajectoryFile::from_toml(trajectory, Path::new(FILE))
+        .map_err(|error| DiagnoseError::Scenario(error.to_string()))
 }
 
 /// The recordings with that of the drive off.

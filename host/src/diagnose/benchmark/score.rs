@@ -125,14 +125,11 @@ impl Outcome {
         self.followed.as_ref().filter(|_| held)
     }
 
-    /// Whether the experiment that the rig could run has left the hidden effect alone in the first set.
+    /// Whether the experiment has left the hidden effect alone in the first set.
     fn separated(&self) -> Option<bool> {
         let truth = self.truth().first().copied()?;
         let after = self.experiment()?.answer.as_ref()?;
-        Some(
-            (after.named.first())
-                .is_some_and(|first| first.set.iter().all(|name| is_right(name, truth))),
-        )
+        Some((after.named.first()).is_some_and(|first| first.set == [truth]))
     }
 
     /// Whether it is one effect with partners that its recording cannot tell from it, and all of them were returned as the
@@ -176,7 +173,8 @@ pub struct Score {
     pub remainder_flagged: Proportion,
     /// One of an exactly confounded set: the whole set is returned.
     pub set_returned: Proportion,
-    /// A first set with the hidden effect in it, an experiment proposed: the rig runs it with nothing changed by hand.
+    /// A first set with the hidden effect in it, an experiment proposed: the rig runs it as it is, or with what pulls on it taken
+    /// off.
     pub experiment_runs: Proportion,
     /// Of these: the hidden effect is left alone with its recording.
     pub set_separated: Proportion,

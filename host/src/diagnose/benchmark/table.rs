@@ -79,7 +79,7 @@ pub fn markdown(scores: &[Score]) -> String {
         &p(|s| s.set_returned),
     );
     row(
-        "open name with the hidden effect in its set: the rig can run the experiment proposed by itself",
+        "open name with the hidden effect in its set: the rig runs the experiment proposed, as it is or with what pulls on it taken off",
         "",
         &p(|s| s.experiment_runs),
     );

@@ -16,11 +16,23 @@ const MOST: usize = 4000;
 /// Values tried of each of the rival's shapes.
 const STEPS: usize = 12;
 
+/// What of a joint's standard model a refit leaves as the description states it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Held {
+    /// The direction of gravity.
+    pub gravity: bool,
+    /// The constant torque.
+    pub constant: bool,
+}
+
 /// A motion as instants, pass after pass.
 pub(super) struct Course {
     instants: Vec<Vec<Instant<f64>>>,
     /// Independent values that one row stands for.
     weight: f64,
+    pub(super) held: Held,
+    /// Gravity's torque with cos q and with sin q as described, of length 1.
+    gravity: [f64; 2],
 }
 
 /// Whether an effect's torque along a given motion can be written down.
@@ -33,6 +45,8 @@ pub(super) fn predictable(kind: Kind) -> bool {
 
 impl Course {
     pub(super) fn of(place: &Place, primitive: &Primitive) -> Self {
+        let [_, cosine, sine, ..] = place.nominal;
+        let length = cosine.hypot(sine);
         let duration = primitive.trajectory.duration();
         let rows = (duration * FLOOR_RATE).ceil().clamp(1.0, MOST as f64) as usize;
         let period = duration / rows as f64;
@@ -78,6 +92,11 @@ impl Course {
         Self {
             instants: instants.collect(),
             weight: period * FLOOR_RATE,
+            held: Held {
+                gravity: place.held.gravity && length > 0.0,
+                ..place.held
+            },
+            gravity: [cosine, sine].map(|part| part / length.max(f64::MIN_POSITIVE)),
         }
     }
 
@@ -92,7 +111,8 @@ impl Course {
         .collect()
     }
 
-    /// What the standard model can take up: its columns, those of the load once a pass.
+    /// What the standard model can take up: its columns, those of the load once a pass. What is changed by hand changes
+    /// gravity's direction as well.
     fn nominal(&self, rows: &[(usize, usize)], revolute: bool) -> DMatrix<f64> {
         let passes = self.instants.len();
         let own = if revolute { 3 } else { 1 };
@@ -103,12 +123,18 @@ impl Course {
             x[(r, own * p)] = at.acceleration;
             if revolute {
                 let (sine, cosine) = at.position.sin_cos();
-                x[(r, own * p + 1)] = cosine;
-                x[(r, own * p + 2)] = sine;
+                if self.held.gravity && *p == 0 {
+                    x[(r, own * p + 1)] = self.gravity[0] * cosine + self.gravity[1] * sine;
+                } else {
+                    x[(r, own * p + 1)] = cosine;
+                    x[(r, own * p + 2)] = sine;
+                }
             }
             x[(r, friction)] = at.velocity;
             x[(r, friction + 1)] = at.direction;
-            x[(r, friction + 2)] = 1.0;
+            if !self.held.constant {
+                x[(r, friction + 2)] = 1.0;
+            }
         }
         x
     }

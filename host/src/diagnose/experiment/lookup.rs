@@ -19,17 +19,19 @@ pub(super) struct Split {
 
 /// What the log with the drive off is called in results.
 pub const OFF_LOG: &str = "drive-off-log";
+/// … and a motion with everything taken off that pulls on the joint.
+pub const PULLS_OFF: &str = "pulls-taken-off";
 
 const DRIVE_OFF: &str = "Record two seconds with the drive off (`rig record` without a trajectory leaves the rig disarmed) and give them with --drive-off. The mean of tau{k} (or i{k}) there is the sensor's own offset, because no current flows: about the size in question, it is current_offset; about zero, it is not. With u{k} recorded in motion the same shows as R times the offset between the voltage and what current and speed account for.";
-const TAKE_OFF: &str = "Take off what can pull on the joint (hoses, cables, a counterweight) or fix the link to its shaft half a turn further, and run the same motion again; record t, q{k} and tau{k}. A torque from outside goes or changes with it, friction that differs by direction stays. No motion alone tells the two apart: while the joint moves both are the same constant, and at rest they widen the same band.";
-const TURNED: &str = "Run the motion twice: as the robot stands, and with its base turned by 180 degrees about the vertical or, better, laid on its side so that gravity does nothing. Record t, q{k} and tau{k} each time and give both recordings. What belongs to gravity changes with the base; what belongs to the encoder, the gear or a cable stays.";
+const TAKE_OFF: &str = "Take off whatever can pull on the joint from outside (hoses, cables, springs), run the motion again with the same columns recorded, and give that recording with --pulls-off. A torque from outside is gone there, friction that differs by direction stays; where there was nothing to take off, that settles it as well. No motion alone tells the two apart: while the joint moves both are the same constant, and at rest they widen the same band.";
+const TURNED: &str = "Run the motion twice: as the robot stands, and with its base turned by 180 degrees about the vertical or, better, laid on its side so that gravity does nothing. Record t, q{k} and tau{k} each time and diagnose each by itself, the second with `gravity` in its description as it then acts on the base. What belongs to gravity changes with the base; what belongs to the encoder, the gear or a cable stays.";
 const GRAVITY_CLOSES: &str = "Run the reversals where gravity is strongest, and again about a position where it does nothing; record t, q{k} and tau{k}. Gravity keeps the teeth together, so lost motion from backlash shows at the second place only; what winds up by friction or twist shows at both. A second encoder on the link (ql{k}) shows it directly.";
 const FAST_AND_SLOW: &str = "Run the sine, and again at a third of its speed; record t, q{k} and tau{k}. An error of the encoder or of the timing grows with the square of the speed, inertia included; a torque of gear, gravity or cable stays the same at both.";
 const BEYOND_RESONANCE: &str = "Run the chirp, and again at a third of its amplitude; record t, q{k} and tau{k} at 500 Hz or more. A delay goes on turning the phase in proportion to the frequency; a twisting shaft has an antiresonance, which a payload moves to lower frequency; play changes with the amplitude.";
 const CURRENT_TOO: &str = "Record the motor's current i{k} beside its voltage u{k} during the reversals; with the shaft locked by hand or clamp, a few steps of the voltage each way do as well. What the bridge loses stands between voltage and current; friction stands in the current itself.";
 const ONE_AT_A_TIME: &str = "Run the motion of this joint alone, the others held, then that of the other joint alone, then both together; record t, q and tau of all joints. A coupling shows in this joint while only the other one moves; what belongs to this joint alone does not.";
 const LIFT: &str = "Run the sine at full speed; record t, q{k} and tau{k}, and give a description identified before the change as --robot. A payload adds inertia in a fixed proportion to its weight, a tilt adds none.";
-const TWO_LOADS: &str = "Run the constant speeds twice: as the robot is, and with a payload of about half the link's mass; record t, q{k} and tau{k} and give both recordings. What belongs to load or current grows with it, what belongs to the position or the magnets stays.";
+const TWO_LOADS: &str = "Run the constant speeds twice: as the robot is, and with a payload of about half the link's mass; record t, q{k} and tau{k} and diagnose each by itself, the second with the payload in its description. What belongs to load or current grows with it, what belongs to the position or the magnets stays.";
 const COLD_AND_WARM: &str = "Run the motion from cold until the gear is warm, and keep the order of speeds random; record t, q{k}, tau{k} and, if there is a sensor, temp{k}. What falls with warmth changes from the first to the last period at the same speed; what depends on speed or current does not.";
 const WIDE: &str = "Run the sine over the whole range; record t, q{k} and tau{k}. Over more than two thirds of a turn a spring goes on growing where gravity turns back and a constant stays; taking the cable off and repeating decides it at any range.";
 const SPEEDS: &str = "Run the constant speeds; record t, q{k} and tau{k}. What depends on the speed shows at constant speed, what remembers the last reversal has died out there.";
@@ -62,7 +64,7 @@ pub(super) fn split([a, b]: [Kind; 2]) -> Split {
     if has("current_offset") {
         made(OFF_LOG, DRIVE_OFF, None)
     } else if is("asymmetric_coulomb", "torque_offset") {
-        by_hand("load-taken-off", TAKE_OFF, Some(Family::ConstantSpeeds))
+        by_hand(PULLS_OFF, TAKE_OFF, Some(Family::ConstantSpeeds))
     } else if has("drive_deadzone") {
         by_hand(
             "current-and-voltage",

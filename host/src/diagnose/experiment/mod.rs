@@ -19,8 +19,8 @@ mod tests;
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::trajectory::Trajectory;
 
-pub use criterion::FLOOR_RATE;
-pub use lookup::OFF_LOG;
+pub use criterion::{FLOOR_RATE, Held};
+pub use lookup::{OFF_LOG, PULLS_OFF};
 pub use place::Nominal;
 pub use primitives::{Family, Hands};
 
@@ -51,8 +51,8 @@ pub struct Proposal {
 }
 
 /// The experiment that tells `rivals` of one joint (from 0) apart: each an effect with its estimate and the joint's
-/// nominal parameters estimated beside it. `floor` is the noise of its torque, N·m or N, as RMS after the low-pass, so of
-/// about [`FLOOR_RATE`] independent values a second.
+/// nominal parameters estimated beside it; `held` is what the refit of the nominal model left as described. `floor` is the
+/// noise of its torque, N·m or N, as RMS after the low-pass, so of about [`FLOOR_RATE`] independent values a second.
 ///
 /// None where there are fewer than two rivals.
 ///
@@ -62,12 +62,13 @@ pub fn next(
     robot: &Robot,
     joint: usize,
     rivals: &[(Effect<f64>, Nominal)],
+    held: Held,
     floor: f64,
 ) -> Result<Option<Proposal>, DiagnoseError> {
     let Some((_, nominal)) = rivals.first().filter(|_| rivals.len() > 1) else {
         return Ok(None);
     };
-    let place = Place::of(robot, joint, *nominal)?;
+    let place = Place::of(robot, joint, *nominal, held)?;
     let kinds = |[a, b]: Pair| [rivals[a].0.kind, rivals[b].0.kind];
     let lookup = |pair: Pair| by_lookup(robot, joint, place.as_ref(), kinds(pair), names(rivals));
     let (same, apart): (Vec<Pair>, Vec<Pair>) = pairs(rivals.len()).partition(|p| exact(kinds(*p)));
@@ -75,9 +76,10 @@ pub fn next(
     if let Some(pair) = hidden {
         return Ok(Some(lookup(*pair)));
     }
-    // What the rig does by itself comes first.
-    let alone = same.iter().find(|p| !split(kinds(**p)).hands);
-    if apart.is_empty() {
+    let by = |pair: &Pair| split(kinds(*pair));
+    // What the rig does by itself comes first, and first of all what it does without moving.
+    let alone = same.iter().find(|p| !by(p).hands);
+    if apart.is_empty() || alone.is_some_and(|p| by(p).kind == OFF_LOG) {
         return Ok(alone.or(same.first()).map(|p| lookup(*p)));
     }
     let found = place.as_ref().and_then(|place| best(place, rivals, floor));
@@ -101,13 +103,18 @@ pub fn next(
         return Ok(pair.or(apart.first().copied()).map(lookup));
     };
     let stand = place.as_ref().map_or_else(Vec::new, |p| p.stand.clone());
+    // What pulls from outside is taken off for the same motion, but for a spring, which it is to show.
+    let springs = rivals.iter().any(|(effect, _)| effect.kind == Kind::Spring);
+    let (pulled, same): (Vec<Pair>, Vec<Pair>) = (same.into_iter())
+        .partition(|p| !springs && primitive.hands == Hands::None && by(p).kind == PULLS_OFF);
+    let pulls_off = (pulled.first()).map(|p| by(p).text.replace("{k}", &(joint + 1).to_string()));
     let mut text = running(robot, primitive);
-    if primitive.hands != Hands::None {
-        text.push(' ');
-        text.push_str(primitive.hands.text());
+    match &pulls_off {
+        Some(first) => text.insert_str(0, &format!("{first} ")),
+        None => text = format!("{text} {}", primitive.hands.text()),
     }
     text.push_str(&format!(
-        " Give what it records with --data beside the others: the predictions of the rivals lie {apart:.0} standard deviations of the noise apart along it."
+        " The predictions of the rivals that a motion tells apart lie {apart:.0} standard deviations of the noise apart along it."
     ));
     if !same.is_empty() {
         let mut left: Vec<usize> = same.iter().copied().flatten().collect();
@@ -120,6 +127,7 @@ pub fn next(
         ));
     }
     let kind = match primitive.hands {
+        Hands::None if pulls_off.is_some() => PULLS_OFF.to_owned(),
         Hands::None => primitive.family.name().to_owned(),
         Hands::Payload => format!("payload-swap: {}", primitive.family.name()),
         Hands::BaseOnItsSide => format!("base-turned: {}", primitive.family.name()),
@@ -132,7 +140,7 @@ pub fn next(
             file: Some(FILE.to_owned()),
             separation: Some(*apart),
             duration: Some(primitive.hands.passes().len() as f64 * primitive.trajectory.duration()),
-            hands: primitive.hands != Hands::None,
+            hands: primitive.hands != Hands::None || pulls_off.is_some(),
             trajectory: None,
         },
         trajectory: Some(file_of(robot, joint, &stand, primitive)),
@@ -232,9 +240,11 @@ fn nearest(
 ) -> Option<(f64, Pair)> {
     let told = pairs(rivals.len()).filter(|[a, b]| !exact([rivals[*a].0.kind, rivals[*b].0.kind]));
     told.map(|[a, b]| {
-        // A constant torque is in the standard model already: no motion shows it, but what is more than a constant shows.
+        // A constant that the standard model or a spring holds as well shows along no motion, but what is more than a constant
+        // shows.
         let between = |truth: usize, rival: usize| {
-            if constant(rivals[truth].0.kind) {
+            let spring = rivals[rival].0.kind == Kind::Spring;
+            if constant(rivals[truth].0.kind) && (spring || !course.held.constant) {
                 f64::INFINITY
             } else {
                 course.separation(&rivals[truth], &rivals[rival].0, revolute, floor)

@@ -4,6 +4,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::trajectory::Trajectory;
 
 use super::super::DiagnoseError;
+use super::criterion::Held;
 use super::primitives::Hands;
 use crate::batch::ModelBatch;
 use crate::identify::chain_of;
@@ -40,6 +41,8 @@ pub(super) struct Place {
     /// Torque of gravity per first moment along x: with cos q, with sin q, constant; m/s².
     pub(super) pull: [f64; 3],
     pub(super) nominal: Nominal,
+    /// What of it a refit leaves as described.
+    pub(super) held: Held,
 }
 
 impl Place {
@@ -48,6 +51,7 @@ impl Place {
         robot: &Robot,
         joint: usize,
         nominal: Nominal,
+        held: Held,
     ) -> Result<Option<Self>, DiagnoseError> {
         let Some(own) = robot.joints.get(joint) else {
             return Ok(None);
@@ -89,6 +93,7 @@ impl Place {
             drive_inertia: drive.map_or(0.0, |d| d.joint_inertia + d.rotor_inertia * ratio * ratio),
             pull: [0.0; 3],
             nominal,
+            held,
         };
         place.pull = place.gravity_of(robot, joint)?;
         let quarter = 0.25 * (high - low);

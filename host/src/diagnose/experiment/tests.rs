@@ -59,7 +59,9 @@ fn what_is_found_for_stribeck_against_presliding_separates_them_as_predicted() {
     ];
     // So much noise that the distance is moderate and the rival's freedom would show in it.
     let floor = 0.5;
-    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let place = Place::of(&robot, 0, NOMINAL, Held::default())
+        .unwrap()
+        .unwrap();
     let (primitive, predicted) = best(&place, &rivals, floor).unwrap();
     println!(
         "{:?} {}: {predicted:.2}",
@@ -113,7 +115,9 @@ fn the_choice_beats_the_other_motions_and_fits_the_limits_and_the_rig() {
         effect(Kind::PreslidingDahl, &[0.4], &[0.01]),
     ];
     let began = std::time::Instant::now();
-    let found = next(&robot, 0, &rivals, 0.05).unwrap().unwrap();
+    let found = next(&robot, 0, &rivals, Held::default(), 0.05)
+        .unwrap()
+        .unwrap();
     println!("{:?}: {}", began.elapsed(), found.experiment.text);
     let file = found.trajectory.unwrap();
     within_limits(&robot, &file);
@@ -125,7 +129,9 @@ fn the_choice_beats_the_other_motions_and_fits_the_limits_and_the_rig() {
     assert_eq!(found.experiment.separates, ["stribeck", "presliding"]);
     let apart = found.experiment.separation.unwrap();
     let chosen = apart / found.experiment.duration.unwrap().sqrt();
-    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let place = Place::of(&robot, 0, NOMINAL, Held::default())
+        .unwrap()
+        .unwrap();
     let mut least = f64::INFINITY;
     for family in Family::ALL {
         for primitive in of_family(&place, family, Hands::None) {
@@ -150,7 +156,9 @@ fn motions_of_every_family_respect_limits_and_torque() {
             } else {
                 [0.0; 6]
             };
-            let place = Place::of(&robot, joint, nominal).unwrap().unwrap();
+            let place = Place::of(&robot, joint, nominal, Held::default())
+                .unwrap()
+                .unwrap();
             for family in Family::ALL {
                 for primitive in of_family(&place, family, Hands::None) {
                     within_limits(&robot, &file_of(&robot, joint, &place.stand, &primitive));
@@ -164,7 +172,9 @@ fn motions_of_every_family_respect_limits_and_torque() {
     // A link too heavy for its motor is not asked to move.
     let mut weak = robot();
     weak.joints[0].limits.as_mut().unwrap().torque = Some(0.5);
-    let place = Place::of(&weak, 0, NOMINAL).unwrap().unwrap();
+    let place = Place::of(&weak, 0, NOMINAL, Held::default())
+        .unwrap()
+        .unwrap();
     assert!(
         Family::ALL
             .iter()
@@ -178,7 +188,9 @@ fn hands_are_asked_for_only_where_no_motion_decides() {
         effect(Kind::LoadFriction, &[0.1], &[]),
         effect(Kind::Cogging, &[0.1, 0.0], &[12.0]),
     ];
-    let easy = next(&robot(), 0, &rivals, 0.05).unwrap().unwrap();
+    let easy = next(&robot(), 0, &rivals, Held::default(), 0.05)
+        .unwrap()
+        .unwrap();
     println!("{} {}", easy.experiment.kind, easy.experiment.text);
     assert!(!easy.experiment.kind.contains("payload"));
     // In noise that no motion overcomes the answer is what grows with the load.
@@ -186,7 +198,9 @@ fn hands_are_asked_for_only_where_no_motion_decides() {
         effect(Kind::Cogging, &[0.02, 0.0], &[12.0]),
         effect(Kind::TorqueRipple, &[0.007, 0.0], &[12.0]),
     ];
-    let found = next(&robot(), 0, &rivals, 5.0).unwrap().unwrap();
+    let found = next(&robot(), 0, &rivals, Held::default(), 5.0)
+        .unwrap()
+        .unwrap();
     println!("{} {}", found.experiment.kind, found.experiment.text);
     assert!(found.experiment.kind.contains("payload-swap"));
 }
@@ -208,7 +222,9 @@ fn every_confused_pair_of_the_registry_has_an_answer() {
             }
             seen.push(pair);
             let rivals = [middle_of_range(*kind), middle_of_range(other)];
-            let found = next(&robot, 0, &rivals, 0.05).unwrap().unwrap();
+            let found = next(&robot, 0, &rivals, Held::default(), 0.05)
+                .unwrap()
+                .unwrap();
             let e = &found.experiment;
             println!(
                 "{} / {}: {} {:?} {:?} s: {}",
@@ -233,17 +249,25 @@ fn every_confused_pair_of_the_registry_has_an_answer() {
 fn exact_pairs_ask_for_another_channel_or_another_load() {
     let robot = robot();
     let pair = |a: Kind, b: Kind| {
-        next(&robot, 0, &[middle_of_range(a), middle_of_range(b)], 0.05)
-            .unwrap()
-            .unwrap()
+        next(
+            &robot,
+            0,
+            &[middle_of_range(a), middle_of_range(b)],
+            Held::default(),
+            0.05,
+        )
+        .unwrap()
+        .unwrap()
     };
     let off = pair(Kind::CurrentOffset, Kind::AsymmetricCoulomb);
     assert_eq!(off.experiment.kind, "drive-off-log");
     assert!(off.experiment.text.contains("i1") && off.trajectory.is_none());
     let taken = pair(Kind::TorqueOffset, Kind::AsymmetricCoulomb);
-    assert_eq!(taken.experiment.kind, "load-taken-off");
+    assert_eq!(taken.experiment.kind, PULLS_OFF);
     // The torque domain agrees that no motion splits them.
-    let place = Place::of(&robot, 0, NOMINAL).unwrap().unwrap();
+    let place = Place::of(&robot, 0, NOMINAL, Held::default())
+        .unwrap()
+        .unwrap();
     let rivals = [
         effect(Kind::TorqueOffset, &[0.2], &[]),
         effect(Kind::AsymmetricCoulomb, &[0.2], &[]),
@@ -259,9 +283,15 @@ fn exact_partners_stand_together_against_what_a_motion_tells_apart() {
         effect(Kind::TorqueOffset, &[0.2], &[]),
     ];
     let with = |third| {
-        next(&robot(), 0, &[constants[0], constants[1], third], 0.05)
-            .unwrap()
-            .unwrap()
+        next(
+            &robot(),
+            0,
+            &[constants[0], constants[1], third],
+            Held::default(),
+            0.05,
+        )
+        .unwrap()
+        .unwrap()
     };
     let found = with(effect(Kind::Spring, &[0.5, 0.2], &[]));
     let e = &found.experiment;
@@ -290,7 +320,10 @@ fn what_is_looked_up_is_the_closest_pair() {
     ];
     let asked = |order: [usize; 3]| {
         let list = order.map(|k| rivals[k]);
-        next(&robot(), 0, &list, 1e3).unwrap().unwrap().experiment
+        next(&robot(), 0, &list, Held::default(), 1e3)
+            .unwrap()
+            .unwrap()
+            .experiment
     };
     let first = asked([0, 1, 2]);
     for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1]] {
@@ -301,7 +334,14 @@ fn what_is_looked_up_is_the_closest_pair() {
 #[test]
 fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
     assert_eq!(
-        next(&robot(), 0, &[middle_of_range(Kind::Stribeck)], 0.05).unwrap(),
+        next(
+            &robot(),
+            0,
+            &[middle_of_range(Kind::Stribeck)],
+            Held::default(),
+            0.05
+        )
+        .unwrap(),
         None
     );
     let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
@@ -310,8 +350,32 @@ fn one_effect_needs_no_experiment_and_a_slide_without_values_has_one() {
         (Effect::new(Kind::Stribeck, &[5.0], &[0.005]), nominal),
         (Effect::new(Kind::PreslidingDahl, &[20.0], &[1e-4]), nominal),
     ];
-    let found = next(&emps, 0, &rivals, 2.0).unwrap().unwrap();
+    let found = next(&emps, 0, &rivals, Held::default(), 2.0)
+        .unwrap()
+        .unwrap();
     println!("{}", found.experiment.text);
     within_limits(&emps, &found.trajectory.unwrap());
     assert!(found.experiment.separation.unwrap() > DECIDES);
+}
+
+/// Where the description states which way gravity acts and what is constant, a wide motion tells a tilt from a constant, and
+/// nobody has to turn the base.
+#[test]
+fn a_tilt_is_told_from_a_constant_by_a_motion_where_neither_is_in_the_standard_model() {
+    let rivals = [
+        effect(Kind::AsymmetricCoulomb, &[0.1], &[]),
+        effect(Kind::GravityTilt, &[0.1, 0.0], &[]),
+    ];
+    let across = rivals.map(|(e, [inertia, gravity, _, viscous, coulomb, _])| {
+        (e, [inertia, 0.0, gravity, viscous, coulomb, 0.0])
+    });
+    let ask = |held| next(&robot(), 0, &across, held, 0.05).unwrap().unwrap();
+    let held = ask(Held {
+        gravity: true,
+        constant: true,
+    });
+    println!("{}: {}", held.experiment.kind, held.experiment.text);
+    assert!(!held.experiment.hands);
+    assert!(held.experiment.separation.unwrap() > DECIDES);
+    assert_eq!(ask(Held::default()).experiment.kind, "base-turned");
 }

@@ -32,11 +32,11 @@ pub use record::Intrusion;
 pub use reference::Excitation;
 pub use rig::Noise;
 
-use super::DiagnoseError;
+use super::{DiagnoseError, Unburdened};
 use crate::data::{Block, Column, RecordingWriter};
 use crate::files::write_whole;
 use crate::plant::PlantConfig;
-use crate::prepare::InMemory;
+use crate::prepare::{InMemory, Recording};
 use crate::robot::{Drive, Robot};
 use record::{Nominal, record};
 use size::{Equation, Problem, beyond};
@@ -135,6 +135,7 @@ impl Scenario {
                 None
             },
             further: Vec::new(),
+            unburdened: Vec::new(),
             drive_off: None,
             holdout: recording("holdout", &other, 2)?,
             truth: Truth {
@@ -312,6 +313,8 @@ pub struct Made {
     pub repeat: Option<InMemory>,
     /// To learn from besides: what was recorded since.
     pub further: Vec<InMemory>,
+    /// … with everything taken off that pulls on the rig from outside.
+    pub unburdened: Vec<InMemory>,
     /// The rig with its drive off; none unless asked for.
     pub drive_off: Option<InMemory>,
     /// Another reference.
@@ -337,22 +340,36 @@ impl Scenario {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 impl Made {
-    /// What a diagnosis makes of these recordings and `robot`, with the repeat where there is one.
+    /// [`Self::diagnose`] of recordings that can be.
     pub(super) fn diagnosed(
         &self,
         robot: &Robot,
         options: &super::Options,
     ) -> (super::Diagnosis, Robot) {
-        use crate::prepare::Recording;
-        let own: Vec<&dyn Recording> = core::iter::once(&self.train)
-            .chain(&self.repeat)
-            .map(|recording| recording as &dyn Recording)
-            .collect();
-        super::diagnose(robot, &own, &[&self.holdout], options, &mut |_| ()).unwrap()
+        self.diagnose(robot, options).unwrap()
     }
 }
 
 impl Made {
+    /// What a diagnosis makes of these recordings and `robot`, with the repeat where there is one and what was recorded since.
+    ///
+    /// # Errors
+    /// Those of [`super::diagnose`].
+    pub fn diagnose(
+        &self,
+        robot: &Robot,
+        options: &super::Options,
+    ) -> Result<(super::Diagnosis, Robot), DiagnoseError> {
+        let free: Vec<Unburdened> = self.unburdened.iter().map(|r| Unburdened(r)).collect();
+        let training: Vec<&dyn Recording> = core::iter::once(&self.train)
+            .chain(&self.repeat)
+            .chain(&self.further)
+            .map(|recording| recording as &dyn Recording)
+            .chain(free.iter().map(|recording| recording as &dyn Recording))
+            .collect();
+        super::diagnose(robot, &training, &[&self.holdout], options, &mut |_| ())
+    }
+
     /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
     ///
     /// # Errors

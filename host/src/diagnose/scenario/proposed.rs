@@ -1,9 +1,12 @@
 //! A proposed motion on the rig of a scenario.
 
+use rig_shared::effects::Kind;
+
 use super::record::drive_off;
 use super::reference::RATE;
-use super::{Made, Scenario, drive_of, rig};
+use super::{Effect, Made, Scenario, drive_of, rig};
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::pull::is_outside;
 use crate::excite::TrajectoryFile;
 use crate::prepare::InMemory;
 
@@ -40,6 +43,17 @@ impl Scenario {
             label: "proposed".into(),
             blocks: vec![self.run(&healthy, &made.robot, &reference, RUN)?],
         })
+    }
+
+    /// The same rig with everything taken off that pulls on it from outside.
+    pub fn unburdened(&self) -> Self {
+        let outside = |effect: &Effect| Kind::named(effect.name(), None).is_some_and(is_outside);
+        Self {
+            hidden: (self.hidden.iter().copied())
+                .filter(|hidden| !outside(&hidden.effect))
+                .collect(),
+            ..self.clone()
+        }
     }
 
     /// Records the rig that `made` was recorded on with its drive off.

@@ -13,6 +13,7 @@ use rig_shared::effects::{Channel, Confusion, Kind, Need};
 
 use super::Run;
 use super::outcome::NotTestable;
+use super::pull;
 use super::waves;
 use crate::report::format_unit;
 use crate::robot::{Joint, JointKind, Robot};
@@ -78,14 +79,17 @@ fn unspanned(kind: Kind, joint: &Joint, span: f64) -> Option<(String, String)> {
 }
 
 /// What no recording of torque and motion tells apart from the effect, and what does; without the pairs that the
-/// recorded voltage of these runs resolves.
+/// recorded voltage of these runs resolves, or a run with nothing that pulls from outside.
 pub fn confounded(kind: Kind, joint: usize, runs: &[Run]) -> Vec<&'static Confusion> {
     let voltage = !runs.is_empty()
         && runs
             .iter()
             .all(|run| run.joints.get(joint).is_some_and(|j| j.voltage.is_some()));
-    let all = kind.about().confused.iter();
-    all.filter(|c| c.exact && !(voltage && c.separated_by.contains("voltage")))
+    let outside = |name: &str| Kind::named(name, None).is_some_and(pull::is_outside);
+    let by_pull = |with: &str| pull::told_apart(runs) && pull::is_outside(kind) != outside(with);
+    (kind.about().confused.iter())
+        .filter(|c| c.exact && !by_pull(c.with))
+        .filter(|c| !(voltage && c.separated_by.contains("voltage")))
         .collect()
 }
 

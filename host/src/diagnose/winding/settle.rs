@@ -17,6 +17,8 @@ const CONSTANTS: [Kind; 3] = [
     Kind::TorqueOffset,
     Kind::CurrentOffset,
 ];
+/// Those that are a torque. They are one function, too, unless a recording is without all that pulls on the joint.
+const TORQUES: [Kind; 2] = [Kind::TorqueOffset, Kind::AsymmetricCoulomb];
 /// What the sensor reads without a current counts as the torque's constant, or as nothing, within so many standard deviations …
 const WITHIN: f64 = 3.0;
 /// … and this share of the constant.
@@ -88,12 +90,20 @@ pub(in crate::diagnose) fn settled(
                 continue;
             };
             words[k] = Word::of(zero, constant, std);
-            let name = match words[k] {
-                Word::Sensor => sensor,
-                Word::Torque if candidate.kind == sensor => Kind::TorqueOffset,
+            let names = match words[k] {
+                Word::Sensor => &[sensor][..],
+                Word::Torque if candidate.kind == sensor => &TORQUES[..],
                 _ => continue,
             };
-            if let Some(profile) = in_its_place(name, chosen)? {
+            let mut best: Option<Profile> = None;
+            for name in names {
+                let better =
+                    |p: &Profile| (best.as_ref()).is_none_or(|b| p.evidence.gain > b.evidence.gain);
+                if let Some(profile) = in_its_place(*name, chosen)?.filter(better) {
+                    best = Some(profile);
+                }
+            }
+            if let Some(profile) = best {
                 chosen[k] = profile;
             }
         } else if !search.is_described(&candidate)
