@@ -99,14 +99,15 @@ pub fn next(
                     && ((like(a, c) && like(b, d)) || (like(a, d) && like(b, c)))
             })
         });
-        let pair = alone.or(told).copied().or(nearest);
+        let pulled = same.iter().find(|p| by(p).kind == PULLS_OFF);
+        let pair = alone.or(pulled).or(told).copied().or(nearest);
         return Ok(pair.or(apart.first().copied()).map(lookup));
     };
     let stand = place.as_ref().map_or_else(Vec::new, |p| p.stand.clone());
-    // What pulls from outside is taken off for the same motion, but for a spring, which it is to show.
-    let springs = rivals.iter().any(|(effect, _)| effect.kind == Kind::Spring);
-    let (pulled, same): (Vec<Pair>, Vec<Pair>) = (same.into_iter())
-        .partition(|p| !springs && primitive.hands == Hands::None && by(p).kind == PULLS_OFF);
+    // What pulls from outside is taken off for the same motion. A spring is told from a constant by that, too: gravity and
+    // friction are then known without either.
+    let (pulled, same): (Vec<Pair>, Vec<Pair>) =
+        (same.into_iter()).partition(|p| primitive.hands == Hands::None && by(p).kind == PULLS_OFF);
     let pulls_off = (pulled.first()).map(|p| by(p).text.replace("{k}", &(joint + 1).to_string()));
     let mut text = running(robot, primitive);
     match &pulls_off {

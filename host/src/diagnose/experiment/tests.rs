@@ -275,9 +275,9 @@ fn exact_pairs_ask_for_another_channel_or_another_load() {
     assert!(best(&place, &rivals, 0.05).is_none_or(|(_, apart)| apart < 1e-3));
 }
 
-/// A third name is told from exact partners by a motion, which the partners must not keep from being proposed.
+/// One experiment for all names: the motion that tells a third one from exact partners, with what tells the partners apart.
 #[test]
-fn exact_partners_stand_together_against_what_a_motion_tells_apart() {
+fn exact_partners_and_what_a_motion_tells_from_them_share_an_experiment() {
     let constants = [
         effect(Kind::AsymmetricCoulomb, &[0.2], &[]),
         effect(Kind::TorqueOffset, &[0.2], &[]),
@@ -296,15 +296,10 @@ fn exact_partners_stand_together_against_what_a_motion_tells_apart() {
     let found = with(effect(Kind::Spring, &[0.5, 0.2], &[]));
     let e = &found.experiment;
     println!("{} {:?}: {}", e.kind, e.separation, e.text);
-    assert!(!e.hands && found.trajectory.is_some());
-    assert!(e.separation.unwrap() > DECIDES);
-    assert!(
-        e.text
-            .contains("asymmetric_coulomb and torque_offset no motion tells"),
-        "{}",
-        e.text
-    );
-    // Among exact partners alone the rig does first what it can do by itself.
+    assert_eq!((e.kind.as_str(), e.hands), (PULLS_OFF, true));
+    assert!(e.separation.unwrap() > DECIDES && found.trajectory.is_some());
+    assert!(e.text.contains("--pulls-off"), "{}", e.text);
+    // The rig does first what it can do by itself.
     let found = with(effect(Kind::CurrentOffset, &[0.2], &[]));
     assert_eq!(found.experiment.kind, OFF_LOG);
     assert!(!found.experiment.hands);

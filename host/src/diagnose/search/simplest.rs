@@ -1,8 +1,8 @@
 //! Of candidates that explain alike, the one that needs least.
 //!
 //! What holds another law wins by a hair wherever the other one is true: a spring's stiffness and preload hold every
-//! constant. Laws of one family are told apart by the partial test of what the larger one adds (Wald 1943; the covariance
-//! of the blocks as elsewhere), others by whether the data tell them apart at all.
+//! constant. Of two laws of which one holds the other, the larger is taken where what it adds stands by itself (Wald 1943; the
+//! covariance of the blocks as elsewhere) and is as large as an effect has to be; others are told apart by whether the data do.
 
 use rig_shared::effects::Kind;
 
@@ -103,10 +103,17 @@ impl Search<'_> {
         trials: usize,
     ) -> bool {
         let gears = is_gear(best.candidate.kind) || is_gear(other.candidate.kind);
+        let as_good = || {
+            if holds(fit, best, other) {
+                !adds(fit, best, other, trials)
+            } else {
+                equal(best, other)
+            }
+        };
         !gears
+            && best.candidate.joint == other.candidate.joint
             && self.size(&other.candidate) < self.size(&best.candidate)
-            && equal(best, other)
-            && !(holds(fit, best, other) && adds(fit, best, other, trials))
+            && as_good()
     }
 }
 
