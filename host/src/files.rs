@@ -69,6 +69,48 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     })
 }
 
+/// Refuses a folder that cannot take results of these names, before the work that they cost; makes nothing.
+///
+/// # Errors
+/// [`WriteError`] naming what is in the way.
+pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
+    let refuse = |path: &Path, cause| {
+        Err(WriteError {
+            path: path.into(),
+            cause,
+        })
+    };
+    let taken = names
+        .iter()
+        .map(|name| path.join(name))
+        .find(|p| p.is_dir());
+    if let Some(taken) = taken {
+        let cause = io::Error::new(
+            io::ErrorKind::IsADirectory,
+            "this is a folder, and a file of this name is to be written",
+        );
+        return refuse(&taken, cause);
+    }
+    // What is not there yet will be made in what is.
+    let there = path
+        .ancestors()
+        .find(|p| p.as_os_str().is_empty() || p.exists());
+    let there = there
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    if !there.is_dir() {
+        let cause = io::Error::new(
+            io::ErrorKind::NotADirectory,
+            "this is a file, and a folder is wanted",
+        );
+        return refuse(there, cause);
+    }
+    match tempfile::tempfile_in(there) {
+        Ok(_) => Ok(()),
+        Err(cause) => refuse(there, cause),
+    }
+}
+
 /// Makes sure that a folder for results is there.
 ///
 /// # Errors
@@ -87,4 +129,29 @@ pub fn folder(path: &Path) -> Result<(), WriteError> {
         path: path.into(),
         cause,
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_in_the_way_is_said_before_and_nothing_is_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert!(can_take(&at("new/deep"), &["report.html"]).is_ok());
+        assert!(!at("new").exists());
+        fs::write(at("file"), "").unwrap();
+        for path in [at("file"), at("file/deeper")] {
+            let error = can_take(&path, &[]).unwrap_err();
+            assert_eq!(error.path, at("file"));
+            assert!(error.to_string().contains("a folder is wanted"));
+        }
+        fs::create_dir_all(at("out/report.html")).unwrap();
+        let error = can_take(&at("out"), &["model.toml", "report.html"]).unwrap_err();
+        assert_eq!(error.path, at("out/report.html"));
+        assert!(can_take(&at("out"), &["model.toml"]).is_ok());
+        assert_eq!(fs::read_dir(at("out")).unwrap().count(), 1);
+    }
 }

@@ -23,7 +23,7 @@ joint_elasticity viscous_warmup presliding_dahl presliding_lugre current_offset 
 spring measurement_delay torque_saturation position_friction torque_ripple encoder_motor encoder_joint
 drive_deadzone""".split()
 OUTSIDE = "dwell_breakaway frictional_lag hysteretic_stiffness link_flex contact_burst supply_sag".split()
-FAULTS = "sign degrees ratio_2 ratio_half rpm late_20ms too_short still".split()
+FAULTS = "sign degrees ratio_2 ratio_half described_ratio_2 rpm late_20ms too_short still".split()
 
 
 class Hidden(NamedTuple):
@@ -196,6 +196,7 @@ def case(kind, effect, seed, noise=0.05):
         wrong = dict(motor_inertia=0.03, link_inertia=0.03, gravity=0.03, viscous=0.06, coulomb=0.06)
         for name, off in wrong.items():
             description[name] *= 1 + off * random.uniform(-1, 1)
+    description["gear_ratio"] = 2 * RATIO if effect == "described_ratio_2" else RATIO
     title = f"{effect} {seed}" if noise == 0.05 or kind != "nothing" else f"{effect} {seed} at {noise} A"
     readings = Readings(**{"noise": noise, **hidden.readings})
     return Case(title, kind, effect, noise, seed, hidden, description, rig, readings, train, holdout)
@@ -241,7 +242,7 @@ coulomb = {values["coulomb"]:.5f}
 viscous = {values["viscous"]:.5f}
 offset = 0.0
 [joint.drive]
-gear_ratio = {RATIO}
+gear_ratio = {values["gear_ratio"]}
 rotor_inertia = {values["motor_inertia"] / RATIO**2:.9f}
 torque_constant = {values["torque_constant"]:.6f}
 resistance = 0.6

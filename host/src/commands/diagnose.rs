@@ -5,18 +5,27 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
+use super::input::{
+    Inputs, RobotArg, command_line, recordings, refuse_as_drive_off, refuse_shared, refuse_twice,
+};
 use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::experiment::FILE;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
 use crate::diagnose::voltage::diagnose_voltage;
 use crate::diagnose::{DiagnoseError, Options, Unburdened, diagnose, sensor_zeros};
-use crate::files::{folder, write_whole};
+use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
 use crate::prepare::Recording;
 use crate::report::{self, format_significant};
 use crate::robot::Robot;
+
+/// The description with what was found.
+const MODEL: &str = "model.toml";
+/// The result for programs.
+const DIAGNOSIS: &str = "diagnosis.json";
+/// The result for people.
+const REPORT: &str = "report.html";
 
 /// Says what the model lacks: where prediction and recording disagree, which physical effect is missing, what it takes
 /// away on data held back, and when there is nothing left to find.
@@ -64,11 +73,16 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &[MODEL, DIAGNOSIS, REPORT, FILE])?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
     let learnt: Vec<PathBuf> = args.data.iter().chain(&args.pulls_off).cloned().collect();
     refuse_twice(&learnt, "give it once")?;
     refuse_shared(&learnt, &args.holdout)?;
+    if let Some(path) = &args.drive_off {
+        let moved: Vec<PathBuf> = learnt.iter().chain(&args.holdout).cloned().collect();
+        refuse_as_drive_off(path, &moved)?;
+    }
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
     let special = (args.drive_off.iter().map(|path| ("--drive-off", path)))
@@ -111,7 +125,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let text = model.to_toml()?;
     let context = Context {
         command: command_line(),
-        identified: Some(("model.toml".into(), text.clone())),
+        identified: Some((MODEL.into(), text.clone())),
         remarks: Vec::new(),
         warnings: warnings.into_iter().chain(heard).collect(),
     };
@@ -125,9 +139,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Some((name, motion)) => write_whole(&args.out.join(name), motion.as_bytes())?,
         None => forget(&args.out.join(FILE))?,
     }
-    write_whole(&args.out.join("model.toml"), text.as_bytes())?;
-    write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
-    write_whole(&args.out.join("report.html"), page.as_bytes())?;
+    write_whole(&args.out.join(MODEL), text.as_bytes())?;
+    write_whole(&args.out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
+    write_whole(&args.out.join(REPORT), page.as_bytes())?;
     print(ui, &found, &args.out);
     Ok(())
 }
@@ -187,12 +201,15 @@ fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
         ui.say(&line);
     }
     for fault in &found.data_faults {
-        ui.remark(&fault.text);
+        ui.remark(&match fault.recording.as_str() {
+            recording if fault.text.contains(recording) => fault.text.clone(),
+            recording => format!("{recording}: {}", fault.text),
+        });
     }
     if found.verdict == Verdict::DataFault {
         ui.remark("nothing was fitted; model.toml is the description as it was given.");
     }
-    ui.say(&format!("report: {}", out.join("report.html").display()));
+    ui.say(&format!("report: {}", out.join(REPORT).display()));
 }
 
 fn summary(found: &Diagnosis) -> Vec<String> {

@@ -11,7 +11,7 @@ use rig_shared::multibody::{COLUMNS, column};
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
 use super::ui::Ui;
-use crate::files::{folder, write_whole};
+use crate::files::{can_take, folder, write_whole};
 use crate::identify::{
     Estimator, Identification, Loss, ModelKind, Options, identified_robot, identify,
 };
@@ -231,6 +231,13 @@ impl Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let names = [
+        "identified.toml",
+        "identified.urdf",
+        "identification.json",
+        "report.html",
+    ];
+    can_take(&args.out, &names)?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
     let training = Inputs::read(&robot, &args.data)?;

@@ -330,6 +330,17 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
     }
 }
 
+/// A motion under torque says nothing of what a sensor reads without one.
+pub(crate) fn refuse_as_drive_off(log: &Path, moved: &[PathBuf]) -> Result<(), CommandError> {
+    if moved.iter().any(|path| real(path) == real(log)) {
+        return Err(CommandError::Sentence(format!(
+            "{} is given as --drive-off and as a recording of motion; --drive-off takes one made with the drive off.",
+            log.display()
+        )));
+    }
+    Ok(())
+}
+
 /// A recording that is learnt from twice makes every interval too narrow.
 pub(crate) fn refuse_twice(data: &[PathBuf], instead: &str) -> Result<(), CommandError> {
     for (k, path) in data.iter().enumerate() {

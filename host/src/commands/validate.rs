@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::ui::Ui;
-use crate::files::{folder, write_whole};
+use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
 use crate::report::{self, format_significant};
 use crate::validate::{Motion, Options, Validation, validate};
@@ -32,6 +32,7 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &["validation.json", "report.html"])?;
     let robot = args.robot.load(ui)?;
     let inputs = Inputs::open(&robot, &args.data)?;
     for warning in inputs.warnings() {

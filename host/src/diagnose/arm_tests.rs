@@ -192,6 +192,19 @@ fn a_missing_term_of_the_other_joint_is_named_with_its_inertia() {
     assert!(diagnosis.steps[0].gap_closed > 0.8);
 }
 
+#[test]
+fn friction_with_another_joint_s_speed_is_not_called_an_inertia() {
+    let fault = Some((1, Fault::ViscousCoupling(0.4)));
+    let diagnosis = made(&ArmScenario::new(Arm::Planar, fault, 1));
+    told("viscous", &diagnosis);
+    assert!(
+        named(&diagnosis)
+            .iter()
+            .all(|(name, _)| *name != "inertia_coupling")
+    );
+    assert!(diagnosis.remainder.is_some());
+}
+
 /// A real arm: description, training, hold-out.
 struct Real {
     robot: Robot,

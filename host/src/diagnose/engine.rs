@@ -19,7 +19,7 @@ use super::described::by_description;
 use super::fault::{faulty, of_preparing};
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, left_of_held, not_carried_over};
+use super::judge::{Judge, Judged, left_of_held, not_carried_over, taken_by_none};
 use super::lead::{differ, leads, moved, slack};
 use super::locate::coordinates;
 use super::motion::Replay;
@@ -216,9 +216,14 @@ fn attempt(
     refuse_guesses(robot, &mut tried, &judged);
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     refuse_guesses(robot, &mut tried, &judged);
+    let mut fallen = search.fallen.clone();
     let mut without = |judged: Judged, k: usize, why: &str| -> Result<Judged, DiagnoseError> {
         let mut stand = judged.chosen;
-        refuse(robot, &mut tried, &stand.remove(k), why);
+        let gone = stand.remove(k);
+        refuse(robot, &mut tried, &gone, why);
+        if gone.takes_much(search.trials()) {
+            fallen.push(gone);
+        }
         let judged = judge.judged(search.possible(&refit.base, stand)?)?;
         refuse_guesses(robot, &mut tried, &judged);
         Ok(judged)
@@ -269,6 +274,9 @@ fn attempt(
         named.dedup_by_key(|(joint, _)| *joint);
         judged.left = left_of_held(robot, &held.last(), &judged.floors)
             .or_else(|| not_carried_over(robot, &named, &judged.floors));
+    }
+    if judged.left.is_none() {
+        judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
     }
     let Judged { chosen, floors, .. } = &judged;
     let joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;

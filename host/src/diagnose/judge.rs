@@ -17,7 +17,7 @@ use super::runs::Run;
 use super::search::{Search, is_gear, shadow, with};
 use super::testable;
 use crate::report::{format_significant, format_unit, format_value};
-use crate::robot::{Joint, Robot};
+use crate::robot::{Joint, Robot, title_of};
 
 /// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
 /// what stands in for another leaves more of it.
@@ -257,6 +257,7 @@ impl Judge<'_, '_> {
             let own = chosen.iter().filter(|p| p.candidate.joint == joint);
             let shadow = own.map(shadow).fold(0.0, f64::max) * explained;
             rms * rms > (BEYOND_FLOOR * floor).powi(2) + shadow
+                && (shown.is_some() || self.away_from_reversals(fit, chosen, joint))
         } else {
             shown.is_some()
         };
@@ -276,6 +277,25 @@ impl Judge<'_, '_> {
             places,
             doubt: false,
         })
+    }
+
+    /// Whether more than the floor is left of a joint away from its reversals, which filters blur the same way in every run. A
+    /// gear shows at reversals.
+    fn away_from_reversals(&self, fit: &Fit, chosen: &[Profile], joint: usize) -> bool {
+        if (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind)) {
+            return true;
+        }
+        let source = &self.search.source;
+        let clear = (source.thinning).clear_of_reversals(source.runs, joint);
+        let residual = fit.residual(joint);
+        let (mut squares, mut used) = (0.0, 0.0);
+        for ((r, counts), keep) in residual.iter().zip(&clear).zip(&self.rows.keep[joint]) {
+            let counts = counts * f64::from(u8::from(*keep));
+            squares += counts * r * r;
+            used += counts;
+        }
+        let floor = floor::from_repeats(self.rows, &self.pairs, &residual, Some(&clear), joint);
+        floor.is_none_or(|floor| squares > used * (BEYOND_FLOOR * floor).powi(2))
     }
 
     /// What differs between the recordings with all that pulls on a joint and those without, where no effect explains it.
@@ -448,6 +468,32 @@ pub(super) fn not_carried_over(
         ratio: after / floors[joint],
         text: format!(
             "Of the data held back the names take nothing off in joint {name}: they explain the training data alone, and are no more than guesses. Record more to learn from.",
+        ),
+        places: Vec::new(),
+        doubt: true,
+    })
+}
+
+/// What was taken off by a law that could not stand, on a joint where nothing was found that could.
+pub(super) fn taken_by_none(
+    robot: &Robot,
+    fallen: &[Profile],
+    chosen: &[Profile],
+    floors: &[f64],
+) -> Option<Remainder> {
+    let bare = |p: &&Profile| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
+    let gain = |p: &&Profile| p.evidence.joint_gain;
+    let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
+    let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
+    let name = &robot.joints[joint].name;
+    Some(Remainder {
+        joint: name.clone(),
+        rms: floors[joint] * (1.0 - left * left).max(0.0).sqrt(),
+        ratio: 1.0 / left,
+        text: format!(
+            "The law of {} takes {:.0} % off what is left of joint {name}, on stretches that it was not fitted to, but not with values that such a rig has: something is missing that has no name here.",
+            title_of(most.candidate.kind),
+            100.0 * gain(&most)
         ),
         places: Vec::new(),
         doubt: true,

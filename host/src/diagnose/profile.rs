@@ -19,6 +19,8 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
 pub(super) const LEAST_SIGMAS: f64 = 2.0;
+/// What takes away this share of the RMS is no chance, whatever it is called.
+const MUCH: f64 = 0.1;
 /// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 /// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
@@ -38,8 +40,6 @@ const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
 const FOLLOWED: usize = ABREAST;
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
-/// Steps of the recorded position below which a distance is not told from none: the direction of motion is not known to less.
-const STEPS_OF_A_DISTANCE: f64 = 2.0;
 /// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
 const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
 /// A shape is known well enough within this ratio, less one, or this share of a linear range.
@@ -101,6 +101,14 @@ impl Profile {
         } else {
             None
         }
+    }
+
+    /// Whether it takes away so much that something is there, be it this or another.
+    pub(super) fn takes_much(&self, tried: usize) -> bool {
+        let e = &self.evidence;
+        self.corrected(tried) <= SIGNIFICANT
+            && e.joint_gain >= MUCH
+            && e.gain_sigmas >= LEAST_SIGMAS
     }
 
     fn least_gain(&self) -> f64 {
@@ -185,14 +193,14 @@ fn coordinate(shape: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// Where a refinement may go on a joint whose position is resolved that finely: beyond ten times its range a law is no longer
-/// told from its limit, nor is a distance below the position's steps.
-fn searched(shape: &Parameter, resolution: f64) -> [f64; 2] {
+/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
+/// least that is `told`.
+fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
         Scale::Logarithmic => {
             let told = if is_distance(shape) {
-                (STEPS_OF_A_DISTANCE * resolution).min(most)
+                told.min(most)
             } else {
                 0.0
             };
@@ -204,9 +212,9 @@ fn searched(shape: &Parameter, resolution: f64) -> [f64; 2] {
 
 /// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a
 /// gear only play is one.
-fn vanished(kind: Kind, shapes: &[f64; SHAPES], resolution: f64) -> Option<&'static str> {
+fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
     let shape = kind.about().shapes.first()?;
-    let least = (1.0 + AT_THE_END) * searched(shape, resolution)[0];
+    let least = (1.0 + AT_THE_END) * searched(shape, told)[0];
     let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
     (counts && shapes[0] < least).then_some(shape.name)
 }
@@ -331,7 +339,7 @@ impl Search<'_> {
             return Ok(None);
         };
         let joint = self.library[c].joint;
-        let mut vanished = vanished(kind, &best.1, self.resolution[joint]);
+        let mut vanished = vanished(kind, &best.1, self.least_told(kind, joint));
         if kind == Kind::JointElasticity && fixed.is_none() {
             let mass = self.source.mass(joint, 0)?;
             vanished = vanished
@@ -458,8 +466,8 @@ impl Search<'_> {
         let shape = &scales[place];
         let [step, fine] = spacing(shape, scales.len());
         let middle = coordinate(shape, best.1[place]);
-        let resolution = self.resolution[self.library[c].joint];
-        let [least, most] = searched(shape, resolution).map(|bound| coordinate(shape, bound));
+        let told = self.least_told(self.library[c].kind, self.library[c].joint);
+        let [least, most] = searched(shape, told).map(|bound| coordinate(shape, bound));
         let (mut low, mut high) = ((middle - step).max(least), (middle + step).min(most));
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {

@@ -403,10 +403,17 @@ pub(super) struct Joint {
 }
 
 impl Joint {
-    /// Probability that the gains of the `k`-th effect are nothing but error (Wald 1943), by the covariance that its
-    /// intervals are of.
-    pub(super) fn of_nothing(&self, chosen: &[Profile], free: usize, k: usize) -> f64 {
-        let gains = DVector::from_column_slice(self.gains(chosen, free, k));
+    /// Probability that the first `count` gains of the `k`-th effect are nothing but error (Wald 1943), by the covariance that
+    /// its intervals are of.
+    pub(super) fn of_nothing(
+        &self,
+        chosen: &[Profile],
+        free: usize,
+        k: usize,
+        count: usize,
+    ) -> f64 {
+        let gains = self.gains(chosen, free, k);
+        let gains = DVector::from_column_slice(&gains[..count.min(gains.len())]);
         let (at, count) = (place(chosen, free, k), gains.len());
         let own = (self.solution.covariance.view((at, at), (count, count))).into_owned();
         let wald = own.cholesky().map(|c| gains.dot(&c.solve(&gains)));

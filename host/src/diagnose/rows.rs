@@ -17,6 +17,14 @@ use crate::robot::{JointKind, Robot};
 /// indicator that is 1 on such samples.
 const SPOILT: f64 = 0.1;
 
+/// Periods of the position filter's cut-off by which it may move a reversal: it rounds the corner where friction changes its
+/// sign, or stops the joint for a moment.
+const SMEAR: f64 = 0.2;
+
+/// Share of a row's neighbourhood that may reverse where none is to be in it: 2 % of dry friction, the wrong way round, is below
+/// most noise.
+const CLEAR: f64 = 0.02;
+
 /// Directions whose angle has a sine below this are one.
 const PARALLEL: f64 = 1e-6;
 
@@ -47,6 +55,7 @@ pub(super) struct Thinning {
     low_pass: LowPass,
     step: usize,
     trimmed: usize,
+    smear: f64,
 }
 
 impl Thinning {
@@ -62,7 +71,27 @@ impl Thinning {
             low_pass,
             step: treatment.decimation.max(1),
             trimmed: treatment.trimmed,
+            smear: SMEAR / treatment.cutoff,
         })
+    }
+
+    /// Time by which the position's filter may move a reversal, s.
+    pub(super) fn smear(&self) -> f64 {
+        self.smear
+    }
+
+    /// Of each row of a joint, 1 where the filters let no reversal into it, else 0.
+    pub(super) fn clear_of_reversals(&self, runs: &[Run], joint: usize) -> Vec<f64> {
+        let mut clear = Vec::new();
+        for own in runs.iter().map(|run| &run.joints[joint]) {
+            let reverses =
+                |(v, a): (&f64, &f64)| f64::from(u8::from(v.abs() < a.abs() * self.smear));
+            let reversing: Vec<f64> = own.qd.iter().zip(&own.qdd).map(reverses).collect();
+            let mut share = Vec::new();
+            self.push(&reversing, &mut share);
+            clear.extend((share.iter()).map(|s| f64::from(u8::from(s.abs() < CLEAR))));
+        }
+        clear
     }
 
     /// Kept samples of a run of `samples`.

@@ -106,6 +106,20 @@ pub(super) fn resolution(runs: &[Run], joint: usize) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
+/// How far a joint goes, in the RMS, within `time` (s) from a reversal on, rad or m.
+pub(super) fn blurred(runs: &[Run], joint: usize, time: f64) -> f64 {
+    let (mut squares, mut count) = (0.0, 0_u32);
+    for own in runs.iter().map(|run| &run.joints[joint]) {
+        for (pair, a) in own.qd.windows(2).zip(&own.qdd) {
+            if pair[0] * pair[1] < 0.0 {
+                squares += a * a;
+                count += 1;
+            }
+        }
+    }
+    0.5 * (squares / f64::from(count.max(1))).sqrt() * time * time
+}
+
 /// Lets recordings go on from those of `runs` and `before` that they were made after, by one clock and within
 /// [`ONE_SESSION`]: what has warmed up is warm. Clocks that begin anew with each recording say nothing of that.
 pub(super) fn in_sessions(runs: &mut [Run], before: &[Run]) {

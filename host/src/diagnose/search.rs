@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rig_shared::effects::SHAPES;
+use rig_shared::effects::{Kind, SHAPES};
 
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
@@ -11,7 +11,7 @@ use super::fit::Fit;
 use super::judge::equal;
 use super::profile::{LEAST_GAIN, Profile, grid};
 use super::rows::Column;
-use super::runs::resolution;
+use super::runs::{blurred, resolution};
 use super::waves;
 use crate::batch::each_by;
 use crate::robot::Placed;
@@ -27,6 +27,8 @@ pub(super) use kinds::{is_first_law, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
 
+/// Steps of the recorded position below which a distance is not told from none: the direction of motion is not known to less.
+const STEPS_OF_A_DISTANCE: f64 = 2.0;
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
 /// Most effects beside those of the description.
@@ -48,8 +50,12 @@ pub(super) struct Search<'a> {
     pub(super) threads: usize,
     /// Joint by joint.
     pub(super) resolution: Vec<f64>,
+    /// How far each joint goes from a reversal within the time that its filter blurs, rad or m.
+    blurred: Vec<f64>,
     /// Lowest to highest position, joint by joint, rad or m.
     spans: Vec<f64>,
+    /// What the last search had to drop although it takes away much beside all that was found.
+    pub(super) fallen: Vec<Profile>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
@@ -65,6 +71,9 @@ impl<'a> Search<'a> {
             resolution: (0..source.nominal.joints())
                 .map(|joint| resolution(source.runs, joint))
                 .collect(),
+            blurred: (0..source.nominal.joints())
+                .map(|joint| blurred(source.runs, joint, source.thinning.smear()))
+                .collect(),
             spans: (0..source.nominal.joints())
                 .map(|joint| waves::span(source.runs, joint))
                 .collect(),
@@ -73,8 +82,20 @@ impl<'a> Search<'a> {
             described,
             measured: Vec::new(),
             settled: Vec::new(),
+            fallen: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
+        }
+    }
+
+    /// The least distance that joint `joint`'s motion tells from none to a law of that kind, rad or m: some steps of its encoder;
+    /// to friction also how far the joint goes from a reversal before the filter lets it be seen that it has reversed.
+    pub(super) fn least_told(&self, kind: Kind, joint: usize) -> f64 {
+        let steps = STEPS_OF_A_DISTANCE * self.resolution[joint];
+        if is_gear(kind) {
+            steps
+        } else {
+            steps.max(self.blurred[joint])
         }
     }
 
@@ -112,20 +133,23 @@ impl<'a> Search<'a> {
         Ok(columns)
     }
 
-    /// All candidates at their best, best gain first.
+    /// All candidates at their best, best gain first, but those that exclude one that is `present`, and the `impossible` ones.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn sweep(
         &self,
         fit: &Fit,
-        without: &[Candidate],
+        present: &[Candidate],
+        impossible: &[Candidate],
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let open: Vec<usize> = (0..self.library.len())
             .filter(|c| {
                 let candidate = &self.library[*c];
                 // A second law under one name is no second effect.
-                is_first_law(candidate.kind) && !without.iter().any(|w| rivals(w, candidate))
+                is_first_law(candidate.kind)
+                    && !present.iter().any(|w| rivals(w, candidate))
+                    && !impossible.contains(candidate)
             })
             .collect();
         let mut profiles = each_by(open.len(), self.threads, |k| {
@@ -181,9 +205,8 @@ impl<'a> Search<'a> {
         let mut impossible: Vec<Candidate> = Vec::new();
         while chosen.len() < most {
             let fit = with(base, &chosen, None);
-            let present = chosen.iter().map(|p| p.candidate);
-            let without: Vec<Candidate> = present.chain(impossible.iter().copied()).collect();
-            let profiles = self.sweep(&fit, &without)?;
+            let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
+            let profiles = self.sweep(&fit, &present, &impossible)?;
             let found = |p: &&Profile| !self.is_described(&p.candidate);
             told(chosen.iter().filter(found).count(), &profiles);
             let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
@@ -216,11 +239,16 @@ impl<'a> Search<'a> {
                 chosen.retain(|profile| profile.vanished.is_none());
             }
             if same(&before, &chosen) {
-                break;
+                // It does not stand at its best shapes; another that takes away less may.
+                if impossible.contains(&newcomer) {
+                    break;
+                }
+                impossible.push(newcomer);
             }
         }
         self.other_laws(base, &mut chosen)?;
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
+        self.fallen = self.still_taking(base, &chosen, &impossible)?;
         Ok(chosen)
     }
 
@@ -247,7 +275,25 @@ impl<'a> Search<'a> {
             let unlike = |c: &&Candidate| is_gear(c.kind) && !like(c.kind.about().name);
             others.extend(self.library.iter().filter(unlike));
         }
-        self.sweep(&fit, &others)
+        self.sweep(&fit, &others, &[])
+    }
+
+    /// Which of `dropped` pass beside `chosen`, where their best shapes let them stand or not.
+    fn still_taking(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        dropped: &[Candidate],
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let fit = with(base, chosen, None);
+        let trials = self.trials();
+        let mut taking = Vec::new();
+        for candidate in dropped {
+            let place = self.library.iter().position(|c| c == candidate);
+            let profile = place.map(|c| self.profile(&fit, c, None)).transpose()?;
+            taking.extend(profile.flatten().filter(|p| p.takes_much(trials)));
+        }
+        Ok(taking)
     }
 
     /// Another law under the same name where it does clearly better: it has more parameters to bend.
@@ -294,10 +340,9 @@ impl<'a> Search<'a> {
                 let others: Vec<Candidate> = (chosen.iter().enumerate())
                     .filter(|(k, _)| *k != i)
                     .map(|(_, p)| p.candidate)
-                    .chain(impossible.iter().copied())
                     .collect();
                 let rival = self
-                    .sweep(&fit, &others)?
+                    .sweep(&fit, &others, impossible)?
                     .into_iter()
                     .find(|p| p.refused(trials).is_none());
                 if let Some(rival) = rival

@@ -2,14 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use rig_shared::effects::{GAINS, Kind};
+
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::judge::Judge;
-use crate::diagnose::profile::Profile;
+use crate::diagnose::profile::{Profile, SIGNIFICANT};
 use crate::diagnose::refit::Refit;
 use crate::diagnose::search::{Search, is_gear};
 
 /// Probability above which an effect may be nothing: its 95 % interval holds zero.
 const NOTHING: f64 = 0.05;
+/// Gains of a coupling that are of an inertia, which come first; the last is friction.
+const OF_INERTIA: usize = 2;
 /// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
 /// true gears of the emulated rig come out from 0.7 to 1.1.
 const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
@@ -32,7 +36,7 @@ pub(super) fn unbelieved(
     let free = refit.free.len();
     let nothing = (found.clone())
         .filter(|k| !is_gear(chosen[*k].candidate.kind))
-        .map(|k| (k, joint.of_nothing(chosen, free, k)))
+        .map(|k| (k, joint.of_nothing(chosen, free, k, GAINS)))
         .filter(|(_, p)| *p > NOTHING)
         .max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, _)) = nothing {
@@ -40,6 +44,13 @@ pub(super) fn unbelieved(
             k,
             "by its own deviation it could as well be nothing",
         )));
+    }
+    let couples = |k: &usize| chosen[*k].candidate.kind == Kind::InertiaCoupling;
+    for k in found.clone().filter(couples) {
+        if joint.of_nothing(chosen, free, k, OF_INERTIA) > SIGNIFICANT {
+            let why = "what it takes away goes with the other joint's speed alone, and no inertia is shown";
+            return Ok(Some((k, why)));
+        }
     }
     for k in found.filter(|k| is_gear(chosen[*k].candidate.kind)) {
         let shares = joint.gains(chosen, free, k);

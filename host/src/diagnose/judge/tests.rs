@@ -1,5 +1,7 @@
 //! Which other names a step may have.
 
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -62,4 +64,19 @@ fn the_runner_up_is_of_the_same_joint() {
     };
     rank(&mut alone, &own, &rivals[..1], &[]);
     assert_eq!(alone.runner_up, None);
+}
+
+#[test]
+fn what_a_law_takes_that_cannot_stand_is_not_nothing() {
+    let template = std::path::Path::new("one-link.toml");
+    let robot = Robot::from_toml(crate::robot::ONE_LINK_TEMPLATE, template).unwrap();
+    let mut fallen = profile(Kind::Backlash, 0, 0.5);
+    fallen.evidence.joint_gain = 0.4;
+    let left = taken_by_none(&robot, std::slice::from_ref(&fallen), &[], &[0.3]).unwrap();
+    println!("{}", left.text);
+    assert!(left.text.contains("40 %") && left.text.contains("no name"));
+    assert!((left.ratio - 1.0 / 0.6).abs() < 1e-12 && (left.rms - 0.3 * 0.8).abs() < 1e-12);
+    // Where a name stands, what it leaves is judged by itself.
+    let named = profile(Kind::JointElasticity, 0, 0.5);
+    assert!(taken_by_none(&robot, &[fallen], &[named], &[0.3]).is_none());
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
-use rig_shared::effects::Kind;
+use rig_shared::effects::{GAINS, Kind};
 
 use super::*;
 use crate::data::{Block, JointColumns};
@@ -130,7 +130,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
                 (s.values[viscous] - 0.3) / s.std(viscous),
             ]
         }),
-        nothing: [0, 1].map(|k| beside.of_nothing(&both, free, k)),
+        nothing: [0, 1].map(|k| beside.of_nothing(&both, free, k, GAINS)),
     }
 }
 

@@ -1,7 +1,10 @@
 //! What the columns say about themselves and each other, without a model.
 
+use std::ops::Range;
+
 use super::super::Run;
 use super::super::outcome::{About, DataFault};
+use super::super::runs::JointRun;
 use super::names;
 use crate::data::{Block, Implausible, JointColumns, plausibility, unit_of_steps, velocity_scale};
 use crate::robot::{JointKind, Robot};
@@ -14,6 +17,13 @@ const LEAST_TO_LEARN: f64 = 5.0;
 const FEWEST: usize = 100;
 /// Share of the moving time at the torque limit that leaves too little to learn from.
 const AT_LIMIT: f64 = 0.2;
+
+/// No joint moves that spans less, rad or m.
+const LEAST_MOTION: f64 = 1e-5;
+/// … or less than this times what the filter takes for noise.
+const ABOVE_NOISE: f64 = 8.0;
+/// Within a second, of the steps in which its encoder reads.
+const STEPS: f64 = 3.0;
 
 /// Kind of a position that jumps.
 pub(super) const JUMP: &str = "jump";
@@ -41,17 +51,17 @@ pub(super) fn fault(
     }
 }
 
+fn span(values: &[f64]) -> (f64, f64) {
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    (values.iter()).fold(ends, |(low, high), v| (low.min(*v), high.max(*v)))
+}
+
 /// Furthest distance between filtered positions, over what the filter takes for noise.
 fn motion(run: &Run, joint: usize) -> (f64, f64) {
     let Some(own) = run.joints.get(joint) else {
         return (0.0, 0.0);
     };
-    let (low, high) = own
-        .q
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
+    let (low, high) = span(&own.q);
     let noise = own.q.iter().zip(&own.q_raw);
     let noise = noise.map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / own.q.len().max(1) as f64;
     ((high - low).max(0.0), noise.sqrt())
@@ -60,7 +70,7 @@ fn motion(run: &Run, joint: usize) -> (f64, f64) {
 /// Whether a joint moves at all: by more than its noise and than a hundredth of a millirad.
 pub(super) fn moves(run: &Run, joint: usize) -> bool {
     let (range, noise) = motion(run, joint);
-    range > 1e-5 && range > 8.0 * noise
+    range > LEAST_MOTION && range > ABOVE_NOISE * noise
 }
 
 /// The time covered, or what stands in the way of judging anything.
@@ -83,23 +93,61 @@ pub(super) fn too_short(runs: &[&Run]) -> Option<DataFault> {
     })
 }
 
-/// Training data that are too short for names, together.
+/// Seconds of a run in which some joint moves: those over which a filtered position spans more than its noise and than the
+/// steps in which it is read.
+fn in_motion(run: &Run) -> f64 {
+    let window = (run.rate.round() as usize).max(1);
+    let still = |own: &JointRun, floor: f64, rows: Range<usize>| {
+        let (low, high) = span(&own.q[rows]);
+        high - low <= floor
+    };
+    let floors: Vec<f64> = (0..run.joints.len())
+        .map(|j| {
+            let steps = run.joints[j].q_raw.windows(2).map(|w| (w[1] - w[0]).abs());
+            let step = steps.filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
+            let steps = if step.is_finite() { STEPS * step } else { 0.0 };
+            LEAST_MOTION.max(ABOVE_NOISE * motion(run, j).1).max(steps)
+        })
+        .collect();
+    let windows = (0..run.len()).step_by(window).filter_map(|from| {
+        let rows = from..(from + window).min(run.len());
+        let own = || run.joints.iter().zip(&floors);
+        let moves = own().any(|(own, floor)| !still(own, *floor, rows.clone()));
+        moves.then_some(rows.len() as f64)
+    });
+    windows.sum::<f64>() / run.rate.max(f64::MIN_POSITIVE)
+}
+
+/// Training data that hold too little motion for names, together, or those of them with everything taken off that pulls.
 pub(in crate::diagnose) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault> {
+    let all: Vec<&Run> = runs.iter().collect();
+    let free: Vec<&Run> = runs.iter().filter(|run| run.unburdened).collect();
+    let of_free = || too_short_as("recordings with everything taken off", &free);
+    too_short_as("training data", &all).or_else(|| (!free.is_empty()).then(of_free).flatten())
+}
+
+fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     let time: f64 = (runs.iter())
         .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
         .sum();
-    let all: Vec<&Run> = runs.iter().collect();
-    (time < LEAST_TO_LEARN).then(|| {
-        fault(
-            &all,
-            "too-short",
-            About::Recording,
-            "",
-            format!(
-                "The training data hold {time:.2} s in all; names are not learnt from less than {LEAST_TO_LEARN} s, and half a minute with reversals would be right."
-            ),
-        )
-    })
+    let moving: f64 = runs.iter().map(|run| in_motion(run)).sum();
+    let (kind, held) = match () {
+        () if time < LEAST_TO_LEARN => ("too-short", format!("{time:.2} s in all")),
+        () if moving < LEAST_TO_LEARN => (
+            "not-moving",
+            format!("{moving:.1} s of motion in {time:.1} s"),
+        ),
+        () => return None,
+    };
+    Some(fault(
+        runs,
+        kind,
+        About::Recording,
+        "",
+        format!(
+            "The {what} hold {held}; names are not learnt from less than {LEAST_TO_LEARN} s, and half a minute with reversals would be right."
+        ),
+    ))
 }
 
 /// The unit of time by its steps.

@@ -10,6 +10,7 @@
 //! model's many parameters take up; a fault that comes and goes within a recording; a sign that a short motion does not
 //! show beyond what its many parameters take up.
 
+mod alike;
 mod columns;
 mod fit;
 mod gravity;

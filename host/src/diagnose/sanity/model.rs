@@ -110,6 +110,9 @@ impl<'a> Judge<'a> {
             {
                 found.push(fault);
             }
+            if found.iter().all(|f: &DataFault| f.joint != self.name(j)) {
+                found.extend(self.alike(j, described)?);
+            }
         }
         if let (true, Some(turned)) = (found.is_empty(), mixed) {
             found.push(self.said(&turned));
@@ -125,7 +128,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    fn name(&self, joint: usize) -> &str {
+    pub(super) fn name(&self, joint: usize) -> &str {
         &self.robot.joints[joint].name
     }
 
@@ -320,7 +323,7 @@ impl<'a> Judge<'a> {
     }
 
     /// A position that is a multiple of the joint's: what the factors that fit, the best first, are called.
-    fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> DataFault {
+    pub(super) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> DataFault {
         let named = factors
             .iter()
             .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));

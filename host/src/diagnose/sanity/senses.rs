@@ -60,9 +60,22 @@ pub(super) fn friction(qd: &[f64], motors: Option<&DMatrix<f64>>) -> DMatrix<f64
     })
 }
 
+/// Columns of [`friction`], then the description's weight and its inertia with all that goes with it: shares of what is
+/// described.
+pub(super) fn columns(data: &Rows, j: usize, described: &Described) -> DMatrix<f64> {
+    let (weight, all) = (&described.weight[j], &described.all[j]);
+    let lost = friction(&data.qd[j], described.motors.get(j));
+    let first = lost.ncols();
+    DMatrix::from_fn(data.len(), first + 2, |k, c| match c.checked_sub(first) {
+        None => lost[(k, c)],
+        Some(0) => weight[k],
+        Some(_) => all[k] - weight[k],
+    })
+}
+
 impl Judge<'_> {
     /// Mean of the joint's own inertia over its motion, as weights of the parameters.
-    fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
+    pub(super) fn inertia(&self, j: usize) -> Result<DVector<f64>, DiagnoseError> {
         let mut still = self.rows.thinned(200);
         for column in still.qd.iter_mut().chain(&mut still.qdd) {
             column.fill(0.0);
@@ -154,15 +167,8 @@ impl Judge<'_> {
         let Some(described) = described.filter(|_| self.states_from(j)) else {
             return (None, None);
         };
-        let (weight, all) = (&described.weight[j], &described.all[j]);
-        let lost = friction(&data.qd[j], described.motors.get(j));
-        let first = lost.ncols();
-        let x = DMatrix::from_fn(data.len(), first + 2, |k, c| match c.checked_sub(first) {
-            None => lost[(k, c)],
-            Some(0) => weight[k],
-            Some(_) => all[k] - weight[k],
-        });
-        let tau = &data.tau[j];
+        let x = columns(data, j, described);
+        let (tau, first) = (&data.tau[j], x.ncols() - 2);
         let Some(fit) = Fit::of(&x, tau, &(0..first + 2).collect::<Vec<_>>()) else {
             return (None, None);
         };

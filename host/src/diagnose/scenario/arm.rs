@@ -132,7 +132,9 @@ impl ArmScenario {
         let robot = described(self.arm)?;
         let joints = robot.joints.len();
         if let Some((joint, fault)) = self.fault
-            && (joint >= joints || joint == 0 && matches!(fault, Fault::InertiaCoupling(_)))
+            && (joint >= joints
+                || joint == 0
+                    && matches!(fault, Fault::InertiaCoupling(_) | Fault::ViscousCoupling(_)))
         {
             return Err(DiagnoseError::Scenario(format!(
                 "{fault:?} cannot be hidden in joint {joint} of {joints}, counted from 0"

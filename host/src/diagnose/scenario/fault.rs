@@ -21,6 +21,8 @@ pub enum Fault {
     LoadFriction(f64),
     /// Torque per acceleration of the joint before, kg·m².
     InertiaCoupling(f64),
+    /// Torque per velocity of the joint before, N·m·s/rad: friction that it shares, and no inertia.
+    ViscousCoupling(f64),
     /// The base turned about x and y, rad.
     GravityTilt([f64; 2]),
     /// A point mass, kg, at a place in the link's frame, m.
@@ -92,6 +94,7 @@ impl Hidden {
                 share * (load[j] + inertial).abs() * turned
             }
             Fault::InertiaCoupling(inertia) => inertia * self.acceleration[j - 1],
+            Fault::ViscousCoupling(viscous) => viscous * v[j - 1],
             Fault::GravityTilt(_) | Fault::Payload(_) | Fault::JointOffset(_) => 0.0,
         };
         Ok(())

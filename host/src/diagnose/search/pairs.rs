@@ -88,7 +88,7 @@ impl Search<'_> {
         let taken = pair.iter().map(|p| p.candidate);
         let gears = self.library.iter().filter(|c| is_gear(c.kind));
         let without: Vec<Candidate> = taken.chain(gears.copied()).collect();
-        let second = self.sweep(&with(base, &pair, None), &without)?;
+        let second = self.sweep(&with(base, &pair, None), &without, &[])?;
         pair.extend((second.into_iter()).find(|p| p.refused(trials).is_none()));
         for _ in 0..2 {
             self.refine_all(base, &mut pair)?;
