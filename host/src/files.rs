@@ -101,7 +101,7 @@ pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
     if !there.is_dir() {
         let cause = io::Error::new(
             io::ErrorKind::NotADirectory,
-            "this is a file, and a folder is wanted",
+            "this is no folder, and a folder is wanted",
         );
         return refuse(there, cause);
     }
@@ -147,6 +147,11 @@ mod tests {
             let error = can_take(&path, &[]).unwrap_err();
             assert_eq!(error.path, at("file"));
             assert!(error.to_string().contains("a folder is wanted"));
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(at("nowhere/x"), at("dangling")).unwrap();
+            assert!(can_take(&at("dangling"), &[]).is_err());
         }
         fs::create_dir_all(at("out/report.html")).unwrap();
         let error = can_take(&at("out"), &["model.toml", "report.html"]).unwrap_err();

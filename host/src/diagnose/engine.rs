@@ -275,7 +275,8 @@ fn attempt(
         judged.left = left_of_held(robot, &held.last(), &judged.floors)
             .or_else(|| not_carried_over(robot, &named, &judged.floors));
     }
-    if judged.left.is_none() {
+    // Where a motion was repeated, what is left has been held against the noise.
+    if judged.left.is_none() && judge.pairs.is_empty() {
         judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
     }
     let Judged { chosen, floors, .. } = &judged;

@@ -19,8 +19,9 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
 pub(super) const LEAST_SIGMAS: f64 = 2.0;
-/// What takes away this share of the RMS is no chance, whatever it is called.
-const MUCH: f64 = 0.1;
+/// What takes away this share of the RMS is no chance, whatever it is called: a link that is driven by the noise of a motion with
+/// rests took a fifth where nothing was missing.
+const MUCH: f64 = 0.3;
 /// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 /// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.

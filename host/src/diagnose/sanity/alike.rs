@@ -17,8 +17,12 @@ use super::senses::{Described, columns};
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
-/// A wrong ratio is no smaller factor.
+/// A wrong ratio is no smaller factor of a position.
 const LEAST: f64 = 1.5;
+/// … or of a torque, as a payload in a cold rig comes near.
+const LEAST_OF_TORQUE: f64 = 1.8;
+/// Weight and inertia are off by one ratio alike within this factor; a payload adds to each what it will.
+const ALIKE: f64 = 1.15;
 /// Weight and inertia of a description are right within this factor, its friction within the square of it.
 const RIGHT: f64 = 1.25;
 /// Share of what is left that gravity of another period has to leave, at most; that all else fits is what decides.
@@ -78,9 +82,10 @@ impl Judge<'_> {
         let own = self.inertia(j)?;
         let stated: f64 = own.iter().zip(&parameters).map(|(w, p)| w * p).sum();
         let by_ratio = shares.inertia * stated / (stated - rotor * (1.0 - 1.0 / (factor * factor)));
-        let inertia = apart(shares.inertia, factor).min(apart(by_ratio, factor));
-        let alike = apart(factor, 1.0) > LEAST
-            && (three.iter().chain([&(factor * inertia)])).all(|s| apart(*s, factor) < RIGHT);
+        let inertia = apart(shares.inertia, shares.weight).min(apart(by_ratio, shares.weight));
+        let alike = apart(factor, 1.0) > LEAST_OF_TORQUE
+            && inertia < ALIKE
+            && three.iter().all(|s| apart(*s, factor) < RIGHT);
         Ok(alike.then(|| {
             self.say(
                 "ratio",

@@ -130,12 +130,15 @@ fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     let time: f64 = (runs.iter())
         .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
         .sum();
-    let moving: f64 = runs.iter().map(|run| in_motion(run)).sum();
+    // A sum of nothing is −0.
+    let moving = 0.0 + runs.iter().map(|run| in_motion(run)).sum::<f64>();
     let (kind, held) = match () {
         () if time < LEAST_TO_LEARN => ("too-short", format!("{time:.2} s in all")),
         () if moving < LEAST_TO_LEARN => (
             "not-moving",
-            format!("{moving:.1} s of motion in {time:.1} s"),
+            format!(
+                "{moving:.1} s of motion beyond the noise and the steps of its position, in {time:.1} s"
+            ),
         ),
         () => return None,
     };

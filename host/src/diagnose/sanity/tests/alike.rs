@@ -24,6 +24,16 @@ fn a_ratio_is_told_from_a_payload_and_from_friction() {
         let given = tau(&sound, 0, factor);
         only(&other, &given, "ratio", 0, "alike");
     }
+    // A payload in a cold rig.
+    let mut changed = robot.clone();
+    let joint = &mut changed.joints[0];
+    let inertial = joint.inertial.as_mut().unwrap();
+    inertial.first_moment.iter_mut().for_each(|m| *m /= 1.65);
+    inertial.inertia.iter_mut().for_each(|i| *i /= 1.45);
+    let friction = joint.friction.as_mut().unwrap();
+    friction.coulomb /= 1.65;
+    friction.viscous /= 1.65;
+    assert_eq!(faults(&changed, &sound).unwrap(), []);
     let mut heavier = robot.clone();
     let inertial = heavier.joints[0].inertial.as_mut().unwrap();
     inertial.first_moment.iter_mut().for_each(|m| *m *= 0.5);
