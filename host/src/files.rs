@@ -91,10 +91,10 @@ pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
         );
         return refuse(&taken, cause);
     }
-    // What is not there yet will be made in what is.
+    // What is not there yet will be made in what is; a link to nothing is there and no folder.
     let there = path
         .ancestors()
-        .find(|p| p.as_os_str().is_empty() || p.exists());
+        .find(|p| p.as_os_str().is_empty() || p.symlink_metadata().is_ok());
     let there = there
         .filter(|p| !p.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
