@@ -212,11 +212,11 @@ fn attempt(
     let values = &search.source.values;
     let trial = Replay::of(&bench, &refit, values, loaded);
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
-    let judged = judge.judged(found)?;
+    let judged = judge.judged(found.clone())?;
     refuse_guesses(robot, &mut tried, &judged);
     let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
     refuse_guesses(robot, &mut tried, &judged);
-    let mut fallen = search.fallen.clone();
+    let mut fallen = Vec::new();
     let mut without = |judged: Judged, k: usize, why: &str| -> Result<Judged, DiagnoseError> {
         let mut stand = judged.chosen;
         let gone = stand.remove(k);
@@ -277,6 +277,7 @@ fn attempt(
     }
     // Where a motion was repeated, what is left has been held against the noise.
     if judged.left.is_none() && judge.pairs.is_empty() {
+        fallen.extend(search.still_taking(&refit.base, &found)?);
         judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
     }
     let Judged { chosen, floors, .. } = &judged;

@@ -54,8 +54,8 @@ pub(super) struct Search<'a> {
     blurred: Vec<f64>,
     /// Lowest to highest position, joint by joint, rad or m.
     spans: Vec<f64>,
-    /// What the last search had to drop although it takes away much beside all that was found.
-    pub(super) fallen: Vec<Profile>,
+    /// What the last search had to drop.
+    dropped: Vec<Candidate>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
@@ -82,7 +82,7 @@ impl<'a> Search<'a> {
             described,
             measured: Vec::new(),
             settled: Vec::new(),
-            fallen: Vec::new(),
+            dropped: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -248,7 +248,7 @@ impl<'a> Search<'a> {
         }
         self.other_laws(base, &mut chosen)?;
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
-        self.fallen = self.still_taking(base, &chosen, &impossible)?;
+        self.dropped = impossible;
         Ok(chosen)
     }
 
@@ -278,17 +278,19 @@ impl<'a> Search<'a> {
         self.sweep(&fit, &others, &[])
     }
 
-    /// Which of `dropped` pass beside `chosen`, where their best shapes let them stand or not.
-    fn still_taking(
+    /// What the last search had to drop although it takes away much beside `chosen`, all that it found.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn still_taking(
         &self,
         base: &Fit,
         chosen: &[Profile],
-        dropped: &[Candidate],
     ) -> Result<Vec<Profile>, DiagnoseError> {
         let fit = with(base, chosen, None);
         let trials = self.trials();
         let mut taking = Vec::new();
-        for candidate in dropped {
+        for candidate in &self.dropped {
             let place = self.library.iter().position(|c| c == candidate);
             let profile = place.map(|c| self.profile(&fit, c, None)).transpose()?;
             taking.extend(profile.flatten().filter(|p| p.takes_much(trials)));

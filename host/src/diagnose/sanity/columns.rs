@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::super::Run;
 use super::super::outcome::{About, DataFault};
-use super::super::runs::JointRun;
+use super::super::runs::{JointRun, resolution};
 use super::names;
 use crate::data::{Block, Implausible, JointColumns, plausibility, unit_of_steps, velocity_scale};
 use crate::robot::{JointKind, Robot};
@@ -103,9 +103,7 @@ fn in_motion(run: &Run) -> f64 {
     };
     let floors: Vec<f64> = (0..run.joints.len())
         .map(|j| {
-            let steps = run.joints[j].q_raw.windows(2).map(|w| (w[1] - w[0]).abs());
-            let step = steps.filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
-            let steps = if step.is_finite() { STEPS * step } else { 0.0 };
+            let steps = STEPS * resolution(std::slice::from_ref(run), j);
             LEAST_MOTION.max(ABOVE_NOISE * motion(run, j).1).max(steps)
         })
         .collect();
