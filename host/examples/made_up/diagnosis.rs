@@ -337,6 +337,7 @@ pub(super) fn remainder() -> Diagnosis {
         gap_closed: Some(0.722),
         remainder: Some(Remainder {
             joint: "link".into(),
+            unit: "N*m".into(),
             rms: 0.084,
             ratio: 1.94,
             places: vec![place("position", [0.9, 1.6], "rad", 0.58, "58 % of it lies between 0.9 and 1.6 rad, in both directions.")],

@@ -12,6 +12,7 @@ use super::profile::{LEAST_GAIN, SIGNIFICANT};
 use super::refit::Refit;
 use super::rows::{Column, combined};
 use super::solve::Solution;
+use super::type_b::LINK;
 use crate::robot::JointKind;
 
 /// Share of the whole change's gain that a part of the parameters must reach to speak for it.
@@ -188,8 +189,8 @@ fn payload(
     }
     let (distance, mass) = (dj / dm, dm * dm / dj);
     let (vm, vj, c) = (
-        after.covariance[(moment, moment)],
-        after.covariance[(inertia, inertia)],
+        after.covariance[(moment, moment)] + (LINK * after.values[moment]).powi(2),
+        after.covariance[(inertia, inertia)] + (LINK * after.values[inertia]).powi(2),
         after.covariance[(moment, inertia)],
     );
     let spread = |gm: f64, gj: f64| {

@@ -3,11 +3,14 @@
 //! A name that stands in for another one fits as well because the nominal parameters move beside it: a constant takes the
 //! place of a spring where gravity takes up its stiffness. With the true name the description's values stand.
 
+use rig_shared::effects::Kind;
+
 use super::DiagnoseError;
 use super::anchor::Anchor;
 use super::judge::{BEYOND_FLOOR, Judge, Judged, equal};
-use super::profile::Profile;
+use super::profile::{Profile, stiff};
 use super::refit::Refit;
+use super::search::with;
 
 /// Share of what a name leaves beyond the floor, the description's values as they are, that another one leaves at most.
 const MUCH_LESS: f64 = 0.5;
@@ -26,12 +29,11 @@ pub(super) fn by_description(
         return Ok(judged);
     }
     let frozen = refit.frozen(anchor);
-    let left = |list: &[Profile], joint: usize| {
-        let mut fit = frozen.clone();
-        for column in list.iter().flat_map(|p| p.columns.iter()) {
-            fit.push(column);
-        }
-        fit.rms(joint)
+    let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
+    // Where gravity is as described, a spring that it could hide behind shows.
+    let stands = |rival: &Profile, list: &[Profile], k: usize| {
+        let shows = || stiff(&with(&frozen, list, Some(k)), &rival.columns);
+        rival.vanished.is_none() || rival.candidate.kind == Kind::Spring && shows()
     };
     let mut chosen = judged.chosen.clone();
     let mut moved = false;
@@ -48,7 +50,7 @@ pub(super) fn by_description(
         }
         let rivals = judge.search.alternatives(judge.base, &chosen, k)?;
         let best = (rivals.into_iter())
-            .filter(|rival| equal(&chosen[k], rival))
+            .filter(|rival| equal(&chosen[k], rival) && stands(rival, &chosen, k))
             .map(|rival| {
                 let mut list = chosen.clone();
                 list[k] = rival;

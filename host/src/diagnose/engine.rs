@@ -32,7 +32,7 @@ use super::search::with;
 use super::sentences::offsets;
 use super::stated::{Now, Stated};
 use super::waves::is_of_the_motor;
-use super::winding::{contradict, name_something, settled, tell, windings, zeros};
+use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::report::{format_unit, format_value};
@@ -280,6 +280,8 @@ fn attempt(
         fallen.extend(search.still_taking(&refit.base, &found)?);
         judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
     }
+    let left = judged.left.is_some();
+    judged.left = judged.left.or_else(|| left_of_voltage(&windings));
     let Judged { chosen, floors, .. } = &judged;
     let joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
     let after = &joint.solution;
@@ -311,7 +313,6 @@ fn attempt(
         word.applied(step);
     }
     let explained = refit.explained(chosen, after);
-    let left = judged.left.is_some();
     let change = change(&bench, &refit, &explained, left, after, &options.without);
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
     {

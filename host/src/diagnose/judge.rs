@@ -12,7 +12,7 @@ use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
 use super::pull;
-use super::rows::{Rows, combined};
+use super::rows::Rows;
 use super::runs::Run;
 use super::search::{Search, is_gear, shadow, with};
 use super::testable;
@@ -45,10 +45,12 @@ const FAR_BEYOND_READING_OF_GEARS: f64 = 7.0;
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
 const AS_GOOD: f64 = 0.9;
-/// Standard deviation of a torque that counts as constant, as a share of its mean.
-const VARIES: f64 = 0.2;
 /// Standard deviations from which on a change between recordings is certain.
 const CERTAIN: f64 = 5.0;
+/// … that a stiffness may be larger than found.
+const SURELY: f64 = 2.0;
+/// How far from the middle of the motion a spring may be at rest, in spans of the motion.
+const SPANS_TO_REST: f64 = 2.0;
 /// Standard deviations of a paired difference between blocks.
 const NO_DIFFERENCE: f64 = 2.5;
 
@@ -264,13 +266,14 @@ impl Judge<'_, '_> {
         let shown = shown.map_or("It goes with no single coordinate of the motion.", |p| {
             &p.text
         });
-        let name = &self.robot.joints[joint].name;
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
         let text = format!(
             "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {shown}",
             100.0 * (ratio - 1.0)
         );
         left.then(|| Remainder {
             joint: name.clone(),
+            unit: kind.units().1.to_owned(),
             rms: (rms * rms - (rms / ratio).powi(2)).max(0.0).sqrt(),
             ratio,
             text,
@@ -309,6 +312,7 @@ impl Judge<'_, '_> {
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         (step.abs() > CERTAIN * std && step.abs() > QUARTER * rms).then(|| Remainder {
             joint: name.clone(),
+            unit: kind.units().1.to_owned(),
             rms: 0.5 * step.abs(),
             ratio: rms / (rms * rms - 0.25 * step * step).max(0.0).sqrt().max(0.1 * rms),
             text: format!(
@@ -322,7 +326,7 @@ impl Judge<'_, '_> {
     }
 
     fn knocked(&self, burst: &Burst, rms: f64, joint: usize, places: Vec<Place>) -> Remainder {
-        let name = &self.robot.joints[joint].name;
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
         let Burst {
             share,
             count,
@@ -332,6 +336,7 @@ impl Judge<'_, '_> {
         } = burst;
         Remainder {
             joint: name.clone(),
+            unit: kind.units().1.to_owned(),
             rms: rms * share.sqrt(),
             ratio: 1.0 / (1.0 - share).max(1e-6).sqrt(),
             text: format!(
@@ -361,6 +366,7 @@ impl Judge<'_, '_> {
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         (rms > far * own).then(|| Remainder {
             joint: name.clone(),
+            unit: kind.units().1.to_owned(),
             rms: (rms * rms - own * own).sqrt(),
             ratio: rms / own,
             text: format!(
@@ -392,13 +398,14 @@ impl Judge<'_, '_> {
                 ""
             }
         );
-        let name = &self.robot.joints[joint].name;
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
         let percent = format_significant(100.0 * found.gain, 2);
         let left = rms * (1.0 - (1.0 - found.gain).powi(2)).max(0.0).sqrt();
         if names.is_empty() {
             // The description's own friction and filters leave a little of that.
             return (found.gain > UNNAMED).then(|| Remainder {
                 joint: name.clone(),
+                unit: kind.units().1.to_owned(),
                 rms: left,
                 ratio: rms / floor,
                 text: format!(
@@ -423,6 +430,7 @@ impl Judge<'_, '_> {
         );
         Some(Remainder {
             joint: name.clone(),
+            unit: kind.units().1.to_owned(),
             rms: left,
             ratio: rms / floor,
             text,
@@ -437,9 +445,10 @@ impl Judge<'_, '_> {
 pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Option<Remainder> {
     let ratio = |j: usize| held[j] / floors[j];
     let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
-    let name = &robot.joints[j].name;
+    let Joint { name, kind, .. } = &robot.joints[j];
     (ratio(j) > BEYOND_FLOOR_HELD).then(|| Remainder {
         joint: name.clone(),
+        unit: kind.units().1.to_owned(),
         rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
         ratio: ratio(j),
         text: format!(
@@ -461,9 +470,10 @@ pub(super) fn not_carried_over(
     let grown = |(_, [before, after]): &&(usize, [f64; 2])| after / before;
     let worst = steps.iter().max_by(|a, b| grown(a).total_cmp(&grown(b)))?;
     let (joint, [before, after]) = *worst;
-    let name = &robot.joints[joint].name;
+    let Joint { name, kind, .. } = &robot.joints[joint];
     (after >= before).then(|| Remainder {
         joint: name.clone(),
+        unit: kind.units().1.to_owned(),
         rms: (after.powi(2) - floors[joint].powi(2)).max(0.0).sqrt(),
         ratio: after / floors[joint],
         text: format!(
@@ -485,9 +495,10 @@ pub(super) fn taken_by_none(
     let gain = |p: &&Profile| p.evidence.joint_gain;
     let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
     let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
-    let name = &robot.joints[joint].name;
+    let Joint { name, kind, .. } = &robot.joints[joint];
     Some(Remainder {
         joint: name.clone(),
+        unit: kind.units().1.to_owned(),
         rms: floors[joint] * (1.0 - left * left).max(0.0).sqrt(),
         ratio: 1.0 / left,
         text: format!(
@@ -512,17 +523,12 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
         }
     };
     exact(own.candidate.kind);
-    for rival in rivals {
+    for rival in rivals.iter().filter(|rival| may_stand(rival, runs)) {
         let name = rival.candidate.kind.about().name;
         if names.iter().any(|n| n == name) {
             continue;
         }
         if equal(own, rival) {
-            // A spring holds every constant: where it takes away no more, nothing asks for its stiffness.
-            let more = rival.evidence.gain > own.evidence.gain;
-            if rival.candidate.kind == Kind::Spring && is_constant(own) && !more {
-                continue;
-            }
             names.push(name.to_owned());
         } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
             step.runner_up = Some(name.to_owned());
@@ -533,19 +539,22 @@ pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[R
     step.set = names;
 }
 
-/// Whether an effect's torque on its joint is one constant, as found, but for [`VARIES`] of it and where it is gone.
-fn is_constant(profile: &Profile) -> bool {
-    let joint = profile.candidate.joint;
-    let terms = profile.columns.iter().zip(&profile.evidence.gains);
-    let Some(mut torque) = combined(joint + 1, terms.map(|(c, g)| (c, *g))).swap_remove(joint)
-    else {
-        return false;
+/// Whether a rival may be what is there: none whose law has run to its limit, but a spring that is at rest not far from where the
+/// joint goes, were it a little stiffer than found.
+fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
+    let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
+    let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
+        return rival.vanished.is_none();
     };
-    torque.retain(|t| *t != 0.0);
-    let count = torque.len().max(1) as f64;
-    let mean = torque.iter().sum::<f64>() / count;
-    let variance = torque.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / count;
-    variance.sqrt() < VARIES * mean.abs()
+    if rival.vanished.is_none() || rival.candidate.kind != Kind::Spring {
+        return rival.vanished.is_none();
+    }
+    let places = (runs.iter()).flat_map(|run| &run.joints[rival.candidate.joint].q);
+    let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+        [low.min(*q), high.max(*q)]
+    });
+    let pull = stiffness * 0.5 * (low + high) + preload;
+    pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
 }
 
 /// Whether the data support a rival as well as what stands.

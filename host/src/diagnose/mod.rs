@@ -45,6 +45,7 @@ mod solve;
 mod stated;
 pub mod testable;
 mod transmission;
+mod type_b;
 pub mod voltage;
 mod waves;
 mod winding;

@@ -218,8 +218,10 @@ pub struct NextExperiment {
 pub struct Remainder {
     /// Name of the joint.
     pub joint: String,
-    /// RMS beyond the noise floor, in the residual's unit.
+    /// RMS beyond the noise floor.
     pub rms: f64,
+    /// Its unit: of the residual, or V of what a voltage alone shows.
+    pub unit: String,
     /// RMS over the noise floor.
     pub ratio: f64,
     /// Where it sits.

@@ -1,9 +1,15 @@
 //! A candidate at the shapes that explain most, and whether that is enough to take it.
 
+mod shapes;
+#[cfg(test)]
+mod tests;
+
 use std::sync::Arc;
 
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
+pub(super) use self::shapes::grid;
+use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
@@ -13,15 +19,19 @@ use super::search::{Search, is_gear};
 use super::simplex::Simplex;
 use super::transmission::ABREAST;
 
-/// Family-wise probability of a name although nothing is there.
+/// Family-wise probability of what is said of recordings although nothing is there.
 pub(super) const SIGNIFICANT: f64 = 0.01;
+/// … of a name, which has to take away enough on folds that it was not fitted to, and surely, besides.
+pub(super) const TAKEN: f64 = 0.05;
 /// Least share of the RMS that an effect must take away on folds it was not fitted to.
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
-pub(super) const LEAST_SIGMAS: f64 = 2.0;
+const LEAST_SIGMAS: f64 = 2.0;
 /// What takes away this share of the RMS is no chance, whatever it is called: a link that is driven by the noise of a motion with
 /// rests took a fifth where nothing was missing.
 const MUCH: f64 = 0.3;
+/// … then it need only be so many standard deviations of its gain: what shows where the torque is highest alone shows in few blocks.
+const LEAST_SIGMAS_OF_MUCH: f64 = 1.0;
 /// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 /// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
@@ -31,20 +41,10 @@ const HOPELESS_GEAR: f64 = 0.02;
 /// Share of critical damping beyond which a gear is no spring: shafts and gears of steel have some hundredths, and what hardly
 /// swings is a lag of friction, with which a spring and all friction on the link are easily confused.
 const MOST_DAMPED: f64 = 0.5;
-/// Points of a grid per decade of a logarithmic range.
-const PER_DECADE: f64 = 4.0;
-/// Steps of a grid over a linear range.
-const LINEAR_STEPS: u32 = 8;
-/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
-const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
 /// Starting points that are followed up, side by side.
 const FOLLOWED: usize = ABREAST;
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
-/// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
-const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
-/// A shape is known well enough within this ratio, less one, or this share of a linear range.
-const FINE_ENOUGH: f64 = 0.01;
 
 /// Share explained, shapes, columns.
 type Best = (f64, [f64; SHAPES], Arc<Vec<Column>>);
@@ -61,7 +61,7 @@ pub(super) struct Profile {
     /// What they do.
     pub(super) evidence: Evidence,
     /// A shape that has run to the least of what is searched, where a law is its limit of none; the swing of a link on a gear
-    /// that hardly lets it; a gain that has left what physics allows.
+    /// that hardly lets it; the stiffness of a spring that is a constant; a gain that has left what physics allows.
     pub(super) vanished: Option<&'static str>,
     /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
     pub(super) followed: Option<Followed>,
@@ -86,7 +86,7 @@ impl Profile {
             Some(format!(
                 "its {shape} goes to the least that can be told from none"
             ))
-        } else if p > SIGNIFICANT {
+        } else if p > TAKEN {
             Some(format!("p = {p:.2}, corrected for {tried} trials"))
         } else if e.joint_gain < self.least_gain() {
             Some(format!(
@@ -94,7 +94,7 @@ impl Profile {
                 100.0 * e.joint_gain,
                 100.0 * self.least_gain()
             ))
-        } else if e.gain_sigmas < LEAST_SIGMAS {
+        } else if self.in_too_few_blocks() {
             Some(format!(
                 "its gain is only {:.1} of its standard deviations",
                 e.gain_sigmas
@@ -107,9 +107,19 @@ impl Profile {
     /// Whether it takes away so much that something is there, be it this or another.
     pub(super) fn takes_much(&self, tried: usize) -> bool {
         let e = &self.evidence;
-        self.corrected(tried) <= SIGNIFICANT
-            && e.joint_gain >= MUCH
-            && e.gain_sigmas >= LEAST_SIGMAS
+        self.corrected(tried) <= TAKEN && e.joint_gain >= MUCH && e.gain_sigmas >= LEAST_SIGMAS
+    }
+
+    /// Whether its gain is too little beside what it varies by from block to block. A gear's shapes bend to much.
+    pub(super) fn in_too_few_blocks(&self) -> bool {
+        let e = &self.evidence;
+        let much = e.joint_gain >= MUCH && !is_gear(self.candidate.kind);
+        let least = if much {
+            LEAST_SIGMAS_OF_MUCH
+        } else {
+            LEAST_SIGMAS
+        };
+        e.gain_sigmas < least
     }
 
     fn least_gain(&self) -> f64 {
@@ -126,134 +136,24 @@ impl Profile {
     }
 }
 
-/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
-/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
-fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
-    let mut list = Vec::new();
-    let shapes = kind.about().shapes;
-    let [low, high] = shapes[0].range;
-    const STEPS: usize = 11;
-    for k in 0..=STEPS {
-        let first = low * (high / low).powf(k as f64 / STEPS as f64);
-        for share in [0.05, 0.25, 0.5, 0.9] {
-            list.push(if kind == Kind::Backlash {
-                [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
-            } else {
-                // A few per cent of critical damping for a tenth of a kg·m².
-                [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
-            });
-        }
-    }
-    list
-}
-
-/// Grid of shapes of an effect.
-pub(super) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
-    if is_gear(kind) {
-        return starts(kind);
-    }
-    let shapes = kind.about().shapes;
-    let mut points = vec![[0.0; SHAPES]];
-    for (place, shape) in shapes.iter().enumerate() {
-        let [low, high] = shape.range;
-        let values: Vec<f64> = match shape.scale {
-            Scale::Logarithmic => {
-                let n = ((high / low).log10() * PER_DECADE / shapes.len() as f64)
-                    .ceil()
-                    .max(1.0);
-                (0..=n as usize)
-                    .map(|k| low * (high / low).powf(k as f64 / n))
-                    .collect()
-            }
-            Scale::Linear => (0..=LINEAR_STEPS)
-                .map(|k| low + (high - low) * f64::from(k) / f64::from(LINEAR_STEPS))
-                .collect(),
-            Scale::Whole => (0..=(high - low).floor() as u32)
-                .map(|k| low + f64::from(k))
-                .collect(),
-        };
-        points = points
-            .into_iter()
-            .flat_map(|point| {
-                values.iter().map(move |v| {
-                    let mut point = point;
-                    point[place] = *v;
-                    point
-                })
-            })
-            .collect();
-    }
-    points
-}
-
-/// A shape's value as the search moves it: its logarithm where ratios count.
-fn coordinate(shape: &Parameter, value: f64) -> f64 {
-    match shape.scale {
-        Scale::Logarithmic => value.ln(),
-        Scale::Linear | Scale::Whole => value,
-    }
-}
-
-/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
-/// least that is `told`.
-fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
-    let ([low, high], [least, most]) = (shape.bounds, shape.range);
-    match shape.scale {
-        Scale::Logarithmic => {
-            let told = if is_distance(shape) {
-                told.min(most)
-            } else {
-                0.0
-            };
-            [low.max(0.1 * least).max(told), high.min(10.0 * most)]
-        }
-        Scale::Linear | Scale::Whole => [low, high],
-    }
-}
-
-/// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a
-/// gear only play is one.
-fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
-    let shape = kind.about().shapes.first()?;
-    let least = (1.0 + AT_THE_END) * searched(shape, told)[0];
-    let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
-    (counts && shapes[0] < least).then_some(shape.name)
-}
-
 /// Share of critical damping at which a link of that inertia swings on an elastic gear while the motor stands.
 fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
     let [stiffness, damping, ..] = *shapes;
     0.5 * damping / (stiffness * mass).sqrt()
 }
 
-/// Whether a shape is a way that the position shows.
-fn is_distance(shape: &Parameter) -> bool {
-    shape.unit == "rad"
-}
-
-/// The value there, within what physics allows.
-fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
-    let [low, high] = shape.bounds;
-    match shape.scale {
-        Scale::Logarithmic => coordinate.exp(),
-        Scale::Linear | Scale::Whole => coordinate,
+/// Whether a spring pulls back, beside what it pulls everywhere alike: preload alone is a constant, which has names of its own.
+pub(super) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
+    let Some((stiffness, preload)) = columns.split_first() else {
+        return false;
+    };
+    let mut beside = fit.clone();
+    for column in preload {
+        beside.push(column);
     }
-    .clamp(low, high)
-}
-
-/// Distance of the grid's points along a coordinate of one of `count` shapes, and the one at which a refinement ends.
-fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
-    let [low, high] = shape.range;
-    match shape.scale {
-        Scale::Logarithmic => [
-            count as f64 / PER_DECADE * std::f64::consts::LN_10,
-            FINE_ENOUGH,
-        ],
-        Scale::Linear | Scale::Whole => [
-            (high - low) / f64::from(LINEAR_STEPS),
-            FINE_ENOUGH * (high - low),
-        ],
-    }
+    let evidence = (beside.distinct(std::slice::from_ref(stiffness)))
+        .and_then(|own| beside.evidence(&own, &[[0.0, f64::INFINITY]]));
+    evidence.is_some_and(|e| e.corrected(1) < SIGNIFICANT && e.gain_sigmas >= LEAST_SIGMAS)
 }
 
 impl Search<'_> {
@@ -345,6 +245,9 @@ impl Search<'_> {
             let mass = self.source.mass(joint, 0)?;
             vanished = vanished
                 .or_else(|| (damping_ratio(&best.1, mass) > MOST_DAMPED).then_some("swing"));
+        }
+        if kind == Kind::Spring && !stiff(fit, &best.2) {
+            vanished = Some("stiffness");
         }
         Ok(Some(Profile {
             candidate: self.library[c],

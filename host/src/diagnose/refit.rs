@@ -14,6 +14,7 @@ use super::bench::Bench;
 use super::columns::Source;
 use super::fit::{Fit, dot};
 use super::floor;
+use super::lead::slack;
 use super::locate::Coordinate;
 use super::model::weights;
 use super::outcome::{Absorbed, Value};
@@ -22,6 +23,7 @@ use super::quiet::counts;
 use super::rows::{Column, Rows, combined};
 use super::search::{is_gear, with};
 use super::solve::{Solution, jackknifed, solve};
+use super::type_b::widened;
 
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
 const DIFFERENCE: f64 = 0.01;
@@ -448,11 +450,12 @@ impl Joint {
         });
         let shapes = (kind.about().shapes.iter().enumerate())
             .map(|(s, shape)| (*shape, profile.shapes[s], self.stds[k][s]));
+        let slack = slack(source.runs);
         (gains.chain(shapes))
             .map(|(parameter, value, std)| {
                 let value = Value {
                     value,
-                    std,
+                    std: widened(kind, &parameter, value, std, slack),
                     unit: source.unit(&profile.candidate, &parameter),
                 };
                 (parameter.name.to_owned(), value)

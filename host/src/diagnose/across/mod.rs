@@ -40,6 +40,7 @@ use super::profile::SIGNIFICANT;
 use super::rows::Column;
 use super::search::is_gear;
 use super::solve::{Solution, jackknifed, solve};
+use super::type_b::widened;
 use super::{DiagnoseError, Options};
 use crate::prepare::LowPass;
 use crate::robot::unit_of;
@@ -352,6 +353,7 @@ impl Between<'_, '_> {
             let parameters = (about.gains.iter().chain(about.shapes).zip(values))
                 .map(|(p, [value, std])| {
                     let unit = unit_of(p, joint.kind);
+                    let std = widened(kind, p, value, std, 0.0);
                     (p.name.to_owned(), Value { value, std, unit })
                 })
                 .collect();

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::*;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Evidence;
+use crate::diagnose::runs::JointRun;
 
 fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
     Profile {
@@ -79,4 +80,30 @@ fn what_a_law_takes_that_cannot_stand_is_not_nothing() {
     // Where a name stands, what it leaves is judged by itself.
     let named = profile(Kind::JointElasticity, 0, 0.5);
     assert!(taken_by_none(&robot, &[fallen], &[named], &[0.3]).is_none());
+}
+
+#[test]
+fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
+    let run = Run {
+        joints: vec![JointRun {
+            q: vec![2.0, 3.0],
+            ..JointRun::default()
+        }],
+        ..Run::default()
+    };
+    let spring = |stiffness: f64, preload: f64, vanished| {
+        let mut spring = profile(Kind::Spring, 0, 0.5);
+        spring.evidence.gains = vec![stiffness, preload];
+        spring.evidence.stds = vec![0.1, 0.1];
+        spring.vanished = vanished;
+        may_stand(&spring, std::slice::from_ref(&run))
+    };
+    // About the middle of the motion, 2.5 rad, it pulls with 0.3 N·m: with 0.2 N·m/rad more it is at rest 1.5 rad away …
+    assert!(spring(0.0, 0.3, Some("stiffness")));
+    // … and with 0.6 N·m 3 rad, thrice as far as it moves.
+    assert!(!spring(0.0, 0.6, Some("stiffness")));
+    assert!(spring(0.0, 0.6, None));
+    let mut other = profile(Kind::Stribeck, 0, 0.5);
+    other.vanished = Some("velocity");
+    assert!(!may_stand(&other, &[run]));
 }

@@ -8,7 +8,7 @@ use super::{Profile, STAYS, Search, in_the_shadow, is_gear, with};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::{Candidate, Source};
 use crate::diagnose::fit::{Evidence, Fit};
-use crate::diagnose::profile::{LEAST_GAIN, LEAST_SIGMAS};
+use crate::diagnose::profile::LEAST_GAIN;
 use crate::diagnose::stated::{candidate, is_one};
 
 impl<'a> Search<'a> {
@@ -150,7 +150,7 @@ impl<'a> Search<'a> {
         let mut i = 0;
         while i < chosen.len() {
             let e = &chosen[i].evidence;
-            let unsure = e.p_value > STAYS || e.gain_sigmas < LEAST_SIGMAS;
+            let unsure = e.p_value > STAYS || chosen[i].in_too_few_blocks();
             let weak = if self.rank_of(&chosen[i].candidate) < 2 {
                 unsure
             } else {

@@ -1,11 +1,15 @@
 //! What a right name leaves because its law is not quite the rig's.
 
+use rig_shared::effects::Kind;
+
 use super::is_gear;
 use crate::diagnose::profile::Profile;
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
 /// closes 93 % of the gap leaves so much …
 const SHADOW: f64 = 0.005;
+/// … a constant and the direction of gravity have no other form: what they leave is what the joint does at rest …
+const SHADOW_OF_A_CONSTANT: f64 = 0.001;
 /// … and 86 % for gears, whose motion is driven by the measured one.
 const SHADOW_OF_A_GEAR: f64 = 0.02;
 
@@ -23,9 +27,11 @@ pub(super) fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave.
 pub(in crate::diagnose) fn shadow(of: &Profile) -> f64 {
-    if is_gear(of.candidate.kind) {
-        SHADOW_OF_A_GEAR
-    } else {
-        SHADOW
+    match of.candidate.kind {
+        kind if is_gear(kind) => SHADOW_OF_A_GEAR,
+        Kind::TorqueOffset | Kind::CurrentOffset | Kind::AsymmetricCoulomb | Kind::GravityTilt => {
+            SHADOW_OF_A_CONSTANT
+        }
+        _ => SHADOW,
     }
 }

@@ -124,6 +124,7 @@ impl Told<'_> {
         let remainder = left.then(|| Remainder {
             joint: self.joint(),
             rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),
+            unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
             ratio: last / self.floor.max(f64::MIN_POSITIVE),
             places: Vec::new(),
             text: format!(

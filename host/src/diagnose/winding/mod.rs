@@ -14,20 +14,23 @@ mod settle;
 #[cfg(test)]
 mod tests;
 
-use rig_shared::effects::{Effect, Kind, SHAPES};
+use rig_shared::effects::{Effect, Kind, Parameter, SHAPES};
 
 use self::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
 use super::bench::{Bench, Loaded};
 use super::columns::Candidate;
 use super::fit::Fit;
 use super::floor;
-use super::judge::closed;
+use super::judge::{BEYOND_FLOOR, closed};
 use super::limits::smallest;
 use super::locate::locate;
-use super::outcome::{Absorbed, Detectable, Diagnosis, Fate, Map, Place, Step, Tried, Value};
+use super::outcome::{
+    Absorbed, Detectable, Diagnosis, Fate, Map, Place, Remainder, Step, Tried, Value,
+};
 use super::pictures::map;
 use super::profile::{Profile, SIGNIFICANT};
 use super::solve::{Solution, jackknifed, solve};
+use super::type_b::widened;
 use super::{DiagnoseError, Options};
 use crate::report::{format_significant, format_value};
 use crate::robot::{Robot, RobotEffect};
@@ -38,6 +41,10 @@ pub(super) use self::settle::{settled, zeros};
 const EXPLAINED: f64 = 0.1;
 /// Least share of what is left of the voltage that a dead zone takes away.
 const LEAST_SHARE: f64 = 0.1;
+/// Share of what is left of the voltage that a coordinate must explain to be more than an inverter's own unrest.
+const LEFT: f64 = 0.2;
+/// Share of the squares that a dead zone takes away which it may leave: no inverter fades just so.
+const SHADOW: f64 = 0.02;
 /// Relative difference of back-EMF and torque constant that is said: magnets and load change them by less.
 const CONSTANT_OFF: f64 = 0.05;
 /// … and of the resistance: copper gains 0.39 % a kelvin.
@@ -57,6 +64,7 @@ pub(super) struct Winding {
     tried: Tried,
     detectable: Option<Detectable>,
     dead_zone: Option<DeadZone>,
+    left: Option<Remainder>,
 }
 
 struct DeadZone {
@@ -197,25 +205,38 @@ fn winding(
             size,
             unit: about.gains[0].unit.to_owned(),
         });
-    let dead_zone = profile.filter(|_| stands).map(|profile| {
-        let floor = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0)
-            .unwrap_or_else(|| last.rms(0));
-        let unseen = held.map(|held| {
-            [(&before, None), (&after, Some(fade))]
-                .map(|(solution, k)| held.rms(&solution.values, k))
-        });
-        let train = [base.rms(0), last.rms(0)];
-        let coordinates = training.coordinates();
+    let repeated = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0);
+    let coordinates = training.coordinates();
+    let places_of = |fit: &Fit, floor: f64| {
+        let blocks = fit.block_of_rows();
+        let residual = fit.residual(0);
         let places = locate(
             rows,
             &coordinates,
-            &base.residual(0),
-            base.block_of_rows(),
+            &residual,
+            blocks,
             0,
             &own.name,
             floor,
             options.seed,
         );
+        places.into_iter().filter(|p| p.p_value < SIGNIFICANT)
+    };
+    let left = places_of(&last, repeated.unwrap_or(0.0))
+        .find(|p| p.share > LEFT)
+        .filter(|_| {
+            let taken = base.rms(0).powi(2) - last.rms(0).powi(2);
+            let known = (BEYOND_FLOOR * repeated.unwrap_or(0.0)).powi(2) + SHADOW * taken;
+            last.rms(0).powi(2) > known
+        })
+        .map(|place| unexplained(&own.name, last.rms(0), repeated, place));
+    let dead_zone = profile.filter(|_| stands).map(|profile| {
+        let floor = repeated.unwrap_or_else(|| last.rms(0));
+        let unseen = held.map(|held| {
+            [(&before, None), (&after, Some(fade))]
+                .map(|(solution, k)| held.rms(&solution.values, k))
+        });
+        let train = [base.rms(0), last.rms(0)];
         let at = before.values.len();
         let volts = after.values[at];
         DeadZone {
@@ -228,7 +249,7 @@ fn winding(
                 set: vec![about.name.to_owned()],
                 parameters: std::iter::once((
                     about.gains[0].name.to_owned(),
-                    value(&after, at, about.gains[0].unit),
+                    value(&after, at, &about.gains[0]),
                 ))
                 .collect(),
                 p_value: profile.corrected(trials),
@@ -241,13 +262,8 @@ fn winding(
                 gap_closed: closed(unseen.unwrap_or(train), floor),
                 why: why(&before, &after, FADES[fade], floor),
             },
-            places: (places.into_iter())
-                .filter(|p| p.p_value < SIGNIFICANT)
-                .take(1)
-                .map(|p| Place {
-                    text: format!("Of the motor's voltage: {}", p.text),
-                    ..p
-                })
+            places: (places_of(&base, floor).take(1))
+                .map(of_the_voltage)
                 .collect(),
             absorbed: absorbed(&own.name, &before, &after),
             map: Map {
@@ -270,7 +286,42 @@ fn winding(
         tried,
         detectable,
         dead_zone,
+        left,
     })
+}
+
+fn of_the_voltage(place: Place) -> Place {
+    Place {
+        text: format!("Of the motor's voltage: {}", place.text),
+        ..place
+    }
+}
+
+/// What nothing here explains of a voltage; `floor` is known where a motion was repeated.
+fn unexplained(joint: &str, rms: f64, floor: Option<f64>, place: Place) -> Remainder {
+    let squares = match floor {
+        Some(floor) => rms * rms - floor * floor,
+        None => place.share * rms * rms,
+    };
+    let place = of_the_voltage(place);
+    Remainder {
+        joint: joint.to_owned(),
+        rms: squares.max(0.0).sqrt(),
+        unit: "V".to_owned(),
+        ratio: 1.0 / (1.0 - squares / (rms * rms)).max(1e-6).sqrt(),
+        text: format!(
+            "Of the motor's voltage at joint {joint} {} V RMS are left that are no noise, and no effect of the library explains them. {} They bend no torque.",
+            format_significant(squares.max(0.0).sqrt(), 3),
+            place.text
+        ),
+        places: vec![place],
+        doubt: true,
+    }
+}
+
+/// What the voltages leave that nothing explains.
+pub(super) fn left_of_voltage(windings: &[Winding]) -> Option<Remainder> {
+    windings.iter().find_map(|w| w.left.clone())
 }
 
 /// Why a voltage that stands is none of an inverter's: what else the equation lacks bends it by as much.
@@ -288,11 +339,12 @@ fn too_small(profile: &Profile) -> Option<String> {
     })
 }
 
-fn value(solution: &Solution, k: usize, unit: &str) -> Value {
+fn value(solution: &Solution, k: usize, volts: &Parameter) -> Value {
+    let value = solution.values[k];
     Value {
-        value: solution.values[k],
-        std: solution.std(k),
-        unit: unit.to_owned(),
+        value,
+        std: widened(Kind::DriveDeadzone, volts, value, solution.std(k), 0.0),
+        unit: volts.unit.to_owned(),
     }
 }
 

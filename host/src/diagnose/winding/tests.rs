@@ -41,6 +41,28 @@ fn a_dead_zone_shows_in_the_voltage_alone() {
     );
 }
 
+/// What its law would explain is there whether the library holds the law or not.
+#[test]
+fn what_no_law_explains_of_a_voltage_is_a_remainder() {
+    let made = made(Some(Effect::DriveDeadzone { voltage: 0.6 }), 5);
+    let options = Options {
+        without: vec![Kind::DriveDeadzone],
+        ..Options::default()
+    };
+    let (found, _) = made.diagnosed(&made.robot, &options);
+    assert!(found.steps.is_empty(), "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::Remainder);
+    let left = found.remainder.unwrap();
+    println!("{}", left.text);
+    assert_eq!(left.unit, "V");
+    // Resistance and back-EMF have bent to some of it.
+    assert!(
+        (0.1..0.6).contains(&left.rms) && left.ratio > 3.0,
+        "{left:?}"
+    );
+    assert_eq!(left.places[0].coordinate, "current of the motor");
+}
+
 #[test]
 fn without_one_the_voltage_names_nothing_and_says_what_it_would_have_shown() {
     let made = made(None, 6);

@@ -75,12 +75,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
             )
         });
     };
-    let unit = found
-        .waterfall
-        .iter()
-        .find(|w| w.joint == remainder.joint)
-        .map_or("", |w| w.unit.as_str());
-    let shown = words::shown(found, unit);
+    let shown = words::shown(found, &remainder.unit);
     let mut section = Section::new(
         "left",
         "What is left without a name",

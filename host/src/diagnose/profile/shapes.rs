@@ -1,0 +1,140 @@
+//! Where a law's shapes are looked for.
+
+use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
+
+use crate::diagnose::search::is_gear;
+
+/// Points of a grid per decade of a logarithmic range.
+const PER_DECADE: f64 = 4.0;
+/// Steps of a grid over a linear range.
+const LINEAR_STEPS: u32 = 8;
+/// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
+const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
+/// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
+const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
+/// A shape is known well enough within this ratio, less one, or this share of a linear range.
+const FINE_ENOUGH: f64 = 0.01;
+
+/// Where the search for a gear's shapes begins. With play the fit has a narrow ridge along gap and friction and many false
+/// tops where contact chatters: teeth that are taken as soft and damped show the ridge alone.
+fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
+    let mut list = Vec::new();
+    let shapes = kind.about().shapes;
+    let [low, high] = shapes[0].range;
+    const STEPS: usize = 11;
+    for k in 0..=STEPS {
+        let first = low * (high / low).powf(k as f64 / STEPS as f64);
+        for share in [0.05, 0.25, 0.5, 0.9] {
+            list.push(if kind == Kind::Backlash {
+                [first, SOFT_TEETH[0], SOFT_TEETH[1], share]
+            } else {
+                // A few per cent of critical damping for a tenth of a kg·m².
+                [first, 0.1 * (0.1 * first).sqrt(), share, 0.0]
+            });
+        }
+    }
+    list
+}
+
+/// Grid of shapes of an effect.
+pub(in crate::diagnose) fn grid(kind: Kind) -> Vec<[f64; SHAPES]> {
+    if is_gear(kind) {
+        return starts(kind);
+    }
+    let shapes = kind.about().shapes;
+    let mut points = vec![[0.0; SHAPES]];
+    for (place, shape) in shapes.iter().enumerate() {
+        let [low, high] = shape.range;
+        let values: Vec<f64> = match shape.scale {
+            Scale::Logarithmic => {
+                let n = ((high / low).log10() * PER_DECADE / shapes.len() as f64)
+                    .ceil()
+                    .max(1.0);
+                (0..=n as usize)
+                    .map(|k| low * (high / low).powf(k as f64 / n))
+                    .collect()
+            }
+            Scale::Linear => (0..=LINEAR_STEPS)
+                .map(|k| low + (high - low) * f64::from(k) / f64::from(LINEAR_STEPS))
+                .collect(),
+            Scale::Whole => (0..=(high - low).floor() as u32)
+                .map(|k| low + f64::from(k))
+                .collect(),
+        };
+        points = points
+            .into_iter()
+            .flat_map(|point| {
+                values.iter().map(move |v| {
+                    let mut point = point;
+                    point[place] = *v;
+                    point
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+/// A shape's value as the search moves it: its logarithm where ratios count.
+pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
+    match shape.scale {
+        Scale::Logarithmic => value.ln(),
+        Scale::Linear | Scale::Whole => value,
+    }
+}
+
+/// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
+/// least that is `told`.
+pub(super) fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
+    let ([low, high], [least, most]) = (shape.bounds, shape.range);
+    match shape.scale {
+        Scale::Logarithmic => {
+            let told = if is_distance(shape) {
+                told.min(most)
+            } else {
+                0.0
+            };
+            [low.max(0.1 * least).max(told), high.min(10.0 * most)]
+        }
+        Scale::Linear | Scale::Whole => [low, high],
+    }
+}
+
+/// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a
+/// gear only play is one.
+pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
+    let shape = kind.about().shapes.first()?;
+    let least = (1.0 + AT_THE_END) * searched(shape, told)[0];
+    let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
+    (counts && shapes[0] < least).then_some(shape.name)
+}
+
+/// Whether a shape is a way that the position shows.
+pub(super) fn is_distance(shape: &Parameter) -> bool {
+    shape.unit == "rad"
+}
+
+/// The value there, within what physics allows.
+pub(super) fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
+    let [low, high] = shape.bounds;
+    match shape.scale {
+        Scale::Logarithmic => coordinate.exp(),
+        Scale::Linear | Scale::Whole => coordinate,
+    }
+    .clamp(low, high)
+}
+
+/// Distance of the grid's points along a coordinate of one of `count` shapes, and the one at which a refinement ends.
+pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
+    let [low, high] = shape.range;
+    match shape.scale {
+        Scale::Logarithmic => [
+            count as f64 / PER_DECADE * std::f64::consts::LN_10,
+            FINE_ENOUGH,
+        ],
+        Scale::Linear | Scale::Whole => [
+            (high - low) / f64::from(LINEAR_STEPS),
+            FINE_ENOUGH * (high - low),
+        ],
+    }
+}
