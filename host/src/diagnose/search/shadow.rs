@@ -8,6 +8,9 @@ use crate::diagnose::profile::Profile;
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
 /// closes 93 % of the gap leaves so much …
 const SHADOW: f64 = 0.005;
+/// … friction falls with speed along another curve on every rig (Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, section 2): a law that
+/// closes 86 % …
+const SHADOW_OF_A_CURVE: f64 = 0.02;
 /// … a constant and the direction of gravity have no other form: what they leave is what the joint does at rest …
 const SHADOW_OF_A_CONSTANT: f64 = 0.001;
 /// … and 86 % for gears, whose motion is driven by the measured one.
@@ -32,6 +35,7 @@ pub(in crate::diagnose) fn shadow(of: &Profile) -> f64 {
         Kind::TorqueOffset | Kind::CurrentOffset | Kind::AsymmetricCoulomb | Kind::GravityTilt => {
             SHADOW_OF_A_CONSTANT
         }
+        Kind::Stribeck => SHADOW_OF_A_CURVE,
         _ => SHADOW,
     }
 }
