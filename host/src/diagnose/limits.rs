@@ -11,7 +11,7 @@ use super::experiment::{self, Held, Nominal};
 use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
-use super::profile::{LEAST_GAIN, Profile, TAKEN, grid};
+use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
 use super::search::{is_first_law, is_gear, rivals, with};
 use super::{DiagnoseError, testable};
 use crate::robot::Robot;
@@ -171,7 +171,7 @@ pub(super) fn smallest(fit: &Fit, column: &[f64], count: usize, trials: usize) -
     let freedom = (g - k).max(1.0);
     let level = FisherSnedecor::new(k, freedom)
         .ok()?
-        .inverse_cdf(1.0 - TAKEN / trials.max(1) as f64);
+        .inverse_cdf(1.0 - SIGNIFICANT / trials.max(1) as f64);
     let statistic = level * k * (g - 1.0) / freedom;
     let more = Normal::standard().inverse_cdf(POWER);
     let size = visible.max(std * (statistic.sqrt() + more));

@@ -19,10 +19,8 @@ use super::search::{Search, is_gear};
 use super::simplex::Simplex;
 use super::transmission::ABREAST;
 
-/// Family-wise probability of what is said of recordings although nothing is there.
+/// Family-wise probability of a name although nothing is there.
 pub(super) const SIGNIFICANT: f64 = 0.01;
-/// … of a name, which has to take away enough on folds that it was not fitted to, and surely, besides.
-pub(super) const TAKEN: f64 = 0.05;
 /// Least share of the RMS that an effect must take away on folds it was not fitted to.
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
@@ -86,7 +84,7 @@ impl Profile {
             Some(format!(
                 "its {shape} goes to the least that can be told from none"
             ))
-        } else if p > TAKEN {
+        } else if p > SIGNIFICANT {
             Some(format!("p = {p:.2}, corrected for {tried} trials"))
         } else if e.joint_gain < self.least_gain() {
             Some(format!(
@@ -107,7 +105,9 @@ impl Profile {
     /// Whether it takes away so much that something is there, be it this or another.
     pub(super) fn takes_much(&self, tried: usize) -> bool {
         let e = &self.evidence;
-        self.corrected(tried) <= TAKEN && e.joint_gain >= MUCH && e.gain_sigmas >= LEAST_SIGMAS
+        self.corrected(tried) <= SIGNIFICANT
+            && e.joint_gain >= MUCH
+            && e.gain_sigmas >= LEAST_SIGMAS
     }
 
     /// Whether its gain is too little beside what it varies by from block to block. A gear's shapes bend to much.
