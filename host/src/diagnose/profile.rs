@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 pub(super) use self::shapes::grid;
-use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
+use self::shapes::{coordinate, is_distance, searched, spacing, vanished};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
@@ -292,12 +292,15 @@ impl Search<'_> {
                 .filter_map(|(k, simplex)| {
                     let x = simplex.asks()?;
                     let mut shapes = [0.0; SHAPES];
-                    for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
-                        *to = value_at(shape, x);
+                    for (place, x) in x.iter().enumerate() {
+                        match self.value_at(&self.library[c], place, *x) {
+                            Ok(value) => shapes[place] = value,
+                            Err(error) => return Some(Err(error)),
+                        }
                     }
-                    Some((k, shapes))
+                    Some(Ok((k, shapes)))
                 })
-                .collect();
+                .collect::<Result<_, DiagnoseError>>()?;
             if asked.is_empty() {
                 return Ok(());
             }
@@ -340,8 +343,8 @@ impl Search<'_> {
         let mut best: Option<(f64, [f64; SHAPES], Vec<Column>)> = None;
         while let Some(x) = simplex.asks() {
             let mut shapes = [0.0; SHAPES];
-            for ((to, shape), x) in shapes.iter_mut().zip(scales).zip(x) {
-                *to = value_at(shape, x);
+            for (place, x) in x.iter().enumerate() {
+                shapes[place] = self.value_at(candidate, place, *x)?;
             }
             let columns = source.columns_by(self.threads, candidate, &shapes)?;
             let mut left = fit.clone();
@@ -376,7 +379,7 @@ impl Search<'_> {
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;
-            shapes[place] = value_at(shape, x);
+            shapes[place] = self.value_at(&self.library[c], place, x)?;
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
             let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(f64::NEG_INFINITY);

@@ -1,8 +1,12 @@
 //! Where a law's shapes are looked for.
 
+use std::f64::consts::TAU;
+
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
-use crate::diagnose::search::is_gear;
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::columns::Candidate;
+use crate::diagnose::search::{Search, is_gear};
 
 /// Points of a grid per decade of a logarithmic range.
 const PER_DECADE: f64 = 4.0;
@@ -10,6 +14,9 @@ const PER_DECADE: f64 = 4.0;
 const LINEAR_STEPS: u32 = 8;
 /// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
 const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
+/// A link does not swing slower on closed teeth, Hz. Softer ones bend to what a wide play does between two touches, as a spring with
+/// a little play, and then nothing stands. Teeth of the rigs that this was tried on carry theirs at 20 Hz and more.
+const SLOWEST_TEETH: f64 = 8.0;
 /// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
 const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
 /// A shape is known well enough within this ratio, less one, or this share of a linear range.
@@ -115,7 +122,7 @@ pub(super) fn is_distance(shape: &Parameter) -> bool {
 }
 
 /// The value there, within what physics allows.
-pub(super) fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
+fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
     let [low, high] = shape.bounds;
     match shape.scale {
         Scale::Logarithmic => coordinate.exp(),
@@ -136,5 +143,26 @@ pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
             (high - low) / f64::from(LINEAR_STEPS),
             FINE_ENOUGH * (high - low),
         ],
+    }
+}
+
+impl Search<'_> {
+    /// The value of a candidate's shape there, within what physics allows.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn value_at(
+        &self,
+        candidate: &Candidate,
+        place: usize,
+        coordinate: f64,
+    ) -> Result<f64, DiagnoseError> {
+        let shape = &candidate.kind.about().shapes[place];
+        let value = value_at(shape, coordinate);
+        if candidate.kind != Kind::Backlash || shape.name != "stiffness" {
+            return Ok(value);
+        }
+        let mass = self.source.mass(candidate.joint, 0)?;
+        Ok(value.max((TAU * SLOWEST_TEETH).powi(2) * mass))
     }
 }
