@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 pub(super) use self::shapes::grid;
-use self::shapes::{coordinate, is_distance, searched, spacing, vanished};
+use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
@@ -270,10 +270,13 @@ impl Search<'_> {
         best: &mut Best,
     ) -> Result<(), DiagnoseError> {
         let scales = self.library[c].kind.about().shapes;
+        let least = self.least(&self.library[c])?;
         let mut simplices: Vec<Simplex> = (starts.iter())
             .map(|(_, shapes, _)| {
-                let at: Vec<f64> = (scales.iter().zip(shapes))
-                    .map(|(shape, value)| coordinate(shape, *value))
+                // Where a bound lets it move.
+                let inside = |(value, least): (&f64, &f64)| value.max(2.0 * least);
+                let at: Vec<f64> = (scales.iter().zip(shapes.iter().zip(&least)))
+                    .map(|(shape, at)| coordinate(shape, inside(at)))
                     .collect();
                 // Away from a bound.
                 let away = |shape: &Parameter, x: f64| {
@@ -292,15 +295,12 @@ impl Search<'_> {
                 .filter_map(|(k, simplex)| {
                     let x = simplex.asks()?;
                     let mut shapes = [0.0; SHAPES];
-                    for (place, x) in x.iter().enumerate() {
-                        match self.value_at(&self.library[c], place, *x) {
-                            Ok(value) => shapes[place] = value,
-                            Err(error) => return Some(Err(error)),
-                        }
+                    for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
+                        shapes[place] = value_at(shape, x).max(least[place]);
                     }
-                    Some(Ok((k, shapes)))
+                    Some((k, shapes))
                 })
-                .collect::<Result<_, DiagnoseError>>()?;
+                .collect();
             if asked.is_empty() {
                 return Ok(());
             }
@@ -329,6 +329,7 @@ impl Search<'_> {
         start: &[f64; SHAPES],
     ) -> Result<([f64; SHAPES], Vec<Column>), DiagnoseError> {
         let scales = candidate.kind.about().shapes;
+        let least = self.least(candidate)?;
         let at: Vec<f64> = (scales.iter().zip(start))
             .map(|(shape, value)| coordinate(shape, *value))
             .collect();
@@ -343,8 +344,8 @@ impl Search<'_> {
         let mut best: Option<(f64, [f64; SHAPES], Vec<Column>)> = None;
         while let Some(x) = simplex.asks() {
             let mut shapes = [0.0; SHAPES];
-            for (place, x) in x.iter().enumerate() {
-                shapes[place] = self.value_at(candidate, place, *x)?;
+            for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
+                shapes[place] = value_at(shape, x).max(least[place]);
             }
             let columns = source.columns_by(self.threads, candidate, &shapes)?;
             let mut left = fit.clone();
@@ -379,7 +380,7 @@ impl Search<'_> {
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;
-            shapes[place] = self.value_at(&self.library[c], place, x)?;
+            shapes[place] = value_at(shape, x);
             let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
             let Some(share) = self.explained(fit, c, &columns) else {
                 return Ok(f64::NEG_INFINITY);

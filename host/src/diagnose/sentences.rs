@@ -36,6 +36,11 @@ fn listed(items: &[String]) -> String {
     }
 }
 
+/// Whether what is left is of a motor's voltage.
+fn of_a_voltage(d: &Diagnosis) -> bool {
+    d.remainder.as_ref().is_some_and(|left| left.unit == "V")
+}
+
 /// The verdict with its figures.
 pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     let mut words = Vec::new();
@@ -58,6 +63,12 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
         Verdict::ParameterChange => {
             words.push(
                 "The equations of the description hold, but not all of its values.".to_owned(),
+            );
+        }
+        Verdict::Remainder if d.steps.is_empty() && of_a_voltage(d) => {
+            words.push(
+                "With its parameters fitted again the description explains the torque; no effect had to be added. The motor's voltage is another matter."
+                    .to_owned(),
             );
         }
         Verdict::Explained | Verdict::Remainder => {}

@@ -122,7 +122,7 @@ pub(super) fn is_distance(shape: &Parameter) -> bool {
 }
 
 /// The value there, within what physics allows.
-fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
+pub(super) fn value_at(shape: &Parameter, coordinate: f64) -> f64 {
     let [low, high] = shape.bounds;
     match shape.scale {
         Scale::Logarithmic => coordinate.exp(),
@@ -147,22 +147,21 @@ pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
 }
 
 impl Search<'_> {
-    /// The value of a candidate's shape there, within what physics allows.
+    /// The least that a candidate's shapes may be where that depends on the rig.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn value_at(
-        &self,
-        candidate: &Candidate,
-        place: usize,
-        coordinate: f64,
-    ) -> Result<f64, DiagnoseError> {
-        let shape = &candidate.kind.about().shapes[place];
-        let value = value_at(shape, coordinate);
-        if candidate.kind != Kind::Backlash || shape.name != "stiffness" {
-            return Ok(value);
+    pub(super) fn least(&self, candidate: &Candidate) -> Result<[f64; SHAPES], DiagnoseError> {
+        let mut least = [f64::NEG_INFINITY; SHAPES];
+        if candidate.kind == Kind::Backlash {
+            let mass = self.source.mass(candidate.joint, 0)?;
+            let shapes = candidate.kind.about().shapes.iter();
+            for (least, shape) in least.iter_mut().zip(shapes) {
+                if shape.name == "stiffness" {
+                    *least = (TAU * SLOWEST_TEETH).powi(2) * mass;
+                }
+            }
         }
-        let mass = self.source.mass(candidate.joint, 0)?;
-        Ok(value.max((TAU * SLOWEST_TEETH).powi(2) * mass))
+        Ok(least)
     }
 }

@@ -10,6 +10,7 @@
 //! drop of brushes is a dead zone by its look.
 
 mod equation;
+mod left;
 mod settle;
 #[cfg(test)]
 mod tests;
@@ -17,11 +18,12 @@ mod tests;
 use rig_shared::effects::{Effect, Kind, Parameter, SHAPES};
 
 use self::equation::{ACROSS, CONSTANT, CURRENT, Equation, FADES, SPEED};
+use self::left::{Rest, of_the_voltage};
 use super::bench::{Bench, Loaded};
 use super::columns::Candidate;
 use super::fit::Fit;
 use super::floor;
-use super::judge::{BEYOND_FLOOR, closed};
+use super::judge::closed;
 use super::limits::smallest;
 use super::locate::locate;
 use super::outcome::{
@@ -41,10 +43,6 @@ pub(super) use self::settle::{settled, zeros};
 const EXPLAINED: f64 = 0.1;
 /// Least share of what is left of the voltage that a dead zone takes away.
 const LEAST_SHARE: f64 = 0.1;
-/// Share of what is left of the voltage that a coordinate must explain to be more than an inverter's own unrest.
-const LEFT: f64 = 0.2;
-/// Share of the squares that a dead zone takes away which it may leave: no inverter fades just so.
-const SHADOW: f64 = 0.02;
 /// Relative difference of back-EMF and torque constant that is said: magnets and load change them by less.
 const CONSTANT_OFF: f64 = 0.05;
 /// … and of the resistance: copper gains 0.39 % a kelvin.
@@ -164,8 +162,9 @@ fn winding(
         followed: None,
         otherwise: None,
     });
+    let left_out = options.without.contains(&Kind::DriveDeadzone);
     let refused = match &profile {
-        _ if options.without.contains(&Kind::DriveDeadzone) => Some("it was left out".to_owned()),
+        _ if left_out => Some("it was left out".to_owned()),
         Some(profile) => profile.refused(trials).or_else(|| too_small(profile)),
         None => Some("it takes no voltage along the current".to_owned()),
     };
@@ -222,14 +221,19 @@ fn winding(
         );
         places.into_iter().filter(|p| p.p_value < SIGNIFICANT)
     };
-    let left = places_of(&last, repeated.unwrap_or(0.0))
-        .find(|p| p.share > LEFT)
-        .filter(|_| {
-            let taken = base.rms(0).powi(2) - last.rms(0).powi(2);
-            let known = (BEYOND_FLOOR * repeated.unwrap_or(0.0)).powi(2) + SHADOW * taken;
-            last.rms(0).powi(2) > known
-        })
-        .map(|place| unexplained(&own.name, last.rms(0), repeated, place));
+    // A dead zone that is too small for a name explains what it explains.
+    let mut known = last.clone();
+    if !stands && !left_out {
+        known.push(&training.dead_zones[fade]);
+    }
+    let left = Rest {
+        joint: &own.name,
+        voltage: plain.rms(0),
+        rms: [base.rms(0), known.rms(0)],
+        floor: repeated,
+        place: places_of(&known, repeated.unwrap_or(0.0)).next(),
+    }
+    .remainder();
     let dead_zone = profile.filter(|_| stands).map(|profile| {
         let floor = repeated.unwrap_or_else(|| last.rms(0));
         let unseen = held.map(|held| {
@@ -281,8 +285,11 @@ fn winding(
             -scale * after.values[CONSTANT],
             scale.abs() * after.std(CONSTANT),
         ],
-        constant: constant_off(robot, joint, &after),
-        remarks: resistance_off(robot, joint, &after).into_iter().collect(),
+        // An equation that does not hold bends what it is fitted by.
+        constant: constant_off(robot, joint, &after).filter(|_| left.is_none()),
+        remarks: (resistance_off(robot, joint, &after).filter(|_| left.is_none()))
+            .into_iter()
+            .collect(),
         tried,
         detectable,
         dead_zone,
@@ -290,38 +297,10 @@ fn winding(
     })
 }
 
-fn of_the_voltage(place: Place) -> Place {
-    Place {
-        text: format!("Of the motor's voltage: {}", place.text),
-        ..place
-    }
-}
-
-/// What nothing here explains of a voltage; `floor` is known where a motion was repeated.
-fn unexplained(joint: &str, rms: f64, floor: Option<f64>, place: Place) -> Remainder {
-    let squares = match floor {
-        Some(floor) => rms * rms - floor * floor,
-        None => place.share * rms * rms,
-    };
-    let place = of_the_voltage(place);
-    Remainder {
-        joint: joint.to_owned(),
-        rms: squares.max(0.0).sqrt(),
-        unit: "V".to_owned(),
-        ratio: 1.0 / (1.0 - squares / (rms * rms)).max(1e-6).sqrt(),
-        text: format!(
-            "Of the motor's voltage at joint {joint} {} V RMS are left that are no noise, and no effect of the library explains them. {} They bend no torque.",
-            format_significant(squares.max(0.0).sqrt(), 3),
-            place.text
-        ),
-        places: vec![place],
-        doubt: true,
-    }
-}
-
 /// What the voltages leave that nothing explains.
 pub(super) fn left_of_voltage(windings: &[Winding]) -> Option<Remainder> {
-    windings.iter().find_map(|w| w.left.clone())
+    let left = windings.iter().filter_map(|w| w.left.clone());
+    left.max_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }
 
 /// Why a voltage that stands is none of an inverter's: what else the equation lacks bends it by as much.
@@ -490,6 +469,11 @@ pub(super) fn tell(windings: Vec<Winding>, diagnosis: &mut Diagnosis, model: &mu
                 diagnosis.steps.push(dead.step);
             }
         }
+        // The one that is most beyond its floor, or a torque's, is the remainder already.
+        let other = winding
+            .left
+            .filter(|left| diagnosis.remainder.as_ref() != Some(left));
+        diagnosis.words.extend(other.map(|left| left.text));
         diagnosis.words.extend(winding.constant);
         diagnosis.words.extend(winding.remarks);
     }

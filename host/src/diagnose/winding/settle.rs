@@ -36,14 +36,14 @@ pub(in crate::diagnose) enum Word {
 }
 
 /// What the sensors read without a current and its standard deviation, joint by joint, N·m or N: as recorded with the drive
-/// off (`given`), else as the voltage says.
+/// off (`given`), else as the voltage says where its equation holds.
 pub(in crate::diagnose) fn zeros(
     given: &[[f64; 2]],
     windings: &[Winding],
     joints: usize,
 ) -> Vec<Option<[f64; 2]>> {
     let of = |joint: usize| {
-        let winding = windings.iter().find(|w| w.joint == joint);
+        let winding = (windings.iter()).find(|w| w.joint == joint && w.left.is_none());
         given.get(joint).copied().or(winding.map(|w| w.offset))
     };
     (0..joints).map(of).collect()

@@ -83,9 +83,14 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::warning(remainder.text.clone()))
     .with(Block::Text(format!(
-        "Joint {}: {} RMS beyond the noise; the whole residual is {} times the noise floor.",
+        "Joint {}: {} RMS beyond the noise; {} is {} times the noise floor.",
         remainder.joint,
         shown.value(remainder.rms),
+        if remainder.unit == "V" {
+            "what is left of the voltage"
+        } else {
+            "the whole residual"
+        },
         format_significant(remainder.ratio, 3)
     )));
     let texts = gap::texts(&remainder.places);

@@ -30,7 +30,7 @@ pub(super) fn meaning(verdict: Verdict) -> &'static str {
             "The equations hold; a value in the description does not, or does no longer."
         }
         Verdict::Remainder => {
-            "Some of the gap stays open: no effect that is known here explains it, so it is described and not named."
+            "Something stays open: no effect that is known here explains it, so it is described and not named."
         }
         Verdict::DataFault => "A recording cannot be what it says it is. Nothing was fitted to it.",
     }
