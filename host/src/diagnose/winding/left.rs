@@ -70,3 +70,42 @@ pub(super) fn of_the_voltage(place: Place) -> Place {
         ..place
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn left(rms: [f64; 2], floor: Option<f64>, share: f64) -> Option<Remainder> {
+        Rest {
+            joint: "link",
+            voltage: 4.0,
+            rms,
+            floor,
+            place: Some(Place {
+                joint: "link".into(),
+                coordinate: "current of the motor".into(),
+                interval: [0.0, 1.0],
+                unit: "A".into(),
+                share,
+                p_value: 1e-6,
+                text: String::new(),
+            }),
+        }
+        .remainder()
+    }
+
+    #[test]
+    fn what_is_small_or_goes_with_nothing_is_no_remainder() {
+        let found = left([0.1, 0.1], Some(0.05), 0.5);
+        assert!(found.is_some_and(|left| (left.ratio - 2.0).abs() < 1e-12));
+        // Under a hundredth of the voltage.
+        assert!(left([0.03, 0.03], Some(0.01), 0.5).is_none());
+        // Neither with the current nor far beyond the floor …
+        assert!(left([0.1, 0.1], Some(0.05), 0.1).is_none());
+        // … and far beyond it.
+        assert!(left([0.2, 0.2], Some(0.05), 0.1).is_some());
+        assert!(left([0.2, 0.2], None, 0.1).is_none());
+        // What a dead zone of half a volt fades by.
+        assert!(left([0.5, 0.07], Some(0.05), 0.5).is_none());
+    }
+}

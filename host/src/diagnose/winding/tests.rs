@@ -101,6 +101,33 @@ fn a_constant_of_the_sensor_is_told_from_one_of_the_torque() {
     assert!(set.iter().all(|n| n != "current_offset"), "{set:?}");
 }
 
+/// An amplifier that clips bends what the voltage says of the sensor's zero: a torque's constant had become the sensor's by it.
+#[test]
+fn a_voltage_that_follows_no_winding_owns_no_constant() {
+    let mut made = made(Some(Effect::TorqueOffset { torque: 0.3 }), 8);
+    let (whole, _) = made.diagnosed(&made.robot, &Options::default());
+    assert!(whole.remainder.is_none(), "{:?}", whole.words);
+    for recording in [
+        &mut made.train,
+        made.repeat.as_mut().unwrap(),
+        &mut made.holdout,
+    ] {
+        for block in &mut recording.blocks {
+            for volts in block.joints[0].voltage.as_mut().unwrap() {
+                *volts = volts.min(4.0);
+            }
+        }
+    }
+    let (clipped, _) = made.diagnosed(&made.robot, &Options::default());
+    let left = clipped.remainder.unwrap();
+    assert_eq!(left.unit, "V", "{}", left.text);
+    let set = &clipped.steps[0].set;
+    for name in ["torque_offset", "current_offset"] {
+        assert!(set.iter().any(|n| n == name), "{set:?}");
+    }
+    assert!(!clipped.words.iter().any(|w| w.contains('Ω')));
+}
+
 /// Without the voltage the three constants stand together, until the drive has been recorded off.
 #[test]
 fn with_the_drive_off_a_sensor_s_constant_is_told_from_a_torque() {
