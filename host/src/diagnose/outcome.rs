@@ -233,6 +233,13 @@ pub struct Remainder {
     pub doubt: bool,
 }
 
+impl Remainder {
+    /// Whether it is of a motor's voltage, and the torque may be explained.
+    pub fn of_a_voltage(&self) -> bool {
+        self.unit == "V"
+    }
+}
+
 /// Something about a recording that no physics explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {

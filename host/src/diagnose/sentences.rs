@@ -6,7 +6,7 @@ use rig_shared::multibody::COLUMNS;
 use super::bench::Bench;
 use super::finish::Found;
 use super::floor::repeats;
-use super::outcome::{Diagnosis, Step, Verdict, Waterfall};
+use super::outcome::{Diagnosis, Remainder, Step, Verdict, Waterfall};
 use super::profile::Profile;
 use super::pull;
 use super::solve::Solution;
@@ -36,11 +36,6 @@ fn listed(items: &[String]) -> String {
     }
 }
 
-/// Whether what is left is of a motor's voltage.
-fn of_a_voltage(d: &Diagnosis) -> bool {
-    d.remainder.as_ref().is_some_and(|left| left.unit == "V")
-}
-
 /// The verdict with its figures.
 pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     let mut words = Vec::new();
@@ -65,7 +60,9 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
                 "The equations of the description hold, but not all of its values.".to_owned(),
             );
         }
-        Verdict::Remainder if d.steps.is_empty() && of_a_voltage(d) => {
+        Verdict::Remainder
+            if d.steps.is_empty() && d.remainder.as_ref().is_some_and(Remainder::of_a_voltage) =>
+        {
             words.push(
                 "With its parameters fitted again the description explains the torque; no effect had to be added. The motor's voltage is another matter."
                     .to_owned(),

@@ -8,7 +8,7 @@ use super::{Between, Solved, Term};
 use crate::diagnose::fit::Fit;
 
 /// Teeth that are closed carry their link at more than so many Hz; where it swings more slowly, something gives beside them.
-const CLOSED_TEETH: f64 = 16.0;
+pub(in crate::diagnose) const CLOSED_TEETH: f64 = 16.0;
 /// Standard deviations from which stiffness, damping and friction of the link count as told.
 const TOLD: f64 = 3.0;
 /// Damping ratio that stands where the motion does not tell one.

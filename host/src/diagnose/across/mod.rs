@@ -24,6 +24,7 @@ use rig_shared::effects::{Kind, SHAPES};
 
 use self::contact::contact;
 use self::equation::{ACROSS, Equation};
+pub(super) use self::gear::CLOSED_TEETH;
 use self::gear::Gear;
 use self::law::{Found, Law, Laws, beside, laws};
 use super::anchor::Anchor;

@@ -6,6 +6,7 @@ use super::{Across, Between, Found, Gear, Law, Laws, Named, SCALE_OFF, SURE, Sol
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Described, Diagnosis, Fate, Map};
 use crate::diagnose::search::is_gear;
+use crate::diagnose::type_b::widened;
 use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::{JointKind, Robot, RobotEffect};
 
@@ -59,8 +60,9 @@ impl Between<'_, '_> {
                 self.length(floor)
             ),
             Some(gear) => {
+                let shapes = gear.kind.about().shapes;
                 let value = |k: usize, unit: &str| {
-                    let std = gear.stds[k];
+                    let std = widened(gear.kind, &shapes[k], gear.shapes[k], gear.stds[k], 0.0);
                     let value = if std.is_finite() {
                         format_value(gear.shapes[k], std)
                     } else {

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::across::CLOSED_TEETH;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::search::{Search, is_gear};
 
@@ -15,8 +16,8 @@ const LINEAR_STEPS: u32 = 8;
 /// Stiffness (N·m/rad) and damping (N·m·s/rad) of teeth that the search for play begins with.
 const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
 /// A link does not swing slower on closed teeth, Hz. Softer ones bend to what a wide play does between two touches, as a spring with
-/// a little play, and then nothing stands. Teeth of the rigs that this was tried on carry theirs at 20 Hz and more.
-const SLOWEST_TEETH: f64 = 8.0;
+/// a little play, and then nothing stands.
+const SLOWEST_TEETH: f64 = 0.5 * CLOSED_TEETH;
 /// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
 const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
 /// A shape is known well enough within this ratio, less one, or this share of a linear range.

@@ -231,9 +231,8 @@ fn winding(
         voltage: plain.rms(0),
         rms: [base.rms(0), known.rms(0)],
         floor: repeated,
-        place: places_of(&known, repeated.unwrap_or(0.0)).next(),
     }
-    .remainder();
+    .remainder(|| places_of(&known, repeated.unwrap_or(0.0)).next());
     let dead_zone = profile.filter(|_| stands).map(|profile| {
         let floor = repeated.unwrap_or_else(|| last.rms(0));
         let unseen = held.map(|held| {

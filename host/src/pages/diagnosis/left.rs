@@ -86,7 +86,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         "Joint {}: {} RMS beyond the noise; {} is {} times the noise floor.",
         remainder.joint,
         shown.value(remainder.rms),
-        if remainder.unit == "V" {
+        if remainder.of_a_voltage() {
             "what is left of the voltage"
         } else {
             "the whole residual"
