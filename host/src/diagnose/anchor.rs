@@ -138,6 +138,15 @@ impl Anchor {
             .collect()
     }
 
+    /// Base parameters less what of the held ones has been taken off the torque.
+    pub(super) fn beyond_held(&self, values: &[f64]) -> Vec<f64> {
+        let mut rest = values.to_vec();
+        for (k, x) in self.fixed() {
+            rest[k] -= x;
+        }
+        rest
+    }
+
     /// Base parameters from the free directions' coefficients.
     pub(super) fn values(&self, coefficients: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.prior.len()];

@@ -108,6 +108,17 @@ impl<'a> Bench<'a> {
         Ok(Loaded { runs, rows })
     }
 
+    /// Whether a joint's constant torque is fitted as part of the nominal model, whatever pulls on the joint: the preload of a spring
+    /// is part of it then, but where the description states that spring.
+    fn lets_constant_free(&self, joint: usize) -> bool {
+        let states_spring = (self.stated.free().iter())
+            .map(candidate)
+            .any(|c| c.kind == Kind::Spring && c.joint == joint);
+        !self.stated.pulls_told
+            && !states_spring
+            && !self.anchor.holds_constant(joint, &self.nominal)
+    }
+
     /// What columns are formed from, with a model of these base parameters.
     ///
     /// # Errors
@@ -127,6 +138,9 @@ impl<'a> Bench<'a> {
             thinning: &loaded.rows.thinning,
             predicted,
             values: values.to_vec(),
+            free_constants: (0..self.robot.joints.len())
+                .map(|j| self.lets_constant_free(j))
+                .collect(),
             delays: vec![DELAY; self.robot.joints.len()],
             driven: Mutex::default(),
             seen: HashMap::new(),
@@ -134,31 +148,31 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// What a model leaves of recordings' torque, joint by joint over the rows. `coefficients` are those of the free nominal
-    /// directions, then of the effects' columns.
+    /// What a model leaves of recordings' torque, joint by joint over the rows: of its base parameters and the gains of the
+    /// effects' columns.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn remaining(
         &self,
         loaded: &Loaded,
-        coefficients: &[f64],
+        [values, gains]: [&[f64]; 2],
         chosen: &[Profile],
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
-        let (nominal, gains) = coefficients.split_at(self.anchor.free.len());
-        let source = (self.source(loaded, &self.anchor.values(nominal))?)
+        let source = (self.source(loaded, values)?)
             .loaded_by(chosen, gains)?
             .following(&loaded.rows, chosen, gains)?;
         let rows = &loaded.rows;
-        let mut columns = self.anchor.columns(rows);
+        let mut columns = Vec::new();
         for profile in chosen {
             columns.extend(source.columns(&profile.candidate, &profile.shapes)?);
         }
-        let factors = nominal.iter().chain(gains).copied();
+        let nominal = rows.nominal.iter().zip(self.anchor.beyond_held(values));
+        let effects = columns.iter().zip(gains.iter().copied());
         let mut residual = rows.torque.clone();
         take_off(
             &mut residual,
-            &combined(rows.joints(), columns.iter().zip(factors)),
+            &combined(rows.joints(), nominal.chain(effects)),
         );
         Ok(residual)
     }
@@ -168,8 +182,7 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn frozen(&self, loaded: &Loaded) -> Result<Vec<f64>, DiagnoseError> {
-        let mut coefficients = self.anchor.prior_coefficients();
-        let mut effects = Vec::new();
+        let (mut all, mut effects) = (Vec::new(), Vec::new());
         for placed in self.stated.free() {
             let gains = gains(&placed);
             effects.push(Profile {
@@ -182,9 +195,9 @@ impl<'a> Bench<'a> {
                 followed: None,
                 otherwise: None,
             });
-            coefficients.extend(gains);
+            all.extend(gains);
         }
-        self.unseen(loaded, &coefficients, &effects)
+        self.unseen(loaded, [&self.anchor.prior, &all], &effects)
     }
 
     /// RMS per joint of what a model leaves on the rows used.
@@ -194,10 +207,10 @@ impl<'a> Bench<'a> {
     pub(super) fn unseen(
         &self,
         sealed: &Loaded,
-        coefficients: &[f64],
+        fitted: [&[f64]; 2],
         chosen: &[Profile],
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let residual = self.remaining(sealed, coefficients, chosen)?;
+        let residual = self.remaining(sealed, fitted, chosen)?;
         Ok((residual.iter().zip(&sealed.rows.keep))
             .map(|(r, keep)| {
                 let used = || r.iter().zip(keep).filter(|(_, k)| **k);

@@ -35,6 +35,8 @@ pub(super) struct Source<'a> {
     pub(super) predicted: Vec<Predicted>,
     /// Identified base parameters.
     pub(super) values: Vec<f64>,
+    /// Joints of which the nominal model holds a constant torque that is fitted, whatever pulls on them.
+    pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
@@ -186,7 +188,7 @@ impl Source<'_> {
         r: usize,
     ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
         let none: Column = vec![None; self.nominal.joints()];
-        let mut all = vec![vec![none; self.gains(candidate.kind).len()]; shapes.len()];
+        let mut all = vec![vec![none; self.gains(candidate).len()]; shapes.len()];
         for (some, columns) in shapes.chunks(ABREAST).zip(all.chunks_mut(ABREAST)) {
             let full = self.at_full_rate(candidate, some, r)?;
             let (mut places, mut signals) = (Vec::new(), Vec::new());
@@ -212,8 +214,10 @@ impl Source<'_> {
         self.friction(joint)[1].max(0.0)
     }
 
-    /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles.
-    pub(super) fn gains(&self, kind: Kind) -> Vec<Parameter> {
+    /// What a candidate's columns multiply. A tilt is one of gravity as a whole: its gains are angles. A spring's preload is part
+    /// of a constant that is free.
+    pub(super) fn gains(&self, candidate: &Candidate) -> Vec<Parameter> {
+        let kind = candidate.kind;
         if is_gear(kind) {
             // 1 where mass and load are right; the fit may move it a little until they are.
             return vec![Parameter {
@@ -224,6 +228,9 @@ impl Source<'_> {
                 scale: Scale::Linear,
                 meaning: "of the torque that the twist changes",
             }];
+        }
+        if kind == Kind::Spring && self.free_constants[candidate.joint] {
+            return kind.about().gains[..1].to_vec();
         }
         if kind != Kind::GravityTilt {
             return kind.about().gains.to_vec();
@@ -272,7 +279,7 @@ impl Source<'_> {
             return Ok(signals.into_iter().map(|s| vec![own(s)]).collect());
         }
         let (run, predicted) = (&self.runs[r], &self.predicted[r]);
-        let gains = self.gains(candidate.kind).len();
+        let gains = self.gains(candidate).len();
         if pull::is_gone(candidate.kind, run) {
             let nothing = vec![own(vec![0.0; run.len()]); gains];
             return Ok(vec![nothing; shapes.len()]);

@@ -2,6 +2,7 @@
 
 use super::DiagnoseError;
 use super::bench::{Bench, Loaded};
+use super::bodies::Standing;
 use super::outcome::Waterfall;
 use super::profile::Profile;
 use super::refit::Refit;
@@ -17,6 +18,13 @@ pub(super) struct Fall {
 }
 
 impl Fall {
+    /// A model more.
+    fn push(&mut self, found: Vec<f64>) {
+        for (list, rms) in self.models.iter_mut().zip(found) {
+            list.push(rms);
+        }
+    }
+
     /// Before and after the `k`-th effect found.
     pub(super) fn step(&self, joint: usize, k: usize) -> [f64; 2] {
         [self.models[joint][k], self.models[joint][k + 1]]
@@ -60,13 +68,22 @@ impl Descent {
             frozen: bench.frozen(loaded)?,
             models: vec![Vec::new(); n],
         };
-        for count in described..=chosen.len() {
-            let part = &chosen[..count];
-            let [_, base] = refit.footing(part);
-            let fit = with(base, part, None);
-            for (j, list) in train.models.iter_mut().enumerate() {
-                list.push(fit.even_rms(j));
-            }
+        let models = (described..=chosen.len())
+            .map(|count| {
+                let part = &chosen[..count];
+                let free = refit.solution(part)?.values;
+                Ok((part, Standing::of(bench, refit, &loaded.runs, &free, part)))
+            })
+            .collect::<Result<Vec<_>, DiagnoseError>>()?;
+        for (part, standing) in &models {
+            // Of one link the free fit is what stands.
+            let found = if n == 1 {
+                let fit = with(refit.footing(part)[1], part, None);
+                vec![fit.even_rms(0)]
+            } else {
+                bench.unseen(loaded, standing.fitted(), part)?
+            };
+            train.push(found);
         }
         let Some(sealed) = sealed else {
             let holdout = None;
@@ -76,12 +93,8 @@ impl Descent {
             frozen: bench.frozen(sealed)?,
             models: vec![Vec::new(); n],
         };
-        for count in described..=chosen.len() {
-            let part = &chosen[..count];
-            let found = bench.unseen(sealed, &refit.solution(part)?.values, part)?;
-            for (list, rms) in holdout.models.iter_mut().zip(found) {
-                list.push(rms);
-            }
+        for (part, standing) in &models {
+            holdout.push(bench.unseen(sealed, standing.fitted(), part)?);
         }
         Ok(Self {
             train,

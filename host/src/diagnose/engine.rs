@@ -13,6 +13,7 @@ use self::steps::{change_step, refuse, refuse_guesses, steps};
 use self::unbelieved::unbelieved;
 use super::across::{across, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, library};
+use super::bodies::Standing;
 use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
@@ -210,7 +211,7 @@ fn attempt(
     };
     // What is refused is refused by the training data; the hold-out shows what the rest is worth.
     let values = &search.source.values;
-    let trial = Replay::of(&bench, &refit, values, loaded);
+    let trial = Replay::of(&bench, &refit, values, [loaded, loaded]);
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
     let judged = judge.judged(found.clone())?;
     refuse_guesses(robot, &mut tried, &judged);
@@ -256,7 +257,7 @@ fn attempt(
     }
     let described = search.count_described(&judged.chosen);
     let replay = match &sealed {
-        Some(sealed) => Replay::of(&bench, &refit, values, sealed),
+        Some(sealed) => Replay::of(&bench, &refit, values, [loaded, sealed]),
         None => trial,
     };
     let descent = Descent::of(
@@ -283,9 +284,13 @@ fn attempt(
     let left = judged.left.is_some();
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));
     let Judged { chosen, floors, .. } = &judged;
-    let joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
+    let mut joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
+    let standing = |free: &[f64], part| Standing::of(&bench, &refit, &loaded.runs, free, part);
+    let stands = standing(&joint.solution.values, chosen);
+    joint.solution.values = stands.coefficients(&bench.anchor);
     let after = &joint.solution;
-    let before = refit.solution(&chosen[..described])?;
+    let first = &chosen[..described];
+    let before = standing(&refit.solution(first)?.values, first);
     let across = {
         let nominal = bench.anchor.values(&after.values[..refit.free.len()]);
         let of = |loaded| -> Result<_, DiagnoseError> {
@@ -304,7 +309,7 @@ fn attempt(
     };
     progress(0.95);
     let motion = (described..=chosen.len())
-        .map(|count| Ok(replay.errors(&chosen[..count])?.map(|errors| errors.rms())))
+        .map(|count| replay.errors(&chosen[..count]))
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
     let mut steps = steps(
         &search, &refit, &judged, described, &joint, &descent, &motion,
@@ -316,8 +321,10 @@ fn attempt(
     let change = change(&bench, &refit, &explained, left, after, &options.without);
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
     {
-        let given = (replay.errors_of(&stated.moving())).map(|errors| errors.rms());
-        step.motion_rms = (given.zip(motion.last().copied().flatten())).map(|(a, b)| [a, b]);
+        let given = replay.errors_of(&stated.moving());
+        let last = motion.last().and_then(Option::as_ref);
+        let tip = robot.joints.len() - 1;
+        step.motion_rms = (given.as_ref().zip(last)).map(|(a, b)| [a, b].map(|e| e.rms(tip)));
         steps.push(step);
     }
     let stood = stated.told(
@@ -354,7 +361,7 @@ fn attempt(
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
         described: stood,
         steps,
-        absorbed: refit.absorbed(&bench, &before, after),
+        absorbed: refit.absorbed(&bench, &before.coefficients(&bench.anchor), after),
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
@@ -365,6 +372,7 @@ fn attempt(
         maps: Vec::new(),
         curves: Vec::new(),
     };
+    let (mut model, remarks) = stands.model(&bench, values, chosen);
     let drawn = sealed.as_ref().unwrap_or(loaded);
     let found = Found {
         robot,
@@ -373,7 +381,7 @@ fn attempt(
         search: &search,
         rows: &loaded.rows,
         base: &refit.base,
-        after,
+        model: &model,
         chosen,
         described,
         coordinates: &coordinates,
@@ -383,13 +391,14 @@ fn attempt(
             runs: &drawn.runs,
             rows: &drawn.rows,
             left: [
-                bench.remaining(drawn, &before.values, &chosen[..described])?,
-                bench.remaining(drawn, &after.values, chosen)?,
+                bench.remaining(drawn, before.fitted(), first)?,
+                bench.remaining(drawn, stands.fitted(), chosen)?,
             ],
             motion: replay.drawn(chosen, described)?,
         },
     };
-    let mut model = finish(&found, &mut diagnosis)?;
+    finish(&found, &mut diagnosis)?;
+    diagnosis.words.extend(remarks);
     model.effects.extend(stated.held().cloned());
     tell(windings, &mut diagnosis, &mut model);
     tell_across(across, &mut diagnosis, &mut model);
@@ -434,7 +443,7 @@ fn held(bench: &Bench, open: &[usize]) -> Option<String> {
     let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "The training motion tells less of {} than the description, so {} as described: {}.",
+            "The training motion tells less of {} than the description, so {} as described as far as bodies can be so: {}.",
             if names.len() == 1 {
                 "one base parameter"
             } else {

@@ -1,15 +1,14 @@
-//! What follows from a finished search: the description, pictures, sentences, limits.
+//! What follows from a finished search: pictures, sentences, limits.
 
 use super::anchor::Anchor;
 use super::fit::Fit;
 use super::locate::Coordinate;
-use super::model::with_effects;
+use super::motion::Positions;
 use super::outcome::Diagnosis;
 use super::profile::Profile;
 use super::rows::{Nominal, Rows};
 use super::runs::Run;
 use super::search::Search;
-use super::solve::Solution;
 use super::{DiagnoseError, limits, pictures, sentences};
 use crate::robot::Robot;
 
@@ -27,8 +26,8 @@ pub(super) struct Found<'a, 'r> {
     pub(super) rows: &'a Rows,
     /// The nominal model on them.
     pub(super) base: &'a Fit<'r>,
-    /// Everything fitted together.
-    pub(super) after: &'a Solution,
+    /// The description with what was found.
+    pub(super) model: &'a Robot,
     /// The effects, those of the description first.
     pub(super) chosen: &'a [Profile],
     /// How many of them are the description's.
@@ -59,22 +58,14 @@ pub(super) struct Drawn<'a> {
     /// Left by the refitted description and by the model with all effects.
     pub(super) left: [Vec<Vec<f64>>; 2],
     /// Positions that the same models give when simulated, run by run; empty where they are not.
-    pub(super) motion: [Vec<Vec<f64>>; 2],
+    pub(super) motion: [Vec<Positions>; 2],
 }
 
-/// Fills what the search itself does not, and gives the description with what was found.
+/// Fills what the search itself does not.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
-pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<Robot, DiagnoseError> {
-    let (model, remarks) = with_effects(
-        found.robot,
-        found.nominal,
-        found.anchor,
-        &found.after.values,
-        &found.search.source.values,
-        found.chosen,
-    );
+pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), DiagnoseError> {
     diagnosis.maps = pictures::maps(found);
     diagnosis.curves = pictures::curves(found);
     for (step, profile) in diagnosis.steps.iter_mut().zip(found.found()) {
@@ -83,8 +74,7 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<Robot, 
     diagnosis.noise_floor_how = sentences::floor_how(found);
     diagnosis.not_testable = limits::not_testable(found)?;
     diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
-    diagnosis.next_experiment = limits::next(found, diagnosis, &model)?;
+    diagnosis.next_experiment = limits::next(found, diagnosis, found.model)?;
     diagnosis.words = sentences::verdict(diagnosis);
-    diagnosis.words.extend(remarks);
-    Ok(model)
+    Ok(())
 }

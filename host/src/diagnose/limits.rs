@@ -120,7 +120,7 @@ pub(super) fn detectable(
             .iter()
             .any(|t| t.effect == about.name && t.joint == joint.name);
         let taken = (found.chosen.iter()).any(|p| rivals(&p.candidate, candidate));
-        let gains = found.search.source.gains(candidate.kind);
+        let gains = found.search.source.gains(candidate);
         if hidden || taken || !is_first_law(candidate.kind) || is_gear(candidate.kind) {
             continue;
         }

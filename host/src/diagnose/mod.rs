@@ -7,6 +7,7 @@ mod anchor;
 mod arm_tests;
 mod bench;
 pub mod benchmark;
+mod bodies;
 mod burst;
 mod change;
 mod columns;

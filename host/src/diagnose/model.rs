@@ -6,7 +6,6 @@ use nalgebra::{DVector, Rotation3, Vector3};
 use rig_shared::effects::{Effect, Kind, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
 
-use super::anchor::Anchor;
 use super::columns::Candidate;
 use super::profile::Profile;
 use super::rows::Nominal;
@@ -29,31 +28,43 @@ pub(super) struct Fitted<'a> {
     pub(super) shapes: [f64; SHAPES],
 }
 
-/// `robot` with the base parameters `values` and the effects; `formed_at` are the base parameters that the effects'
-/// columns were formed with. The second result says what the description cannot hold.
-pub(super) fn described(
+/// `robot` with these base parameters, and what had to be said of it.
+pub(super) fn redistributed_over(
     robot: &Robot,
     nominal: &Nominal,
-    anchor: &Anchor,
-    coefficients: &[f64],
-    formed_at: &[f64],
-    effects: &[Fitted],
+    values: &[f64],
 ) -> (Robot, Vec<String>) {
-    let mut values = anchor.values(coefficients);
-    let mut gravity = robot.gravity;
-    if let Some(tilt) = (effects.iter()).find(|e| e.candidate.kind == Kind::GravityTilt) {
-        gravity = turned(nominal, gravity, tilt.gains, formed_at, &mut values);
-    }
     let base = Combinations {
         combination: &nominal.base.combination,
         columns: &nominal.base.columns,
-        values: &values,
+        values,
     };
-    let (mut model, mut remarks) = redistributed(
-        robot,
-        &base,
-        Some(&weights(robot, base.combination.ncols())),
-    );
+    let weights = weights(robot, base.combination.ncols());
+    redistributed(robot, &base, Some(&weights))
+}
+
+/// Gravity turned as an effect among these says, and `values` for it.
+pub(super) fn gravity_with(
+    robot: &Robot,
+    nominal: &Nominal,
+    formed_at: &[f64],
+    effects: &[Fitted],
+    values: &mut [f64],
+) -> [f64; 3] {
+    (effects.iter())
+        .find(|e| e.candidate.kind == Kind::GravityTilt)
+        .map_or(robot.gravity, |tilt| {
+            turned(nominal, robot.gravity, tilt.gains, formed_at, values)
+        })
+}
+
+/// A description with new base parameters, `robot` the one given, and what had to be said of it: with gravity and effects.
+pub(super) fn completed(
+    (mut model, mut remarks): (Robot, Vec<String>),
+    robot: &Robot,
+    gravity: [f64; 3],
+    effects: &[Fitted],
+) -> (Robot, Vec<String>) {
     model.gravity = gravity;
     // What its values were identified from before says nothing about the new ones.
     model.identified = None;
@@ -79,17 +90,8 @@ pub(super) fn described(
     (model, remarks)
 }
 
-/// [`described`] with the effects that were found: `values` are the coefficients of the free nominal directions, then those
-/// of the effects' columns.
-pub(super) fn with_effects(
-    robot: &Robot,
-    nominal: &Nominal,
-    anchor: &Anchor,
-    values: &[f64],
-    formed_at: &[f64],
-    chosen: &[Profile],
-) -> (Robot, Vec<String>) {
-    let (free, mut gains) = values.split_at(anchor.free.len());
+/// Effects with their gains.
+pub(super) fn fitted<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
     let mut effects = Vec::new();
     for profile in chosen {
         let (own, rest) = gains.split_at(profile.columns.len());
@@ -100,7 +102,7 @@ pub(super) fn with_effects(
             shapes: profile.shapes,
         });
     }
-    described(robot, nominal, anchor, free, formed_at, &effects)
+    effects
 }
 
 /// Gravity turned as the fitted angles say. For one joint the torque is exactly that of the fit, whose angle multiplies the

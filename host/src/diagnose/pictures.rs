@@ -7,6 +7,7 @@ use super::columns::Candidate;
 use super::finish::Found;
 use super::fit::Fit;
 use super::locate::{BINS, Coordinate, bins, locate, velocity_of};
+use super::motion::Positions;
 use super::outcome::{Curves, Map};
 use super::profile::Profile;
 use super::rows::Rows;
@@ -243,20 +244,20 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
             .collect()
     };
     let [first, last] = &drawn.motion;
-    let simulated = |all: &Vec<Vec<f64>>| -> Vec<f64> {
+    let shown = |q: &[f64]| -> Vec<f64> {
         let mut thinned = Vec::new();
-        if let Some(q) = all.get(r).filter(|q| q.len() == run.len()) {
-            rows.thinning.push(q, &mut thinned);
-        }
-        let at = picked.iter().filter_map(|k| thinned.get(k - start));
-        at.copied().collect()
+        rows.thinning.push(q, &mut thinned);
+        picked.iter().map(|k| thinned[k - start]).collect()
     };
+    let simulated = |all: &[Positions]| all.get(r).map_or(Vec::new(), |run| shown(&run[joint]));
     let motion = if first.is_empty() {
         Default::default()
     } else {
-        let own = run.joints[joint].q.clone();
-        let measured = (0..drawn.runs.len()).map(|k| if k == r { own.clone() } else { Vec::new() });
-        [&measured.collect(), first, last].map(simulated)
+        [
+            shown(&run.joints[joint].q),
+            simulated(first),
+            simulated(last),
+        ]
     };
     Some(Curves {
         joint: found.robot.joints[joint].name.clone(),

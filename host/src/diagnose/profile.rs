@@ -159,7 +159,7 @@ pub(super) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
 impl Search<'_> {
     /// Share of the residual that a candidate's columns explain.
     fn explained(&self, fit: &Fit, c: usize, columns: &[Column]) -> Option<f64> {
-        let bounds = self.bounds(self.library[c].kind);
+        let bounds = self.bounds(&self.library[c]);
         let (share, _) = fit.explained(&fit.beside(columns)?, &bounds)?;
         Some(share)
     }
@@ -236,7 +236,7 @@ impl Search<'_> {
         let Some(projected) = fit.distinct(&best.2) else {
             return Ok(None);
         };
-        let Some(evidence) = fit.evidence(&projected, &self.bounds(kind)) else {
+        let Some(evidence) = fit.evidence(&projected, &self.bounds(&self.library[c])) else {
             return Ok(None);
         };
         let joint = self.library[c].joint;
@@ -410,10 +410,11 @@ impl Search<'_> {
     }
 
     /// What physics allows the gains to be; a delay within the instants of sampling is none.
-    fn bounds(&self, kind: Kind) -> Vec<[f64; 2]> {
-        if kind == Kind::MeasurementDelay {
+    fn bounds(&self, candidate: &Candidate) -> Vec<[f64; 2]> {
+        if candidate.kind == Kind::MeasurementDelay {
             return vec![[slack(self.source.runs), f64::INFINITY]];
         }
-        self.source.gains(kind).iter().map(|g| g.bounds).collect()
+        let gains = self.source.gains(candidate);
+        gains.iter().map(|g| g.bounds).collect()
     }
 }

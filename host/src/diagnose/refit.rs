@@ -247,7 +247,7 @@ impl<'r> Refit<'r> {
     pub(super) fn absorbed(
         &self,
         bench: &Bench,
-        before: &Solution,
+        before: &[f64],
         after: &Solution,
     ) -> Vec<Absorbed> {
         let base = &bench.nominal.base;
@@ -258,7 +258,7 @@ impl<'r> Refit<'r> {
                     // The one direction of several parameters is that of gravity, along the first moment as described.
                     _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
                 };
-                let (before, now) = (scale * before.values[k], scale * after.values[k]);
+                let (before, now) = (scale * before[k], scale * after.values[k]);
                 Absorbed {
                     parameter,
                     unit,
@@ -439,8 +439,8 @@ impl Joint {
         let profile = &chosen[k];
         let kind = profile.candidate.kind;
         let at = place(chosen, free, k);
-        let fitted =
-            (source.gains(kind).into_iter().enumerate()).filter(|_| profile.followed.is_none());
+        let fitted = (source.gains(&profile.candidate).into_iter().enumerate())
+            .filter(|_| profile.followed.is_none());
         let gains = fitted.map(|(g, gain)| {
             (
                 gain,

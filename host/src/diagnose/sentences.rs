@@ -242,17 +242,22 @@ fn worse_refitted(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// The simulated motion's error from the refitted description to the last model.
+/// The simulated motion's error from the refitted description to the last model, at joints where something was found.
 fn motion(d: &Diagnosis) -> Option<String> {
-    let ([first, ..], [.., last]) = (d.steps.first()?.motion_rms?, d.steps.last()?.motion_rms?);
-    let unit = match d.waterfall.first()?.unit.as_str() {
-        "N" => "mm",
-        _ => "mrad",
+    let of_joint = |w: &Waterfall| {
+        let mut steps = d.steps.iter().filter(|s| s.joint == w.joint);
+        let first = steps.next()?;
+        let last = steps.last().unwrap_or(first);
+        let unit = if w.unit == "N" { "mm" } else { "mrad" };
+        let [before, after] = [first.motion_rms?[0], last.motion_rms?[1]].map(|x| number(1e3 * x));
+        let place = match d.waterfall.len() {
+            1 => String::new(),
+            _ => format!(" at joint {}", w.joint),
+        };
+        Some(format!("{after} {unit} RMS{place}, {before} {unit} before"))
     };
-    let [first, last] = [first, last].map(|x| number(1e3 * x));
-    Some(format!(
-        "The simulated motion is off by {last} {unit} RMS, {first} {unit} before."
-    ))
+    let told: Vec<String> = d.waterfall.iter().filter_map(of_joint).collect();
+    (!told.is_empty()).then(|| format!("The simulated motion is off by {}.", told.join("; ")))
 }
 
 /// The candidate that came closest to being taken.

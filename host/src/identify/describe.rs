@@ -86,7 +86,11 @@ pub(crate) fn redistributed(
 }
 
 /// The description with these standard parameters.
-fn written(robot: &Robot, pi: &DVector<f64>, mut remarks: Vec<String>) -> (Robot, Vec<String>) {
+pub(super) fn written(
+    robot: &Robot,
+    pi: &DVector<f64>,
+    mut remarks: Vec<String>,
+) -> (Robot, Vec<String>) {
     let links = robot.joints.len() * COLUMNS;
     let (joints, motors) = pi.as_slice().split_at(links);
     let mut motors = motors.to_vec();

@@ -16,6 +16,7 @@
 mod band;
 mod base;
 mod beyond;
+mod bodies;
 mod cache;
 mod closed;
 mod compare;
@@ -73,6 +74,7 @@ pub use base::{
     Base, Independent, chain_of, column_name, expression, independent_columns, preference,
     transmission_of, unit,
 };
+pub(crate) use bodies::{Sizes, as_bodies};
 pub use cache::RowCache;
 pub use compare::{Compared, Comparison};
 pub use covariance::{Ellipse, Estimate, t_quantile};

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::IdentifyError;
 use super::base::Base;
+use super::bodies::Sizes;
 use super::compare::relative_errors;
 use super::consistent::{Consistent, Quadratic, consistent};
 use super::factor::TriangularFactor;
@@ -21,7 +22,7 @@ use crate::robot::Robot;
 /// Relative uncertainty of the description's inertial values where none is given: right to a factor of about three. On
 /// the real arms (docs/arms.md) errors on data held back are the same to a few per cent from 1 to 3; at 1 the Stäubli
 /// TX40's model of momentum has 52 of 60 values within two published standard deviations, at 2 and 3 it has 55.
-const DESCRIBED_UNCERTAINTY: f64 = 2.0;
+pub(super) const DESCRIBED_UNCERTAINTY: f64 = 2.0;
 
 /// One standard parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -72,12 +73,6 @@ pub(super) fn prior_of(
     full: &[f64],
     uncertainty: Option<f64>,
 ) -> Prior {
-    let mut values = vec![f64::NAN; base.combination.ncols()];
-    for (&c, &value) in base.columns.iter().zip(full) {
-        if value != 0.0 {
-            values[c] = value;
-        }
-    }
     let joints = robot.joints.len();
     let over = |of: &dyn Fn(&Survey, usize) -> f64| {
         (0..joints)
@@ -90,6 +85,28 @@ pub(super) fn prior_of(
         let spectrum = &s.joints[j].spectrum;
         std::f64::consts::TAU * spectrum.motion * spectrum.velocity_rms()
     });
+    let sizes = Sizes {
+        torque: over(&|s, j| s.joints[j].torque_rms),
+        acceleration,
+        speed,
+    };
+    let columns = base.combination.ncols();
+    Prior::of(
+        robot,
+        columns,
+        &hints(columns, (&base.columns, full), sizes),
+        uncertainty.unwrap_or(DESCRIBED_UNCERTAINTY),
+    )
+}
+
+/// What data suggest for the `columns` standard ones: base columns with the values of a fit, and how joints move.
+pub(super) fn hints(columns: usize, (base, full): (&[usize], &[f64]), sizes: Sizes) -> Hints {
+    let mut values = vec![f64::NAN; columns];
+    for (&c, &value) in base.iter().zip(full) {
+        if value != 0.0 {
+            values[c] = value;
+        }
+    }
     // What hardly moves says nothing of sizes: it could move like the others.
     let like_others = |list: Vec<f64>| -> Vec<f64> {
         let most = list.iter().copied().fold(0.0, f64::max);
@@ -97,18 +114,12 @@ pub(super) fn prior_of(
             .map(|own| if own < HARDLY * most { most } else { own })
             .collect()
     };
-    let hints = Hints {
-        torque: over(&|s, j| s.joints[j].torque_rms),
-        acceleration: like_others(acceleration),
+    Hints {
+        torque: sizes.torque,
+        acceleration: like_others(sizes.acceleration),
         values,
-        speed: like_others(speed),
-    };
-    Prior::of(
-        robot,
-        base.combination.ncols(),
-        &hints,
-        uncertainty.unwrap_or(DESCRIBED_UNCERTAINTY),
-    )
+        speed: like_others(sizes.speed),
+    }
 }
 
 /// The problem of a factor whose rows have the residual's noise as unit.

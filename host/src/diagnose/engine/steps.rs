@@ -4,6 +4,7 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::change::Change;
 use crate::diagnose::descent::Descent;
 use crate::diagnose::judge::{Judged, closed, rank};
+use crate::diagnose::motion::Errors;
 use crate::diagnose::outcome::{Step, Tried};
 use crate::diagnose::profile::Profile;
 use crate::diagnose::refit::{Joint, Refit};
@@ -18,7 +19,7 @@ pub(super) fn steps(
     described: usize,
     joint: &Joint,
     descent: &Descent,
-    motion: &[Option<f64>],
+    motion: &[Option<Errors>],
 ) -> Result<Vec<Step>, DiagnoseError> {
     let Judged { chosen, floors, .. } = judged;
     let trials = search.trials();
@@ -42,7 +43,8 @@ pub(super) fn steps(
             rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
             train_rms: train,
             holdout_rms: unseen,
-            motion_rms: motion[at].zip(motion[at + 1]).map(|(a, b)| [a, b]),
+            motion_rms: (motion[at].as_ref().zip(motion[at + 1].as_ref()))
+                .map(|pair| <[&Errors; 2]>::from(pair).map(|e| e.rms(j))),
             gap_closed: closed(unseen.unwrap_or(train), floors[j]),
             why: String::new(),
         };

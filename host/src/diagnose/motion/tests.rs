@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 use std::path::Path;
 
+use super::controller::{of_joints, regressed};
 use super::*;
 use crate::diagnose::runs::JointRun;
 use crate::robot::{JointFriction, ONE_LINK_TEMPLATE};
@@ -17,40 +18,40 @@ fn robot(coulomb: f64) -> Robot {
     robot
 }
 
-/// 10 s of the robot under `controller`, as it would be recorded.
-fn recorded(robot: &Robot, controller: &Controller) -> Run {
+/// 10 s of the robot under `controllers`, as they would be recorded. Each joint follows two sines, the further out the faster.
+fn recorded(robot: &Robot, controllers: &[Controller]) -> Run {
     let t: Vec<f64> = (0..10_000).map(|k| k as f64 / RATE).collect();
-    let reference: Vec<f64> = (t.iter())
-        .map(|t| 0.4 * (1.0 - (2.0 * t).cos()) + 0.1 * (1.0 - (7.0 * t).cos()))
+    let sine = |rate: f64| move |t: &f64| 1.0 - (rate * t).cos();
+    let references: Vec<Vec<f64>> = (0..robot.joints.len())
+        .map(|j| {
+            let (slow, fast) = (sine(2.0 + 0.6 * j as f64), sine(7.0 + 0.9 * j as f64));
+            t.iter().map(|t| 0.4 * slow(t) + 0.1 * fast(t)).collect()
+        })
         .collect();
     let model = Model::from_robot(robot).unwrap();
-    let motion = closed_loop(
-        robot,
-        &model,
-        std::slice::from_ref(controller),
-        &Inputs {
-            period: 1.0 / RATE,
-            reference: std::slice::from_ref(&reference),
-            added: &[],
-            q: &[0.0],
-            v: &[0.0],
-            substeps: 4,
-        },
-        |_| (),
-    )
-    .unwrap();
+    let still = vec![0.0; robot.joints.len()];
+    let inputs = Inputs {
+        period: 1.0 / RATE,
+        reference: &references,
+        added: &[],
+        q: &still,
+        v: &still,
+        substeps: 4,
+    };
+    let motion = closed_loop(robot, &model, controllers, &inputs, |_| ()).unwrap();
+    let of_joint = |(j, reference): (usize, Vec<f64>)| JointRun {
+        q_raw: motion.q[j].clone(),
+        q: motion.q[j].clone(),
+        qd: motion.qd[j].clone(),
+        // Held over the sample after it: as in the middle between two.
+        tau: motion.tau[j].clone(),
+        reference: Some(reference),
+        ..JointRun::default()
+    };
     Run {
         rate: RATE,
         t,
-        joints: vec![JointRun {
-            q_raw: motion.q[0].clone(),
-            q: motion.q[0].clone(),
-            qd: motion.qd[0].clone(),
-            // Held over the sample after it: as in the middle between two.
-            tau: motion.tau[0].clone(),
-            reference: Some(reference),
-            ..JointRun::default()
-        }],
+        joints: references.into_iter().enumerate().map(of_joint).collect(),
         ..Run::default()
     }
 }
@@ -63,31 +64,94 @@ fn own() -> Controller {
     }
 }
 
-fn off(robot: &Robot, controller: &Controller, run: &Run) -> f64 {
+/// RMS by which each joint of the robot, as simulated, departs from the run.
+fn off(robot: &Robot, controllers: &[Controller], run: &Run) -> Vec<f64> {
     let model = Model::from_robot(robot).unwrap();
-    let q = replayed(robot, &model, controller, run).unwrap();
-    let errors = q.iter().zip(&run.joints[0].q).map(|(a, b)| (a - b).powi(2));
-    (errors.sum::<f64>() / q.len() as f64).sqrt()
+    let q = replayed(robot, &model, controllers, run).unwrap();
+    let rms = |(q, joint): (&Vec<f64>, &JointRun)| {
+        let squares = q.iter().zip(&joint.q).map(|(a, b)| (a - b).powi(2));
+        (squares.sum::<f64>() / q.len() as f64).sqrt()
+    };
+    q.iter().zip(&run.joints).map(rms).collect()
 }
 
 #[test]
 fn the_true_model_moves_as_recorded_and_a_wrong_one_does_not() {
     let truth = robot(0.4);
-    let run = recorded(&truth, &own());
-    let stand_in = stand_in(&truth, std::slice::from_ref(&run)).unwrap();
-    for controller in [own(), stand_in] {
-        let [right, wrong] = [0.4, 0.6].map(|fc| off(&robot(fc), &controller, &run));
+    let run = recorded(&truth, &[own()]);
+    let mut blind = run.clone();
+    blind.joints[0].reference = None;
+    let of = |robot: &Robot, run: &Run| of_joints(robot, robot, std::slice::from_ref(run));
+    let mut described = truth.clone();
+    described.joints[0].controller = Some(own());
+    for (robot_of, run, how) in [
+        (&described, &run, "the description's own"),
+        (&truth, &run, "that the references"),
+        (&truth, &blind, "stand-in of 5 Hz"),
+    ] {
+        let (controllers, told) = of(robot_of, run);
+        assert!(told.contains(how), "{told}");
+        let [right, wrong] =
+            [0.4, 0.6].map(|fc| off(&robot(fc), controllers.as_ref().unwrap(), run)[0]);
         assert!(right < 0.05 * wrong, "{right} {wrong}");
     }
     // Friction too high by 0.2 N·m is a position error of 0.2 N·m over the stiffness of 100 N·m/rad.
-    let wrong = off(&robot(0.6), &own(), &run);
+    let wrong = off(&robot(0.6), &[own()], &run)[0];
     assert!((1.0e-3..3.0e-3).contains(&wrong), "{wrong}");
 }
 
 #[test]
+fn of_two_joints_the_one_with_wrong_friction_moves_wrongly() {
+    let edda = |elbow: f64| {
+        let text = include_str!("../../../robots/edda.toml");
+        let mut robot = Robot::from_toml(text, Path::new("edda.toml")).unwrap();
+        robot.joints[1].friction.as_mut().unwrap().coulomb = elbow;
+        robot
+    };
+    let truth = edda(0.8);
+    let own = [300.0, 60.0].map(|kd| Controller {
+        position_gain: 20.0,
+        velocity_gain: kd,
+        torque_gain: 1.0,
+    });
+    let mut run = recorded(&truth, &own);
+    let off_by = |run: &Run, elbow: f64| {
+        let (controllers, how) = of_joints(&truth, &truth, std::slice::from_ref(run));
+        (off(&edda(elbow), &controllers.unwrap(), run), how)
+    };
+    let check = |run: &Run| {
+        let [(right, how), (wrong, _)] = [0.8, 1.6].map(|elbow| off_by(run, elbow));
+        assert!(
+            right.iter().all(|r| *r < 0.05 * wrong[1]),
+            "{right:?} {wrong:?}"
+        );
+        assert!(wrong[1] > 3.0 * wrong[0], "{wrong:?}");
+        how
+    };
+    let how = check(&run);
+    assert!(
+        how.contains("that the references in the recordings show, at each joint"),
+        "{how}"
+    );
+    run.joints[1].reference = None;
+    let how = check(&run);
+    assert!(
+        how.contains("(joint shoulder); a stand-in of 5 Hz"),
+        "{how}"
+    );
+    // Without a torque there is nothing to drive it with.
+    run.joints[0].tau.clear();
+    let (none, how) = of_joints(&truth, &truth, &[run]);
+    assert!(
+        none.is_none() && how.contains("joint shoulder is not recorded"),
+        "{how}"
+    );
+}
+
+#[test]
 fn a_controller_is_read_off_its_references() {
-    let mut run = recorded(&robot(0.4), &own());
-    let found = regressed(std::slice::from_ref(&run)).unwrap();
+    let mut run = recorded(&robot(0.4), &[own()]);
+    let found = regressed(std::slice::from_ref(&run), 0).unwrap();
     let damping = found.torque_gain * found.velocity_gain;
     assert!((damping - 5.0).abs() < 0.05, "{damping}");
     assert!((damping * found.position_gain - 100.0).abs() < 1.0);
@@ -97,15 +161,15 @@ fn a_controller_is_read_off_its_references() {
             *r = 0.9 * (5.3 * t).sin();
         }
     }
-    assert!(regressed(&[run]).is_none());
+    assert!(regressed(&[run], 0).is_none());
 }
 
 #[test]
 fn worse_is_what_block_after_block_says() {
-    let errors = |blocks: &[f64]| Errors(blocks.iter().map(|s| [*s, 100.0]).collect());
+    let errors = |blocks: &[f64]| Errors(vec![blocks.iter().map(|s| [*s, 100.0]).collect()]);
     let before = errors(&[1.0, 1.2, 0.9, 1.1, 1.0, 1.0]);
-    assert!(errors(&[1.5, 1.8, 1.4, 1.6, 1.5, 1.6]).worse_than(&before));
-    assert!(!errors(&[0.5, 0.6, 0.4, 0.5, 0.5, 0.5]).worse_than(&before));
+    assert!(errors(&[1.5, 1.8, 1.4, 1.6, 1.5, 1.6]).worse_than(&before, 0));
+    assert!(!errors(&[0.5, 0.6, 0.4, 0.5, 0.5, 0.5]).worse_than(&before, 0));
     // One bad block is chance.
-    assert!(!errors(&[1.0, 1.2, 0.9, 4.1, 1.0, 1.0]).worse_than(&before));
+    assert!(!errors(&[1.0, 1.2, 0.9, 4.1, 1.0, 1.0]).worse_than(&before, 0));
 }

@@ -16,7 +16,7 @@ use crate::diagnose::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
 impl Search<'_> {
     /// Gains and shapes of a candidate.
     fn size(&self, candidate: &Candidate) -> usize {
-        self.source.gains(candidate.kind).len() + candidate.kind.about().shapes.len()
+        self.source.gains(candidate).len() + candidate.kind.about().shapes.len()
     }
 
     /// Which of `profiles`, best first, is taken: of those that pass, the best, or the smallest that the data support as

@@ -102,3 +102,23 @@ fn stated_without_a_constant() -> Verdict {
     };
     made.diagnosed(&made.robot, &options).0.verdict
 }
+
+/// What a spring pulls everywhere alike is part of a constant that is fitted anyway; its stiffness is not.
+#[test]
+fn a_spring_is_found_where_the_description_cannot_state_a_constant() {
+    let (stiffness, rest) = (1.2, 0.3);
+    let made = (Scenario::short([Effect::Spring { stiffness, rest }], 103).make()).unwrap();
+    let options = Options {
+        without: vec![Kind::Backlash, Kind::JointElasticity],
+        no_offsets: true,
+        ..Options::default()
+    };
+    let (diagnosis, model) = made.diagnosed(&made.robot, &options);
+    assert_eq!(names(&diagnosis), ["spring"]);
+    let found = &diagnosis.steps[0].parameters["stiffness"];
+    assert!((found.value / stiffness - 1.0).abs() < 0.1, "{found:?}");
+    assert!(diagnosis.steps[0].gap_closed > 0.9);
+    // The rest of the law, −stiffness·rest, stands as the joint's offset.
+    let offset = model.joints[0].friction.as_ref().unwrap().offset;
+    assert!((offset + stiffness * rest).abs() < 0.1, "{offset}");
+}

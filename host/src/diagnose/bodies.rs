@@ -1,0 +1,203 @@
+//! The description with what was found, the links of an arm bodies that can exist.
+//!
+//! Base parameters of several links that are fitted freely need be no bodies': what a motion tells badly comes out as noise
+//! has it, the inertia matrix is then not positive and nothing can be simulated. So an arm gets the bodies nearest in the
+//! measure of the data, those of its base parameters among them that were held, and the effects' gains are fitted again
+//! beside them. One link is a body whatever its base parameters are.
+//!
+//! Leaves out: that effects are formed with the base parameters of the free fit.
+
+use nalgebra::DMatrix;
+
+use super::anchor::{Anchor, Direction};
+use super::bench::Bench;
+use super::fit::{Fit, dot};
+use super::floor;
+use super::model::{completed, fitted, gravity_with, redistributed_over};
+use super::profile::Profile;
+use super::refit::Refit;
+use super::rows::{Column, combined};
+use super::runs::{JointRun, Run};
+use super::search::with;
+use super::solve::solve;
+use crate::identify::{Combinations, Sizes, as_bodies};
+use crate::report::format_significant;
+use crate::robot::Robot;
+
+/// What a model holds that was fitted to the training data.
+pub(super) struct Standing {
+    /// Base parameters.
+    pub(super) values: Vec<f64>,
+    /// Of the effects' columns.
+    pub(super) gains: Vec<f64>,
+    /// The description with links that can exist, and what has to be said of it; none of one link.
+    bodies: Option<(Robot, Vec<String>)>,
+}
+
+impl Standing {
+    /// From the coefficients of the free nominal directions and of the effects' columns in a free fit to `runs`.
+    pub(super) fn of(
+        bench: &Bench,
+        refit: &Refit,
+        runs: &[Run],
+        coefficients: &[f64],
+        chosen: &[Profile],
+    ) -> Self {
+        let (free, gains) = coefficients.split_at(bench.anchor.free.len());
+        let standing = Self {
+            values: bench.anchor.values(free),
+            gains: gains.to_vec(),
+            bodies: None,
+        };
+        if bench.robot.joints.len() == 1 {
+            return standing;
+        }
+        standing.embodied(bench, refit, runs, coefficients, chosen)
+    }
+
+    /// Base parameters and gains.
+    pub(super) fn fitted(&self) -> [&[f64]; 2] {
+        [&self.values, &self.gains]
+    }
+
+    /// Coefficients of the free nominal directions, then of the effects' columns.
+    pub(super) fn coefficients(&self, anchor: &Anchor) -> Vec<f64> {
+        let along =
+            |direction: &Direction| direction.iter().map(|&(k, f)| f * self.values[k]).sum();
+        let free = anchor.free.iter().map(along);
+        free.chain(self.gains.iter().copied()).collect()
+    }
+
+    /// The description with them, and what has to be said of it; `formed_at` are the base parameters that the effects' columns
+    /// were formed with.
+    pub(super) fn model(
+        &self,
+        bench: &Bench,
+        formed_at: &[f64],
+        chosen: &[Profile],
+    ) -> (Robot, Vec<String>) {
+        let Bench { robot, nominal, .. } = bench;
+        let effects = fitted(chosen, &self.gains);
+        let mut values = self.values.clone();
+        let gravity = gravity_with(robot, nominal, formed_at, &effects, &mut values);
+        let with_links = match &self.bodies {
+            Some(bodies) => bodies.clone(),
+            None => redistributed_over(robot, nominal, &values),
+        };
+        completed(with_links, robot, gravity, &effects)
+    }
+
+    fn embodied(
+        self,
+        bench: &Bench,
+        refit: &Refit,
+        runs: &[Run],
+        coefficients: &[f64],
+        chosen: &[Profile],
+    ) -> Self {
+        let Bench { robot, nominal, .. } = bench;
+        let left = with(refit.footing(chosen)[1], chosen, None);
+        let rows = left.rows();
+        let n = rows.joints();
+        let residuals: Vec<Vec<f64>> = (0..n).map(|j| left.residual(j)).collect();
+        let memory = floor::memory(rows, &residuals);
+        let scale = (0..n).map(|j| 1.0 / left.rms(j).max(f64::MIN_POSITIVE));
+        let fit = Fit::new(rows, scale.collect(), memory);
+        let effects: Vec<(&Column, bool)> = (chosen.iter())
+            .flat_map(|p| p.columns.iter().map(|c| (c, p.followed.is_none())))
+            .collect();
+        let fitted: Vec<&Column> = effects
+            .iter()
+            .filter(|(_, f)| *f)
+            .map(|(c, _)| *c)
+            .collect();
+        let beside = fit.clone().taking(fitted.iter().copied());
+        let columns: Vec<Vec<f64>> = (rows.nominal.iter())
+            .map(|column| beside.projected(fit.weighted(column)))
+            .collect();
+        let rows_in_one = (memory / rows.period).max(1.0);
+        let mut information = DMatrix::zeros(columns.len(), columns.len());
+        for a in 0..columns.len() {
+            for b in 0..=a {
+                information[(a, b)] = dot(&columns[a], &columns[b]) / rows_in_one;
+                information[(b, a)] = information[(a, b)];
+            }
+        }
+        let base = Combinations {
+            combination: &nominal.base.combination,
+            columns: &nominal.base.columns,
+            values: &self.values,
+        };
+        let bodies = match as_bodies(robot, &base, information, sizes(runs)) {
+            Ok(bodies) => bodies,
+            Err(error) => {
+                let (model, mut remarks) = redistributed_over(robot, nominal, &self.values);
+                remarks.push(format!(
+                    "The links of model.toml are not made bodies that can exist ({error}); it may not be fit for simulation."
+                ));
+                let bodies = Some((model, remarks));
+                return Self { bodies, ..self };
+            }
+        };
+        // What the bodies change of the torque, and what effects make up of it.
+        let all: Vec<&Column> = refit
+            .free
+            .iter()
+            .chain(effects.iter().map(|(c, _)| *c))
+            .collect();
+        let mut rest = fit;
+        rest.subtract(&combined(
+            n,
+            all.into_iter().zip(coefficients.iter().copied()),
+        ));
+        let before: Vec<f64> = (0..n).map(|j| rest.rms(j)).collect();
+        let moved = bodies.values.iter().zip(&self.values).map(|(b, f)| b - f);
+        rest.subtract(&combined(n, rows.nominal.iter().zip(moved)));
+        let mut gains = self.gains;
+        if let Some(made_up) = solve(&rest, &fitted, &[]).filter(|_| !fitted.is_empty()) {
+            rest.subtract(&combined(
+                n,
+                fitted.iter().copied().zip(made_up.values.iter().copied()),
+            ));
+            let own = gains.iter_mut().zip(&effects).filter(|(_, (_, f))| *f);
+            own.zip(made_up.values)
+                .for_each(|((gain, _), change)| *gain += change);
+        }
+        let mut remarks = bodies.remarks;
+        let more = (0..n).map(|j| (j, rest.rms(j) / before[j].max(f64::MIN_POSITIVE) - 1.0));
+        if let Some((j, share)) = more.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            remarks.push(format!(
+                "Links are taken as bodies that can exist; of the training data that leaves up to {} % more than a fit that is free of it (joint {}).",
+                format_significant(100.0 * share.max(0.0), 2),
+                robot.joints[j].name
+            ));
+        }
+        Self {
+            values: bodies.values,
+            gains,
+            bodies: Some((bodies.robot, remarks)),
+        }
+    }
+}
+
+/// How the joints move, and what moves them.
+fn sizes(runs: &[Run]) -> Sizes {
+    let joints = 0..runs.first().map_or(0, |run| run.joints.len());
+    let rms = |of: fn(&JointRun) -> &[f64]| -> Vec<f64> {
+        (joints.clone())
+            .map(|j| {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for x in runs.iter().flat_map(|run| of(&run.joints[j])) {
+                    sum += x * x;
+                    count += 1.0;
+                }
+                f64::sqrt(sum / f64::max(count, 1.0))
+            })
+            .collect()
+    };
+    Sizes {
+        torque: rms(|joint| &joint.tau),
+        speed: rms(|joint| &joint.qd),
+        acceleration: rms(|joint| &joint.qdd),
+    }
+}
