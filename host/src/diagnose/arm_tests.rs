@@ -40,7 +40,13 @@ fn named(diagnosis: &Diagnosis) -> Vec<(&str, &str)> {
 }
 
 fn told(what: &str, diagnosis: &Diagnosis) {
-    println!("{what}: {:?}", named(diagnosis));
+    println!("{what}: {:?} {:?}", diagnosis.verdict, named(diagnosis));
+    for fault in &diagnosis.data_faults {
+        println!("    {}", fault.text);
+    }
+    if let Some(left) = &diagnosis.remainder {
+        println!("    {}", left.text);
+    }
     for step in &diagnosis.steps {
         println!(
             "    {} on {}: {:?} p {:.1e} train {:.4?} holdout {:.4?} closed {:.2}",
@@ -95,11 +101,6 @@ fn faults_of_one_joint() {
             "upright-load",
             Arm::Upright,
             Some((0, Fault::LoadFriction(0.1))),
-        ),
-        (
-            "upright-tilt",
-            Arm::Upright,
-            Some((0, Fault::GravityTilt([0.0, 0.06]))),
         ),
         (
             "upright-offset",
@@ -207,6 +208,16 @@ fn friction_with_another_joint_s_speed_is_not_called_an_inertia() {
             .all(|(name, _)| *name != "inertia_coupling")
     );
     assert!(diagnosis.remainder.is_some());
+}
+
+/// Its torque goes with 45 times its position, as would that of a position divided by the gear ratio twice.
+#[test]
+fn an_eccentric_gear_is_no_wrong_ratio() {
+    let fault = Some((4, Fault::GearEccentricity([0.8, 1.0])));
+    let diagnosis = made(&ArmScenario::new(Arm::Six, fault, 1));
+    told("eccentric", &diagnosis);
+    assert_eq!(named(&diagnosis), [("gear_eccentricity", "joint_5")]);
+    assert!(diagnosis.steps[0].gap_closed > 0.9);
 }
 
 /// A real arm: description, training, hold-out.

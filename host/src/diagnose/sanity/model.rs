@@ -34,6 +34,8 @@ const FARTHEST: f64 = 5.0;
 const SHOWN_BY: f64 = 5.0;
 /// Share of a joint's highest speed above which it moves.
 const IN_MOTION: f64 = 0.05;
+/// Share of a joint's range by which a position may lie outside it: limits are described with some care.
+const OUTSIDE: f64 = 0.2;
 /// Rows of one trial of several joints.
 pub(super) const TRIAL: usize = 500;
 
@@ -256,7 +258,7 @@ impl<'a> Judge<'a> {
                 continue;
             }
             let mut tried: Vec<(f64, f64)> = Vec::new();
-            for factor in self.factors(j) {
+            for factor in self.factors(j).into_iter().filter(|f| self.reaches(j, *f)) {
                 let all = try_out(Some(j), factor)?;
                 let own = all[j];
                 // What misfits by a little more than a quarter is an effect's business.
@@ -306,6 +308,17 @@ impl<'a> Judge<'a> {
         let (gravity, inertia) = self.scales(rows, j, self.stated(rows, j)?.as_ref());
         let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
         Ok(miss(gravity) + miss(inertia))
+    }
+
+    /// Whether a joint could be where it is recorded times a factor. Where it cannot, its torque goes with such a multiple of its
+    /// position for another reason: an eccentric gear's once a turn of the motor.
+    fn reaches(&self, j: usize, factor: f64) -> bool {
+        let limits = self.robot.joints[j].limits.as_ref();
+        limits.map(|l| l.position).is_none_or(|[low, high]| {
+            let more = OUTSIDE * (high - low);
+            let mut places = self.rows.q[j].iter().map(|q| factor * q);
+            places.all(|q| (low - more..=high + more).contains(&q))
+        })
     }
 
     /// Factors by which a joint's position is tried.
