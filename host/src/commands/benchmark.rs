@@ -8,7 +8,9 @@ use clap::ValueEnum;
 use super::error::CommandError;
 use super::ui::Ui;
 use crate::diagnose::benchmark::peer::{Frols, Stlsq};
-use crate::diagnose::benchmark::{Diagnose, Method, Plan, Score, markdown, run as ask};
+use crate::diagnose::benchmark::{
+    Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
+};
 use crate::diagnose::scenario::{Effect, Noise};
 use crate::files::{folder, write_whole};
 
@@ -63,6 +65,9 @@ pub(crate) struct Args {
     /// Record an encoder on the link beside the motor's
     #[arg(long)]
     pub(crate) second_encoder: bool,
+    /// Seeds of arms of two and of six joints with one joint at fault; judged by the project's own diagnosis
+    #[arg(long, default_value_t = 0)]
+    pub(crate) arms: u64,
     /// Methods to judge
     #[arg(long, value_enum, value_delimiter = ',', default_value = "diagnose")]
     pub(crate) only: Vec<Judged>,
@@ -103,6 +108,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             )));
         }
     }
+    if args.keep && args.arms > 0 {
+        return Err(CommandError::Sentence(
+            "--keep writes the recordings of one joint; leave out --arms.".into(),
+        ));
+    }
     let effects = if args.effects.is_empty() {
         Effect::names().map(str::to_owned).collect()
     } else {
@@ -123,6 +133,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         second_encoder: args.second_encoder,
     };
     let cases = plan.cases()?;
+    let arms = arm_cases(args.first_seed, args.arms)?;
     folder(&args.out)?;
     if args.keep {
         let mut progress = ui.progress("recording", cases.len() as u64);
@@ -166,9 +177,24 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         .zip(&outcomes)
         .map(|(method, outcomes)| Score::of(method.name(), outcomes))
         .collect();
-    let table = markdown(&scores);
+    let mut table = String::new();
+    if !cases.is_empty() {
+        table.push_str(&markdown(&scores));
+    }
+    let progress = Mutex::new(ui.progress("arms", arms.len() as u64));
+    let of_arms = run_arms(&arms, threads, &|done, total| {
+        if let Ok(mut progress) = progress.lock() {
+            progress.at_of(done as u64, total as u64);
+        }
+    })?;
+    drop(progress);
+    if !arms.is_empty() {
+        let gap = if table.is_empty() { "" } else { "\n" };
+        table.push_str(gap);
+        table.push_str(&arm_table(&of_arms));
+    }
     let json = serde_json::json!({
-        "schema": "rig-benchmark/1", "scores": scores, "outcomes": outcomes,
+        "schema": "rig-benchmark/1", "scores": scores, "outcomes": outcomes, "arms": of_arms,
     });
     write_whole(
         &args.out.join("benchmark.json"),
@@ -176,6 +202,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     write_whole(&args.out.join("benchmark.md"), table.as_bytes())?;
     ui.say(table.trim_end());
-    ui.say(&format!("{}: {} cases.", args.out.display(), cases.len()));
+    let count = cases.len() + arms.len();
+    ui.say(&format!("{}: {count} cases.", args.out.display()));
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! Every figure is over scenarios of [`super::scenario`]; proportions come with Wilson intervals.
 
 mod answer;
+mod arms;
 mod cases;
 mod follow;
 mod parameters;
@@ -18,6 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::DiagnoseError;
 use crate::batch::each_by;
 pub use answer::{Answer, Diagnose, Method, Named, Proposed, exact_class, is_right};
+pub use arms::{ArmCase, ArmOutcome, arm_cases, arm_table, run_arms};
 pub use cases::{Case, Group, Plan};
 pub use follow::Followed;
 pub use parameters::{Compared, compare};

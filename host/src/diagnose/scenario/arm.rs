@@ -28,7 +28,7 @@ const CURRENT_LOOP: f64 = 4e-4;
 /// Counts of the encoder per motor turn, behind a gear and on a direct drive.
 const COUNTS: [f64; 2] = [8192.0, 1_048_576.0];
 /// Coulomb friction, viscous friction per rad/s and inertia of the drive over the torque limit.
-const OF_LIMIT: [f64; 3] = [0.03, 0.015, 3e-3];
+pub(super) const OF_LIMIT: [f64; 3] = [0.03, 0.015, 3e-3];
 /// White noise of the torque's reading, its step, and the RMS of the surroundings' torque over the torque limit.
 const NOISE: [f64; 3] = [3e-3, 5e-4, 1.5e-3];
 /// Memory of the surroundings' torque, s.
@@ -111,6 +111,11 @@ fn described(arm: Arm) -> Result<Robot, DiagnoseError> {
 fn limit(joint: &crate::robot::Joint) -> f64 {
     let stated = joint.limits.as_ref().and_then(|l| l.torque);
     stated.unwrap_or(100.0)
+}
+
+/// Torque limits of an arm's joints, N·m.
+pub(super) fn limits_of(arm: Arm) -> Result<Vec<f64>, DiagnoseError> {
+    Ok(described(arm)?.joints.iter().map(limit).collect())
 }
 
 impl ArmScenario {

@@ -31,6 +31,43 @@ pub enum Fault {
     JointOffset(f64),
 }
 
+impl Fault {
+    /// Name in results: the library's where it has one.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Stribeck(_) => "stribeck",
+            Self::AsymmetricCoulomb(_) => "asymmetric_coulomb",
+            Self::GearEccentricity(_) => "gear_eccentricity",
+            Self::LoadFriction(_) => "load_friction",
+            Self::InertiaCoupling(_) => "inertia_coupling",
+            Self::ViscousCoupling(_) => "viscous_coupling",
+            Self::GravityTilt(_) => "gravity_tilt",
+            Self::Payload(_) => "payload",
+            Self::JointOffset(_) => "joint_offset",
+        }
+    }
+
+    /// What is to be said of it.
+    pub fn calls_for(&self) -> CallsFor {
+        match self {
+            Self::ViscousCoupling(_) => CallsFor::Remainder,
+            Self::Payload(_) | Self::JointOffset(_) => CallsFor::ParameterChange,
+            _ => CallsFor::Name,
+        }
+    }
+}
+
+/// What is to be said of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CallsFor {
+    /// Its name, and the joint.
+    Name,
+    /// That values of the description have changed.
+    ParameterChange,
+    /// That something is left: the library has no such effect.
+    Remainder,
+}
+
 /// Torque of a fault, from the state and the acceleration of the step before.
 pub(super) struct Hidden {
     fault: Option<(usize, Fault)>,

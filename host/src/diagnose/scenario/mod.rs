@@ -8,6 +8,7 @@
 mod arm;
 mod catalogue;
 mod dice;
+mod drawn;
 mod fault;
 mod hidden;
 mod proposed;
@@ -25,7 +26,7 @@ use std::path::Path;
 use serde::Serialize;
 
 pub use arm::{Arm, ArmRecordings, ArmScenario};
-pub use fault::Fault;
+pub use fault::{CallsFor, Fault};
 pub(super) use hidden::payload;
 pub use hidden::{Effect, Hidden};
 pub use record::Intrusion;
