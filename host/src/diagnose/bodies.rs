@@ -87,6 +87,7 @@ impl Standing {
         completed(with_links, robot, gravity, &effects)
     }
 
+    /// The same with the nearest bodies.
     fn embodied(
         self,
         bench: &Bench,
@@ -96,33 +97,14 @@ impl Standing {
         chosen: &[Profile],
     ) -> Self {
         let Bench { robot, nominal, .. } = bench;
-        let left = with(refit.footing(chosen)[1], chosen, None);
-        let rows = left.rows();
-        let n = rows.joints();
-        let residuals: Vec<Vec<f64>> = (0..n).map(|j| left.residual(j)).collect();
-        let memory = floor::memory(rows, &residuals);
-        let scale = (0..n).map(|j| 1.0 / left.rms(j).max(f64::MIN_POSITIVE));
-        let fit = Fit::new(rows, scale.collect(), memory);
         let effects: Vec<(&Column, bool)> = (chosen.iter())
             .flat_map(|p| p.columns.iter().map(|c| (c, p.followed.is_none())))
             .collect();
-        let fitted: Vec<&Column> = effects
-            .iter()
-            .filter(|(_, f)| *f)
-            .map(|(c, _)| *c)
+        let fitted: Vec<&Column> = (effects.iter())
+            .filter(|(_, fitted)| *fitted)
+            .map(|(column, _)| *column)
             .collect();
-        let beside = fit.clone().taking(fitted.iter().copied());
-        let columns: Vec<Vec<f64>> = (rows.nominal.iter())
-            .map(|column| beside.projected(fit.weighted(column)))
-            .collect();
-        let rows_in_one = (memory / rows.period).max(1.0);
-        let mut information = DMatrix::zeros(columns.len(), columns.len());
-        for a in 0..columns.len() {
-            for b in 0..=a {
-                information[(a, b)] = dot(&columns[a], &columns[b]) / rows_in_one;
-                information[(b, a)] = information[(a, b)];
-            }
-        }
+        let (fit, information) = measure(refit, chosen, &fitted);
         let base = Combinations {
             combination: &nominal.base.combination,
             columns: &nominal.base.columns,
@@ -140,19 +122,14 @@ impl Standing {
             }
         };
         // What the bodies change of the torque, and what effects make up of it.
-        let all: Vec<&Column> = refit
-            .free
-            .iter()
-            .chain(effects.iter().map(|(c, _)| *c))
-            .collect();
+        let n = robot.joints.len();
+        let free = refit.free.iter().chain(effects.iter().map(|(c, _)| *c));
         let mut rest = fit;
-        rest.subtract(&combined(
-            n,
-            all.into_iter().zip(coefficients.iter().copied()),
-        ));
+        rest.subtract(&combined(n, free.zip(coefficients.iter().copied())));
         let before: Vec<f64> = (0..n).map(|j| rest.rms(j)).collect();
         let moved = bodies.values.iter().zip(&self.values).map(|(b, f)| b - f);
-        rest.subtract(&combined(n, rows.nominal.iter().zip(moved)));
+        let nominal = rest.rows().nominal.iter().zip(moved);
+        rest.subtract(&combined(n, nominal));
         let mut gains = self.gains;
         if let Some(made_up) = solve(&rest, &fitted, &[]).filter(|_| !fitted.is_empty()) {
             rest.subtract(&combined(
@@ -178,6 +155,34 @@ impl Standing {
             bodies: Some((bodies.robot, remarks)),
         }
     }
+}
+
+/// The data with what the effects leave of each joint as unit, and what they tell of the base parameters beside `fitted` columns.
+fn measure<'r>(
+    refit: &Refit<'r>,
+    chosen: &[Profile],
+    fitted: &[&Column],
+) -> (Fit<'r>, DMatrix<f64>) {
+    let left = with(refit.footing(chosen)[1], chosen, None);
+    let rows = left.rows();
+    let joints = 0..rows.joints();
+    let residuals: Vec<Vec<f64>> = joints.clone().map(|j| left.residual(j)).collect();
+    let memory = floor::memory(rows, &residuals);
+    let scale = joints.map(|j| 1.0 / left.rms(j).max(f64::MIN_POSITIVE));
+    let fit = Fit::new(rows, scale.collect(), memory);
+    let beside = fit.clone().taking(fitted.iter().copied());
+    let columns: Vec<Vec<f64>> = (rows.nominal.iter())
+        .map(|column| beside.projected(fit.weighted(column)))
+        .collect();
+    let rows_in_one = (memory / rows.period).max(1.0);
+    let mut information = DMatrix::zeros(columns.len(), columns.len());
+    for a in 0..columns.len() {
+        for b in 0..=a {
+            information[(a, b)] = dot(&columns[a], &columns[b]) / rows_in_one;
+            information[(b, a)] = information[(a, b)];
+        }
+    }
+    (fit, information)
 }
 
 /// How the joints move, and what moves them.

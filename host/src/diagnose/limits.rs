@@ -66,7 +66,7 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
                 }
                 tried = true;
                 if !distinct {
-                    let columns = found.search.cached(c, &grid(kind))?;
+                    let columns = found.search.cached(c, &found.search.grid(candidate))?;
                     distinct = (places(kind)).any(|k| last.distinct(&columns[k]).is_some());
                 }
             }
@@ -125,7 +125,7 @@ pub(super) fn detectable(
             continue;
         }
         let mut sizes: Vec<(f64, usize)> = Vec::new();
-        let points = grid(candidate.kind);
+        let points = found.search.grid(candidate);
         let columns = found.search.cached(c, &points)?;
         for place in places(candidate.kind) {
             if !found.search.shows(candidate, &points[place]) {

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
-pub(super) use self::shapes::grid;
 use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
+pub(super) use self::shapes::{grid, grid_on};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
@@ -178,7 +178,7 @@ impl Search<'_> {
         let kind = self.library[c].kind;
         let fixed = self.fixed(&self.library[c]);
         let start = fixed.or(start);
-        let points = grid(kind);
+        let points = self.grid(&self.library[c]);
         let mut best: Option<Best> = None;
         let gear = is_gear(kind);
         let mut followed: Vec<Best> = Vec::new();

@@ -9,7 +9,7 @@ use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::judge::equal;
-use super::profile::{LEAST_GAIN, Profile, grid};
+use super::profile::{LEAST_GAIN, Profile, grid_on};
 use super::rows::Column;
 use super::runs::{blurred, resolution};
 use super::waves;
@@ -112,6 +112,11 @@ impl<'a> Search<'a> {
         waves::shown(candidate.kind, joint, shapes, self.spans[candidate.joint])
     }
 
+    /// Shapes that the search of a candidate begins with.
+    pub(super) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
+        grid_on(candidate.kind, &self.source.robot.joints[candidate.joint])
+    }
+
     /// Columns of the points of a candidate's grid.
     ///
     /// # Errors
@@ -172,7 +177,7 @@ impl<'a> Search<'a> {
         (self.library.iter())
             .filter(|c| is_first_law(c.kind))
             .map(|c| {
-                let shown = grid(c.kind).into_iter().filter(|s| self.shows(c, s));
+                let shown = self.grid(c).into_iter().filter(|s| self.shows(c, s));
                 shown.count()
             })
             .sum()

@@ -130,7 +130,8 @@ impl<'a> Acting<'a> {
         Ok(())
     }
 
-    /// Bounds of the friction of a joint whose Coulomb friction is `coulomb`, at a velocity.
+    /// Bounds of the friction of a joint whose Coulomb friction is `coulomb`, at a velocity: one value where all of it is remembered.
+    /// No more can be than there is: what effects ask for beyond that holds its share of what there is.
     pub(super) fn bounds(
         &self,
         joint: usize,
@@ -146,9 +147,8 @@ impl<'a> Acting<'a> {
         if passive && bounds[0] <= bounds[1] {
             return Ok(bounds);
         }
-        if passive && bounds[0] <= bounds[1] + slack {
-            let middle = 0.5 * (bounds[0] + bounds[1]);
-            return Ok([middle; 2]);
+        if passive {
+            return Ok([winding(bounds, [back, forth]); 2]);
         }
         Err(SimulateError::DrivingEffects {
             joint: joint + 1,
@@ -166,5 +166,21 @@ impl<'a> Acting<'a> {
             let _: [f64; GAINS] = p.kind.terms(&p.shapes, &mut self.memory[k].0, &instant);
         }
         self.time += dt;
+    }
+}
+
+/// Friction that a hidden state holds by itself, between the `remembered` against motion backwards and forwards: at the end of
+/// its way all dry friction that there is in that direction. `bounds` are those of all friction.
+fn winding(bounds: [f64; 2], [back, forth]: [f64; 2]) -> f64 {
+    let whole = back - forth;
+    if whole <= 0.0 {
+        return 0.5 * (bounds[0] + bounds[1]);
+    }
+    // From −1 to 1.
+    let way = (back + forth) / whole;
+    way * if way > 0.0 {
+        bounds[1] - forth
+    } else {
+        back - bounds[0]
     }
 }

@@ -8,6 +8,7 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::across::CLOSED_TEETH;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::search::{Search, is_gear};
+use crate::robot::{Joint, JointKind};
 
 /// Points of a grid per decade of a logarithmic range.
 const PER_DECADE: f64 = 4.0;
@@ -42,6 +43,28 @@ fn starts(kind: Kind) -> Vec<[f64; SHAPES]> {
         }
     }
     list
+}
+
+/// Periods that the later stages of a gear, and the spokes of a torque sensor behind it, make in a turn of the joint. One would be gravity.
+const OF_THE_JOINT: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];
+
+/// Grid of shapes of an effect on a joint.
+pub(in crate::diagnose) fn grid_on(kind: Kind, joint: &Joint) -> Vec<[f64; SHAPES]> {
+    let mut points = grid(kind);
+    if kind == Kind::GearEccentricity && joint.kind == JointKind::Revolute {
+        let later = OF_THE_JOINT.map(|periods| {
+            let mut point = [0.0; SHAPES];
+            point[0] = periods / joint.gear_ratio().abs();
+            point
+        });
+        points.extend(
+            later
+                .into_iter()
+                .filter(|p| !points.contains(p))
+                .collect::<Vec<_>>(),
+        );
+    }
+    points
 }
 
 /// Grid of shapes of an effect.

@@ -7,7 +7,7 @@ use super::dice::Dice;
 use super::fault::Fault;
 use crate::diagnose::DiagnoseError;
 
-/// Purpose of the draws.
+/// Purpose of the draws of the first fault; others follow.
 const DRAW: u64 = 50;
 /// Payload in kg that belongs to a torque limit of 1 N·m at the last joint: the Stäubli TX40 carries 2 kg at its flange.
 const CARRIES: f64 = 2.0 / 30.7;
@@ -67,7 +67,8 @@ impl ArmScenario {
         let Some(name) = fault else {
             return Ok(Self::new(arm, None, seed));
         };
-        let mut dice = Dice::new(seed, DRAW);
+        let place = arm.faults().iter().position(|f| *f == name).unwrap_or(0);
+        let mut dice = Dice::new(seed, DRAW + place as u64);
         let limits = limits_of(arm)?;
         let n = limits.len();
         let any = dice.index(n);
