@@ -14,6 +14,7 @@ use super::predicted::{Predicted, predict};
 use super::profile::Profile;
 use super::rows::{Column, Nominal, Rows, combined};
 use super::runs::{Run, runs_of};
+use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
 use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment};
@@ -269,6 +270,11 @@ pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Cand
             continue;
         }
         for joint in 0..n {
+            // A tilt is one of the base; all else needs a motion of its own joint.
+            let stirs = runs.iter().any(|run| moves(run, joint));
+            if !stirs && kind != Kind::GravityTilt {
+                continue;
+            }
             let at = |other| Candidate { kind, joint, other };
             let warm = runs.iter().all(|r| r.joints[joint].temperature.is_some());
             match kind {

@@ -5,7 +5,8 @@
 //! measure of the data, those of its base parameters among them that were held, and the effects' gains are fitted again
 //! beside them. One link is a body whatever its base parameters are.
 //!
-//! Leaves out: that effects are formed with the base parameters of the free fit.
+//! Leaves out: that effects are formed with the base parameters of the free fit; of a tilted arm, that its moments are by the
+//! cosine too small in what gravity does alone.
 
 use nalgebra::DMatrix;
 
@@ -13,7 +14,7 @@ use super::anchor::{Anchor, Direction};
 use super::bench::Bench;
 use super::fit::{Fit, dot};
 use super::floor;
-use super::model::{completed, fitted, gravity_with, redistributed_over};
+use super::model::{completed, fitted as effects_with, gravity_with, redistributed_over};
 use super::profile::Profile;
 use super::refit::Refit;
 use super::rows::{Column, combined};
@@ -26,10 +27,12 @@ use crate::robot::Robot;
 
 /// What a model holds that was fitted to the training data.
 pub(super) struct Standing {
-    /// Base parameters.
-    pub(super) values: Vec<f64>,
+    /// Base parameters, as columns formed with the description's gravity take them.
+    values: Vec<f64>,
+    /// The same as a description takes them.
+    described: Vec<f64>,
     /// Of the effects' columns.
-    pub(super) gains: Vec<f64>,
+    gains: Vec<f64>,
     /// The description with links that can exist, and what has to be said of it; none of one link.
     bodies: Option<(Robot, Vec<String>)>,
 }
@@ -40,19 +43,21 @@ impl Standing {
         bench: &Bench,
         refit: &Refit,
         runs: &[Run],
-        coefficients: &[f64],
+        [coefficients, formed_at]: [&[f64]; 2],
         chosen: &[Profile],
     ) -> Self {
         let (free, gains) = coefficients.split_at(bench.anchor.free.len());
+        let values = bench.anchor.values(free);
         let standing = Self {
-            values: bench.anchor.values(free),
+            described: values.clone(),
+            values,
             gains: gains.to_vec(),
             bodies: None,
         };
         if bench.robot.joints.len() == 1 {
             return standing;
         }
-        standing.embodied(bench, refit, runs, coefficients, chosen)
+        standing.embodied(bench, refit, runs, [coefficients, formed_at], chosen)
     }
 
     /// Base parameters and gains.
@@ -63,7 +68,7 @@ impl Standing {
     /// Coefficients of the free nominal directions, then of the effects' columns.
     pub(super) fn coefficients(&self, anchor: &Anchor) -> Vec<f64> {
         let along =
-            |direction: &Direction| direction.iter().map(|&(k, f)| f * self.values[k]).sum();
+            |direction: &Direction| direction.iter().map(|&(k, f)| f * self.described[k]).sum();
         let free = anchor.free.iter().map(along);
         free.chain(self.gains.iter().copied()).collect()
     }
@@ -77,7 +82,7 @@ impl Standing {
         chosen: &[Profile],
     ) -> (Robot, Vec<String>) {
         let Bench { robot, nominal, .. } = bench;
-        let effects = fitted(chosen, &self.gains);
+        let effects = effects_with(chosen, &self.gains);
         let mut values = self.values.clone();
         let gravity = gravity_with(robot, nominal, formed_at, &effects, &mut values);
         let with_links = match &self.bodies {
@@ -93,7 +98,7 @@ impl Standing {
         bench: &Bench,
         refit: &Refit,
         runs: &[Run],
-        coefficients: &[f64],
+        [coefficients, formed_at]: [&[f64]; 2],
         chosen: &[Profile],
     ) -> Self {
         let Bench { robot, nominal, .. } = bench;
@@ -104,11 +109,29 @@ impl Standing {
             .filter(|(_, fitted)| *fitted)
             .map(|(column, _)| *column)
             .collect();
-        let (fit, information) = measure(refit, chosen, &fitted);
+        let (fit, mut information) = measure(refit, chosen, &fitted);
+        let mut upright = self.values.clone();
+        let _ = gravity_with(
+            robot,
+            nominal,
+            formed_at,
+            &effects_with(chosen, &self.gains),
+            &mut upright,
+        );
+        // By what the columns take the moments smaller than they are.
+        let taken: Vec<f64> = (self.values.iter().zip(&upright))
+            .map(|(as_taken, value)| if *value == 0.0 { 1.0 } else { as_taken / value })
+            .collect();
+        for (k, mut row) in information.row_iter_mut().enumerate() {
+            row *= taken[k];
+        }
+        for (k, mut column) in information.column_iter_mut().enumerate() {
+            column *= taken[k];
+        }
         let base = Combinations {
             combination: &nominal.base.combination,
             columns: &nominal.base.columns,
-            values: &self.values,
+            values: &upright,
         };
         let bodies = match as_bodies(robot, &base, information, sizes(runs)) {
             Ok(bodies) => bodies,
@@ -127,7 +150,10 @@ impl Standing {
         let mut rest = fit;
         rest.subtract(&combined(n, free.zip(coefficients.iter().copied())));
         let before: Vec<f64> = (0..n).map(|j| rest.rms(j)).collect();
-        let moved = bodies.values.iter().zip(&self.values).map(|(b, f)| b - f);
+        let values: Vec<f64> = (bodies.values.iter().zip(&taken))
+            .map(|(v, t)| v * t)
+            .collect();
+        let moved = values.iter().zip(&self.values).map(|(b, f)| b - f);
         let nominal = rest.rows().nominal.iter().zip(moved);
         rest.subtract(&combined(n, nominal));
         let mut gains = self.gains;
@@ -150,7 +176,8 @@ impl Standing {
             ));
         }
         Self {
-            values: bodies.values,
+            values,
+            described: bodies.values,
             gains,
             bodies: Some((bodies.robot, remarks)),
         }

@@ -60,6 +60,7 @@ impl Descent {
         refit: &Refit,
         chosen: &[Profile],
         described: usize,
+        formed_at: &[f64],
         loaded: &Loaded,
         sealed: Option<&Loaded>,
     ) -> Result<Self, DiagnoseError> {
@@ -72,7 +73,10 @@ impl Descent {
             .map(|count| {
                 let part = &chosen[..count];
                 let free = refit.solution(part)?.values;
-                Ok((part, Standing::of(bench, refit, &loaded.runs, &free, part)))
+                Ok((
+                    part,
+                    Standing::of(bench, refit, &loaded.runs, [&free, formed_at], part),
+                ))
             })
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
         for (part, standing) in &models {

@@ -265,6 +265,7 @@ fn attempt(
         &refit,
         &judged.chosen,
         described,
+        values,
         loaded,
         sealed.as_ref(),
     )?;
@@ -285,7 +286,8 @@ fn attempt(
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));
     let Judged { chosen, floors, .. } = &judged;
     let mut joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
-    let standing = |free: &[f64], part| Standing::of(&bench, &refit, &loaded.runs, free, part);
+    let standing =
+        |free: &[f64], part| Standing::of(&bench, &refit, &loaded.runs, [free, values], part);
     let stands = standing(&joint.solution.values, chosen);
     joint.solution.values = stands.coefficients(&bench.anchor);
     let after = &joint.solution;

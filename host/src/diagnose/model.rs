@@ -105,8 +105,9 @@ pub(super) fn fitted<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted
     effects
 }
 
-/// Gravity turned as the fitted angles say. For one joint the torque is exactly that of the fit, whose angle multiplies the
-/// first moments that its column was formed with.
+/// Gravity turned as the fitted angles say, and the first moments among `values` with it: what a fit calls turned is a part of
+/// gravity added across it, so that its moments are by the cosine too small. The torque of gravity is that of the fit, whose angle
+/// multiplies the moments that its column was formed with.
 fn turned(
     nominal: &Nominal,
     gravity: [f64; 3],
@@ -116,7 +117,7 @@ fn turned(
 ) -> [f64; 3] {
     let axes = nominal.tilt_axes();
     let moments: Vec<usize> = (nominal.base.columns.iter().enumerate())
-        .filter(|(_, c)| nominal.joints() == 1 && (1..=2).contains(&(*c % COLUMNS)))
+        .filter(|(_, c)| (column::FIRST_MOMENT..column::INERTIA).contains(&(*c % COLUMNS)))
         .map(|(k, _)| k)
         .collect();
     let length = |values: &[f64]| {

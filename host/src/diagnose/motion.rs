@@ -80,7 +80,7 @@ impl<'a> Replay<'a> {
         [training, judged]: [&'a Loaded; 2],
     ) -> Self {
         let values = &refit.before.values;
-        let standing = Standing::of(bench, refit, &training.runs, values, &[]);
+        let standing = Standing::of(bench, refit, &training.runs, [values, formed_at], &[]);
         let (moving, _) = standing.model(bench, formed_at, &[]);
         let (controllers, how) = controller::of_joints(bench.robot, &moving, &judged.runs);
         Self {
@@ -98,7 +98,13 @@ impl<'a> Replay<'a> {
     fn model(&self, chosen: &[Profile]) -> Result<Robot, DiagnoseError> {
         let values = self.refit.solution(chosen)?.values;
         let (bench, refit) = (self.bench, self.refit);
-        let standing = Standing::of(bench, refit, self.training, &values, chosen);
+        let standing = Standing::of(
+            bench,
+            refit,
+            self.training,
+            [&values, self.formed_at],
+            chosen,
+        );
         Ok(standing.model(bench, self.formed_at, chosen).0)
     }
 

@@ -81,11 +81,17 @@ impl Run {
     }
 }
 
-/// Two recordings that hold the same samples of position and effort, by their places among those given.
+/// Two recordings that hold the same samples of position and effort, one perhaps for longer, by their places among those given.
 pub(super) fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     let same = |a: &Run, b: &Run| {
-        a.len() == b.len()
-            && (a.joints.iter().zip(&b.joints)).all(|(a, b)| a.q_raw == b.q_raw && a.tau == b.tau)
+        let rows = a.len().min(b.len());
+        let begins_alike = |a: &[f64], b: &[f64]| {
+            let [a, b] = [a, b].map(|all| &all[..rows.min(all.len())]);
+            a == b
+        };
+        2 * rows >= a.len().max(b.len())
+            && (a.joints.iter().zip(&b.joints))
+                .all(|(a, b)| begins_alike(&a.q_raw, &b.q_raw) && begins_alike(&a.tau, &b.tau))
     };
     (0..runs.len()).find_map(|b| {
         let first = (0..b).find(|&a| !runs[b].is_empty() && same(runs[a], runs[b]))?;

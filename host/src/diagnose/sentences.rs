@@ -231,7 +231,8 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
 /// Joints whose hold-out the description predicts better than its parameters fitted again: the motion did not determine them.
 fn worse_refitted(d: &Diagnosis) -> Option<String> {
     let joints: Vec<String> = (d.waterfall.iter())
-        .filter(|w| matches!(w.holdout[..], [given, refitted, ..] if refitted > WORSE * given))
+        // What only the missing effect had bent is right with it.
+        .filter(|w| matches!(w.holdout[..], [given, _, ..] if w.holdout[1..].iter().all(|rms| *rms > WORSE * given)))
         .map(|w| w.joint.clone())
         .collect();
     (!joints.is_empty()).then(|| {

@@ -239,13 +239,11 @@ fn not_settled() -> IdentifyError {
 /// # Errors
 /// [`IdentifyError::Inconsistent`].
 pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, IdentifyError> {
-    let space = Coordinates::new(
-        &Quadratic {
-            matrix: prior.own(&data.matrix),
-            right: data.right.clone(),
-        },
-        prior,
-    );
+    let own = Quadratic {
+        matrix: prior.own(&data.matrix),
+        right: data.right.clone(),
+    };
+    let space = Coordinates::new(&own, prior);
     let mut pi = DVector::from_column_slice(&prior.centre);
     let mut c = space.lower(&prior.centre, &prior.scale);
     let value = |c: &DVector<f64>, pi: &DVector<f64>, strength: f64| {
@@ -303,6 +301,9 @@ pub(super) fn consistent(data: &Quadratic, prior: &Prior) -> Result<Consistent, 
                 let mut whiten = DMatrix::from_diagonal(&scale);
                 if !cholesky.l_dirty().solve_lower_triangular_mut(&mut whiten) {
                     return Err(broken());
+                }
+                for c in prior.nothing_of_its_own(&own.matrix) {
+                    pi[c] = 0.0;
                 }
                 return Ok(Consistent {
                     squares: space.misfit(&c).norm_squared(),

@@ -233,6 +233,16 @@ impl Prior {
         }
     }
 
+    /// Drive inertias of joints that only drives of other joints move: none is stated, and no torque has a place for it.
+    pub(super) fn nothing_of_its_own(&self, own: &DMatrix<f64>) -> impl Iterator<Item = usize> {
+        let coupled = self.shares.is_some();
+        let links = self.bodies.len() * COLUMNS;
+        (0..links.min(own.ncols())).filter(move |c| {
+            let drive = c % COLUMNS == column::DRIVE_INERTIA;
+            coupled && drive && !self.uncertainty[*c].is_finite() && own.column(*c).amax() == 0.0
+        })
+    }
+
     /// Values here as standard parameters.
     pub(super) fn standard(&self, own: &DVector<f64>) -> Vec<f64> {
         match &self.shares {

@@ -143,7 +143,8 @@ impl Allowance {
                 let half = 0.5 * (travel + v * ramp);
                 let sweep = FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half))?;
                 let text = format!(
-                    "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {travel:.3} {unit}"
+                    "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {:.3} {unit} in all",
+                    2.0 * sweep.half_span
                 );
                 Some((Trajectory::FrictionSweep(sweep), text))
             }

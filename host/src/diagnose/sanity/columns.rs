@@ -68,7 +68,7 @@ fn motion(run: &Run, joint: usize) -> (f64, f64) {
 }
 
 /// Whether a joint moves at all: by more than its noise and than a hundredth of a millirad.
-pub(super) fn moves(run: &Run, joint: usize) -> bool {
+pub(in crate::diagnose) fn moves(run: &Run, joint: usize) -> bool {
     let (range, noise) = motion(run, joint);
     range > LEAST_MOTION && range > ABOVE_NOISE * noise
 }

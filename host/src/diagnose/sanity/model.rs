@@ -34,6 +34,8 @@ const FARTHEST: f64 = 5.0;
 const SHOWN_BY: f64 = 5.0;
 /// Share of a joint's highest speed above which it moves.
 const IN_MOTION: f64 = 0.05;
+/// Way from which on a joint moves, rad or m.
+const STIRS: f64 = 0.01;
 /// Share of a joint's range by which a position may lie outside it: limits are described with some care.
 const OUTSIDE: f64 = 0.2;
 /// Rows of one trial of several joints.
@@ -105,7 +107,7 @@ impl<'a> Judge<'a> {
             return Ok(vec![unit]);
         }
         let mut found = Vec::new();
-        for j in 0..n {
+        for j in (0..n).filter(|j| self.stirs(*j)) {
             found.extend(self.against_description(j, described)?);
             if found.iter().all(|f: &DataFault| f.joint != self.name(j))
                 && let Some(fault) = self.sign(j, described)?
@@ -308,6 +310,12 @@ impl<'a> Judge<'a> {
         let (gravity, inertia) = self.scales(rows, j, self.stated(rows, j)?.as_ref());
         let miss = |m: Option<Measured>| m.map_or(0.0, |m| m.value.abs().max(1e-9).ln().abs());
         Ok(miss(gravity) + miss(inertia))
+    }
+
+    /// Whether a joint moves enough for its friction and inertia to have a sense: one that is held gives way a little.
+    fn stirs(&self, j: usize) -> bool {
+        let q = &self.rows.q[j];
+        extreme(q, f64::max) - extreme(q, f64::min) > STIRS
     }
 
     /// Whether a joint could be where it is recorded times a factor. Where it cannot, its torque goes with such a multiple of its

@@ -44,13 +44,7 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
         section = section.with(Block::List(items));
     }
     Some(match &next.file {
-        Some(file) => section
-            .with(Block::Text(format!(
-                "{file} lies beside this page. Run it on the rig, then add the recording to the diagnosis with one more --data:"
-            )))
-            .with(Block::Code(format!(
-                "rig record --port DEVICE --robot ROBOT --trajectory {file} --out next.csv"
-            ))),
+        Some(file) => section.with(Block::Text(format!("{file} lies beside this page."))),
         // What only has to be recorded says how by itself.
         None if names.len() < 2 => section,
         None => section.with(Block::Text(

@@ -127,7 +127,7 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         ],
         rows,
         note: format!(
-            "The step closes {} % of the gap that was there before any step, {}.",
+            "The step closes {} % of the gap that was there before it, {}.",
             parts::percent(step.gap_closed),
             if step.holdout_rms.is_some() {
                 "on data that took no part in the fit"
