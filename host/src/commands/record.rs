@@ -60,6 +60,9 @@ pub(crate) struct Args {
     /// Seed of the emulated rig
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Which recording of the emulated rig this is: another one of the same motion differs by noise
+    #[arg(long, default_value_t = 1)]
+    run: u32,
     /// Replace the recording if it exists
     #[arg(long)]
     pub(crate) force: bool,
@@ -125,7 +128,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     } else if args.probe {
         record(open_probe()?, &experiment, &args.out, ui)?
     } else {
-        let rig = emulated(robot, args.seed)?;
+        let rig = emulated_at(robot, [args.seed, args.run.into()], args.home)?;
         record(EmulatedPort::new(rig), &experiment, &args.out, ui)?
     };
     ui.say(&format!("{}: {losses}", args.out.display()));
@@ -147,17 +150,36 @@ pub(crate) fn uploaded(
 
 /// The emulated rig: a laboratory's, with the nameplate of this description or of the template.
 pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, CommandError> {
+    emulated_at(robot, [seed, 1], None)
+}
+
+/// The same in one of its recordings (counted from 1), its link held where it is said to stand, if that is not where it hangs.
+fn emulated_at(
+    robot: Option<Robot>,
+    [seed, run]: [u64; 2],
+    home: Option<f32>,
+) -> Result<EmulatedRig, CommandError> {
     let described = match robot {
         Some(robot) => robot,
         None => Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?,
     };
     let nameplate = Nameplate::from_robot(&described)?;
-    EmulatedRig::new(&nameplate, PlantConfig::laboratory(seed), seed).map_err(|fault| {
+    let mut plant = PlantConfig::laboratory(seed);
+    let home = home.map_or(plant.initial_position, f64::from);
+    if (home - plant.initial_position).abs() > HANGS {
+        (plant.initial_position, plant.sensors.encoder.zero) = (home, home);
+        plant.held = true;
+    }
+    let noise = seed ^ (run.wrapping_sub(1) << u32::BITS);
+    EmulatedRig::new(&nameplate, plant, noise).map_err(|fault| {
         CommandError::Sentence(format!(
             "The estimator's settings cannot be used: {fault:?}."
         ))
     })
 }
+
+/// A link that is said to stand within this of where it hangs does hang, rad.
+const HANGS: f64 = 0.2;
 
 /// The rig behind the debug probe.
 #[cfg(feature = "probe")]

@@ -248,7 +248,7 @@ fn motion(d: &Diagnosis) -> Option<String> {
     let of_joint = |w: &Waterfall| {
         let mut steps = d.steps.iter().filter(|s| s.joint == w.joint);
         let first = steps.next()?;
-        let last = steps.last().unwrap_or(first);
+        let last = steps.next_back().unwrap_or(first);
         let unit = if w.unit == "N" { "mm" } else { "mrad" };
         let [before, after] = [first.motion_rms?[0], last.motion_rms?[1]].map(|x| number(1e3 * x));
         let place = match d.waterfall.len() {

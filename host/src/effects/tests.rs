@@ -470,8 +470,9 @@ fn memory_holds_no_more_than_the_dry_friction_there_is() {
     };
     assert!(apart(&less, &just) < 0.01, "{}", apart(&less, &just));
     assert!(apart(&more, &just) < 1e-6, "{}", apart(&more, &just));
-    // It comes to rest.
-    assert!(more[3999][1].abs() < 1e-3, "{:?}", more[3999]);
+    // On what is left of its memory it swings, no more than it has slid.
+    let last = more[3999];
+    assert!(last[1].abs() < 0.05 * 2.0, "{last:?}");
 }
 
 #[test]

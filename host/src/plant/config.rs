@@ -161,6 +161,8 @@ pub struct PlantConfig {
     pub substeps: u32,
     /// Joint angle at start, at rest, rad.
     pub initial_position: f64,
+    /// Whether a hand holds the link there until the bridge is switched on.
+    pub held: bool,
     /// Temperature of the surroundings and of everything at start, °C.
     pub ambient: f64,
     /// Motor.
@@ -282,6 +284,7 @@ impl Default for PlantConfig {
             tick: 1.0e-4,
             substeps: 10,
             initial_position: -FRAC_PI_2,
+            held: false,
             ambient: 25.0,
             motor: Motor {
                 resistance: 0.6,

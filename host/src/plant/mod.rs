@@ -70,6 +70,8 @@ pub struct Plant {
     faults: Faults,
     /// Takes effect from the next sampling instant on.
     active: Command,
+    /// Whether the bridge has been on.
+    driven: bool,
     ticks: u64,
     load: Load,
     payload: Option<Body>,
@@ -136,6 +138,7 @@ impl Plant {
             dynamics,
             faults: Faults::default(),
             active: Command::default(),
+            driven: false,
             ticks: 0,
             payload: None,
             disturbance: 0.0,
@@ -164,7 +167,10 @@ impl Plant {
     /// for the tick to come.
     pub fn advance(&mut self, command: Command) -> Sample {
         let held = self.hold();
-        self.dynamics.tick(&self.config, &held);
+        self.driven |= self.active.bridge;
+        if self.driven || !self.config.held {
+            self.dynamics.tick(&self.config, &held);
+        }
         self.ticks += 1;
         self.warm();
         self.active = command;
