@@ -12,7 +12,7 @@ use self::pass::Pass;
 use self::steps::{change_step, refuse, refuse_guesses, steps};
 use self::unbelieved::unbelieved;
 use super::across::{across, names_something, refutes, tell as tell_across};
-use super::bench::{Bench, library};
+use super::bench::{Bench, Loaded, library};
 use super::bodies::Standing;
 use super::change::change;
 use super::descent::Descent;
@@ -412,6 +412,9 @@ fn attempt(
         .extend(read_off(robot, &options.sensor_zeros));
     diagnosis.words.extend(offsets(&bench, after));
     diagnosis.words.extend(held(&bench, &open));
+    diagnosis
+        .words
+        .extend((sealed.as_ref()).and_then(|sealed| no_other_motion(loaded, sealed)));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
@@ -438,6 +441,15 @@ fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// A hold-out that is the training motion once more.
+fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
+    let (own, same) = floor::repeated(&loaded.runs, &sealed.runs)?;
+    Some(format!(
+        "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
+        own.label, same.label
+    ))
 }
 
 /// What was left as the description has it.

@@ -30,6 +30,16 @@ pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
     pairs
 }
 
+/// A hold-out's run that repeats the motion of a training run, and that one.
+pub(super) fn repeated<'r>(training: &'r [Run], held: &'r [Run]) -> Option<(&'r Run, &'r Run)> {
+    held.iter().find_map(|own| {
+        let same = training
+            .iter()
+            .find(|run| run.unburdened == own.unburdened && alike(run, own))?;
+        Some((own, same))
+    })
+}
+
 fn alike(a: &Run, b: &Run) -> bool {
     let rows = a.len().min(b.len());
     if rows < 1000.min(a.len().max(b.len())) || a.len().abs_diff(b.len()) > rows / 10 {

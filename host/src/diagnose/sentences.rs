@@ -313,8 +313,17 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     } else {
         ""
     };
+    let rotor = found.robot.joints[j]
+        .drive
+        .as_ref()
+        .map_or(0.0, |d| d.rotor_inertia);
+    let loaded = if profile.candidate.kind == Kind::LoadFriction && rotor == 0.0 {
+        " The rotor's inertia is not described, so that its torque counts as load of the gear here: the coefficient comes out too small. Give rotor_inertia in [joint.drive]."
+    } else {
+        ""
+    };
     format!(
-        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{runner}{followed}",
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{loaded}{runner}{followed}",
         percent(e.gain),
         format_significant(e.gain_sigmas, 2)
     )

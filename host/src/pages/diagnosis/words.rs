@@ -24,7 +24,7 @@ pub(super) fn meaning(verdict: Verdict) -> &'static str {
             "The model as it is explains these data down to the noise. No effect had to be added."
         }
         Verdict::Explained => {
-            "The model lacked something, and the effects named here close the gap down to the noise."
+            "The model lacked something, and the effects named here explain it: what is left shows nothing more that these data could tell."
         }
         Verdict::ParameterChange => {
             "The equations hold; a value in the description does not, or does no longer."
