@@ -9,7 +9,7 @@ use rig_shared::effects::Kind;
 
 pub(super) use self::follow::Follower;
 use self::pass::Pass;
-use self::steps::{change_step, refuse, refuse_guesses, steps};
+use self::steps::{change_step, reconcile, refuse, refuse_guesses, steps};
 use self::unbelieved::unbelieved;
 use super::across::{across, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, Loaded, library};
@@ -339,6 +339,7 @@ fn attempt(
             })
             .collect(),
     );
+    reconcile(robot, &mut tried, &chosen[described..]);
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),

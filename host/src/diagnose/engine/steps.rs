@@ -69,6 +69,29 @@ pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
     }
 }
 
+/// Brings what was said of each try in line with what stands in the end: what came in without a round of its own was taken, what
+/// is not there has fallen.
+pub(super) fn reconcile(robot: &Robot, tried: &mut [Tried], found: &[Profile]) {
+    let is = |t: &Tried, p: &Profile| {
+        t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
+    };
+    for profile in found {
+        let stands = tried.iter().any(|t| t.refused.is_empty() && is(t, profile));
+        let own = tried.iter_mut().filter(|t| is(t, profile));
+        let best = own
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
+            .filter(|_| !stands);
+        best.into_iter().for_each(|t| t.refused.clear());
+    }
+    for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {
+        if !found.iter().any(|profile| is(fallen, profile)) {
+            fallen.refused =
+                "fell again: beside all others it takes too little away, or another name takes as much"
+                    .into();
+        }
+    }
+}
+
 /// The same of names that were no more than guesses at what is left.
 pub(super) fn refuse_guesses(robot: &Robot, tried: &mut [Tried], judged: &Judged) {
     for guess in &judged.guesses {
