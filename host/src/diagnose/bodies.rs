@@ -25,6 +25,9 @@ use crate::identify::{Combinations, Sizes, as_bodies};
 use crate::report::format_significant;
 use crate::robot::Robot;
 
+/// Share of the residual from which on what the bodies cost is said.
+const SAID: f64 = 1e-3;
+
 /// What a model holds that was fitted to the training data.
 pub(super) struct Standing {
     /// Base parameters, as columns formed with the description's gravity take them.
@@ -168,10 +171,11 @@ impl Standing {
         }
         let mut remarks = bodies.remarks;
         let more = (0..n).map(|j| (j, rest.rms(j) / before[j].max(f64::MIN_POSITIVE) - 1.0));
-        if let Some((j, share)) = more.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let most = more.max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((j, share)) = most.filter(|(_, share)| *share > SAID) {
             remarks.push(format!(
                 "Links are taken as bodies that can exist; of the training data that leaves up to {} % more than a fit that is free of it (joint {}).",
-                format_significant(100.0 * share.max(0.0), 2),
+                format_significant(100.0 * share, 2),
                 robot.joints[j].name
             ));
         }
