@@ -9,7 +9,7 @@ use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::judge::equal;
-use super::profile::{LEAST_GAIN, Profile, grid_on};
+use super::profile::{LEAST_GAIN, Profile, grid, grid_on};
 use super::rows::Column;
 use super::runs::{blurred, resolution};
 use super::waves;
@@ -114,7 +114,12 @@ impl<'a> Search<'a> {
 
     /// Shapes that the search of a candidate begins with.
     pub(super) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
-        grid_on(candidate.kind, &self.source.robot.joints[candidate.joint])
+        let joints = &self.source.robot.joints;
+        // Of one joint such waves stand in for what the laws of others leave: of load friction, on the emulated rig.
+        if joints.len() == 1 {
+            return grid(candidate.kind);
+        }
+        grid_on(candidate.kind, &joints[candidate.joint])
     }
 
     /// Columns of the points of a candidate's grid.
