@@ -10,6 +10,8 @@ const STILL_WHITE: f64 = 3.2;
 /// Two recordings repeat each other when their references (else their positions) differ by less than this share of their
 /// spread.
 const ALIKE: f64 = 0.02;
+/// Share of the torque by which runs may differ that are driven alike.
+const DRIVEN_ALIKE: f64 = 0.2;
 /// Lags looked at for the memory of a residual, s.
 const LONGEST_MEMORY: f64 = 2.0;
 
@@ -33,10 +35,20 @@ pub(super) fn repeats(runs: &[Run]) -> Vec<(usize, usize)> {
 /// A hold-out's run that repeats the motion of a training run, and that one.
 pub(super) fn repeated<'r>(training: &'r [Run], held: &'r [Run]) -> Option<(&'r Run, &'r Run)> {
     held.iter().find_map(|own| {
-        let same = training
-            .iter()
-            .find(|run| run.unburdened == own.unburdened && alike(run, own))?;
+        let same = (training.iter()).find(|run| {
+            run.unburdened == own.unburdened && alike(run, own) && driven_alike(run, own)
+        })?;
         Some((own, same))
+    })
+}
+
+/// Whether the torques of runs of one motion differ by little: pushed from outside they do not.
+fn driven_alike(a: &Run, b: &Run) -> bool {
+    a.joints.iter().zip(&b.joints).all(|(a, b)| {
+        let pairs = || a.tau.iter().zip(&b.tau);
+        let whole: f64 = pairs().map(|(x, _)| x * x).sum();
+        let apart: f64 = pairs().map(|(x, y)| (x - y).powi(2)).sum();
+        apart <= DRIVEN_ALIKE * DRIVEN_ALIKE * whole
     })
 }
 
