@@ -136,7 +136,7 @@ fn what_links_that_can_exist_cost() {
             &robot,
             &[train],
             &[rest],
-            [36.0, 3.0],
+            [42.0, 3.0],
             &[(5, 17.0)],
         );
     }

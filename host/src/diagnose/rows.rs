@@ -54,7 +54,8 @@ pub(super) fn combined<'a>(
 pub(super) struct Thinning {
     low_pass: LowPass,
     step: usize,
-    trimmed: usize,
+    /// Samples at either end that the position's filter spoils. They are cut before the low-pass, which would carry them far in.
+    spoilt: usize,
     smear: f64,
 }
 
@@ -70,7 +71,7 @@ impl Thinning {
         Ok(Self {
             low_pass,
             step: treatment.decimation.max(1),
-            trimmed: treatment.trimmed,
+            spoilt: treatment.trimmed,
             smear: SMEAR / treatment.cutoff,
         })
     }
@@ -96,13 +97,15 @@ impl Thinning {
 
     /// Kept samples of a run of `samples`.
     fn kept(&self, samples: usize) -> impl Iterator<Item = usize> {
-        (self.trimmed..samples.saturating_sub(self.trimmed)).step_by(self.step)
+        (self.spoilt..samples.saturating_sub(self.spoilt)).step_by(self.step)
     }
 
     /// What is kept of a signal at the full rate, appended to `out`.
     pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
-        let smooth = self.low_pass.zero_phase(signal);
-        out.extend(self.kept(signal.len()).map(|k| smooth[k]));
+        let sound = self.spoilt..signal.len().saturating_sub(self.spoilt);
+        let smooth = (self.low_pass).zero_phase_even(signal.get(sound).unwrap_or_default());
+        let kept = self.kept(signal.len());
+        out.extend(kept.map(|k| smooth[k - self.spoilt]));
     }
 
     /// A signal behind the low-pass, at its own rate.
@@ -116,13 +119,14 @@ impl Thinning {
         for four in signals.chunks(ABREAST) {
             let samples = four[0].len();
             let lane = |k: usize, s: usize| four.get(s).map_or(0.0, |signal| signal[k]);
-            let abreast: Vec<Lanes<ABREAST>> = (0..samples)
+            let sound = self.spoilt..samples.saturating_sub(self.spoilt);
+            let abreast: Vec<Lanes<ABREAST>> = sound
                 .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
                 .collect();
-            let smooth = self.low_pass.zero_phase(&abreast);
+            let smooth = self.low_pass.zero_phase_even(&abreast);
             thin.extend((0..four.len()).map(|s| {
                 self.kept(samples)
-                    .map(|k| smooth[k].0[s])
+                    .map(|k| smooth[k - self.spoilt].0[s])
                     .collect::<Vec<f64>>()
             }));
         }
@@ -412,10 +416,10 @@ impl Rows {
     /// Of each of a run's `samples`, whether the row nearest to it is used; before the first row and behind the last none is.
     pub(super) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
         let keep = &self.keep[joint][self.starts[run]..self.starts[run + 1]];
-        let Thinning { step, trimmed, .. } = self.thinning;
+        let Thinning { step, spoilt, .. } = self.thinning;
         (0..samples)
             .map(|k| {
-                let row = (k + step / 2).checked_sub(trimmed).map(|past| past / step);
+                let row = (k + step / 2).checked_sub(spoilt).map(|past| past / step);
                 row.is_some_and(|row| keep.get(row).copied().unwrap_or(false))
             })
             .collect()

@@ -193,7 +193,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
             pi[column::MASS] = total - drive;
             if total <= 0.0 {
                 remarks.push(format!(
-                    "The identified mass of {total} kg is not positive: no simulation can use it."
+                    "The identified mass of {total:.4} kg is not positive: no simulation can use it."
                 ));
             }
         }
@@ -218,7 +218,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                 } else {
                     0.0
                 };
-                remarks.push(format!("The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {total} kg*m^2; {drive} kg*m^2 were left to it."));
+                remarks.push(format!("The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {total:.4} kg*m^2; {drive:.4} kg*m^2 were left to it."));
             }
             let link = total - drive;
             let mass = if prior_mass > 0.0 && least(prior_mass) <= link {
@@ -229,7 +229,7 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                 } else {
                     1.0
                 };
-                remarks.push(format!("The mass does not follow from this motion; {mass} kg was chosen, twice the smallest that the inertia allows."));
+                remarks.push(format!("The mass does not follow from this motion; {mass:.4} kg was chosen, twice the smallest that the inertia allows."));
                 mass
             };
             // A flat body in the plane of motion: second moments S = m·c·cᵀ + what is left, half each way.

@@ -43,15 +43,6 @@ struct Room {
     block: RegressorBlock,
 }
 
-/// Where a row of the extended motion comes from. Beyond the ends of a segment it is continued by the odd reflection
-/// 2·x₀ − x₋ₖ for as long as the low-pass remembers, and constant beyond that.
-#[derive(Clone, Copy)]
-enum Origin {
-    Row(usize),
-    Before(usize),
-    After(usize),
-}
-
 impl<'a> Differential<'a> {
     pub(super) fn new(plan: &'a Plan<'a>) -> Result<Self, PrepareError> {
         let n = plan.chain.joint_count();
@@ -199,37 +190,28 @@ impl<'a> Differential<'a> {
     }
 
     fn filter(&self, motion: &Motion, first: usize, result: &mut Rows) -> Result<(), PrepareError> {
-        let (rows, p) = (motion.t.len() as i64, self.plan.columns.len());
+        let p = self.plan.columns.len();
         let (step, settle) = (self.decimator.step() as i64, self.settle as i64);
-        // Beyond the usable rows as far as the low-pass remembers; at the ends of the segment by reflection.
-        let pad = settle.min(rows - 1);
-        let [low, high] = [
-            if motion.at_ends[0] { pad } else { 0 },
-            if motion.at_ends[1] { pad } else { 0 },
-        ];
-        let begin = if motion.at_ends[0] {
-            -low
-        } else {
-            (motion.usable.0 as i64 - settle).max(0)
-        };
-        let end = if motion.at_ends[1] {
-            rows + high
-        } else {
-            (motion.usable.1 as i64 + settle).min(rows)
-        };
+        // What the position's filter spoils at the ends of the segment would be carried far in by this one: torque and columns
+        // begin and end alike where they are sound, mirrored there.
+        let (low, high) = (motion.sound.0 as i64, motion.sound.1 as i64);
+        let pads = (motion.at_ends).map(|end| if end { settle.min(high - low - 1) } else { 0 });
+        let outer = low - pads[0]..high + pads[1];
+        let begin = outer.start.max(motion.usable.0 as i64 - settle);
+        let end = outer.end.min(motion.usable.1 as i64 + settle);
         // Whole blocks, each ending at a kept row.
         let first = first as i64 + 1;
         let start = first - quotient_up(first - begin, step) * step;
         let blocks = quotient_up(end - start, step) as usize;
-        let origin = |k: i64| {
-            let k = k.clamp(-low, rows - 1 + high);
-            if k < 0 {
-                Origin::Before((-k) as usize)
-            } else if k < rows {
-                Origin::Row(k as usize)
+        let mirrored = |k: i64| {
+            let k = k.clamp(outer.start, outer.end - 1);
+            (if k < low {
+                2 * low - k
+            } else if k < high {
+                k
             } else {
-                Origin::After((2 * (rows - 1) - k) as usize)
-            }
+                2 * (high - 1) - k
+            }) as usize
         };
         let together = (STRETCH / step as usize).max(1);
         let stride = together * step as usize;
@@ -238,8 +220,6 @@ impl<'a> Differential<'a> {
             block: self.batch.block(BLOCK),
         };
         let mut chunk = vec![0.0; self.signals.len() * stride];
-        let mut ends = vec![0.0; self.signals.len() * 2];
-        self.signals_at(motion, &[0, rows as usize - 1], 2, &mut ends, &mut room)?;
         let skipped = ((first - start) / step - 1) as usize;
         let wanted = result.t.len();
         let mut take = |from: usize, s: usize, values: &[f64]| {
@@ -260,22 +240,9 @@ impl<'a> Differential<'a> {
         for from in (0..blocks).step_by(together) {
             let count = together.min(blocks - from);
             let here = start + from as i64 * step;
-            let origins = (here..here + count as i64 * step).map(origin);
             indices.clear();
-            indices.extend(origins.clone().map(|o| match o {
-                Origin::Row(k) | Origin::Before(k) | Origin::After(k) => k,
-            }));
+            indices.extend((here..here + count as i64 * step).map(mirrored));
             self.signals_at(motion, &indices, stride, &mut chunk, &mut room)?;
-            for (r, o) in origins.enumerate() {
-                let side = match o {
-                    Origin::Row(_) => continue,
-                    Origin::Before(_) => 0,
-                    Origin::After(_) => 1,
-                };
-                for (s, column) in chunk.chunks_exact_mut(stride).enumerate() {
-                    column[r] = 2.0 * ends[2 * s + side] - column[r];
-                }
-            }
             stream.push(&chunk, stride, count, &mut take);
         }
         stream.finish(&mut take);

@@ -119,7 +119,7 @@ fn integral_rows(
     for start in motion.usable.0.max(1)..motion.usable.1 {
         let end = start + plan.window;
         if !(motion.offset + start as u64).is_multiple_of(plan.stride as u64)
-            || end + 1 >= motion.sound_end
+            || end + 1 >= motion.sound.1
         {
             continue;
         }

@@ -195,7 +195,7 @@ pub(super) fn momentum_rows(
         ..Default::default()
     };
     // The row before the first and the one after the last are looked at as well.
-    let (first, last) = (motion.usable.0.max(1), motion.sound_end.saturating_sub(1));
+    let (first, last) = (motion.usable.0.max(1), motion.sound.1.saturating_sub(1));
     if first >= motion.usable.1.min(last) {
         return Ok(result);
     }

@@ -149,7 +149,8 @@ fn add_motors(
     }
 }
 
-/// The rows as their definition says: every column at the full rate, each through the sections forward and backward.
+/// The rows as their definition says: every column at the full rate, each through the sections forward and backward, from
+/// where the position's filter has settled.
 fn plain_rows(motion: &Motion, plan: &Plan) -> Vec<(Vec<Vec<f64>>, Vec<f64>)> {
     let n = motion.joints.len();
     let rows = motion.t.len();
@@ -176,12 +177,13 @@ fn plain_rows(motion: &Motion, plan: &Plan) -> Vec<(Vec<Vec<f64>>, Vec<f64>)> {
         }
     }
     let picked = |list: &[f64]| {
-        let filtered = low_pass.zero_phase(list);
+        let (from, to) = motion.sound;
+        let filtered = low_pass.zero_phase_even(&list[from..to]);
         (motion.usable.0..motion.usable.1)
             .filter(|k| {
                 (motion.offset + *k as u64).is_multiple_of(plan.treatment.decimation as u64)
             })
-            .map(|k| filtered[k])
+            .map(|k| filtered[k - from])
             .collect::<Vec<f64>>()
     };
     columns

@@ -155,15 +155,25 @@ impl LowPass {
     ///
     /// `T` may be several signals side by side, which take hardly longer than one.
     pub fn zero_phase<T: Real>(&self, signal: &[T]) -> Vec<T> {
+        self.both_ways(signal, |end, inside| end + end - inside)
+    }
+
+    /// The same with the ends extended by the even reflection x₋ₖ = xₖ: there it follows no slope, but noise of the end sample
+    /// counts hardly more than any other's. For signals that are only compared with each other.
+    pub fn zero_phase_even<T: Real>(&self, signal: &[T]) -> Vec<T> {
+        self.both_ways(signal, |_, inside| inside)
+    }
+
+    fn both_ways<T: Real>(&self, signal: &[T], beyond: impl Fn(T, T) -> T) -> Vec<T> {
         let n = signal.len();
         if n < 2 {
             return signal.to_vec();
         }
         let pad = self.settle.min(n - 1);
         let mut work = Vec::with_capacity(n + 2 * pad);
-        work.extend((1..=pad).rev().map(|k| signal[0] + signal[0] - signal[k]));
+        work.extend((1..=pad).rev().map(|k| beyond(signal[0], signal[k])));
         work.extend_from_slice(signal);
-        work.extend((1..=pad).map(|k| signal[n - 1] + signal[n - 1] - signal[n - 1 - k]));
+        work.extend((1..=pad).map(|k| beyond(signal[n - 1], signal[n - 1 - k])));
         self.run(&mut work);
         work.reverse();
         self.run(&mut work);

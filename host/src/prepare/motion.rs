@@ -32,8 +32,8 @@ pub struct Motion {
     pub joints: Vec<JointMotion>,
     /// First row and one past the last row of this piece's own, ends of the segment trimmed.
     pub usable: (usize, usize),
-    /// One past the last row that is not spoilt by the end of the segment: windows may reach up to it.
-    pub sound_end: usize,
+    /// First row and one past the last that are not spoilt by an end of the segment: windows and filters may reach up to them.
+    pub sound: (usize, usize),
     /// Index of row 0 in its segment.
     pub offset: u64,
     /// Number of the stretch without a gap.
@@ -148,7 +148,7 @@ fn motion_of(
         t: piece.rows.t,
         joints,
         usable: (start, piece.core_end.min(rows - back).max(start)),
-        sound_end: rows - back,
+        sound: (front, rows - back),
         offset: piece.offset,
         segment: piece.segment,
         at_ends: piece.at_ends,

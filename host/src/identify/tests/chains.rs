@@ -354,7 +354,8 @@ fn noisy(robot: &Robot, seconds: f64, share: f64, seed: u64) -> InMemory {
 }
 
 /// How often 95 % intervals hold the truth. Parameters of one recording err together, so that the recordings are what is
-/// counted: their mean share may differ from 95 % by three standard deviations of such a mean.
+/// counted: their mean share may be below 95 % by three standard deviations of such a mean. It may be somewhat above: leaving out
+/// groups errs on the wide side (MacKinnon, Nielsen & Webb 2023, of CV₃).
 #[test]
 fn intervals_of_random_chains_hold_the_truth_as_often_as_they_say() {
     for model in [ModelKind::Differential, ModelKind::Integral] {
@@ -394,7 +395,8 @@ fn intervals_of_random_chains_hold_the_truth_as_often_as_they_say() {
         let squares: f64 = shares.iter().map(|s| (s - mean).powi(2)).sum();
         let std = (squares / (count - 1.0) / count).sqrt();
         println!("{model:?}: {inside} of {all}; by recording {mean:.4} ± {std:.4}");
-        assert!((mean - 0.95).abs() < 3.0 * std, "{model:?}: {mean} ± {std}");
+        let range = 0.95 - 3.0 * std..0.98;
+        assert!(range.contains(&mean), "{model:?}: {mean} ± {std}");
         assert!(std < 0.015, "too few recordings: {std}");
     }
 }

@@ -464,7 +464,7 @@ fn a_recordings_weight_is_how_often_it_counts() {
         let [most, most_ignored] = match estimator {
             Estimator::Ols => [1e-9, 1e-6],
             Estimator::Robust | Estimator::Ml | Estimator::Ridge | Estimator::Consistent => {
-                [3e-3, 1e-2]
+                [3e-3, 2e-2]
             }
             _ => [1e-4, 1e-3],
         };
