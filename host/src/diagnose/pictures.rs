@@ -113,6 +113,7 @@ fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Co
             return all.iter().find(|c| c.name == name).cloned();
         }
         Kind::Stribeck
+        | Kind::StribeckExponential
         | Kind::AsymmetricCoulomb
         | Kind::QuadraticDrag
         | Kind::CurrentOffset

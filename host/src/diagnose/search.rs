@@ -213,6 +213,7 @@ impl<'a> Search<'a> {
         let trials = self.trials();
         let most = chosen.len() + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();
+        let mut stood: Vec<Vec<Profile>> = Vec::new();
         while chosen.len() < most {
             let fit = with(base, &chosen, None);
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
@@ -224,6 +225,7 @@ impl<'a> Search<'a> {
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
             let best = self.richer_law_first(base, &chosen, best, &profiles, trials)?;
+            let best = self.law_of_its_size(&fit, best, trials)?;
             let before = chosen.clone();
             let newcomer = best.candidate;
             chosen.push(best);
@@ -248,8 +250,10 @@ impl<'a> Search<'a> {
                 self.refine_all(base, &mut chosen)?;
                 chosen.retain(|profile| profile.vanished.is_none());
             }
-            if same(&before, &chosen) {
-                // It does not stand at its best shapes; another that takes away less may.
+            stood.push(before);
+            if stood.iter().any(|before| same(before, &chosen)) {
+                // It does not stand at its best shapes, or pushes out what pushes it out in turn; another that takes away less
+                // may.
                 if impossible.contains(&newcomer) {
                     break;
                 }

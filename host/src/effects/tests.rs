@@ -34,8 +34,9 @@ fn with(mut robot: Robot, kind: Kind, gains: &[f64], shapes: &[f64]) -> Robot {
 }
 
 /// Torques of one joint, each of a size that a rig may have.
-const TORQUES: [(Kind, &[f64], &[f64]); 17] = [
+const TORQUES: [(Kind, &[f64], &[f64]); 18] = [
     (Kind::Stribeck, &[0.3], &[0.2]),
+    (Kind::StribeckExponential, &[0.3], &[0.2]),
     (Kind::AsymmetricCoulomb, &[0.15], &[]),
     (Kind::QuadraticDrag, &[0.1], &[]),
     (Kind::LoadFriction, &[0.15], &[]),

@@ -156,7 +156,7 @@ impl RobotEffect {
         };
         let laws = laws(&name);
         let kind = Kind::named(&name, law.as_deref());
-        let Some(kind) = kind.filter(|_| laws.is_empty() == law.is_none()) else {
+        let Some(kind) = kind.filter(|kind| kind.about().law.is_some() == law.is_some()) else {
             return Err(refuse(
                 Some("law"),
                 "the law",
@@ -164,7 +164,13 @@ impl RobotEffect {
                 if laws.is_empty() {
                     format!("{name} has one law only; remove this key")
                 } else {
-                    format!("{name} has the laws {}", laws.join(", "))
+                    let plain = Kind::named(&name, None).is_some_and(|k| k.about().law.is_none());
+                    let or = if plain {
+                        ", or none where this key is missing"
+                    } else {
+                        ""
+                    };
+                    format!("{name} has the laws {}{or}", laws.join(", "))
                 },
             ));
         };

@@ -29,6 +29,7 @@ mod presliding_maxwell;
 mod quadratic_drag;
 mod spring;
 mod stribeck;
+mod stribeck_exponential;
 #[cfg(test)]
 mod tests;
 mod torque_offset;
@@ -177,6 +178,8 @@ macro_rules! registry {
 registry! {
     /// Friction that falls as the joint starts to slide.
     Stribeck in stribeck,
+    /// The same with a longer tail.
+    StribeckExponential in stribeck_exponential,
     /// Friction that differs with the direction.
     AsymmetricCoulomb in asymmetric_coulomb,
     /// Drag of air and churning grease.

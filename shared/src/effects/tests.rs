@@ -213,7 +213,7 @@ proptest! {
     ) {
         let q = loop_of(a.map(|x| x * scale), 2);
         for kind in [
-            Kind::Stribeck, Kind::QuadraticDrag, Kind::LoadFriction, Kind::PreslidingDahl,
+            Kind::Stribeck, Kind::StribeckExponential, Kind::QuadraticDrag, Kind::LoadFriction, Kind::PreslidingDahl,
             Kind::PreslidingMaxwell, Kind::PositionFriction, Kind::AsymmetricCoulomb,
         ] {
             let effect = example(kind);

@@ -76,6 +76,29 @@ impl Search<'_> {
         Ok(if plain { best } else { rich })
     }
 
+    /// Of the laws of one name with as many numbers, which bend to no more, the one that takes most away.
+    pub(super) fn law_of_its_size(
+        &self,
+        fit: &Fit,
+        best: Profile,
+        trials: usize,
+    ) -> Result<Profile, DiagnoseError> {
+        let size = self.size(&best.candidate);
+        let mut most = best;
+        for (c, law) in self.library.iter().enumerate() {
+            if !rivals(law, &most.candidate) || is_gear(law.kind) || self.size(law) != size {
+                continue;
+            }
+            if let Some(law) = self.profile(fit, c, None)?
+                && law.refused(trials).is_none()
+                && law.evidence.gain > most.evidence.gain
+            {
+                most = law;
+            }
+        }
+        Ok(most)
+    }
+
     /// `first` and the plain effect that does most beside it, after those in the model, refined.
     fn pair(
         &self,

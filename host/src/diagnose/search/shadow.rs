@@ -34,7 +34,7 @@ pub(in crate::diagnose) fn shadow(of: &Profile) -> f64 {
         Kind::TorqueOffset | Kind::CurrentOffset | Kind::AsymmetricCoulomb | Kind::GravityTilt => {
             SHADOW_OF_A_CONSTANT
         }
-        Kind::Stribeck => SHADOW_OF_A_CURVE,
+        Kind::Stribeck | Kind::StribeckExponential => SHADOW_OF_A_CURVE,
         _ => SHADOW,
     }
 }

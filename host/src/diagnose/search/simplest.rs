@@ -15,7 +15,7 @@ use crate::diagnose::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
 
 impl Search<'_> {
     /// Gains and shapes of a candidate.
-    fn size(&self, candidate: &Candidate) -> usize {
+    pub(super) fn size(&self, candidate: &Candidate) -> usize {
         self.source.gains(candidate).len() + candidate.kind.about().shapes.len()
     }
 
