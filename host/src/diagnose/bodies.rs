@@ -8,13 +8,18 @@
 //! Leaves out: that effects are formed with the base parameters of the free fit; of a tilted arm, that its moments are by the
 //! cosine too small in what gravity does alone.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
+use super::DiagnoseError;
 use super::anchor::{Anchor, Direction};
 use super::bench::Bench;
 use super::fit::{Fit, dot};
 use super::floor;
-use super::model::{completed, fitted as effects_with, gravity_with, redistributed_over};
+use super::model::{completed, gravity_with, redistributed_over, with_gains};
 use super::profile::Profile;
 use super::refit::Refit;
 use super::rows::{Column, combined};
@@ -28,7 +33,7 @@ use crate::robot::Robot;
 /// Share of the residual from which on what the bodies cost is said.
 const SAID: f64 = 1e-3;
 
-/// What a model holds that was fitted to the training data.
+/// A model that was fitted to the training data.
 pub(super) struct Standing {
     /// Base parameters, as columns formed with the description's gravity take them.
     values: Vec<f64>,
@@ -36,33 +41,13 @@ pub(super) struct Standing {
     described: Vec<f64>,
     /// Of the effects' columns.
     gains: Vec<f64>,
-    /// The description with links that can exist, and what has to be said of it; none of one link.
-    bodies: Option<(Robot, Vec<String>)>,
+    /// The description with all of it.
+    pub(super) model: Robot,
+    /// What has to be said of it, sentences.
+    pub(super) remarks: Vec<String>,
 }
 
 impl Standing {
-    /// From the coefficients of the free nominal directions and of the effects' columns in a free fit to `runs`.
-    pub(super) fn of(
-        bench: &Bench,
-        refit: &Refit,
-        runs: &[Run],
-        [coefficients, formed_at]: [&[f64]; 2],
-        chosen: &[Profile],
-    ) -> Self {
-        let (free, gains) = coefficients.split_at(bench.anchor.free.len());
-        let values = bench.anchor.values(free);
-        let standing = Self {
-            described: values.clone(),
-            values,
-            gains: gains.to_vec(),
-            bodies: None,
-        };
-        if bench.robot.joints.len() == 1 {
-            return standing;
-        }
-        standing.embodied(bench, refit, runs, [coefficients, formed_at], chosen)
-    }
-
     /// Base parameters and gains.
     pub(super) fn fitted(&self) -> [&[f64]; 2] {
         [&self.values, &self.gains]
@@ -75,36 +60,105 @@ impl Standing {
         let free = anchor.free.iter().map(along);
         free.chain(self.gains.iter().copied()).collect()
     }
+}
 
-    /// The description with them, and what has to be said of it; `formed_at` are the base parameters that the effects' columns
-    /// were formed with.
-    pub(super) fn model(
-        &self,
-        bench: &Bench,
-        formed_at: &[f64],
-        chosen: &[Profile],
-    ) -> (Robot, Vec<String>) {
-        let Bench { robot, nominal, .. } = bench;
-        let effects = effects_with(chosen, &self.gains);
-        let mut values = self.values.clone();
-        let gravity = gravity_with(robot, nominal, formed_at, &effects, &mut values);
-        let with_links = match &self.bodies {
-            Some(bodies) => bodies.clone(),
-            None => redistributed_over(robot, nominal, &values),
-        };
-        completed(with_links, robot, gravity, &effects)
+/// What models are fitted to. Each is fitted once: it is asked for by those who judge, simulate, draw and write it.
+pub(super) struct Fitting<'a, 'r> {
+    /// Robot and treatment.
+    pub(super) bench: &'a Bench<'a>,
+    refit: &'a Refit<'r>,
+    /// The training data.
+    runs: &'a [Run],
+    /// Base parameters that the effects' columns are formed with.
+    formed_at: &'a [f64],
+    /// By the columns of its effects.
+    known: RefCell<Vec<(Vec<Arc<Vec<Column>>>, Rc<Standing>)>>,
+}
+
+/// Base parameters as columns and as a description take them, gains, and the description with its links.
+type Linked = ([Vec<f64>; 2], Vec<f64>, (Robot, Vec<String>));
+
+impl<'a, 'r> Fitting<'a, 'r> {
+    /// To `runs`.
+    pub(super) fn new(
+        bench: &'a Bench<'a>,
+        refit: &'a Refit<'r>,
+        runs: &'a [Run],
+        formed_at: &'a [f64],
+    ) -> Self {
+        Self {
+            bench,
+            refit,
+            runs,
+            formed_at,
+            known: RefCell::default(),
+        }
     }
 
-    /// The same with the nearest bodies.
+    /// The model of these effects.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where the motion does not tell its parameters apart.
+    pub(super) fn of(&self, chosen: &[Profile]) -> Result<Rc<Standing>, DiagnoseError> {
+        let same = |known: &[Arc<Vec<Column>>]| {
+            known.len() == chosen.len()
+                && (known.iter().zip(chosen)).all(|(k, p)| Arc::ptr_eq(k, &p.columns))
+        };
+        if let Some((_, standing)) = (self.known.borrow().iter()).find(|(k, _)| same(k)) {
+            return Ok(standing.clone());
+        }
+        let standing = Rc::new(self.fitted(chosen)?);
+        let key = chosen.iter().map(|p| p.columns.clone()).collect();
+        self.known.borrow_mut().push((key, standing.clone()));
+        Ok(standing)
+    }
+
+    fn fitted(&self, chosen: &[Profile]) -> Result<Standing, DiagnoseError> {
+        let Bench {
+            robot,
+            nominal,
+            anchor,
+            ..
+        } = self.bench;
+        let coefficients = self.refit.solution(chosen)?.values;
+        let (free, gains) = coefficients.split_at(anchor.free.len());
+        let values = anchor.values(free);
+        let mut upright = values.clone();
+        let turned = |gains: &[f64], values: &mut [f64]| {
+            gravity_with(
+                robot,
+                nominal,
+                self.formed_at,
+                &with_gains(chosen, gains),
+                values,
+            )
+        };
+        turned(gains, &mut upright);
+        let ([values, described], gains, links) = if robot.joints.len() == 1 {
+            let links = redistributed_over(robot, nominal, &upright);
+            ([values.clone(), values], gains.to_vec(), links)
+        } else {
+            self.embodied(&coefficients, [values, upright], chosen)
+        };
+        let gravity = turned(&gains, &mut values.clone());
+        let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, &gains));
+        Ok(Standing {
+            values,
+            described,
+            gains,
+            model,
+            remarks,
+        })
+    }
+
+    /// The nearest bodies to base parameters of a free fit, and the gains beside them.
     fn embodied(
-        self,
-        bench: &Bench,
-        refit: &Refit,
-        runs: &[Run],
-        [coefficients, formed_at]: [&[f64]; 2],
+        &self,
+        coefficients: &[f64],
+        [values, upright]: [Vec<f64>; 2],
         chosen: &[Profile],
-    ) -> Self {
-        let Bench { robot, nominal, .. } = bench;
+    ) -> Linked {
+        let Bench { robot, nominal, .. } = self.bench;
         let effects: Vec<(&Column, bool)> = (chosen.iter())
             .flat_map(|p| p.columns.iter().map(|c| (c, p.followed.is_none())))
             .collect();
@@ -112,17 +166,9 @@ impl Standing {
             .filter(|(_, fitted)| *fitted)
             .map(|(column, _)| *column)
             .collect();
-        let (fit, mut information) = measure(refit, chosen, &fitted);
-        let mut upright = self.values.clone();
-        let _ = gravity_with(
-            robot,
-            nominal,
-            formed_at,
-            &effects_with(chosen, &self.gains),
-            &mut upright,
-        );
+        let (fit, mut information) = measure(self.refit, chosen, &fitted);
         // By what the columns take the moments smaller than they are.
-        let taken: Vec<f64> = (self.values.iter().zip(&upright))
+        let taken: Vec<f64> = (values.iter().zip(&upright))
             .map(|(as_taken, value)| if *value == 0.0 { 1.0 } else { as_taken / value })
             .collect();
         for (k, mut row) in information.row_iter_mut().enumerate() {
@@ -136,30 +182,29 @@ impl Standing {
             columns: &nominal.base.columns,
             values: &upright,
         };
-        let bodies = match as_bodies(robot, &base, information, sizes(runs)) {
+        let mut gains = coefficients[self.refit.free.len()..].to_vec();
+        let bodies = match as_bodies(robot, &base, information, sizes(self.runs)) {
             Ok(bodies) => bodies,
             Err(error) => {
-                let (model, mut remarks) = redistributed_over(robot, nominal, &self.values);
+                let (model, mut remarks) = redistributed_over(robot, nominal, &upright);
                 remarks.push(format!(
                     "The links of model.toml are not made bodies that can exist ({error}); it may not be fit for simulation."
                 ));
-                let bodies = Some((model, remarks));
-                return Self { bodies, ..self };
+                return ([values, upright], gains, (model, remarks));
             }
         };
         // What the bodies change of the torque, and what effects make up of it.
         let n = robot.joints.len();
-        let free = refit.free.iter().chain(effects.iter().map(|(c, _)| *c));
+        let free = (self.refit.free.iter()).chain(effects.iter().map(|(c, _)| *c));
         let mut rest = fit;
         rest.subtract(&combined(n, free.zip(coefficients.iter().copied())));
         let before: Vec<f64> = (0..n).map(|j| rest.rms(j)).collect();
-        let values: Vec<f64> = (bodies.values.iter().zip(&taken))
+        let near: Vec<f64> = (bodies.values.iter().zip(&taken))
             .map(|(v, t)| v * t)
             .collect();
-        let moved = values.iter().zip(&self.values).map(|(b, f)| b - f);
+        let moved = near.iter().zip(&values).map(|(b, f)| b - f);
         let nominal = rest.rows().nominal.iter().zip(moved);
         rest.subtract(&combined(n, nominal));
-        let mut gains = self.gains;
         if let Some(made_up) = solve(&rest, &fitted, &[]).filter(|_| !fitted.is_empty()) {
             rest.subtract(&combined(
                 n,
@@ -179,12 +224,7 @@ impl Standing {
                 robot.joints[j].name
             ));
         }
-        Self {
-            values,
-            described: bodies.values,
-            gains,
-            bodies: Some((bodies.robot, remarks)),
-        }
+        ([near, bodies.values], gains, (bodies.robot, remarks))
     }
 }
 

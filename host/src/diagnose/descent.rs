@@ -1,8 +1,8 @@
 //! The RMS of the torque residual from model to model.
 
 use super::DiagnoseError;
-use super::bench::{Bench, Loaded};
-use super::bodies::Standing;
+use super::bench::Loaded;
+use super::bodies::Fitting;
 use super::outcome::Waterfall;
 use super::profile::Profile;
 use super::refit::Refit;
@@ -18,6 +18,28 @@ pub(super) struct Fall {
 }
 
 impl Fall {
+    /// On recordings that nothing was fitted to, through the effects from the `described` first on.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn unseen(
+        fitting: &Fitting,
+        chosen: &[Profile],
+        described: usize,
+        sealed: &Loaded,
+    ) -> Result<Self, DiagnoseError> {
+        let bench = fitting.bench;
+        let mut fall = Self {
+            frozen: bench.frozen(sealed)?,
+            models: vec![Vec::new(); bench.robot.joints.len()],
+        };
+        for count in described..=chosen.len() {
+            let part = &chosen[..count];
+            fall.push(bench.unseen(sealed, fitting.of(part)?.fitted(), part)?);
+        }
+        Ok(fall)
+    }
+
     /// A model more.
     fn push(&mut self, found: Vec<f64>) {
         for (list, rms) in self.models.iter_mut().zip(found) {
@@ -56,58 +78,38 @@ impl Descent {
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn of(
-        bench: &Bench,
+        fitting: &Fitting,
         refit: &Refit,
         chosen: &[Profile],
         described: usize,
-        formed_at: &[f64],
         loaded: &Loaded,
         sealed: Option<&Loaded>,
     ) -> Result<Self, DiagnoseError> {
+        let bench = fitting.bench;
         let n = bench.robot.joints.len();
         let mut train = Fall {
             frozen: bench.frozen(loaded)?,
             models: vec![Vec::new(); n],
         };
-        let models = (described..=chosen.len())
-            .map(|count| {
-                let part = &chosen[..count];
-                let free = refit.solution(part)?.values;
-                Ok((
-                    part,
-                    Standing::of(bench, refit, &loaded.runs, [&free, formed_at], part),
-                ))
-            })
-            .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        for (part, standing) in &models {
+        for count in described..=chosen.len() {
+            let part = &chosen[..count];
             // Of one link the free fit is what stands.
             let found = if n == 1 {
                 let fit = with(refit.footing(part)[1], part, None);
                 vec![fit.even_rms(0)]
             } else {
-                bench.unseen(loaded, standing.fitted(), part)?
+                bench.unseen(loaded, fitting.of(part)?.fitted(), part)?
             };
             train.push(found);
         }
-        let Some(sealed) = sealed else {
-            let holdout = None;
-            return Ok(Self { train, holdout });
-        };
-        let mut holdout = Fall {
-            frozen: bench.frozen(sealed)?,
-            models: vec![Vec::new(); n],
-        };
-        for (part, standing) in &models {
-            holdout.push(bench.unseen(sealed, standing.fitted(), part)?);
-        }
-        Ok(Self {
-            train,
-            holdout: Some(holdout),
-        })
+        let holdout = sealed
+            .map(|sealed| Fall::unseen(fitting, chosen, described, sealed))
+            .transpose()?;
+        Ok(Self { train, holdout })
     }
 
     /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
-    /// parameters count as a step.
+    /// parameters count as a step. 0 where there is no gap.
     pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> f64 {
         let fall = self.holdout.as_ref().unwrap_or(&self.train);
         let (mut gap, mut closed) = (0.0, 0.0);
@@ -121,7 +123,7 @@ impl Descent {
             gap += (first - floor) / floor;
             closed += (first - last) / floor;
         }
-        closed / gap
+        if gap > 0.0 { closed / gap } else { 0.0 }
     }
 
     /// As a result has it; `found` are the effects that the description does not state.

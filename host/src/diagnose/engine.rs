@@ -10,10 +10,10 @@ use rig_shared::effects::Kind;
 pub(super) use self::follow::Follower;
 use self::pass::Pass;
 use self::steps::{change_step, reconcile, refuse, refuse_guesses, steps};
-use self::unbelieved::unbelieved;
+use self::unbelieved::{contradicted, unbelieved};
 use super::across::{across, names_something, refutes, tell as tell_across};
 use super::bench::{Bench, Loaded, library};
-use super::bodies::Standing;
+use super::bodies::Fitting;
 use super::change::change;
 use super::descent::Descent;
 use super::described::by_description;
@@ -209,9 +209,9 @@ fn attempt(
         base: &refit.base,
         seed: options.seed,
     };
-    // What is refused is refused by the training data; the hold-out shows what the rest is worth.
     let values = &search.source.values;
-    let trial = Replay::of(&bench, &refit, values, [loaded, loaded]);
+    let fitting = Fitting::new(&bench, &refit, &loaded.runs, values);
+    let trial = Replay::of(&fitting, loaded)?;
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
     let judged = judge.judged(found.clone())?;
     refuse_guesses(robot, &mut tried, &judged);
@@ -237,6 +237,13 @@ fn attempt(
     while let Some((k, why)) = unbelieved(&refit, &search, &judge, &judged.chosen)? {
         judged = without(judged, k, why)?;
     }
+    // The hold-out finds no name; one that it contradicts does not stand.
+    if let Some(sealed) = &sealed {
+        while let Some(k) = contradicted(&fitting, &search, &judged.chosen, sealed)? {
+            let why = "explains the training data, and leaves more of the recordings held back than there is without it";
+            judged = without(judged, k, why)?;
+        }
+    }
     let said = settled(
         &zeros(&options.sensor_zeros, &windings, robot.joints.len()),
         &search,
@@ -257,15 +264,14 @@ fn attempt(
     }
     let described = search.count_described(&judged.chosen);
     let replay = match &sealed {
-        Some(sealed) => Replay::of(&bench, &refit, values, [loaded, sealed]),
+        Some(sealed) => Replay::of(&fitting, sealed)?,
         None => trial,
     };
     let descent = Descent::of(
-        &bench,
+        &fitting,
         &refit,
         &judged.chosen,
         described,
-        values,
         loaded,
         sealed.as_ref(),
     )?;
@@ -286,13 +292,11 @@ fn attempt(
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));
     let Judged { chosen, floors, .. } = &judged;
     let mut joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
-    let standing =
-        |free: &[f64], part| Standing::of(&bench, &refit, &loaded.runs, [free, values], part);
-    let stands = standing(&joint.solution.values, chosen);
+    let stands = fitting.of(chosen)?;
     joint.solution.values = stands.coefficients(&bench.anchor);
     let after = &joint.solution;
     let first = &chosen[..described];
-    let before = standing(&refit.solution(first)?.values, first);
+    let before = fitting.of(first)?;
     let across = {
         let nominal = bench.anchor.values(&after.values[..refit.free.len()]);
         let of = |loaded| -> Result<_, DiagnoseError> {
@@ -375,7 +379,7 @@ fn attempt(
         maps: Vec::new(),
         curves: Vec::new(),
     };
-    let (mut model, remarks) = stands.model(&bench, values, chosen);
+    let mut model = stands.model.clone();
     let drawn = sealed.as_ref().unwrap_or(loaded);
     let found = Found {
         robot,
@@ -401,7 +405,7 @@ fn attempt(
         },
     };
     finish(&found, &mut diagnosis)?;
-    diagnosis.words.extend(remarks);
+    diagnosis.words.extend(stands.remarks.iter().cloned());
     model.effects.extend(stated.held().cloned());
     tell(windings, &mut diagnosis, &mut model);
     tell_across(across, &mut diagnosis, &mut model);

@@ -39,8 +39,8 @@ const BEYOND_FLOOR_HELD: f64 = 1.5;
 /// Times the noise of a torque's reading from which on what names leave is not passed off as noise without a repeat: a drive's
 /// own unrest is as much again, or twice.
 const FAR_BEYOND_READING: f64 = 3.0;
-/// … beside a gear, whose law makes more of the position's noise where motor and link resonate.
-const FAR_BEYOND_READING_OF_GEARS: f64 = 7.0;
+/// … beside a gear, whose law makes more of the position's noise where motor and link resonate, and where nothing has a name.
+const FAR_FAR_BEYOND_READING: f64 = 7.0;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
 const SHARE_LEFT: f64 = 0.1;
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
@@ -350,14 +350,17 @@ impl Judge<'_, '_> {
         }
     }
 
-    /// What names leave of a joint that is far more than its reading's own noise, where no repeat says how much of it is noise.
+    /// What is left of a joint that is far more than its reading's own noise, where no repeat says how much of it is noise.
     fn unproven(&self, fit: &Fit, chosen: &[Profile], joint: usize) -> Option<Remainder> {
-        let own = || chosen.iter().filter(|p| p.candidate.joint == joint);
-        if own().next().is_none() || !self.pairs.is_empty() {
+        if !self.pairs.is_empty() {
             return None;
         }
-        let far = if own().any(|p| is_gear(p.candidate.kind)) {
-            FAR_BEYOND_READING_OF_GEARS
+        let mut own = chosen
+            .iter()
+            .filter(|p| p.candidate.joint == joint)
+            .peekable();
+        let far = if own.peek().is_none() || own.any(|p| is_gear(p.candidate.kind)) {
+            FAR_FAR_BEYOND_READING
         } else {
             FAR_BEYOND_READING
         };

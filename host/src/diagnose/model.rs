@@ -91,7 +91,7 @@ pub(super) fn completed(
 }
 
 /// Effects with their gains.
-pub(super) fn fitted<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
+pub(super) fn with_gains<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
     let mut effects = Vec::new();
     for profile in chosen {
         let (own, rest) = gains.split_at(profile.columns.len());

@@ -11,11 +11,10 @@
 //! voltage.
 
 use super::DiagnoseError;
-use super::bench::{Bench, Loaded};
-use super::bodies::Standing;
+use super::bench::Loaded;
+use super::bodies::Fitting;
 use super::profile::Profile;
 use super::pull;
-use super::refit::Refit;
 use super::runs::{JointRun, Run};
 use crate::robot::{Controller, Robot, title_of};
 use crate::simulate::{Inputs, Model, SimulateError, closed_loop};
@@ -59,11 +58,7 @@ impl Errors {
 
 /// Recordings to be simulated.
 pub(super) struct Replay<'a> {
-    bench: &'a Bench<'a>,
-    refit: &'a Refit<'a>,
-    /// Base parameters that the effects' columns are formed with.
-    formed_at: &'a [f64],
-    training: &'a [Run],
+    fitting: &'a Fitting<'a, 'a>,
     runs: &'a [Run],
     /// One a joint; none where nothing is simulated.
     controllers: Option<Vec<Controller>>,
@@ -72,40 +67,23 @@ pub(super) struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    /// Of the recordings that models are fitted to and those that they are judged on.
+    /// Of the recordings that models are judged on.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
     pub(super) fn of(
-        bench: &'a Bench<'a>,
-        refit: &'a Refit<'a>,
-        formed_at: &'a [f64],
-        [training, judged]: [&'a Loaded; 2],
-    ) -> Self {
-        let values = &refit.before.values;
-        let standing = Standing::of(bench, refit, &training.runs, [values, formed_at], &[]);
-        let (moving, _) = standing.model(bench, formed_at, &[]);
-        let (controllers, how) = controller::of_joints(bench.robot, &moving, &judged.runs);
-        Self {
-            bench,
-            refit,
-            formed_at,
-            training: &training.runs,
+        fitting: &'a Fitting<'a, 'a>,
+        judged: &'a Loaded,
+    ) -> Result<Self, DiagnoseError> {
+        let moving = fitting.of(&[])?;
+        let (controllers, how) =
+            controller::of_joints(fitting.bench.robot, &moving.model, &judged.runs);
+        Ok(Self {
+            fitting,
             runs: &judged.runs,
             controllers,
             how,
-        }
-    }
-
-    /// The description with effects, its parameters fitted with them.
-    fn model(&self, chosen: &[Profile]) -> Result<Robot, DiagnoseError> {
-        let values = self.refit.solution(chosen)?.values;
-        let (bench, refit) = (self.bench, self.refit);
-        let standing = Standing::of(
-            bench,
-            refit,
-            self.training,
-            [&values, self.formed_at],
-            chosen,
-        );
-        Ok(standing.model(bench, self.formed_at, chosen).0)
+        })
     }
 
     /// Positions of a model, run by run; the error says why there are none.
@@ -145,7 +123,7 @@ impl<'a> Replay<'a> {
             return Ok(self.how.clone());
         }
         for count in described..=chosen.len() {
-            if let Err(why) = self.simulated(&self.model(&chosen[..count])?) {
+            if let Err(why) = self.simulated(&self.fitting.of(&chosen[..count])?.model) {
                 let whose = match count.checked_sub(1).map(|k| chosen[k].candidate.kind) {
                     Some(kind) => format!("The model with {} among its effects", title_of(kind)),
                     None => "The model without effects".to_owned(),
@@ -184,7 +162,7 @@ impl<'a> Replay<'a> {
         if self.controllers.is_none() {
             return Ok(None);
         }
-        Ok(self.errors_of(&self.model(chosen)?))
+        Ok(self.errors_of(&self.fitting.of(chosen)?.model))
     }
 
     /// Simulated positions with the `described` first and with all of `chosen`, run by run; empty where they cannot be
@@ -201,7 +179,9 @@ impl<'a> Replay<'a> {
             return Ok(Default::default());
         }
         let of = |part: &[Profile]| -> Result<_, DiagnoseError> {
-            Ok(self.simulated(&self.model(part)?).unwrap_or_default())
+            Ok(self
+                .simulated(&self.fitting.of(part)?.model)
+                .unwrap_or_default())
         };
         Ok([
             of(&chosen[..described])?,

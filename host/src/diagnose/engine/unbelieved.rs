@@ -1,10 +1,13 @@
-//! Effects that all effects fitted together take back.
+//! Effects that all effects fitted together take back, or that other recordings do.
 
 use std::f64::consts::TAU;
 
 use rig_shared::effects::{GAINS, Kind};
 
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::bench::Loaded;
+use crate::diagnose::bodies::Fitting;
+use crate::diagnose::descent::Fall;
 use crate::diagnose::judge::Judge;
 use crate::diagnose::profile::{Profile, SIGNIFICANT};
 use crate::diagnose::refit::Refit;
@@ -17,6 +20,8 @@ const OF_INERTIA: usize = 2;
 /// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
 /// true gears of the emulated rig come out from 0.7 to 1.1.
 const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
+/// What a name may leave more on recordings held back than the model without it: half of what the least of names takes away.
+const WORSE: f64 = 1.01;
 
 /// The effect found that is least to be believed beside the others, and why; none where all are.
 ///
@@ -64,6 +69,33 @@ pub(super) fn unbelieved(
         }
     }
     Ok(None)
+}
+
+/// The effect found with which the recordings held back are explained worst, if worse than without it; none where all of them
+/// carry over. Beside a gear that is not to be told: its link is followed only once its name stands.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn contradicted(
+    fitting: &Fitting,
+    search: &Search,
+    chosen: &[Profile],
+    sealed: &Loaded,
+) -> Result<Option<usize>, DiagnoseError> {
+    let given = search.count_given(chosen);
+    let fall = Fall::unseen(fitting, chosen, given, sealed)?;
+    let rise = |k: usize| {
+        let [before, after] = fall.step(chosen[k].candidate.joint, k - given);
+        after / before
+    };
+    let geared = |joint: usize| {
+        (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
+    };
+    let worse = (given..chosen.len())
+        .filter(|k| !geared(chosen[*k].candidate.joint))
+        .map(|k| (k, rise(k)))
+        .filter(|(_, rise)| *rise > WORSE);
+    Ok(worse.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k))
 }
 
 /// Frequency at which the link swings on its gear while the motor stands, Hz.
