@@ -100,9 +100,9 @@ fn init_excite_record_identify_validate() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_bytes() {
+fn the_same_seed_gives_the_same_bytes_and_each_run_its_own_noise() {
     let folder = tempfile::tempdir().unwrap();
-    let record = |name: &str, seed: &str| {
+    let record = |name: &str, seed: &str, run: &str| {
         let path = folder.path().join(name);
         succeed(
             rig()
@@ -113,15 +113,51 @@ fn the_same_seed_gives_the_same_bytes() {
                     "2",
                     "--seed",
                     seed,
+                    "--run",
+                    run,
                     "--out",
                 ])
                 .arg(&path),
         );
         fs::read(path).unwrap()
     };
-    let first = record("a.csv", "7");
-    assert_eq!(first, record("b.csv", "7"));
-    assert_ne!(first, record("c.csv", "8"));
+    let first = record("a.csv", "7", "1");
+    assert_eq!(first, record("b.csv", "7", "1"));
+    assert_ne!(first, record("c.csv", "8", "1"));
+    let again = record("d.csv", "7", "2");
+    assert_ne!(first, again);
+    // The same rig: where its link hangs differs by what its encoder reads at rest.
+    let start = |bytes: &[u8]| -> f64 {
+        let text = String::from_utf8_lossy(bytes).into_owned();
+        let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+        let column = lines.next().unwrap().split(',').position(|c| c == "q1");
+        let row: Vec<&str> = lines.next().unwrap().split(',').collect();
+        row[column.unwrap()].parse().unwrap()
+    };
+    assert!((start(&first) - start(&again)).abs() < 0.01);
+}
+
+/// A link that is said to stand level is held there until the drive has it: the angle begins where it was said to.
+#[test]
+fn an_emulated_link_begins_where_it_is_said_to_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("level.csv");
+    succeed(
+        rig()
+            .args(["record", "--emulated", "--seconds", "2", "--home", "0"])
+            .arg("--out")
+            .arg(&path),
+    );
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let of = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let first: Vec<f64> = (lines.next().unwrap().split(','))
+        .map(|value| value.parse().unwrap_or(f64::NAN))
+        .collect();
+    let (angle, speed) = (first[of("q1")], first.get(of("qd1")));
+    assert!(angle.abs() < 0.02, "{angle}");
+    assert!(speed.is_none_or(|v| v.abs() < 0.1), "{speed:?}");
 }
 
 /// Janot, Gautier & Brunot 2019: mass, viscous, Coulomb friction and offset of EMPS.

@@ -164,35 +164,30 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             }
         })
         .collect();
-    let progress = Mutex::new(ui.progress("hiding and seeking", cases.len() as u64));
     let threads = crate::prepare::threads(args.threads);
-    let outcomes = ask(&cases, &methods, threads, &|done, total| {
+    let count = cases.len() + arms.len();
+    let progress = Mutex::new(ui.progress("hiding and seeking", count as u64));
+    let at = |done: usize| {
         if let Ok(mut progress) = progress.lock() {
-            progress.at_of(done as u64, total as u64);
+            progress.at_of(done as u64, count as u64);
         }
-    })?;
+    };
+    let outcomes = ask(&cases, &methods, threads, &|done, _| at(done))?;
+    let of_arms = run_arms(&arms, threads, &|done, _| at(cases.len() + done))?;
     drop(progress);
     let scores: Vec<Score> = methods
         .iter()
         .zip(&outcomes)
         .map(|(method, outcomes)| Score::of(method.name(), outcomes))
         .collect();
-    let mut table = String::new();
+    let mut tables = Vec::new();
     if !cases.is_empty() {
-        table.push_str(&markdown(&scores));
+        tables.push(markdown(&scores));
     }
-    let progress = Mutex::new(ui.progress("arms", arms.len() as u64));
-    let of_arms = run_arms(&arms, threads, &|done, total| {
-        if let Ok(mut progress) = progress.lock() {
-            progress.at_of(done as u64, total as u64);
-        }
-    })?;
-    drop(progress);
     if !arms.is_empty() {
-        let gap = if table.is_empty() { "" } else { "\n" };
-        table.push_str(gap);
-        table.push_str(&arm_table(&of_arms));
+        tables.push(arm_table(&of_arms));
     }
+    let table = tables.join("\n");
     let json = serde_json::json!({
         "schema": "rig-benchmark/1", "scores": scores, "outcomes": outcomes, "arms": of_arms,
     });
@@ -202,7 +197,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     )?;
     write_whole(&args.out.join("benchmark.md"), table.as_bytes())?;
     ui.say(table.trim_end());
-    let count = cases.len() + arms.len();
     ui.say(&format!("{}: {count} cases.", args.out.display()));
     Ok(())
 }

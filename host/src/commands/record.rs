@@ -178,9 +178,6 @@ fn emulated_at(
     })
 }
 
-/// A link that is said to stand within this of where it hangs does hang, rad.
-const HANGS: f64 = 0.2;
-
 /// The rig behind the debug probe.
 #[cfg(feature = "probe")]
 pub(crate) fn open_probe() -> Result<crate::link::ProbeLine, CommandError> {
@@ -218,6 +215,9 @@ fn single(
     }
     Ok(joint.trajectory.to_f32())
 }
+
+/// A link that is said to stand within this of where it hangs does hang, rad.
+const HANGS: f64 = 0.2;
 
 /// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
 /// limits from where the link really stands.

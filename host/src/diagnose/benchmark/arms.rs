@@ -1,21 +1,16 @@
 //! Arms of several joints with one joint at fault.
 
-use std::fmt::Write as _;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use serde::Serialize;
 
 use super::answer::is_right;
+use super::counted;
 use super::score::median;
+use super::table::{Rows, percent};
 use super::wilson::Proportion;
-use crate::batch::each_by;
 use crate::diagnose::outcome::{Diagnosis, Verdict};
-use crate::diagnose::scenario::{Arm, ArmScenario, CallsFor, Fault};
+use crate::diagnose::scenario::{ABOVE_FLOOR, Arm, ArmScenario, CallsFor, Fault};
 use crate::diagnose::{DiagnoseError, Options, diagnose};
 use crate::prepare::Recording;
-
-/// A fault counts where a refit of the description leaves so much of it, in noise floors of its joint: as of one joint.
-const ABOVE: f64 = 0.5;
 
 /// One arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +56,7 @@ pub fn arm_cases(first_seed: u64, seeds: u64) -> Result<Vec<ArmCase>, DiagnoseEr
     let mut cases = Vec::new();
     for seed in first_seed..first_seed + seeds {
         for (name, arm) in Arm::ALL {
-            let faults = arm.faults().iter().copied().map(Some);
+            let faults = arm.faults().into_iter().map(Some);
             for fault in std::iter::once(None).chain(faults) {
                 cases.push(ArmCase {
                     arm: name,
@@ -82,13 +77,7 @@ pub fn run_arms(
     threads: usize,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ArmOutcome>, DiagnoseError> {
-    let done = AtomicUsize::new(0);
-    let results = each_by(cases.len(), threads, |k| {
-        let outcome = cases[k].ask();
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
-        outcome
-    });
-    results.into_iter().collect()
+    counted(cases, threads, progress, ArmCase::ask)
 }
 
 impl ArmCase {
@@ -149,7 +138,7 @@ impl ArmOutcome {
 
     /// Whether the fault is large enough to be seen; where nothing was fitted that is not known, and held against the diagnosis.
     fn above(&self) -> bool {
-        self.size.is_none_or(|size| size >= ABOVE)
+        self.size.is_none_or(|size| size >= ABOVE_FLOOR)
     }
 
     fn calls_for(&self, what: CallsFor) -> bool {
@@ -190,21 +179,12 @@ impl ArmOutcome {
 
 /// The figures as Markdown, one column an arm.
 pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
-    let arms: Vec<&str> = Arm::ALL.iter().map(|(name, _)| *name).collect();
-    let mut text = String::from("| arms, one joint at fault | aim |");
-    for arm in &arms {
-        let _ = write!(text, " {arm} |");
-    }
-    text.push_str("\n| --- | --- |");
-    text.push_str(&" --- |".repeat(arms.len()));
-    text.push('\n');
+    let arms: Vec<(&str, Vec<&ArmOutcome>)> = (Arm::ALL.iter())
+        .map(|(name, _)| (*name, outcomes.iter().filter(|o| o.arm == *name).collect()))
+        .collect();
+    let mut rows = Rows::new("arms, one joint at fault", &arms);
     let mut row = |name: &str, aim: &str, of: &dyn Fn(&[&ArmOutcome]) -> String| {
-        let _ = write!(text, "| {name} | {aim} |");
-        for arm in &arms {
-            let own: Vec<&ArmOutcome> = outcomes.iter().filter(|o| o.arm == *arm).collect();
-            let _ = write!(text, " {} |", of(&own));
-        }
-        text.push('\n');
+        rows.row(name, aim, &|own| of(own));
     };
     type Is = fn(&ArmOutcome) -> bool;
     let share = |of: Is, is: Is| {
@@ -213,8 +193,12 @@ pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
         }
     };
     let named: Is = |o| o.calls_for(CallsFor::Name);
-    let percent =
-        |value: Option<f64>| value.map_or("–".into(), |v| format!("{:.0} %", 100.0 * v));
+    let middle = |of: fn(&ArmOutcome) -> Option<f64>| {
+        move |own: &[&ArmOutcome]| {
+            let right = own.iter().filter(|o| named(o) && o.right_first());
+            percent(median(right.filter_map(|o| of(o)).collect()))
+        }
+    };
     row(
         "right name and joint first, above the floor",
         "≥ 97 %",
@@ -262,24 +246,18 @@ pub fn arm_table(outcomes: &[ArmOutcome]) -> String {
     row(
         "gap closed on the hold-out at the joint, median",
         "≥ 97 %",
-        &|own| {
-            let right = own.iter().filter(|o| named(o) && o.right_first());
-            percent(median(right.filter_map(|o| o.gap_closed).collect()))
-        },
+        &middle(|o| o.gap_closed),
     );
     row(
         "error of the simulated motion, of what it was before, median",
         "",
-        &|own| {
-            let right = own.iter().filter(|o| named(o) && o.right_first());
-            percent(median(right.filter_map(|o| o.motion).collect()))
-        },
+        &middle(|o| o.motion),
     );
     row("failed, or data said to be at fault", "0", &|own| {
         let fault = |o: &&&ArmOutcome| matches!(o.verdict, None | Some(Verdict::DataFault));
         own.iter().filter(fault).count().to_string()
     });
-    text
+    rows.text
 }
 
 #[cfg(test)]

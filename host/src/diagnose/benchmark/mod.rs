@@ -38,19 +38,29 @@ pub fn run(
     threads: usize,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Vec<Outcome>>, DiagnoseError> {
-    let done = AtomicUsize::new(0);
-    let results = each_by(cases.len(), threads, |k| {
-        let outcomes = ask(&cases[k], methods);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
-        outcomes
-    });
     let mut lists: Vec<Vec<Outcome>> = methods.iter().map(|_| Vec::new()).collect();
-    for outcomes in results {
-        for (list, outcome) in lists.iter_mut().zip(outcomes?) {
+    for outcomes in counted(cases, threads, progress, |case| ask(case, methods))? {
+        for (list, outcome) in lists.iter_mut().zip(outcomes) {
             list.push(outcome);
         }
     }
     Ok(lists)
+}
+
+/// What comes of each case, in their order, `threads` at a time.
+fn counted<C: Sync, O: Send>(
+    cases: &[C],
+    threads: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    ask: impl Fn(&C) -> Result<O, DiagnoseError> + Sync,
+) -> Result<Vec<O>, DiagnoseError> {
+    let done = AtomicUsize::new(0);
+    let results = each_by(cases.len(), threads, |k| {
+        let outcome = ask(&cases[k]);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, cases.len());
+        outcome
+    });
+    results.into_iter().collect()
 }
 
 fn ask(case: &Case, methods: &[&dyn Method]) -> Result<Vec<Outcome>, DiagnoseError> {

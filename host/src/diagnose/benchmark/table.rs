@@ -7,19 +7,10 @@ use super::wilson::Proportion;
 
 /// Markdown: the criteria with what is aimed at, one column a method, then one table of effects for each method.
 pub fn markdown(scores: &[Score]) -> String {
-    let mut text = String::from("| criterion | aim |");
-    for score in scores {
-        let _ = write!(text, " {} |", score.method);
-    }
-    text.push_str("\n| --- | --- |");
-    text.push_str(&" --- |".repeat(scores.len()));
-    text.push('\n');
+    let methods: Vec<(&str, &Score)> = scores.iter().map(|s| (s.method.as_str(), s)).collect();
+    let mut rows = Rows::new("criterion", &methods);
     let mut row = |name: &str, aim: &str, of: &dyn Fn(&Score) -> String| {
-        let _ = write!(text, "| {name} | {aim} |");
-        for score in scores {
-            let _ = write!(text, " {} |", of(score));
-        }
-        text.push('\n');
+        rows.row(name, aim, &|score| of(score));
     };
     let p = |f: fn(&Score) -> Proportion| move |s: &Score| f(s).to_string();
     row(
@@ -113,6 +104,7 @@ pub fn markdown(scores: &[Score]) -> String {
         );
     }
     row("failed altogether", "0", &|s| s.failed.to_string());
+    let mut text = rows.text;
     for score in scores {
         let _ = write!(
             text,
@@ -140,10 +132,39 @@ pub fn markdown(scores: &[Score]) -> String {
     text
 }
 
+/// Figures with what is aimed at, as Markdown, one column each of those that they are of.
+pub(super) struct Rows<'o, O> {
+    columns: &'o [(&'o str, O)],
+    pub(super) text: String,
+}
+
+impl<'o, O> Rows<'o, O> {
+    /// The head; `of` names what the rows are.
+    pub(super) fn new(of: &str, columns: &'o [(&'o str, O)]) -> Self {
+        let mut text = format!("| {of} | aim |");
+        for (name, _) in columns {
+            let _ = write!(text, " {name} |");
+        }
+        text.push_str("\n| --- | --- |");
+        text.push_str(&" --- |".repeat(columns.len()));
+        text.push('\n');
+        Self { columns, text }
+    }
+
+    /// One figure.
+    pub(super) fn row(&mut self, name: &str, aim: &str, of: &dyn Fn(&O) -> String) {
+        let _ = write!(self.text, "| {name} | {aim} |");
+        for (_, column) in self.columns {
+            let _ = write!(self.text, " {} |", of(column));
+        }
+        self.text.push('\n');
+    }
+}
+
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("–".into(), |v| format!("{v:.digits$}"))
 }
 
-fn percent(value: Option<f64>) -> String {
+pub(super) fn percent(value: Option<f64>) -> String {
     value.map_or("–".into(), |v| format!("{:.1} %", 100.0 * v))
 }

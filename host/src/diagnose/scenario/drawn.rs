@@ -12,6 +12,19 @@ const DRAW: u64 = 50;
 /// Payload in kg that belongs to a torque limit of 1 N·m at the last joint: the Stäubli TX40 carries 2 kg at its flange.
 const CARRIES: f64 = 2.0 / 30.7;
 
+/// Faults that a seed draws, by name.
+const FAULTS: [&str; 9] = [
+    "stribeck",
+    "asymmetric_coulomb",
+    "gear_eccentricity",
+    "load_friction",
+    "inertia_coupling",
+    "viscous_coupling",
+    "gravity_tilt",
+    "payload",
+    "joint_offset",
+];
+
 impl Arm {
     /// All of them, by name.
     pub const ALL: [(&'static str, Self); 3] = [
@@ -21,40 +34,16 @@ impl Arm {
     ];
 
     /// Faults that its recordings show, by name.
-    pub fn faults(self) -> &'static [&'static str] {
-        match self {
+    pub fn faults(self) -> Vec<&'static str> {
+        let hidden: &[&str] = match self {
             // No gear, and no gravity along its way.
-            Self::Planar => &[
-                "stribeck",
-                "asymmetric_coulomb",
-                "inertia_coupling",
-                "viscous_coupling",
-                "gravity_tilt",
-                "payload",
-            ],
+            Self::Planar => &["gear_eccentricity", "load_friction", "joint_offset"],
             // A base turned about a horizontal axis changes its torque in second order alone.
-            Self::Upright => &[
-                "stribeck",
-                "asymmetric_coulomb",
-                "gear_eccentricity",
-                "load_friction",
-                "inertia_coupling",
-                "viscous_coupling",
-                "payload",
-                "joint_offset",
-            ],
-            Self::Six => &[
-                "stribeck",
-                "asymmetric_coulomb",
-                "gear_eccentricity",
-                "load_friction",
-                "inertia_coupling",
-                "viscous_coupling",
-                "gravity_tilt",
-                "payload",
-                "joint_offset",
-            ],
-        }
+            Self::Upright => &["gravity_tilt"],
+            Self::Six => &[],
+        };
+        let shown = FAULTS.iter().filter(|fault| !hidden.contains(fault));
+        shown.copied().collect()
     }
 }
 
@@ -62,12 +51,19 @@ impl ArmScenario {
     /// An arm with a fault of [`Arm::faults`] drawn by the seed, or with none.
     ///
     /// # Errors
-    /// [`DiagnoseError::Scenario`] where no fault has that name.
+    /// [`DiagnoseError::Scenario`] where the arm shows no fault of that name.
     pub fn drawn(arm: Arm, fault: Option<&str>, seed: u64) -> Result<Self, DiagnoseError> {
         let Some(name) = fault else {
             return Ok(Self::new(arm, None, seed));
         };
-        let place = arm.faults().iter().position(|f| *f == name).unwrap_or(0);
+        let faults = arm.faults();
+        let unknown = || {
+            DiagnoseError::Scenario(format!(
+                "this arm shows no fault called \"{name}\"; choose from {}",
+                faults.join(", ")
+            ))
+        };
+        let place = (faults.iter().position(|f| *f == name)).ok_or_else(unknown)?;
         let mut dice = Dice::new(seed, DRAW + place as u64);
         let limits = limits_of(arm)?;
         let n = limits.len();
@@ -119,12 +115,7 @@ impl ArmScenario {
                 let error = dice.sign() * dice.log_uniform([0.005, 0.1]);
                 (any, Fault::JointOffset(error))
             }
-            _ => {
-                return Err(DiagnoseError::Scenario(format!(
-                    "no arm has a fault called \"{name}\"; choose from {}",
-                    arm.faults().join(", ")
-                )));
-            }
+            _ => return Err(unknown()),
         };
         Ok(Self::new(arm, Some((joint, fault)), seed))
     }

@@ -290,16 +290,19 @@ pub struct Size {
     pub parameter_change: bool,
 }
 
+/// What an effect has to leave after a refit, in noise floors, for it to be expected to be found.
+pub const ABOVE_FLOOR: f64 = 0.5;
+
 impl Size {
-    /// Whether the effect can be expected to be found: what it leaves is at least half of the noise floor. A change of
-    /// parameters is judged with the parameters as they were.
+    /// Whether the effect can be expected to be found: what it leaves is at least [`ABOVE_FLOOR`] of the noise floor. A change
+    /// of parameters is judged with the parameters as they were.
     pub fn above_floor(&self) -> bool {
         let rms = if self.parameter_change {
             self.frozen_rms
         } else {
             self.excess_rms
         };
-        rms >= 0.5 * self.floor_rms
+        rms >= ABOVE_FLOOR * self.floor_rms
     }
 }
 

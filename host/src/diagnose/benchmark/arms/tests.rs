@@ -71,7 +71,7 @@ fn a_name_counts_on_its_own_joint_alone() {
         "{table}"
     );
     assert!(cell("library: a remainder").starts_with("1/2"), "{table}");
-    assert_eq!(cell("gap closed"), "90 %");
-    assert_eq!(cell("simulated motion"), "50 %");
+    assert_eq!(cell("gap closed"), "90.0 %");
+    assert_eq!(cell("simulated motion"), "50.0 %");
     assert_eq!(cell("failed"), "0");
 }
