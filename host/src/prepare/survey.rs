@@ -100,8 +100,8 @@ struct Running {
 /// Rows of the longest segments of the spectrum: at 1 kHz they resolve 0.25 Hz.
 const LONGEST_SEGMENT: usize = 4096;
 
-/// A spectrum whose segments are as long as the recording allows: at least seven of them, half overlapping. Rows
-/// wait until it is known that the recording is long enough for the longest segments.
+/// A spectrum whose segments are as long as the recording and its stretches without a gap allow: of a whole one at least seven
+/// of them, half overlapping. Rows wait until it is known that the recording is long enough for the longest segments.
 #[derive(Default)]
 struct Delayed {
     /// Value, and whether it follows the one before without a gap.
@@ -125,8 +125,10 @@ impl Delayed {
     }
 
     fn start(&mut self) {
-        let quarter = (self.waiting.len() / 4).max(1);
-        let segment = (1usize << quarter.ilog2()).clamp(64, LONGEST_SEGMENT);
+        let stretches = self.waiting.chunk_by(|_, (_, follows)| *follows);
+        let longest = stretches.map(<[_]>::len).max().unwrap_or(0);
+        let most = (self.waiting.len() / 4).min(longest).max(1);
+        let segment = (1usize << most.ilog2()).clamp(64, LONGEST_SEGMENT);
         self.welch = Some(Welch::new(segment));
         for (x, follows) in std::mem::take(&mut self.waiting) {
             self.push(x, follows);
@@ -294,5 +296,41 @@ impl Survey {
             joints,
             note: None,
         })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::data::{Block, JointColumns};
+    use crate::prepare::InMemory;
+
+    /// Lost rows part a recording in stretches that are shorter than the longest segments of a spectrum: it is looked at with
+    /// shorter ones.
+    #[test]
+    fn a_recording_in_many_stretches_is_surveyed() {
+        let stretch = |first: usize| {
+            let t: Vec<f64> = (first..first + 1000).map(|k| k as f64 * 1e-3).collect();
+            let joint = JointColumns {
+                q: t.iter().map(|t| (3.0 * t).sin()).collect(),
+                tau: t.iter().map(|t| (3.0 * t).cos()).collect(),
+                ..Default::default()
+            };
+            Block {
+                t,
+                joints: vec![joint],
+                first_line: first as u64 + 2,
+                ..Default::default()
+            }
+        };
+        let recording = InMemory {
+            label: "made".into(),
+            blocks: (0..40).map(|k| stretch(1001 * k)).collect(),
+        };
+        let survey = Survey::take(&recording, 1).unwrap();
+        assert_eq!((survey.rows, survey.longest), (40_000, 1000));
+        assert!((survey.sample_rate - 1000.0).abs() < 1e-6);
+        assert!(!survey.joints[0].only_noise(survey.sample_rate));
     }
 }

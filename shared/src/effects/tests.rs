@@ -74,7 +74,8 @@ fn every_kind_says_all_there_is_to_say() {
             .iter()
             .filter(|k| k.about().name == about.name)
             .count();
-        assert_eq!(laws > 1, about.law.is_some(), "{kind:?}");
+        // One of several laws may go by the name alone.
+        assert!(laws > 1 || about.law.is_none(), "{kind:?}");
         assert_eq!(Kind::named(about.name, about.law), Some(kind));
         for text in [
             about.title,
