@@ -70,10 +70,6 @@ const OF_THE_CURRENT: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDela
 /// Rounds in which such a law meets the torque that it makes: what is missing falls by its share of the torque in each.
 const OWN_ROUNDS: usize = 4;
 
-/// How long a joint is taken to have moved before its recording begins as it does then, s: friction that remembers the way is
-/// wound up where it comes in motion, and not where it comes to rest.
-const BEFORE: f64 = 0.1;
-
 impl Source<'_> {
     /// The same with the gears' load and the drives' torque as effects make them that are in the model; `gains` are those of
     /// their columns, one effect after the other.
@@ -336,39 +332,32 @@ impl Source<'_> {
             .unwrap_or(0.0);
         let gains = candidate.kind.about().gains.len();
         let mut out = vec![Vec::with_capacity(run.len()); gains];
-        let at = |k: usize| Instant {
-            position: joint.q[k],
-            velocity: joint.qd[k],
-            acceleration: joint.qdd[k],
-            direction: if joint.qd[k] == 0.0 {
-                0.0
-            } else {
-                joint.qd[k].signum()
-            },
-            motor_angle: ratio * joint.q[k],
-            drive_torque: drive[k],
-            load: load[k],
-            time: run.t[k] - run.began,
-            warming: joint
-                .temperature
-                .as_ref()
-                .map_or(0.0, |t| t[k] - first_temperature),
-            other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
-            period: 1.0 / run.rate,
-            // Delays and payloads have columns of their own.
-            drive_rate: 0.0,
-            gravity: 0.0,
-        };
         let mut memory = [0.0; MEMORY];
-        if !run.is_empty() {
-            let before = Instant {
-                period: BEFORE,
-                ..at(0)
-            };
-            let _: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &before);
-        }
         for k in 0..run.len() {
-            let terms: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &at(k));
+            let at = Instant {
+                position: joint.q[k],
+                velocity: joint.qd[k],
+                acceleration: joint.qdd[k],
+                direction: if joint.qd[k] == 0.0 {
+                    0.0
+                } else {
+                    joint.qd[k].signum()
+                },
+                motor_angle: ratio * joint.q[k],
+                drive_torque: drive[k],
+                load: load[k],
+                time: run.t[k] - run.began,
+                warming: joint
+                    .temperature
+                    .as_ref()
+                    .map_or(0.0, |t| t[k] - first_temperature),
+                other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
+                period: 1.0 / run.rate,
+                // Delays and payloads have columns of their own.
+                drive_rate: 0.0,
+                gravity: 0.0,
+            };
+            let terms: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &at);
             for (list, term) in out.iter_mut().zip(terms) {
                 list.push(term);
             }
