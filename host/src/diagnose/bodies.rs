@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 use super::DiagnoseError;
 use super::anchor::{Anchor, Direction};
-use super::bench::Bench;
+use super::bench::{Bench, Loaded};
 use super::fit::{Fit, dot};
 use super::floor;
 use super::model::{completed, gravity_with, redistributed_over, with_gains};
@@ -111,6 +111,18 @@ impl<'a, 'r> Fitting<'a, 'r> {
         let key = chosen.iter().map(|p| p.columns.clone()).collect();
         self.known.borrow_mut().push((key, standing.clone()));
         Ok(standing)
+    }
+
+    /// RMS that the model of these effects leaves of other recordings, joint by joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn unseen(
+        &self,
+        chosen: &[Profile],
+        others: &Loaded,
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        self.bench.unseen(others, self.of(chosen)?.fitted(), chosen)
     }
 
     fn fitted(&self, chosen: &[Profile]) -> Result<Standing, DiagnoseError> {

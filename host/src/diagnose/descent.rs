@@ -18,28 +18,6 @@ pub(super) struct Fall {
 }
 
 impl Fall {
-    /// On recordings that nothing was fitted to, through the effects from the `described` first on.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`].
-    pub(super) fn unseen(
-        fitting: &Fitting,
-        chosen: &[Profile],
-        described: usize,
-        sealed: &Loaded,
-    ) -> Result<Self, DiagnoseError> {
-        let bench = fitting.bench;
-        let mut fall = Self {
-            frozen: bench.frozen(sealed)?,
-            models: vec![Vec::new(); bench.robot.joints.len()],
-        };
-        for count in described..=chosen.len() {
-            let part = &chosen[..count];
-            fall.push(bench.unseen(sealed, fitting.of(part)?.fitted(), part)?);
-        }
-        Ok(fall)
-    }
-
     /// A model more.
     fn push(&mut self, found: Vec<f64>) {
         for (list, rms) in self.models.iter_mut().zip(found) {
@@ -98,14 +76,25 @@ impl Descent {
                 let fit = with(refit.footing(part)[1], part, None);
                 vec![fit.even_rms(0)]
             } else {
-                bench.unseen(loaded, fitting.of(part)?.fitted(), part)?
+                fitting.unseen(part, loaded)?
             };
             train.push(found);
         }
-        let holdout = sealed
-            .map(|sealed| Fall::unseen(fitting, chosen, described, sealed))
-            .transpose()?;
-        Ok(Self { train, holdout })
+        let Some(sealed) = sealed else {
+            let holdout = None;
+            return Ok(Self { train, holdout });
+        };
+        let mut holdout = Fall {
+            frozen: bench.frozen(sealed)?,
+            models: vec![Vec::new(); n],
+        };
+        for count in described..=chosen.len() {
+            holdout.push(fitting.unseen(&chosen[..count], sealed)?);
+        }
+        Ok(Self {
+            train,
+            holdout: Some(holdout),
+        })
     }
 
     /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal

@@ -1,5 +1,7 @@
 //! Runs as rows of a regression: torque and nominal regressor, low-passed, thinned, masked.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 use rig_shared::lanes::Lanes;
 use rig_shared::multibody::{COLUMNS, column};
@@ -95,17 +97,21 @@ impl Thinning {
         clear
     }
 
+    /// Samples of a run of `samples` that the position's filter has not spoilt.
+    fn sound(&self, samples: usize) -> Range<usize> {
+        self.spoilt..samples.saturating_sub(self.spoilt).max(self.spoilt)
+    }
+
     /// Kept samples of a run of `samples`.
     fn kept(&self, samples: usize) -> impl Iterator<Item = usize> {
-        (self.spoilt..samples.saturating_sub(self.spoilt)).step_by(self.step)
+        self.sound(samples).step_by(self.step)
     }
 
     /// What is kept of a signal at the full rate, appended to `out`.
     pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
-        let sound = self.spoilt..signal.len().saturating_sub(self.spoilt);
-        let smooth = (self.low_pass).zero_phase_even(signal.get(sound).unwrap_or_default());
-        let kept = self.kept(signal.len());
-        out.extend(kept.map(|k| smooth[k - self.spoilt]));
+        let sound = signal.get(self.sound(signal.len())).unwrap_or_default();
+        let smooth = self.low_pass.zero_phase_even(sound);
+        out.extend(smooth.into_iter().step_by(self.step));
     }
 
     /// A signal behind the low-pass, at its own rate.
@@ -119,15 +125,13 @@ impl Thinning {
         for four in signals.chunks(ABREAST) {
             let samples = four[0].len();
             let lane = |k: usize, s: usize| four.get(s).map_or(0.0, |signal| signal[k]);
-            let sound = self.spoilt..samples.saturating_sub(self.spoilt);
-            let abreast: Vec<Lanes<ABREAST>> = sound
+            let abreast: Vec<Lanes<ABREAST>> = (self.sound(samples))
                 .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
                 .collect();
             let smooth = self.low_pass.zero_phase_even(&abreast);
             thin.extend((0..four.len()).map(|s| {
-                self.kept(samples)
-                    .map(|k| smooth[k - self.spoilt].0[s])
-                    .collect::<Vec<f64>>()
+                let kept = smooth.iter().step_by(self.step);
+                kept.map(|row| row.0[s]).collect::<Vec<f64>>()
             }));
         }
         thin

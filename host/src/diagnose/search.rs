@@ -312,15 +312,18 @@ impl<'a> Search<'a> {
         Ok(taking)
     }
 
+    /// Places in the library of what excludes a candidate, but for itself: other laws under its name, other transmissions.
+    fn laws_beside(&self, present: Candidate) -> impl Iterator<Item = (usize, &Candidate)> {
+        let another = move |c: &Candidate| rivals(c, &present) && c.kind != present.kind;
+        (self.library.iter().enumerate()).filter(move |(_, c)| another(c))
+    }
+
     /// Another law under the same name where it does clearly better: it has more parameters to bend.
     fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
             let present = chosen[i].candidate;
-            for (c, candidate) in self.library.iter().enumerate() {
-                if !rivals(candidate, &present) || candidate.kind == present.kind {
-                    continue;
-                }
+            for (c, _) in self.laws_beside(present) {
                 if let Some(rival) = self.profile(&fit, c, None)?
                     && rival.vanished.is_none()
                     && rival.evidence.beyond(&chosen[i].evidence) > LEAST_GAIN

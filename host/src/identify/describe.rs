@@ -7,6 +7,7 @@ use rig_shared::transmission::MOTOR_COLUMNS;
 use super::Identification;
 use super::beyond::with_beyond;
 use super::prior::described;
+use crate::report::format_significant;
 use crate::robot::{IdentifiedBand, JointKind, Robot};
 
 /// `robot` with the identified values, its dynamics those of the base parameters.
@@ -193,7 +194,8 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
             pi[column::MASS] = total - drive;
             if total <= 0.0 {
                 remarks.push(format!(
-                    "The identified mass of {total:.4} kg is not positive: no simulation can use it."
+                    "The identified mass of {} kg is not positive: no simulation can use it.",
+                    format_significant(total, 4)
                 ));
             }
         }
@@ -218,7 +220,11 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                 } else {
                     0.0
                 };
-                remarks.push(format!("The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {total:.4} kg*m^2; {drive:.4} kg*m^2 were left to it."));
+                remarks.push(format!(
+                    "The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {} kg*m^2; {} kg*m^2 were left to it.",
+                    format_significant(total, 4),
+                    format_significant(drive, 4)
+                ));
             }
             let link = total - drive;
             let mass = if prior_mass > 0.0 && least(prior_mass) <= link {
@@ -229,7 +235,10 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                 } else {
                     1.0
                 };
-                remarks.push(format!("The mass does not follow from this motion; {mass:.4} kg was chosen, twice the smallest that the inertia allows."));
+                remarks.push(format!(
+                    "The mass does not follow from this motion; {} kg was chosen, twice the smallest that the inertia allows.",
+                    format_significant(mass, 4)
+                ));
                 mass
             };
             // A flat body in the plane of motion: second moments S = m·c·cᵀ + what is left, half each way.

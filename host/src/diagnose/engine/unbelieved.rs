@@ -7,7 +7,6 @@ use rig_shared::effects::{GAINS, Kind};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::bodies::Fitting;
-use crate::diagnose::descent::Fall;
 use crate::diagnose::judge::Judge;
 use crate::diagnose::profile::{Profile, SIGNIFICANT};
 use crate::diagnose::refit::Refit;
@@ -82,20 +81,22 @@ pub(super) fn contradicted(
     chosen: &[Profile],
     sealed: &Loaded,
 ) -> Result<Option<usize>, DiagnoseError> {
-    let given = search.count_given(chosen);
-    let fall = Fall::unseen(fitting, chosen, given, sealed)?;
-    let rise = |k: usize| {
-        let [before, after] = fall.step(chosen[k].candidate.joint, k - given);
-        after / before
-    };
     let geared = |joint: usize| {
         (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
     };
-    let worse = (given..chosen.len())
-        .filter(|k| !geared(chosen[*k].candidate.joint))
-        .map(|k| (k, rise(k)))
-        .filter(|(_, rise)| *rise > WORSE);
-    Ok(worse.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k))
+    let mut worst: Option<(usize, f64)> = None;
+    for k in search.count_given(chosen)..chosen.len() {
+        let joint = chosen[k].candidate.joint;
+        if geared(joint) {
+            continue;
+        }
+        let left = |count| Ok::<_, DiagnoseError>(fitting.unseen(&chosen[..count], sealed)?[joint]);
+        let rise = left(k + 1)? / left(k)?;
+        if rise > worst.map_or(WORSE, |(_, rise)| rise) {
+            worst = Some((k, rise));
+        }
+    }
+    Ok(worst.map(|(k, _)| k))
 }
 
 /// Frequency at which the link swings on its gear while the motor stands, Hz.

@@ -1,6 +1,6 @@
 //! Two plain effects against one that bends to much: a gear, or a law of friction with many shapes.
 
-use super::{Search, is_first_law, is_gear, rivals, with};
+use super::{Search, is_first_law, is_gear, with};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
@@ -55,9 +55,8 @@ impl Search<'_> {
         let mut rich: Option<Profile> = None;
         let passing = |p: &&Profile| p.candidate.joint == joint && p.refused(trials).is_none();
         for first in profiles.iter().filter(passing) {
-            for (c, law) in self.library.iter().enumerate() {
-                let another = !is_first_law(law.kind) && !is_gear(law.kind);
-                if !another || !rivals(law, &first.candidate) {
+            for (c, law) in self.laws_beside(first.candidate) {
+                if is_first_law(law.kind) || is_gear(law.kind) {
                     continue;
                 }
                 if let Some(law) = self.profile(&fit, c, None)?
@@ -83,10 +82,10 @@ impl Search<'_> {
         best: Profile,
         trials: usize,
     ) -> Result<Profile, DiagnoseError> {
-        let size = self.size(&best.candidate);
+        let (own, size) = (best.candidate, self.size(&best.candidate));
         let mut most = best;
-        for (c, law) in self.library.iter().enumerate() {
-            if !rivals(law, &most.candidate) || is_gear(law.kind) || self.size(law) != size {
+        for (c, law) in self.laws_beside(own) {
+            if is_gear(law.kind) || self.size(law) != size {
                 continue;
             }
             if let Some(law) = self.profile(fit, c, None)?
