@@ -23,6 +23,13 @@ joint_elasticity viscous_warmup presliding_dahl presliding_lugre current_offset 
 spring measurement_delay torque_saturation position_friction torque_ripple encoder_motor encoder_joint
 drive_deadzone""".split()
 OUTSIDE = "dwell_breakaway frictional_lag hysteretic_stiffness link_flex contact_burst supply_sag".split()
+# Of each of these one at most is hidden beside others: one function of the motion, or one name.
+ONE_OF = [set(group.split()) for group in (
+    "asymmetric_coulomb current_offset torque_offset spring",
+    "backlash backlash_link_friction joint_elasticity",
+    "presliding_dahl presliding_lugre",
+    "encoder_motor encoder_joint",
+)]
 FAULTS = "sign degrees ratio_2 ratio_half described_ratio_2 rpm late_20ms too_short still".split()
 
 
@@ -36,11 +43,11 @@ class Hidden(NamedTuple):
 
 class Case(NamedTuple):
     title: str
-    kind: str  # effect, outside, nothing or fault
+    kind: str  # effect, combined, outside, nothing or fault
     effect: str
     noise: float
     seed: int
-    hidden: Hidden
+    hidden: list  # of Hidden, empty where nothing is
     description: dict  # values of the robot's description
     rig: Rig
     readings: Readings
@@ -179,26 +186,38 @@ def hide(effect, seed):
     return _hide_in_friction(effect, random) or _hide_in_gear(effect, random) or _hide_elsewhere(effect, random)
 
 
+def combination(count, seed):
+    """So many effects that can be told apart, their names joined by `+`."""
+    random = np.random.default_rng([zlib.crc32(b"combination"), count, seed])
+    chosen = []
+    for effect in random.permutation(EFFECTS):
+        if len(chosen) < count and not any(effect in group and group & set(chosen) for group in ONE_OF):
+            chosen.append(str(effect))
+    return "+".join(chosen)
+
+
 def case(kind, effect, seed, noise=0.05):
-    """One case; `effect` is the fault's name where that is what is hidden."""
-    hidden = hide(effect, seed) if kind in ("effect", "outside") else Hidden()
-    key = zlib.crc32(f"{effect if kind in ('effect', 'outside') else 'none'}@{seed}".encode())
+    """One case; `effect` is the fault's name where that is what is hidden, several joined by `+` where they are combined."""
+    effects = effect.split("+") if kind in ("effect", "combined", "outside") else []
+    hidden = [hide(each, seed) for each in effects]
+    key = zlib.crc32(f"{effect if effects else 'none'}@{seed}".encode())
     random = np.random.default_rng([999, key])
     reach = _draw(random, 1.2, 2.2)
     train, holdout = motion(random, TRAIN, reach), motion(random, HOLDOUT, reach)
-    rig = PLAIN._replace(feed_forward=float(random.integers(0, 2)), **hidden.rig)
+    rig, readings = PLAIN._replace(feed_forward=float(random.integers(0, 2))), Readings(noise=noise)
+    for each in hidden:
+        rig, readings = rig._replace(**each.rig), readings._replace(**each.readings)
     if effect == "still":
         train = np.full(20000, 0.3)
     description = PLAIN._asdict()
     # A description is never quite right. Where a payload or the split of the link is what is hidden, it is otherwise.
-    if effect not in ("payload", "link_flex"):
+    if not {"payload", "link_flex"} & set(effects):
         random = np.random.default_rng([5, key])
         wrong = dict(motor_inertia=0.03, link_inertia=0.03, gravity=0.03, viscous=0.06, coulomb=0.06)
         for name, off in wrong.items():
             description[name] *= 1 + off * random.uniform(-1, 1)
     description["gear_ratio"] = 2 * RATIO if effect == "described_ratio_2" else RATIO
     title = f"{effect} {seed}" if noise == 0.05 or kind != "nothing" else f"{effect} {seed} at {noise} A"
-    readings = Readings(**{"noise": noise, **hidden.readings})
     return Case(title, kind, effect, noise, seed, hidden, description, rig, readings, train, holdout)
 
 

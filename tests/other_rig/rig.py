@@ -196,6 +196,19 @@ def _slide(v, torque, inertia, viscous, forward, backward, dt):
 
 
 @numba.njit(cache=True)
+def _rub(p, share, v, torque, inertia, viscous, level, bristle, dt):
+    """One step of a speed and of the bristles of its share of all friction."""
+    viscous, level = share * viscous, share * level
+    if p.stroke == 0:
+        return _slide(v, torque, inertia, viscous, level * (1 + p.asymmetry), level * (1 - p.asymmetry), dt), bristle
+    # The bristles' law solved over the step's distance, so that no step is too long for it.
+    end = 1.0 if v >= 0 else -1.0
+    bent = end + (bristle - end) * math.exp(-abs(v) * dt / p.stroke)
+    friction = level * (bent + p.asymmetry) + share * p.micro_damping * (bent - bristle) / dt * p.stroke
+    return (v + dt * (torque - friction) / inertia) / (1 + dt * viscous / inertia), bent
+
+
+@numba.njit(cache=True)
 def _factors(p, dt):
     """Of one step: what the disturbance keeps, what it is pushed by, how far the current follows its command."""
     keep = math.exp(-dt / DISTURBANCE_TIME)
@@ -250,15 +263,7 @@ def _rigid(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
             if p.load_friction > 0:
                 level += p.load_friction * abs(load + p.link_inertia * mean_acceleration)
             v_before = v
-            if p.stroke > 0:
-                # The bristles' law solved over the step's distance, so that no step is too long for it.
-                end = 1.0 if v >= 0 else -1.0
-                bent = end + (bristle - end) * math.exp(-abs(v) * dt / p.stroke)
-                friction = level * bent + p.micro_damping * (bent - bristle) / dt * p.stroke
-                bristle = bent
-                v = (v + dt * (torque - friction) / inertia) / (1 + dt * viscous / inertia)
-            else:
-                v = _slide(v, torque, inertia, viscous, level * (1 + p.asymmetry), level * (1 - p.asymmetry), dt)
+            v, bristle = _rub(p, 1.0, v, torque, inertia, viscous, level, bristle, dt)
             x += dt * v
             mean_acceleration += ((v - v_before) / dt - mean_acceleration) * dt / LOAD_TIME
             if p.rest > 0:
@@ -280,6 +285,7 @@ def _two_masses(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
     position, speed, current = np.empty(rows), np.empty(rows), np.empty(rows * FINE)
     keep, kick, follow = _factors(p, dt)
     x, v, vl, disturbance, slip = ref[0], 0.0, 0.0, 0.0, 0.0
+    bristle_of_motor, bristle_of_link = 0.0, 0.0
     # The link hangs on the flank that carries it.
     weight = p.gravity * math.sin(x)
     xl = x - (p.play / 2 if weight > 0 else -p.play / 2) - weight / p.stiffness
@@ -310,12 +316,12 @@ def _two_masses(p, ref, ref_speed, ref_acceleration, seed, touch_at, touch_of):
             if p.slip_limit > 0:
                 slip = min(max(slip + dt * twist_speed * p.slip_stiffness, -p.slip_limit), p.slip_limit)
                 shaft += slip
-            level = _level(p, x, v)
-            of_motor, of_link = level * p.motor_share, level * (1 - p.motor_share)
-            torque = _motor(p, i, x) - shaft
-            v = _slide(v, torque, p.motor_inertia, viscous * p.motor_share, of_motor, of_motor, dt)
-            torque = shaft - _load(p, xl) + disturbance + touch
-            vl = _slide(vl, torque, p.link_inertia, viscous * (1 - p.motor_share), of_link, of_link, dt)
+            level = _level(p, x, v) + p.load_friction * abs(shaft)
+            v, bristle_of_motor = _rub(p, p.motor_share, v, _motor(p, i, x) - shaft, p.motor_inertia, viscous, level,
+                                       bristle_of_motor, dt)
+            torque = shaft - _load(p, xl) + disturbance + touch - p.drag * vl * abs(vl)
+            vl, bristle_of_link = _rub(p, 1 - p.motor_share, vl, torque, p.link_inertia, viscous, level,
+                                       bristle_of_link, dt)
             x += dt * v
             xl += dt * vl
     return position, speed, current

@@ -15,16 +15,51 @@ const SHADOW_OF_A_CONSTANT: f64 = 0.001;
 /// … and 86 % for gears, whose motion is driven by the measured one.
 const SHADOW_OF_A_GEAR: f64 = 0.02;
 
+/// Standard deviations between blocks by which an effect stands clear of another's shadow where that other does little.
+const CLEAR: f64 = 3.0;
+
 /// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
 pub(super) fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
-    let squares =
-        |p: &Profile| -> f64 { p.evidence.block_errors.iter().map(|e| e[0] - e[1]).sum() };
-    let own = squares(&chosen[i]);
+    let own = taken(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
+        let (casting, share) = (taken(other), shadow(other));
         k != i
             && other.candidate.joint == chosen[i].candidate.joint
-            && own < shadow(other) * squares(other)
+            && own.iter().sum::<f64>() < share * casting.iter().sum::<f64>()
+            && !(errs_where_it_acts(other.candidate.kind) && clear(&own, &casting, share))
     })
+}
+
+/// Squares that an effect takes away, block by block.
+fn taken(profile: &Profile) -> Vec<f64> {
+    let blocks = profile.evidence.block_errors.iter();
+    blocks.map(|[without, with]| without - with).collect()
+}
+
+/// Whether what is wrong with a law is in proportion to what it does: of touches and waves. Friction's curves err between
+/// where they act and where they do not.
+fn errs_where_it_acts(kind: Kind) -> bool {
+    let waves = [
+        Kind::Cogging,
+        Kind::GearEccentricity,
+        Kind::EncoderEccentricityMotor,
+        Kind::EncoderEccentricityJoint,
+        Kind::TorqueRipple,
+    ];
+    is_gear(kind) || waves.contains(&kind)
+}
+
+/// Whether in the half of the blocks in which the other one does least, what an effect takes away is surely more than that
+/// one's shadow there.
+fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
+    let mut blocks: Vec<[f64; 2]> = (own.iter().zip(casting)).map(|(o, c)| [*o, *c]).collect();
+    blocks.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    blocks.truncate(blocks.len() / 2);
+    let beyond: Vec<f64> = blocks.iter().map(|[own, cast]| own - share * cast).collect();
+    let n = beyond.len().max(2) as f64;
+    let mean = beyond.iter().sum::<f64>() / n;
+    let spread = beyond.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    mean > CLEAR * (spread / n).sqrt()
 }
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave.
