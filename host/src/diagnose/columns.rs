@@ -148,20 +148,22 @@ impl Source<'_> {
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
     ) -> Result<Vec<Column>, DiagnoseError> {
-        let all = self.columns_of(candidate, std::slice::from_ref(shapes))?;
-        Ok(all.into_iter().next().unwrap_or_default())
+        self.columns_by(1, candidate, shapes)
     }
 
-    /// One column a gain for each of several shapes.
+    /// One column a gain for each of several shapes, the runs shared among threads.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
     pub(super) fn columns_of(
         &self,
+        threads: usize,
         candidate: &Candidate,
         shapes: &[[f64; SHAPES]],
     ) -> Result<Vec<Vec<Column>>, DiagnoseError> {
-        let parts = (0..self.runs.len()).map(|r| self.of_run(candidate, shapes, r));
+        let parts = each_by(self.runs.len(), threads, |r| {
+            self.of_run(candidate, shapes, r)
+        });
         joined(parts)
     }
 
@@ -175,9 +177,8 @@ impl Source<'_> {
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
     ) -> Result<Vec<Column>, DiagnoseError> {
-        let one = std::slice::from_ref(shapes);
-        let parts = each_by(self.runs.len(), threads, |r| self.of_run(candidate, one, r));
-        Ok(joined(parts)?.into_iter().next().unwrap_or_default())
+        let all = self.columns_of(threads, candidate, std::slice::from_ref(shapes))?;
+        Ok(all.into_iter().next().unwrap_or_default())
     }
 
     /// For each of several shapes one column a gain, along one run.

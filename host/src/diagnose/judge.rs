@@ -5,6 +5,7 @@ use rig_shared::effects::Kind;
 use super::DiagnoseError;
 use super::burst::{Burst, burst};
 use super::engine::Follower;
+use super::experiment::exact;
 use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, locate};
@@ -114,8 +115,13 @@ impl Judge<'_, '_> {
             let closes = |k: usize| {
                 let j = chosen[k].candidate.joint;
                 let last = on(j).unwrap_or(&judged);
-                let rms = |but| with(self.base, &last.chosen, but).rms(j);
-                closed([rms(Some(k)), rms(None)], last.quiet[j])
+                let [before, after] = [Some(k), None].map(|but| with(self.base, &last.chosen, but));
+                // A gear is worth what it does at its touches, which hardly count beside all else.
+                if is_gear(chosen[k].candidate.kind) {
+                    closed([before.even_rms(j), after.even_rms(j)], last.floors[j])
+                } else {
+                    closed([before.rms(j), after.rms(j)], last.quiet[j])
+                }
             };
             // What the description states is no guess of the search.
             let mut doubtful: Vec<(usize, f64)> = (self.search.count_given(chosen)..chosen.len())
@@ -140,14 +146,17 @@ impl Judge<'_, '_> {
         Ok(judged)
     }
 
-    /// Whether nothing else in its place takes away half as much. What explains another joint is not in its place.
+    /// Whether nothing else in its place takes away half as much. What explains another joint is not in its place; what is the
+    /// same function of the motion is no other.
     fn stands_out(&self, chosen: &[Profile], k: usize) -> Result<bool, DiagnoseError> {
         let own = &chosen[k];
-        let name = own.candidate.kind.about().name;
+        let own_kind = own.candidate.kind;
+        let name = own_kind.about().name;
         let rivals = self.search.alternatives(self.base, chosen, k)?;
         Ok((rivals.iter())
             .filter(|r| r.candidate.joint == own.candidate.joint)
             .filter(|r| r.candidate.kind.about().name != name)
+            .filter(|r| r.vanished.is_none() && !exact([own_kind, r.candidate.kind]))
             .all(|r| r.evidence.gain < HALF * own.evidence.gain))
     }
 

@@ -20,8 +20,10 @@ use super::simplex::Simplex;
 use super::transmission::ABREAST;
 
 /// Share of the torque that a twist changes by mass and load of the link, below which it is no twist: true gears of the emulated rig come
-/// out from 0.7 to 1.1, and a wide play of a third stands in for a base that is not level.
+/// out from 0.7 to 1.1, and a wide play of a third stands in for a base that is not level …
 const LEAST_OF_A_TWIST: f64 = 0.5;
+/// … a soft spring, whose swing the motor's motion alone does not tell for long, has come out at 0.49.
+const LEAST_OF_A_SPRINGS_TWIST: f64 = 0.4;
 /// Family-wise probability of a name although nothing is there.
 pub(super) const SIGNIFICANT: f64 = 0.01;
 /// Least share of the RMS that an effect must take away on folds it was not fitted to.
@@ -31,8 +33,12 @@ const LEAST_SIGMAS: f64 = 2.0;
 /// What takes away this share of the RMS is no chance, whatever it is called: a link that is driven by the noise of a motion with
 /// rests took a fifth where nothing was missing.
 const MUCH: f64 = 0.3;
+/// … of an elastic gear, whose link may ring in a few blocks alone, this. Play bends to a single touch.
+const MUCH_OF_A_SPRING: f64 = 0.5;
 /// … then it need only be so many standard deviations of its gain: what shows where the torque is highest alone shows in few blocks.
 const LEAST_SIGMAS_OF_MUCH: f64 = 1.0;
+/// Deviations of a fair coin by which it takes something off more blocks than not, where a few loud blocks hide what it varies by.
+const SIGNS: f64 = 3.0;
 /// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
 /// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
@@ -44,6 +50,10 @@ const HOPELESS_GEAR: f64 = 0.02;
 const MOST_DAMPED: f64 = 0.5;
 /// Starting points that are followed up, side by side.
 const FOLLOWED: usize = ABREAST;
+/// First step of a simplex, in a shape's coordinate, and its answers: from a grid …
+const FAR: (f64, usize) = (0.4, 120);
+/// … and from shapes that were the best beside a model that was nearly this one.
+const NEAR: (f64, usize) = (0.2, 50);
 /// Golden-section steps of the refinement.
 const REFINEMENTS: usize = 14;
 
@@ -113,16 +123,21 @@ impl Profile {
             && e.gain_sigmas >= LEAST_SIGMAS
     }
 
-    /// Whether its gain is too little beside what it varies by from block to block. A gear's shapes bend to much.
+    /// Whether its gain is too little beside what it varies by from block to block. A gear's shapes bend to much; what is no gear
+    /// may also show by how many blocks it takes something off.
     pub(super) fn in_too_few_blocks(&self) -> bool {
         let e = &self.evidence;
-        let much = e.joint_gain >= MUCH && !is_gear(self.candidate.kind);
+        let gear = is_gear(self.candidate.kind);
+        let much = match self.candidate.kind {
+            Kind::JointElasticity => e.joint_gain >= MUCH_OF_A_SPRING,
+            _ => !gear && e.joint_gain >= MUCH,
+        };
         let least = if much {
             LEAST_SIGMAS_OF_MUCH
         } else {
             LEAST_SIGMAS
         };
-        e.gain_sigmas < least
+        e.gain_sigmas < least && (gear || e.sign_sigmas() < SIGNS)
     }
 
     fn least_gain(&self) -> f64 {
@@ -221,7 +236,8 @@ impl Search<'_> {
             if followed.is_empty() {
                 followed.push(best.clone());
             }
-            self.descend(fit, c, &followed, &mut best)?;
+            let far = if start.is_some() { NEAR } else { FAR };
+            self.descend(fit, c, &followed, far, &mut best)?;
         }
         // The simplex has moved all shapes at once; one shape does not wait for another to move.
         let rounds = match about.shapes {
@@ -249,12 +265,13 @@ impl Search<'_> {
             vanished = vanished
                 .or_else(|| (damping_ratio(&best.1, mass) > MOST_DAMPED).then_some("swing"));
         }
-        if gear
-            && evidence
-                .gains
-                .first()
-                .is_some_and(|share| *share < LEAST_OF_A_TWIST)
-        {
+        let least_share = if kind == Kind::JointElasticity {
+            LEAST_OF_A_SPRINGS_TWIST
+        } else {
+            LEAST_OF_A_TWIST
+        };
+        let share = evidence.gains.first();
+        if gear && share.is_some_and(|share| *share < least_share) {
             vanished = vanished.or(Some("torque"));
         }
         if kind == Kind::Spring && !stiff(fit, &best.2) {
@@ -272,12 +289,13 @@ impl Search<'_> {
     }
 
     /// Simplices from each of the starts, side by side, over the coordinates of all shapes at once: stiffness, damping and
-    /// play pull on each other.
+    /// play pull on each other. They begin so far from it, and end after so many answers.
     fn descend(
         &self,
         fit: &Fit,
         c: usize,
         starts: &[Best],
+        (far, answers): (f64, usize),
         best: &mut Best,
     ) -> Result<(), DiagnoseError> {
         let scales = self.library[c].kind.about().shapes;
@@ -292,13 +310,13 @@ impl Search<'_> {
                 // Away from a bound.
                 let away = |shape: &Parameter, x: f64| {
                     if shape.scale == Scale::Linear && x > 0.5 {
-                        -0.4
+                        -far
                     } else {
-                        0.4
+                        far
                     }
                 };
                 let steps: Vec<f64> = (scales.iter().zip(&at)).map(|(s, x)| away(s, *x)).collect();
-                Simplex::new(&at, &steps)
+                Simplex::new(&at, &steps).of_most(answers)
             })
             .collect();
         loop {
@@ -316,7 +334,9 @@ impl Search<'_> {
                 return Ok(());
             }
             let shapes: Vec<[f64; SHAPES]> = asked.iter().map(|(_, shapes)| *shapes).collect();
-            let columns = self.source.columns_of(&self.library[c], &shapes)?;
+            let columns = self
+                .source
+                .columns_of(self.threads, &self.library[c], &shapes)?;
             for ((k, shapes), columns) in asked.into_iter().zip(columns) {
                 let share = self.explained(fit, c, &columns).unwrap_or(0.0);
                 simplices[k].told(-share);

@@ -135,10 +135,11 @@ impl<'a> Search<'a> {
         if let Some(held) = cache().get(&c) {
             return Ok(held.clone());
         }
-        let columns: Vec<Arc<Vec<Column>>> = (self.source.columns_of(&self.library[c], points)?)
-            .into_iter()
-            .map(Arc::new)
-            .collect();
+        let columns: Vec<Arc<Vec<Column>>> =
+            (self.source.columns_of(1, &self.library[c], points)?)
+                .into_iter()
+                .map(Arc::new)
+                .collect();
         cache().insert(c, columns.clone());
         Ok(columns)
     }

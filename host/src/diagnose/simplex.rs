@@ -1,6 +1,6 @@
 //! The simplex of Nelder and Mead (1965), one question at a time, so that several can be answered side by side.
 
-/// Answers that a simplex may ask for beyond its corners.
+/// Answers that a simplex may ask for beyond its corners, unless told otherwise.
 const MOST_ANSWERS: usize = 120;
 /// Spread of the corners' values, by the best, at which it ends.
 const FLAT: f64 = 1e-4;
@@ -26,6 +26,7 @@ pub(super) struct Simplex {
     corners: Vec<(f64, Vec<f64>)>,
     stage: Stage,
     answers: usize,
+    most_answers: usize,
 }
 
 impl Simplex {
@@ -41,6 +42,15 @@ impl Simplex {
             corners: places.map(|x| (f64::INFINITY, x)).collect(),
             stage: Stage::Corner(0),
             answers: 0,
+            most_answers: MOST_ANSWERS,
+        }
+    }
+
+    /// With the move that brings so many answers as its last.
+    pub(super) fn of_most(self, answers: usize) -> Self {
+        Self {
+            most_answers: answers,
+            ..self
         }
     }
 
@@ -106,7 +116,7 @@ impl Simplex {
     fn sorted(&mut self) -> Stage {
         self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, worst) = (self.corners[0].0, self.corners[self.corners.len() - 1].0);
-        if self.answers >= MOST_ANSWERS || worst - best < FLAT * best.abs() {
+        if self.answers >= self.most_answers || worst - best < FLAT * best.abs() {
             Stage::Done
         } else {
             Stage::Reflect

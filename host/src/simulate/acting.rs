@@ -170,7 +170,8 @@ impl<'a> Acting<'a> {
 }
 
 /// Friction that a hidden state holds by itself, between the `remembered` against motion backwards and forwards: at the end of
-/// its way all dry friction that there is in that direction. `bounds` are those of all friction.
+/// its way all dry friction that there is in that direction, so that what the directions differ by stays a constant, as it is
+/// where less is remembered. `bounds` are those of all friction.
 fn winding(bounds: [f64; 2], [back, forth]: [f64; 2]) -> f64 {
     let whole = back - forth;
     if whole <= 0.0 {
@@ -178,9 +179,6 @@ fn winding(bounds: [f64; 2], [back, forth]: [f64; 2]) -> f64 {
     }
     // From −1 to 1.
     let way = (back + forth) / whole;
-    way * if way > 0.0 {
-        bounds[1] - forth
-    } else {
-        back - bounds[0]
-    }
+    let [backwards, forwards] = [bounds[0] - back, bounds[1] - forth];
+    0.5 * (forwards + backwards + way * (forwards - backwards))
 }

@@ -417,3 +417,27 @@ fn a_link_without_inertia_is_named_whatever_the_controllers() {
     });
     assert_eq!(named(&robot, &[0.3, 0.2]), Ok(()));
 }
+
+/// Whether a little more or a little less friction is remembered than there is: what the directions differ by is the same constant.
+#[test]
+fn friction_that_differs_by_direction_is_a_constant_however_much_is_remembered() {
+    let end = |coulomb: f64| {
+        let mut robot = pendulum(coulomb, 0.2);
+        robot.gravity = [0.0; 3].into();
+        let placed = |text: &str| toml::from_str::<Robot>(text).unwrap().effects;
+        let toml = toml::to_string(&robot).unwrap();
+        robot.effects = placed(&format!(
+            "{toml}\n[[effect]]\nkind = 'presliding'\nlaw = 'dahl'\njoint = 'link'\ncoulomb = 0.3\nstroke = 0.02\n[[effect]]\nkind = 'asymmetric_coulomb'\njoint = 'link'\nasymmetry = 0.1\n"
+        ));
+        let model = Model::from_robot(&robot).unwrap();
+        let mut stepper = Stepper::new(&model).unwrap();
+        let (mut q, mut v) = (vec![0.0], vec![0.0]);
+        for k in 0..4000 {
+            let torque = 0.35 * (2e-3 * f64::from(k)).sin();
+            stepper.step(&mut q, &mut v, &[torque], 1e-3).unwrap();
+        }
+        q[0]
+    };
+    let [less, more] = [end(0.2999), end(0.3001)];
+    assert!((less - more).abs() < 5e-3 * less.abs(), "{less} {more}");
+}

@@ -173,7 +173,7 @@ fn pairs(count: usize) -> impl Iterator<Item = Pair> {
 }
 
 /// Whether the registry has the two as the same function of torque and motion.
-fn exact(pair: [Kind; 2]) -> bool {
+pub(super) fn exact(pair: [Kind; 2]) -> bool {
     confused(pair).is_some_and(|c| c.exact)
 }
 

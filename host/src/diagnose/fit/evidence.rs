@@ -37,6 +37,17 @@ impl Evidence {
         1.0 - (1.0 - self.joint_gain) / (1.0 - simpler.joint_gain).max(f64::MIN_POSITIVE)
     }
 
+    /// By how many standard deviations of a fair coin more blocks are left with less than with more (the sign test, Arbuthnott 1710).
+    pub(in crate::diagnose) fn sign_sigmas(&self) -> f64 {
+        let (less, more) = (self.block_errors.iter()).fold((0.0, 0.0), |(less, more), b| {
+            (
+                less + f64::from(u8::from(b[1] < b[0])),
+                more + f64::from(u8::from(b[1] > b[0])),
+            )
+        });
+        (less - more) / f64::sqrt(less + more).max(1.0)
+    }
+
     /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
     pub(in crate::diagnose) fn ahead_of(&self, other: &Self) -> f64 {
         let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
@@ -128,5 +139,26 @@ mod tests {
         // Of ten per cent that are left, one more is a tenth; of ninety it is hardly anything.
         assert!((of(0.91).beyond(&of(0.90)) - 0.1).abs() < 1e-12);
         assert!((of(0.11).beyond(&of(0.10)) - 1.0 / 90.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn many_blocks_that_agree_count_beside_one_that_is_loud() {
+        let of = |block_errors: Vec<[f64; 2]>| Evidence {
+            block_errors,
+            ..Evidence::default()
+        };
+        // A little off every block, and one in which everything happens.
+        let mut agree: Vec<[f64; 2]> = (0..60).map(|_| [1.0, 0.8]).collect();
+        agree.push([500.0, 450.0]);
+        assert!(of(agree).sign_sigmas() > 7.0);
+        // As much in all, off one block; what stays as it was says nothing.
+        let mut one = vec![[1.0, 1.0]; 60];
+        one.push([500.0, 450.0]);
+        assert!(of(one).sign_sigmas() <= 1.0);
+        let either: Vec<[f64; 2]> = (0..60)
+            .map(|k| [1.0, if k % 2 == 0 { 0.5 } else { 1.1 }])
+            .collect();
+        assert!(of(either).sign_sigmas().abs() < 1e-12);
+        assert!(of(Vec::new()).sign_sigmas().abs() < 1e-12);
     }
 }

@@ -31,6 +31,27 @@ fn what_takes_much_away_may_do_so_in_few_blocks() {
     assert_eq!(saturated(0.6, 1.9), None);
     assert!(saturated(0.6, 0.9).is_some());
     assert!(saturated(0.1, 1.9).is_some());
-    // A gear bends to so much that one touch is enough for a false one.
+    // Play bends to so much that one touch is enough for a false one; a spring rings at its resonance alone.
     assert!(profile(Kind::Backlash, 0.6, 1.9).refused(300).is_some());
+    assert_eq!(profile(Kind::JointElasticity, 0.8, 1.9).refused(300), None);
+    assert!(
+        profile(Kind::JointElasticity, 0.4, 1.9)
+            .refused(300)
+            .is_some()
+    );
+}
+
+/// A constant that shows beside loud blocks: nearly all of them are left with less, what they vary by hides it.
+#[test]
+fn many_blocks_that_agree_stand_in_for_a_gain_beyond_what_they_vary_by() {
+    let of = |kind, less: usize| {
+        let mut agreeing = profile(kind, 0.2, 1.9);
+        agreeing.evidence.block_errors = (0..90)
+            .map(|k| [1.0, if k < less { 0.9 } else { 1.05 }])
+            .collect();
+        agreeing.refused(300)
+    };
+    assert_eq!(of(Kind::AsymmetricCoulomb, 75), None);
+    assert!(of(Kind::AsymmetricCoulomb, 50).is_some());
+    assert!(of(Kind::Backlash, 75).is_some());
 }

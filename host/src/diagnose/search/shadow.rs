@@ -55,7 +55,10 @@ fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
     let mut blocks: Vec<[f64; 2]> = (own.iter().zip(casting)).map(|(o, c)| [*o, *c]).collect();
     blocks.sort_by(|a, b| a[1].total_cmp(&b[1]));
     blocks.truncate(blocks.len() / 2);
-    let beyond: Vec<f64> = blocks.iter().map(|[own, cast]| own - share * cast).collect();
+    let beyond: Vec<f64> = blocks
+        .iter()
+        .map(|[own, cast]| own - share * cast)
+        .collect();
     let n = beyond.len().max(2) as f64;
     let mean = beyond.iter().sum::<f64>() / n;
     let spread = beyond.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -71,5 +74,43 @@ pub(in crate::diagnose) fn shadow(of: &Profile) -> f64 {
         }
         Kind::Stribeck | Kind::StribeckExponential => SHADOW_OF_A_CURVE,
         _ => SHADOW,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_where_the_other_does_nothing_is_no_shadow_of_it() {
+        // A touch every fourth block; block by block something else of its own.
+        let loud = |k: usize| if k.is_multiple_of(4) { 100.0 } else { 0.5 };
+        let casting: Vec<f64> = (0..80).map(loud).collect();
+        let share = SHADOW_OF_A_GEAR;
+        let whole: f64 = casting.iter().sum();
+        let everywhere: Vec<f64> = (0..80).map(|k| 0.3 + 0.02 * f64::from(k % 5)).collect();
+        assert!(everywhere.iter().sum::<f64>() < share * whole);
+        assert!(clear(&everywhere, &casting, share));
+        // As much, but in proportion to what casts it.
+        let shadow: Vec<f64> = casting.iter().map(|c| 0.9 * share * c).collect();
+        assert!(!clear(&shadow, &casting, share));
+        // As much where it is quiet, of one block alone.
+        let mut once = vec![0.0; 80];
+        once[1] = 24.0;
+        assert!(!clear(&once, &casting, share));
+    }
+
+    #[test]
+    fn friction_errs_between_where_it_acts_and_where_not() {
+        for kind in [
+            Kind::Backlash,
+            Kind::Cogging,
+            Kind::EncoderEccentricityMotor,
+        ] {
+            assert!(errs_where_it_acts(kind), "{kind:?}");
+        }
+        for kind in [Kind::Stribeck, Kind::PreslidingDahl, Kind::LoadFriction] {
+            assert!(!errs_where_it_acts(kind), "{kind:?}");
+        }
     }
 }
