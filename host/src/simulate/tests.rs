@@ -423,7 +423,7 @@ fn a_link_without_inertia_is_named_whatever_the_controllers() {
 fn friction_that_differs_by_direction_is_a_constant_however_much_is_remembered() {
     let end = |coulomb: f64| {
         let mut robot = pendulum(coulomb, 0.2);
-        robot.gravity = [0.0; 3].into();
+        robot.gravity = [0.0; 3];
         let placed = |text: &str| toml::from_str::<Robot>(text).unwrap().effects;
         let toml = toml::to_string(&robot).unwrap();
         robot.effects = placed(&format!(
