@@ -70,8 +70,8 @@ class Answer(NamedTuple):
     @property
     def exact(self):
         """Whether all right names stand there, each once, and no other."""
-        each_once = all(sum(name in _names(step) for step in self.steps) >= 1 for name in self.hidden)
-        return each_once and not self.wrong and len(self.steps) == len(self.hidden)
+        every = all(any(name in _names(step) for step in self.steps) for name in self.hidden)
+        return every and not self.wrong and len(self.steps) == len(self.hidden)
 
     @property
     def remainder(self):
