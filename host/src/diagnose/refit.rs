@@ -338,7 +338,9 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
     };
     let left = known.inverse();
     (anchor.free.iter().enumerate())
-        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER && !anchor.is_unstated(*k))
+        // What nobody stated is fitted, but for the constant of a joint that stands throughout.
+        .filter(|(k, _)| !anchor.is_unstated(*k) || dot(&columns[*k], &columns[*k]) <= 0.0)
+        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER)
         .filter_map(|(_, direction)| match direction.as_slice() {
             [(b, _)] => Some(*b),
             _ => None,
