@@ -96,6 +96,36 @@ fn told(what: &str, diagnosis: &Diagnosis) {
     }
 }
 
+/// A URDF states no constant torque; of a joint that stands throughout none can be fitted.
+#[test]
+fn an_arm_with_a_joint_that_stands_throughout_is_diagnosed() {
+    let Some(mut real) = kuka() else { return };
+    let place = tempfile::tempdir().unwrap();
+    let frozen = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        let mut lines = text.lines();
+        let header = lines.next().unwrap();
+        let column = header.split(',').position(|name| name == "q3").unwrap();
+        let mut out = header.to_owned();
+        let mut first = None;
+        for line in lines {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            cells[column] = first.get_or_insert(cells[column]);
+            out += &format!("\n{}", cells.join(","));
+        }
+        let path = place.path().join(path.file_name().unwrap());
+        std::fs::write(&path, out + "\n").unwrap();
+        path
+    };
+    real.training = real.training.iter().map(frozen).collect();
+    real.holdout = real.holdout.iter().map(frozen).collect();
+    let (diagnosis, _) = real.told("frozen");
+    assert!(diagnosis.data_faults.is_empty());
+    assert_eq!(diagnosis.waterfall.len(), 7);
+    let still = &real.robot.joints[2].name;
+    assert!(diagnosis.steps.iter().all(|step| step.joint != *still));
+}
+
 #[test]
 fn two_joints_with_nothing_wrong_are_left_alone() {
     let diagnosis = made(&ArmScenario::new(Arm::Planar, None, 1));

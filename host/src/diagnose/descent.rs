@@ -65,10 +65,13 @@ impl Descent {
     ) -> Result<Self, DiagnoseError> {
         let bench = fitting.bench;
         let n = bench.robot.joints.len();
-        let mut train = Fall {
-            frozen: bench.frozen(loaded)?,
-            models: vec![Vec::new(); n],
+        let frozen = |loaded| -> Result<Fall, DiagnoseError> {
+            Ok(Fall {
+                frozen: bench.frozen(loaded)?,
+                models: vec![Vec::new(); n],
+            })
         };
+        let mut train = frozen(loaded)?;
         for count in described..=chosen.len() {
             let part = &chosen[..count];
             // Of one link the free fit is what stands.
@@ -80,21 +83,15 @@ impl Descent {
             };
             train.push(found);
         }
-        let Some(sealed) = sealed else {
-            let holdout = None;
-            return Ok(Self { train, holdout });
-        };
-        let mut holdout = Fall {
-            frozen: bench.frozen(sealed)?,
-            models: vec![Vec::new(); n],
-        };
-        for count in described..=chosen.len() {
-            holdout.push(fitting.unseen(&chosen[..count], sealed)?);
+        let mut holdout = None;
+        if let Some(sealed) = sealed {
+            let mut fall = frozen(sealed)?;
+            for count in described..=chosen.len() {
+                fall.push(fitting.unseen(&chosen[..count], sealed)?);
+            }
+            holdout = Some(fall);
         }
-        Ok(Self {
-            train,
-            holdout: Some(holdout),
-        })
+        Ok(Self { train, holdout })
     }
 
     /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal

@@ -11,7 +11,7 @@ mod evidence;
 mod folds;
 mod jackknife;
 
-pub(super) use evidence::Evidence;
+pub(super) use evidence::{Evidence, sigmas};
 use folds::Folded;
 
 /// Blocks that evidence is counted in: so many times the residual's memory long …

@@ -16,7 +16,7 @@ use super::fit::{Evidence, Fit, dot_self};
 use super::lead::slack;
 use super::rows::Column;
 use super::search::{Search, is_gear};
-use super::simplex::Simplex;
+use super::simplex::{MOST_ANSWERS, Simplex};
 use super::transmission::ABREAST;
 
 /// Share of the torque that a twist changes by mass and load of the link, below which it is no twist: true gears of the emulated rig come
@@ -51,7 +51,7 @@ const MOST_DAMPED: f64 = 0.5;
 /// Starting points that are followed up, side by side.
 const FOLLOWED: usize = ABREAST;
 /// First step of a simplex, in a shape's coordinate, and its answers: from a grid …
-const FAR: (f64, usize) = (0.4, 120);
+const FAR: (f64, usize) = (0.4, MOST_ANSWERS);
 /// … and from shapes that were the best beside a model that was nearly this one.
 const NEAR: (f64, usize) = (0.2, 50);
 /// Golden-section steps of the refinement.

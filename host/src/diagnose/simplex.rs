@@ -1,7 +1,7 @@
 //! The simplex of Nelder and Mead (1965), one question at a time, so that several can be answered side by side.
 
 /// Answers that a simplex may ask for beyond its corners, unless told otherwise.
-const MOST_ANSWERS: usize = 120;
+pub(super) const MOST_ANSWERS: usize = 120;
 /// Spread of the corners' values, by the best, at which it ends.
 const FLAT: f64 = 1e-4;
 

@@ -226,7 +226,7 @@ fn refused(equation: &Equation, others: &[Found], found: &Found, trials: usize) 
             e.gain_sigmas
         ));
     }
-    let squares = |e: &Evidence| -> f64 { e.block_errors.iter().map(|b| b[0] - b[1]).sum() };
+    let squares = |e: &Evidence| -> f64 { e.taken().sum() };
     if (others.iter()).any(|o| squares(e) < SHADOW * SHADOW * squares(&o.evidence)) {
         return Some("it is no more than what another law is off by".to_owned());
     }

@@ -85,13 +85,20 @@ pub(super) fn contradicted(
         (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
     };
     let mut worst: Option<(usize, f64)> = None;
+    let mut last: Option<(usize, Vec<f64>)> = None;
     for k in search.count_given(chosen)..chosen.len() {
         let joint = chosen[k].candidate.joint;
         if geared(joint) {
             continue;
         }
-        let left = |count| Ok::<_, DiagnoseError>(fitting.unseen(&chosen[..count], sealed)?[joint]);
-        let rise = left(k + 1)? / left(k)?;
+        let left = |count| fitting.unseen(&chosen[..count], sealed);
+        let before = match last.take() {
+            Some((count, known)) if count == k => known,
+            _ => left(k)?,
+        };
+        let after = left(k + 1)?;
+        let rise = after[joint] / before[joint];
+        last = Some((k + 1, after));
         if rise > worst.map_or(WORSE, |(_, rise)| rise) {
             worst = Some((k, rise));
         }

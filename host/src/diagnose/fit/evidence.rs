@@ -39,13 +39,16 @@ impl Evidence {
 
     /// By how many standard deviations of a fair coin more blocks are left with less than with more (the sign test, Arbuthnott 1710).
     pub(in crate::diagnose) fn sign_sigmas(&self) -> f64 {
-        let (less, more) = (self.block_errors.iter()).fold((0.0, 0.0), |(less, more), b| {
-            (
-                less + f64::from(u8::from(b[1] < b[0])),
-                more + f64::from(u8::from(b[1] > b[0])),
-            )
-        });
-        (less - more) / f64::sqrt(less + more).max(1.0)
+        let signs: Vec<f64> = (self.taken())
+            .filter(|taken| *taken != 0.0)
+            .map(f64::signum)
+            .collect();
+        signs.iter().sum::<f64>() / (signs.len().max(1) as f64).sqrt()
+    }
+
+    /// Squares that they take away, block by block.
+    pub(in crate::diagnose) fn taken(&self) -> impl Iterator<Item = f64> {
+        (self.block_errors.iter()).map(|[without, with]| without - with)
     }
 
     /// By how many standard deviations of the blocks' paired differences this leaves less than the other.
@@ -53,11 +56,16 @@ impl Evidence {
         let differences: Vec<f64> = (self.block_errors.iter().zip(&other.block_errors))
             .map(|(a, b)| b[1] - a[1])
             .collect();
-        let n = differences.len().max(2) as f64;
-        let mean = differences.iter().sum::<f64>() / n;
-        let spread = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
+        sigmas(&differences)
     }
+}
+
+/// The mean over its standard deviation between blocks.
+pub(in crate::diagnose) fn sigmas(blocks: &[f64]) -> f64 {
+    let n = blocks.len().max(2) as f64;
+    let mean = blocks.iter().sum::<f64>() / n;
+    let spread = blocks.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    mean / (spread / n).sqrt().max(f64::MIN_POSITIVE)
 }
 
 impl Fit<'_> {

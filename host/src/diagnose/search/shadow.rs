@@ -3,6 +3,7 @@
 use rig_shared::effects::Kind;
 
 use super::is_gear;
+use crate::diagnose::fit::sigmas;
 use crate::diagnose::profile::Profile;
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
@@ -20,6 +21,7 @@ const CLEAR: f64 = 3.0;
 
 /// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
 pub(super) fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
+    let taken = |p: &Profile| -> Vec<f64> { p.evidence.taken().collect() };
     let own = taken(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
         let (casting, share) = (taken(other), shadow(other));
@@ -28,12 +30,6 @@ pub(super) fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
             && own.iter().sum::<f64>() < share * casting.iter().sum::<f64>()
             && !(errs_where_it_acts(other.candidate.kind) && clear(&own, &casting, share))
     })
-}
-
-/// Squares that an effect takes away, block by block.
-fn taken(profile: &Profile) -> Vec<f64> {
-    let blocks = profile.evidence.block_errors.iter();
-    blocks.map(|[without, with]| without - with).collect()
 }
 
 /// Whether what is wrong with a law is in proportion to what it does: of touches and waves. Friction's curves err between
@@ -59,10 +55,7 @@ fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
         .iter()
         .map(|[own, cast]| own - share * cast)
         .collect();
-    let n = beyond.len().max(2) as f64;
-    let mean = beyond.iter().sum::<f64>() / n;
-    let spread = beyond.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    mean > CLEAR * (spread / n).sqrt()
+    sigmas(&beyond) > CLEAR
 }
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave.
