@@ -278,7 +278,7 @@ fn ticks(criterion: &mut Criterion) {
     let experiment = Experiment {
         settings: Vec::new(),
         trajectory: Some(trajectory),
-        rest: 0.0,
+        ..Experiment::default()
     };
     group
         .sample_size(10)

@@ -218,6 +218,7 @@ pub fn driven<P: Port>(
             settings,
             trajectory: Some(trajectory),
             rest,
+            ..Experiment::default()
         },
     )
 }

@@ -169,6 +169,7 @@ fn torque_error(plant: &PlantConfig, seed: u64, effects: &[Effect<f32>]) -> f64 
         amplitude: 0.1,
         velocity: 0.5,
         acceleration: 15.0,
+        again: 0.0,
     };
     let per_ampere = f64::from(nameplate(plant).config.drive.joint_torque(1.0));
     let mut line = told(plant, seed);

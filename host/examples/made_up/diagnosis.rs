@@ -76,6 +76,7 @@ fn waterfall(models: &[&str], train: &[f64], holdout: &[f64]) -> Waterfall {
         train: train.into(),
         holdout: holdout.into(),
         floor: 0.051,
+        holdout_floor: 0.051,
     }
 }
 

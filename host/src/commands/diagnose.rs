@@ -6,14 +6,15 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::input::{
-    Inputs, RobotArg, command_line, recordings, refuse_as_drive_off, refuse_shared, refuse_twice,
+    Inputs, RobotArg, command_line, recordings, refuse_as_rest, refuse_shared, refuse_twice,
 };
 use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::experiment::FILE;
 use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
+use crate::diagnose::runs::Run;
 use crate::diagnose::voltage::diagnose_voltage;
-use crate::diagnose::{DiagnoseError, Options, Unburdened, diagnose, sensor_zeros};
+use crate::diagnose::{DiagnoseError, Options, Unburdened, clamped, diagnose, sensor_zeros};
 use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
 use crate::prepare::Recording;
@@ -60,6 +61,10 @@ pub(crate) struct Args {
     /// is gone there comes from outside; may be given several times
     #[arg(long)]
     pulls_off: Vec<PathBuf>,
+    /// Recording with the joints clamped, motor voltage beside current or torque: a dead zone of the drive shows there without friction
+    /// and back-EMF; may be given several times
+    #[arg(long)]
+    clamped: Vec<PathBuf>,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -79,14 +84,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let learnt: Vec<PathBuf> = args.data.iter().chain(&args.pulls_off).cloned().collect();
     refuse_twice(&learnt, "give it once")?;
     refuse_shared(&learnt, &args.holdout)?;
+    let moved: Vec<PathBuf> = learnt.iter().chain(&args.holdout).cloned().collect();
     if let Some(path) = &args.drive_off {
-        let moved: Vec<PathBuf> = learnt.iter().chain(&args.holdout).cloned().collect();
-        refuse_as_drive_off(path, &moved)?;
+        refuse_as_rest(["--drive-off", "the drive off"], path, &moved)?;
+    }
+    refuse_twice(&args.clamped, "give it once")?;
+    for path in &args.clamped {
+        refuse_as_rest(["--clamped", "the joints clamped"], path, &moved)?;
     }
     // Units that look wrong are no reason to stop here: they are a verdict.
     let (training, holdout, workflow) = read(&robot, args)?;
     let special = (args.drive_off.iter().map(|path| ("--drive-off", path)))
-        .chain(args.pulls_off.iter().map(|path| ("--pulls-off", path)));
+        .chain(args.pulls_off.iter().map(|path| ("--pulls-off", path)))
+        .chain(args.clamped.iter().map(|path| ("--clamped", path)));
     if let (Some((option, path)), false) = (special.into_iter().next(), training.any_effort()) {
         return Err(CommandError::Sentence(format!(
             "{option} {} says nothing where a joint goes by its voltage alone; leave it out, or record tau1 or i1 in motion too.",
@@ -102,6 +112,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let options = Options {
         seed: args.seed,
         sensor_zeros: zeros(&robot, args, ui)?,
+        clamped: clamps(&robot, args, ui)?,
         no_offsets: description.urdf.is_some(),
         ..Options::default()
     };
@@ -193,6 +204,19 @@ fn zeros(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<[f64; 2]>, CommandEr
         ui.remark(&warning);
     }
     Ok(zeros)
+}
+
+/// What was recorded with the joints clamped.
+fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError> {
+    let logs = Inputs::read(robot, &args.clamped)?;
+    let runs = (recordings(&logs.listened()).into_iter())
+        .map(clamped)
+        .collect::<Result<Vec<_>, _>>()?
+        .concat();
+    for warning in logs.warnings().chain(logs.heard()) {
+        ui.remark(&warning);
+    }
+    Ok(runs)
 }
 
 /// The result at a glance.

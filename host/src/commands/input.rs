@@ -330,11 +330,15 @@ pub(crate) fn refuse_shared(data: &[PathBuf], holdout: &[PathBuf]) -> Result<(),
     }
 }
 
-/// A motion under torque says nothing of what a sensor reads without one.
-pub(crate) fn refuse_as_drive_off(log: &Path, moved: &[PathBuf]) -> Result<(), CommandError> {
+/// A motion under torque says nothing of what a sensor reads without one, or a motor at rest.
+pub(crate) fn refuse_as_rest(
+    [option, with]: [&str; 2],
+    log: &Path,
+    moved: &[PathBuf],
+) -> Result<(), CommandError> {
     if moved.iter().any(|path| real(path) == real(log)) {
         return Err(CommandError::Sentence(format!(
-            "{} is given as --drive-off and as a recording of motion; --drive-off takes one made with the drive off.",
+            "{} is given as {option} and as a recording of motion; {option} takes one made with {with}.",
             log.display()
         )));
     }

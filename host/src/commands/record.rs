@@ -1,6 +1,7 @@
 //! `rig record`: a trajectory run on the rig, or the rig at rest, recorded.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -48,7 +49,7 @@ pub(crate) struct Args {
     /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
     #[arg(long)]
     trajectory: Option<PathBuf>,
-    /// How long to record after the trajectory, or in all without one, s
+    /// How long to record after the trajectory or its drive_off, or in all without one, s
     #[arg(long, default_value_t = 1.0)]
     seconds: f64,
     /// Where the link stands at the start, rad: an incremental encoder cannot know
@@ -103,21 +104,19 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             upload::settings(&Nameplate::from_robot(robot)?, false)
         });
     }
-    let trajectory = match &args.trajectory {
-        Some(path) => {
-            let file = TrajectoryFile::load(path)?;
-            if let Some(robot) = &robot {
-                file.fits(robot, path)?;
-            }
-            Some(single(&file, path, args.home)?)
-        }
-        None => None,
-    };
-    let experiment = Experiment {
+    let mut experiment = Experiment {
         settings,
-        trajectory,
         rest: args.seconds,
+        ..Experiment::default()
     };
+    if let Some(path) = &args.trajectory {
+        let file = TrajectoryFile::load(path)?;
+        if let Some(robot) = &robot {
+            file.fits(robot, path)?;
+        }
+        experiment.trajectory = Some(single(&file, path, args.home)?);
+        experiment.drive_off = file.drive_off;
+    }
     let losses = if let Some(name) = &args.port {
         record(
             SerialLine::open(name, args.baud)?,
@@ -165,9 +164,12 @@ fn emulated_at(
     };
     let nameplate = Nameplate::from_robot(&described)?;
     let mut plant = PlantConfig::laboratory(seed);
-    let home = home.map_or(plant.initial_position, f64::from);
-    if (home - plant.initial_position).abs() > HANGS {
-        (plant.initial_position, plant.sensors.encoder.zero) = (home, home);
+    let hangs = plant.initial_position;
+    let home = home.map_or(hangs, f64::from);
+    if (home - hangs).abs() > HANGS {
+        // Who says straight down of where it hangs is off by as much wherever else he brings it: the rig has one zero.
+        let stands = home + (hangs + FRAC_PI_2);
+        (plant.initial_position, plant.sensors.encoder.zero) = (stands, stands);
         plant.held = true;
     }
     let noise = seed ^ (run.wrapping_sub(1) << u32::BITS);

@@ -11,6 +11,7 @@ mod mcap_rows;
 mod motors;
 mod plausibility;
 mod source;
+mod spike;
 mod writer;
 
 pub use columns::EffortNeed;

@@ -5,6 +5,7 @@
 //! only what the columns say about each other is checked.
 
 use super::jump::jump;
+use super::spike::spike;
 use super::{Block, JointColumns};
 use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 
@@ -77,6 +78,24 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// Single rows of effort that no other comes near.
+    #[error(
+        "tau{joint} is {value:.4} {unit} in the row at t = {at} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out"
+    )]
+    Spike {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the largest, s.
+        at: f64,
+        /// What stands there.
+        value: f64,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// Largest magnitude elsewhere, but for one row in a thousand.
+        usual: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
     /// Measured velocity and change of position do not belong together.
     #[error(
         "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
@@ -133,6 +152,14 @@ pub enum Implausible {
         /// N·m or N.
         unit: &'static str,
     },
+    /// No effort at all.
+    #[error(
+        "tau{joint} is 0 in every row while the joint moves; check that the column is the torque and was recorded"
+    )]
+    NoEffort {
+        /// Joint, 1-based.
+        joint: usize,
+    },
     /// Time in milliseconds or in a smaller unit.
     #[error("t looks like {} (its steps are {step:.4}); give it in s", unit_of_steps(*step))]
     NotSeconds {
@@ -151,9 +178,10 @@ impl Implausible {
             | Self::Velocity { joint, .. } => format!("q{joint}"),
             Self::VelocityScale { joint, .. } => format!("qd{joint}"),
             Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
-            Self::EffortTooLarge { joint, .. } | Self::EffortTooSmall { joint, .. } => {
-                format!("tau{joint}")
-            }
+            Self::EffortTooLarge { joint, .. }
+            | Self::EffortTooSmall { joint, .. }
+            | Self::NoEffort { joint }
+            | Self::Spike { joint, .. } => format!("tau{joint}"),
             Self::NotSeconds { .. } => "t".into(),
         }
     }
@@ -191,6 +219,14 @@ pub(crate) fn unit_of_steps(step: f64) -> &'static str {
     }
 }
 
+/// That a fault is there more than once, in words.
+fn more(count: usize) -> String {
+    match count {
+        1 => String::new(),
+        n => format!(" and at {} more places", n - 1),
+    }
+}
+
 fn range(values: &[f64]) -> (f64, f64) {
     values
         .iter()
@@ -219,10 +255,7 @@ fn check_joint(
             joint: k,
             at: t[jump.row],
             by: jump.by,
-            more: match jump.count {
-                1 => String::new(),
-                n => format!(" and at {} more places", n - 1),
-            },
+            more: more(jump.count),
             fastest: jump.fastest,
             mend: if unit == "rad" && (jump.by.abs() / core::f64::consts::TAU - 1.0).abs() < 0.02 {
                 "that is a turn: give the angle counted on beyond it"
@@ -279,7 +312,7 @@ fn check_joint(
             });
         }
     }
-    check_effort(k, columns, joint, effort_unit, highest - lowest, found);
+    check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
 }
 
 /// Highest mean speed over ten samples: a single step of a coarse encoder is no speed.
@@ -361,12 +394,24 @@ pub(crate) fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
 
 fn check_effort(
     k: usize,
+    t: &[f64],
     columns: &JointColumns,
     joint: &Joint,
     unit: &'static str,
     travel: f64,
     found: &mut Vec<Implausible>,
 ) {
+    if let Some(spike) = spike(&columns.tau) {
+        found.push(Implausible::Spike {
+            joint: k,
+            at: t[spike.row],
+            value: spike.value,
+            more: more(spike.count),
+            usual: spike.usual,
+            unit,
+        });
+        return;
+    }
     let highest = columns.tau.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let limit = joint.limits.as_ref().and_then(|l| l.torque);
     if let Some(limit) = limit
@@ -382,6 +427,10 @@ fn check_effort(
     }
     // 0.05 rad or 5 cm of travel: a joint that hardly moves may well need next to nothing.
     if columns.tau.is_empty() || travel < 0.05 {
+        return;
+    }
+    if highest == 0.0 {
+        found.push(Implausible::NoEffort { joint: k });
         return;
     }
     // A joint cannot move against its friction with a hundredth of it, whatever else acts.

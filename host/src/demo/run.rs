@@ -62,6 +62,7 @@ impl Run {
             settings,
             trajectory: Some(motion.to_f32()),
             rest,
+            ..Experiment::default()
         };
         let (mut rows, mut estimates) = (Vec::new(), Vec::new());
         let mut trouble = None;

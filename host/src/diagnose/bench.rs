@@ -10,6 +10,7 @@ use super::DiagnoseError;
 use super::anchor::Anchor;
 use super::columns::{Candidate, DELAY, Source};
 use super::fit::Evidence;
+use super::floor;
 use super::predicted::{Predicted, predict};
 use super::profile::Profile;
 use super::rows::{Column, Nominal, Rows, combined};
@@ -17,7 +18,7 @@ use super::runs::{Run, runs_of};
 use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
-use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment};
+use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use crate::robot::{JointKind, Robot};
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
@@ -29,6 +30,18 @@ pub(super) struct Loaded {
     pub(super) runs: Vec<Run>,
     /// Less what the held parameters contribute.
     pub(super) rows: Rows,
+    /// Of these recordings, at their own rate.
+    pub(super) treatment: Treatment,
+}
+
+impl Loaded {
+    /// What positions pass before they are differentiated.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where there is no such filter.
+    pub(super) fn position_filter(&self) -> Result<LowPass, DiagnoseError> {
+        position_filter(&self.treatment)
+    }
 }
 
 /// Everything that stays the same during a diagnosis.
@@ -68,45 +81,73 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Reads recordings and takes off what the held effects and parameters contribute.
+    /// Reads recordings to learn from and takes off what the held effects and parameters contribute.
     ///
     /// # Errors
     /// [`DiagnoseError`].
     pub(super) fn load(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
-        let position = self.position_filter()?;
+        self.loaded(recordings, &self.treatment)
+    }
+
+    /// The same of recordings held back, at their own rate.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`]: two rates among them, or one that cannot hold the band.
+    pub(super) fn load_held(&self, recordings: &[&dyn Recording]) -> Result<Loaded, DiagnoseError> {
+        let joints = self.robot.joints.len();
+        let mut own: Option<Treatment> = None;
+        for recording in recordings {
+            let survey = Survey::take(*recording, joints)?;
+            match &own {
+                None => own = Some(self.treatment.at_rate_of(&survey)?),
+                Some(treatment) => same_rate(&survey, treatment.sample_rate)?,
+            }
+        }
+        self.loaded(recordings, own.as_ref().unwrap_or(&self.treatment))
+    }
+
+    fn loaded(
+        &self,
+        recordings: &[&dyn Recording],
+        treatment: &Treatment,
+    ) -> Result<Loaded, DiagnoseError> {
+        let position = position_filter(treatment)?;
         let mut runs = Vec::new();
         for (k, &recording) in recordings.iter().enumerate() {
-            let rate = self.treatment.sample_rate;
+            let rate = treatment.sample_rate;
             runs.extend(match &self.held[usize::from(recording.unburdened())] {
                 Some((effects, chain)) => {
-                    let freed =
-                        Compensated::new(recording, effects, chain, &self.treatment, false)?;
+                    let freed = Compensated::new(recording, effects, chain, treatment, false)?;
                     runs_of(&freed, k, rate, &position)?
                 }
                 None => runs_of(recording, k, rate, &position)?,
             });
         }
-        self.rows(runs)
-    }
-
-    /// What positions pass before they are differentiated.
-    ///
-    /// # Errors
-    /// [`DiagnoseError::Model`] where there is no such filter.
-    pub(super) fn position_filter(&self) -> Result<LowPass, DiagnoseError> {
-        (self.treatment.position_filter())
-            .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
+        self.rows(runs, treatment)
     }
 
     /// The rows of runs, less what the held parameters contribute.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn rows(&self, runs: Vec<Run>) -> Result<Loaded, DiagnoseError> {
-        let mut rows = Rows::of(&runs, &self.nominal, &self.treatment)?;
+    pub(super) fn rows(
+        &self,
+        runs: Vec<Run>,
+        treatment: &Treatment,
+    ) -> Result<Loaded, DiagnoseError> {
+        let mut rows = Rows::of(&runs, &self.nominal, treatment)?;
         let held = self.anchor.held_torque(&rows);
         take_off(&mut rows.torque, &held);
-        Ok(Loaded { runs, rows })
+        Ok(Loaded {
+            runs,
+            rows,
+            treatment: treatment.clone(),
+        })
+    }
+
+    /// Samples a second of what is learnt from.
+    pub(super) fn rate(&self) -> f64 {
+        self.treatment.sample_rate
     }
 
     /// Whether a joint's constant torque is fitted as part of the nominal model, whatever pulls on the joint: the preload of a spring
@@ -213,13 +254,14 @@ impl<'a> Bench<'a> {
     ) -> Result<Vec<f64>, DiagnoseError> {
         let residual = self.remaining(sealed, fitted, chosen)?;
         Ok((residual.iter().zip(&sealed.rows.keep))
-            .map(|(r, keep)| {
-                let used = || r.iter().zip(keep).filter(|(_, k)| **k);
-                let squares: f64 = used().map(|(r, _)| r * r).sum();
-                (squares / used().count().max(1) as f64).sqrt()
-            })
+            .map(|(r, keep)| floor::rms(r, keep))
             .collect())
     }
+}
+
+fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {
+    (treatment.position_filter())
+        .ok_or_else(|| DiagnoseError::Model("its position filter cannot be built.".into()))
 }
 
 /// Takes a column off signals, joint by joint.

@@ -6,6 +6,8 @@
 //!
 //! Leaves out: disturbances that last as long as the motion, or that are no louder than what else is left.
 
+use std::ops::Range;
+
 use super::runs::Run;
 
 /// Length of a stretch, s.
@@ -32,6 +34,8 @@ pub(super) struct Burst {
     pub(super) time: [f64; 2],
     /// RMS of the loudest over that of the middle one.
     pub(super) times: f64,
+    /// Rows of each.
+    pub(super) rows: Vec<Range<usize>>,
 }
 
 /// The bursts of a joint's residual; none where there are none. Rows are `period` s apart, those of each run begin at its
@@ -82,6 +86,9 @@ pub(super) fn burst(
         label: runs[run].label.clone(),
         time: [begin, begin + STRETCH],
         times: (mean / middle).sqrt(),
+        rows: (loud.iter())
+            .map(|&(_, _, run, first)| first..(first + length).min(starts[run + 1]))
+            .collect(),
     })
 }
 

@@ -366,7 +366,7 @@ impl Source<'_> {
         out
     }
 
-    fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {
+    pub(super) fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {
         let known = || self.slopes.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(slopes) = known().get(&(r, joint)) {
             return Ok(slopes.clone());

@@ -3,9 +3,11 @@
 use super::DiagnoseError;
 use super::bench::Loaded;
 use super::bodies::Fitting;
+use super::columns::Source;
 use super::outcome::Waterfall;
 use super::profile::Profile;
 use super::refit::Refit;
+use super::rounding::rounding;
 use super::search::with;
 use crate::robot::{Robot, title_of};
 
@@ -48,6 +50,10 @@ pub(super) struct Descent {
     pub(super) train: Fall,
     /// With the coefficients of the training data; none without a hold-out.
     pub(super) holdout: Option<Fall>,
+    /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
+    louder: f64,
+    /// What the steps of the encoders leave in them, joint by joint.
+    rounding: Vec<f64>,
 }
 
 impl Descent {
@@ -62,6 +68,7 @@ impl Descent {
         described: usize,
         loaded: &Loaded,
         sealed: Option<&Loaded>,
+        source: &Source,
     ) -> Result<Self, DiagnoseError> {
         let bench = fitting.bench;
         let n = bench.robot.joints.len();
@@ -91,7 +98,35 @@ impl Descent {
             }
             holdout = Some(fall);
         }
-        Ok(Self { train, holdout })
+        let rounding = match sealed {
+            Some(sealed) => rounding(
+                &bench.source(sealed, &source.values)?,
+                &sealed.rows,
+                &sealed.position_filter()?,
+            )?,
+            None => vec![0.0; n],
+        };
+        let slower = sealed.map_or(1.0, |sealed| bench.rate() / sealed.treatment.sample_rate);
+        Ok(Self {
+            train,
+            holdout,
+            louder: slower.max(1.0).sqrt(),
+            rounding,
+        })
+    }
+
+    /// Noise floors of the data that a share of the gap is of, the training's given.
+    pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
+        (floors.iter().zip(&self.rounding))
+            .map(|(floor, rounding)| rounding.max(self.louder * floor))
+            .collect()
+    }
+
+    /// Noise of the data held back with what the steps of the encoders leave besides: less than that is no finding.
+    pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
+        (floors.iter().zip(&self.rounding))
+            .map(|(floor, rounding)| rounding.hypot(self.louder * floor))
+            .collect()
     }
 
     /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
@@ -99,7 +134,7 @@ impl Descent {
     pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> f64 {
         let fall = self.holdout.as_ref().unwrap_or(&self.train);
         let (mut gap, mut closed) = (0.0, 0.0);
-        for (j, floor) in floors.iter().enumerate() {
+        for (j, floor) in self.floors(floors).iter().enumerate() {
             let [refitted, last] = fall.whole(j);
             let first = if changed {
                 fall.frozen[j].max(refitted)
@@ -136,6 +171,7 @@ impl Descent {
                 train: list(&self.train, j),
                 holdout: (self.holdout.as_ref()).map_or_else(Vec::new, |fall| list(fall, j)),
                 floor: floors[j],
+                holdout_floor: self.floors(floors)[j],
             })
             .collect()
     }

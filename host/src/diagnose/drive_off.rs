@@ -9,6 +9,8 @@ use crate::prepare::Recording;
 
 /// Shortest recording, s: what changes slowly must have had time to change.
 const SHORTEST: f64 = 0.5;
+/// How far a joint may swing whose recording does not say that its drive was off, rad or m.
+const SWINGS: f64 = 0.05;
 /// Pieces whose means tell how well the whole mean is known, however the noise is correlated within one.
 const PIECES: usize = 10;
 /// Samples of a piece, at least.
@@ -25,16 +27,23 @@ pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, Diagnose
         what,
     };
     let mut efforts: Vec<Vec<f64>> = Vec::new();
-    let (mut seconds, mut driven) = (0.0, None);
+    let (mut seconds, mut driven, mut told) = (0.0, None, false);
+    let mut ways: Vec<[f64; 2]> = Vec::new();
     recording.each_block(65_536, &mut |block| {
         efforts.resize(block.joints.len(), Vec::new());
         for (all, joint) in efforts.iter_mut().zip(&block.joints) {
             all.extend(&joint.tau);
         }
+        ways.resize(block.joints.len(), [f64::INFINITY, f64::NEG_INFINITY]);
+        for ([low, high], joint) in ways.iter_mut().zip(&block.joints) {
+            (*low, *high) =
+                (joint.q.iter()).fold((*low, *high), |(l, h), q| (l.min(*q), h.max(*q)));
+        }
         if let (Some(first), Some(last)) = (block.t.first(), block.t.last()) {
             seconds += last - first;
         }
         let modes = (block.extra.iter()).filter(|(name, _)| name == "mode");
+        told |= modes.clone().next().is_some();
         let drives = [Mode::Holding, Mode::Running, Mode::Stopping].map(|m| f64::from(m as u8));
         let mut on = modes
             .flat_map(|(_, values)| values)
@@ -46,6 +55,14 @@ pub fn sensor_zeros(recording: &dyn Recording) -> Result<Vec<[f64; 2]>, Diagnose
         return Err(wrong(format!(
             "its column mode holds {mode}, in which the rig drives; disarmed is {}",
             Mode::Disarmed as u8
+        )));
+    }
+    let moves = (ways.iter()).position(|[low, high]| high - low > SWINGS);
+    if let (Some(joint), false) = (moves, told) {
+        let [low, high] = ways[joint];
+        return Err(wrong(format!(
+            "joint {} goes from {low:.3} to {high:.3} in it, and no column mode says that the drive was off",
+            joint + 1
         )));
     }
     let samples = efforts.iter().map(Vec::len).min().unwrap_or(0);
@@ -115,6 +132,18 @@ mod tests {
         }
         // The square of Student's t with nine degrees of freedom has the mean 9/7.
         assert!((0.9..1.8).contains(&squares), "{squares}");
+    }
+
+    #[test]
+    fn a_joint_that_moves_was_driven_unless_its_mode_says_otherwise() {
+        let mut moving = recorded(2.0, f64::from(Mode::Disarmed as u8), 1);
+        for (q, t) in (moving.blocks[0].joints[0].q.iter_mut()).zip(0..) {
+            *q = 0.3 * (0.01 * f64::from(t)).sin();
+        }
+        assert!(sensor_zeros(&moving).is_ok());
+        moving.blocks[0].extra.clear();
+        let text = sensor_zeros(&moving).unwrap_err().to_string();
+        assert!(text.contains("joint 1 goes from -0.300 to 0.300"), "{text}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The workflow from recordings to a verdict.
 
+mod even;
 mod follow;
 mod pass;
 mod steps;
@@ -7,6 +8,7 @@ mod unbelieved;
 
 use rig_shared::effects::Kind;
 
+use self::even::{Uneven, borrowed};
 pub(super) use self::follow::Follower;
 use self::pass::Pass;
 use self::steps::{change_step, reconcile, refuse, refuse_guesses, steps};
@@ -27,13 +29,16 @@ use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Verdict};
 use super::profile::Profile;
 use super::refit::{Refit, open};
+use super::rounding::rounding;
 use super::runs::{Run, copies, in_sessions};
-use super::sanity::{faults, too_short_to_learn};
+use super::sanity::{faults, too_short_to_judge, too_short_to_learn};
 use super::search::with;
 use super::sentences::offsets;
 use super::stated::{Now, Stated};
+use super::touched::touched;
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
+use super::zeros::{another_zero, another_zero_held};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
 use crate::report::{format_unit, format_value};
@@ -61,11 +66,18 @@ pub fn diagnose(
     stated.pulls_told = (1..training.len()).contains(&unburdened);
     let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
     stated.no_offsets = options.no_offsets && !told;
+    let mut uneven = Uneven::default();
     loop {
-        // Each time around more of the description's effects are held.
-        match attempt(robot, &stated, training, holdout, options, progress) {
-            Ok(Attempt::Done(result)) => return Ok(*result),
+        // Each time around more of the description's effects are held, or another recording is brought to an even step.
+        let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
+        let [training, holdout] = [&training, &holdout].map(|recordings| borrowed(recordings));
+        match attempt(robot, &stated, &training, &holdout, options, progress) {
+            Ok(Attempt::Done(mut result)) => {
+                result.0.words.extend(uneven.told());
+                return Ok(*result);
+            }
             Ok(Attempt::Hold(more)) => stated = more,
+            Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {}
             Err(DiagnoseError::Prepare(error)) => {
                 let Some(fault) = of_preparing(&error) else {
                     return Err(error.into());
@@ -97,7 +109,7 @@ fn attempt(
     let mut sealed = if holdout.is_empty() {
         None
     } else {
-        Some(bench.load(holdout)?)
+        Some(bench.load_held(holdout)?)
     };
     in_sessions(&mut loaded.runs, &[]);
     if let Some(sealed) = &mut sealed {
@@ -118,6 +130,9 @@ fn attempt(
     }
     if let (true, Some(sealed)) = (wrong.is_empty(), &sealed) {
         wrong = faults(&stated.robot, &sealed.runs)?;
+        if wrong.is_empty() {
+            wrong.extend(too_short_to_judge(&sealed.runs));
+        }
     }
     if !wrong.is_empty() {
         let fault = (faulty(robot, wrong), robot.clone());
@@ -133,11 +148,23 @@ fn attempt(
     let open = open(&bench, &loaded.rows);
     if !open.is_empty() {
         bench.anchor.hold(&open);
-        loaded = bench.rows(loaded.runs)?;
-        sealed = sealed.map(|s| bench.rows(s.runs)).transpose()?;
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
     }
     let bench = bench;
     progress(0.1);
+    let touches = {
+        let refit = Refit::of(&bench, &loaded.rows)?;
+        let left: Vec<Vec<f64>> = (0..robot.joints.len())
+            .map(|j| refit.base.residual(j))
+            .collect();
+        drop(refit);
+        touched(robot, &left, &mut loaded)
+    };
+    if !touches.is_empty() {
+        loaded = bench.rows(loaded.runs, &loaded.treatment)?;
+    }
     let lead = {
         let refit = Refit::of(&bench, &loaded.rows)?;
         let source = bench.source(&loaded, &bench.anchor.values(&refit.before.values))?;
@@ -158,7 +185,7 @@ fn attempt(
         let runs = loaded.runs.clone();
         drop((first, beside));
         drop(loaded.rows);
-        again = moved(&bench, bench.rows(runs)?, &more)?;
+        again = moved(&bench, bench.rows(runs, &loaded.treatment)?, &more)?;
         let pass = Pass::over(&bench, &again, options, progress)?;
         (&again, better, pass)
     } else {
@@ -206,6 +233,7 @@ fn attempt(
         rows: &loaded.rows,
         coordinates: &coordinates,
         pairs: floor::repeats(&loaded.runs),
+        rounding: rounding(&search.source, &loaded.rows, &loaded.position_filter()?)?,
         base: &refit.base,
         seed: options.seed,
     };
@@ -274,14 +302,15 @@ fn attempt(
         described,
         loaded,
         sealed.as_ref(),
+        &search.source,
     )?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
         let mut named: Vec<(usize, [f64; 2])> = (judged.chosen[described..].iter())
             .map(|p| (p.candidate.joint, held.whole(p.candidate.joint)))
             .collect();
         named.dedup_by_key(|(joint, _)| *joint);
-        judged.left = left_of_held(robot, &held.last(), &judged.floors)
-            .or_else(|| not_carried_over(robot, &named, &judged.floors));
+        judged.left = left_of_held(robot, &held.last(), &descent.noise_held(&judged.floors))
+            .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
     }
     // Where a motion was repeated, what is left has been held against the noise.
     if judged.left.is_none() && judge.pairs.is_empty() {
@@ -309,7 +338,6 @@ fn attempt(
             after,
             loaded,
             held.as_ref().zip(sealed.as_ref()),
-            &bench.position_filter()?,
             options,
         )?
     };
@@ -394,6 +422,7 @@ fn attempt(
         coordinates: &coordinates,
         floors,
         seed: options.seed,
+        sensor_zeros: &options.sensor_zeros,
         drawn: Drawn {
             runs: &drawn.runs,
             rows: &drawn.rows,
@@ -412,6 +441,22 @@ fn attempt(
     let told = diagnosis.described.iter().map(|d| d.text.clone());
     diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
+    diagnosis.words.extend(touches);
+    {
+        let [before, after] = [&refit.base, &with(&refit.base, chosen, None)].map(|fit| fit.rms(0));
+        let told = another_zero(robot, &search.source, &refit.base, 1.0 - after / before)?;
+        let held = match (&told, &sealed) {
+            (None, Some(sealed)) if left => {
+                let residual = bench.remaining(sealed, stands.fitted(), chosen)?;
+                another_zero_held(&bench, sealed, &search.source.values, &residual)?
+            }
+            _ => None,
+        };
+        diagnosis.words.extend(told.or(held));
+    }
+    diagnosis
+        .words
+        .extend(sealed.as_ref().and_then(|sealed| own_rate(&bench, sealed)));
     diagnosis
         .words
         .extend(read_off(robot, &options.sensor_zeros));
@@ -423,6 +468,21 @@ fn attempt(
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
+}
+
+/// That a hold-out is judged at another rate than that of the recordings learnt from.
+fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
+    let [learnt, held] = [bench.rate(), sealed.treatment.sample_rate];
+    let label = &sealed.runs.first()?.label;
+    (learnt != held).then(|| {
+        format!(
+            "{label} is judged at its own rate, {held:.1} Hz where {learnt:.1} Hz were learnt from{}.",
+            match learnt > held {
+                true => format!("; its noise floor is taken as {:.2} times that of the others", (learnt / held).sqrt()),
+                false => String::new(),
+            }
+        )
+    })
 }
 
 /// Orders over the motor's turn of the waves among effects of a joint.

@@ -38,6 +38,8 @@ pub(super) struct Found<'a, 'r> {
     pub(super) floors: &'a [f64],
     /// Of the bootstrap.
     pub(super) seed: u64,
+    /// What the sensors read with the drive off, where that was recorded.
+    pub(super) sensor_zeros: &'a [[f64; 2]],
     /// Recordings to draw.
     pub(super) drawn: Drawn<'a>,
 }

@@ -98,6 +98,13 @@ pub(super) fn from_repeats(
     (used > 0.0).then(|| (squares / used).sqrt())
 }
 
+/// RMS of a signal over the rows that are used.
+pub(super) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
+    let used = || signal.iter().zip(keep).filter(|(_, keep)| **keep);
+    let squares: f64 = used().map(|(x, _)| x * x).sum();
+    (squares / used().count().max(1) as f64).sqrt()
+}
+
 /// RMS on rows `period` s apart of what a joint's torque reading varies by from sample to sample: less noise than that there
 /// cannot be. None where the reading is no longer white, because something has filtered it before.
 ///

@@ -33,6 +33,8 @@ const QUARTER: f64 = 0.25;
 /// treatment of a true structure leaves up to a tenth more. The difference between a right name's law and the rig's may
 /// leave its shadow besides.
 pub(super) const BEYOND_FLOOR: f64 = 1.12;
+/// … and so much of the torque itself: filters and differences of a step each are not the derivatives that they stand for.
+const TREATED: f64 = 3e-3;
 /// … and beyond this it is so much that names are guesses at it.
 const FAR_BEYOND_FLOOR: f64 = 1.25;
 /// … of the data held back, whose motion is another.
@@ -69,6 +71,8 @@ pub(super) struct Judge<'a, 'r> {
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Runs that repeat each other.
     pub(super) pairs: Vec<(usize, usize)>,
+    /// What the steps of the encoders leave in each joint's torque, which repeats with the motion.
+    pub(super) rounding: Vec<f64>,
     /// The refitted nominal model on them.
     pub(super) base: &'a Fit<'r>,
     /// Of the bootstrap.
@@ -171,8 +175,10 @@ impl Judge<'_, '_> {
             let loud = bursts[j].as_ref().map_or(0.0, |burst| burst.share);
             (1.0 - loud).max(0.0).sqrt()
         };
-        let of_repeats =
-            |counts, j| floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), counts, j);
+        let of_repeats = |counts, j: usize| {
+            let noise = floor::from_repeats(self.rows, &self.pairs, &fit.residual(j), counts, j);
+            noise.map(|noise| noise.max(self.rounding[j]))
+        };
         let (floors, quiet): (Vec<f64>, Vec<f64>) = (0..bursts.len())
             .map(|j| {
                 (
@@ -267,14 +273,18 @@ impl Judge<'_, '_> {
             let explained = (self.base.rms(joint).powi(2) - rms * rms).max(0.0);
             let own = chosen.iter().filter(|p| p.candidate.joint == joint);
             let shadow = own.map(shadow).fold(0.0, f64::max) * explained;
-            rms * rms > (BEYOND_FLOOR * floor).powi(2) + shadow
+            let rounded = floor.powi(2) + (BEYOND_FLOOR * self.rounding[joint]).powi(2);
+            let torque = floor::rms(&self.rows.torque[joint], &self.rows.keep[joint]);
+            let noise = (BEYOND_FLOOR * floor).powi(2).max(rounded) + (TREATED * torque).powi(2);
+            rms * rms > noise + shadow
                 && (shown.is_some() || self.away_from_reversals(fit, chosen, joint))
         } else {
             shown.is_some()
         };
-        let shown = shown.map_or("It goes with no single coordinate of the motion.", |p| {
-            &p.text
-        });
+        let shown = (shown.or(places.first())).map_or(
+            "It goes with no coordinate of the motion beyond chance.",
+            |p| &p.text,
+        );
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         let text = format!(
             "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {shown}",
@@ -307,7 +317,11 @@ impl Judge<'_, '_> {
             used += counts;
         }
         let floor = floor::from_repeats(self.rows, &self.pairs, &residual, Some(&clear), joint);
-        floor.is_none_or(|floor| squares > used * (BEYOND_FLOOR * floor).powi(2))
+        floor.is_none_or(|floor| {
+            let noise = (BEYOND_FLOOR * floor).powi(2);
+            squares
+                > used * noise.max(floor.powi(2) + (BEYOND_FLOOR * self.rounding[joint]).powi(2))
+        })
     }
 
     /// What differs between the recordings with all that pulls on a joint and those without, where no effect explains it.
@@ -342,6 +356,7 @@ impl Judge<'_, '_> {
             label,
             time: [from, to],
             times,
+            ..
         } = burst;
         Remainder {
             joint: name.clone(),

@@ -85,14 +85,15 @@ pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded,
         return Ok(loaded);
     }
     let mut runs = loaded.runs;
+    // A reading is late by a share of its sample: of a recording at another rate by as much of its own.
+    let rate = bench.rate();
     for run in &mut runs {
-        let rate = run.rate;
         for (joint, lead) in run.joints.iter_mut().zip(by) {
             joint.tau = later(&joint.tau, lead * rate);
             joint.taken_off = joint.taken_off.take().map(|held| later(&held, lead * rate));
         }
     }
-    bench.rows(runs)
+    bench.rows(runs, &loaded.treatment)
 }
 
 /// A signal `samples` (at most one, either way) later, by the cubic through the four nearest samples.

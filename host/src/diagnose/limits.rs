@@ -7,13 +7,15 @@ use rig_shared::effects::{Effect, Kind, Need};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::columns::Candidate;
-use super::experiment::{self, Held, Nominal};
+use super::experiment::{self, Held, Nominal, OFF_LOG, PULLS_OFF};
 use super::finish::Found;
 use super::fit::{Fit, dot_self};
 use super::outcome::{Detectable, Diagnosis, NextExperiment, NotTestable};
 use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT, grid};
+use super::pull::told_apart;
 use super::search::{is_first_law, is_gear, rivals, with};
 use super::{DiagnoseError, testable};
+use crate::report::{format_unit, format_value};
 use crate::robot::Robot;
 use crate::simulate::Model;
 
@@ -212,9 +214,13 @@ pub(super) fn next(
         };
         let floor = found.floors[joint];
         if let Some(proposal) = experiment::next(found.robot, joint, &list, held, floor)? {
+            let mut experiment = proposal.experiment;
+            if let Some(again) = given_already(found, joint, &experiment.kind) {
+                experiment.text.insert_str(0, &again);
+            }
             return Ok(Some(NextExperiment {
                 trajectory: proposal.trajectory.map(|t| t.to_toml(found.robot)),
-                ..proposal.experiment
+                ..experiment
             }));
         }
     }
@@ -234,6 +240,21 @@ pub(super) fn next(
             hands: true,
             trajectory: None,
         }))
+}
+
+/// That what is asked for has been given and was not enough, where it has; a sentence with a space after it.
+fn given_already(found: &Found, joint: usize, kind: &str) -> Option<String> {
+    if kind == OFF_LOG {
+        let [zero, std] = *found.sensor_zeros.get(joint)?;
+        let unit = format_unit(found.robot.joints[joint].kind.units().1);
+        return Some(format!(
+            "The log given with --drive-off reads {} {unit}, which does not decide it: record a longer one, of ten times that length for a third of its uncertainty. ",
+            format_value(zero, std)
+        ));
+    }
+    (kind == PULLS_OFF && told_apart(found.search.source.runs)).then(|| {
+        "The recording given with --pulls-off does not decide it: it has to hold the same motion, for as long as the others. ".to_owned()
+    })
 }
 
 /// An effect with its estimate. What is fitted of a tilt is an angle, which turns gravity's torque.

@@ -10,6 +10,7 @@ pub mod benchmark;
 mod bodies;
 mod burst;
 mod change;
+mod clamped;
 mod columns;
 mod descent;
 mod described;
@@ -33,7 +34,10 @@ mod predicted;
 mod profile;
 mod pull;
 mod quiet;
+#[cfg(test)]
+mod recorded_tests;
 mod refit;
+mod rounding;
 mod rows;
 pub mod runs;
 pub mod sanity;
@@ -45,12 +49,15 @@ mod slopes;
 mod solve;
 mod stated;
 pub mod testable;
+mod touched;
 mod transmission;
 mod type_b;
 pub mod voltage;
 mod waves;
 mod winding;
+mod zeros;
 
+pub use clamped::clamped;
 pub use drive_off::sensor_zeros;
 pub use engine::diagnose;
 pub use outcome::Diagnosis;
@@ -72,6 +79,8 @@ pub struct Options {
     pub seed: u64,
     /// What the sensors read with the drive off, by [`sensor_zeros`]; empty where it was not recorded.
     pub sensor_zeros: Vec<[f64; 2]>,
+    /// Recordings of clamped joints, by [`clamped`]; their voltage alone is learnt from.
+    pub clamped: Vec<Run>,
     /// Whether the description comes from a format without a place for a constant torque, so that its having none says
     /// nothing: the constant is then fitted beside the friction, as in an identification.
     pub no_offsets: bool,
@@ -99,9 +108,17 @@ pub enum DiagnoseError {
         /// Why, a clause.
         what: String,
     },
+    /// A recording that says nothing of a motor at rest.
+    #[error("{label} cannot be taken as recorded with the joints clamped: {what}.")]
+    Clamped {
+        /// Name of the recording.
+        label: String,
+        /// Why and what would be right, a clause.
+        what: String,
+    },
     /// A recording given twice, under two names.
     #[error(
-        "{again} holds the same samples as {label}: a copy says nothing of the noise, and is no motion that was not learnt from; give it once."
+        "{again} holds samples of {label}: a copy, or a piece cut out of it, says nothing of the noise, and is no motion that was not learnt from; give each sample once."
     )]
     Copy {
         /// Name of the first.

@@ -284,6 +284,8 @@ pub struct Waterfall {
     pub holdout: Vec<f64>,
     /// Noise floor.
     pub floor: f64,
+    /// … of the hold-out's rows, of which fewer samples are the mean where it was recorded more slowly.
+    pub holdout_floor: f64,
 }
 
 /// Residual before and after against one coordinate, for a plot.
@@ -344,6 +346,15 @@ pub struct Tried {
 }
 
 impl Waterfall {
+    /// Noise floor of what the models are judged on.
+    pub(crate) fn judged_floor(&self) -> f64 {
+        if self.holdout.is_empty() {
+            self.floor
+        } else {
+            self.holdout_floor
+        }
+    }
+
     /// The models' RMS on the recordings held back, else on those of the fit.
     pub(crate) fn judged(&self) -> &[f64] {
         if self.holdout.is_empty() {
@@ -420,7 +431,7 @@ impl Diagnosis {
                 && self.residual == Residual::Torque
                 && w.models.len() >= self.steps.len() + 2
             {
-                gap += (refitted - w.floor) / w.floor;
+                gap += (refitted - w.judged_floor()) / w.floor;
                 closed += (refitted - last) / w.floor;
             }
         }

@@ -102,6 +102,11 @@ impl Thinning {
         self.spoilt..samples.saturating_sub(self.spoilt).max(self.spoilt)
     }
 
+    /// How long after a run's beginning its first row is, s.
+    pub(super) fn trimmed(&self, run: &Run) -> f64 {
+        self.spoilt as f64 / run.rate
+    }
+
     /// Kept samples of a run of `samples`.
     fn kept(&self, samples: usize) -> impl Iterator<Item = usize> {
         self.sound(samples).step_by(self.step)
@@ -383,13 +388,16 @@ impl Rows {
                 thinning.push(&joint.tau, &mut torque[j]);
                 let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
                 let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
-                let spoilt: Vec<f64> = (joint.qd.iter().zip(joint.recorded().iter()))
+                let mut spoilt: Vec<f64> = (joint.qd.iter().zip(joint.recorded().iter()))
                     .map(|(v, tau)| {
                         let limited =
                             low.is_some_and(|l| *tau <= l) || high.is_some_and(|h| *tau >= h);
                         f64::from(u8::from(v.abs() < threshold || limited))
                     })
                     .collect();
+                for part in &run.left_out {
+                    spoilt[part.clone()].fill(1.0);
+                }
                 let mut share = Vec::new();
                 thinning.push(&spoilt, &mut share);
                 keep[j].extend(share.iter().map(|s| *s < SPOILT));

@@ -1,6 +1,9 @@
 //! Recordings as the diagnosis works on them: whole stretches in memory, filtered and differentiated.
 
 use std::borrow::Cow;
+use std::ops::Range;
+
+use rig_shared::safety::Mode;
 
 use super::DiagnoseError;
 use crate::data::Block;
@@ -55,6 +58,10 @@ pub struct Run {
     pub t: Vec<f64>,
     /// Joint by joint.
     pub joints: Vec<JointRun>,
+    /// Samples at which the rig says that its drive was off: the motor's voltage is not the inverter's there.
+    pub coasting: Vec<Range<usize>>,
+    /// Samples that are left out, because something happened in them that is not of the rig.
+    pub left_out: Vec<Range<usize>>,
     /// Whether everything that could pull on the joints from outside had been taken off.
     pub unburdened: bool,
 }
@@ -81,22 +88,42 @@ impl Run {
     }
 }
 
-/// Two recordings that hold the same samples of position and effort, one perhaps for longer, by their places among those given.
+/// Rows that no two recordings share by chance, of which so many differ from the one before.
+const SHARED: (usize, usize) = (64, 16);
+/// Places of a recording that are looked for in another, and how many of them are found of a piece that both hold: two may begin
+/// alike without any noise.
+const LOOKED_FOR: (usize, usize) = (8, 3);
+
+/// Two recordings that hold the same samples of position and effort, or a piece of them, by their places among those given.
 pub(super) fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
-    let same = |a: &Run, b: &Run| {
-        let rows = a.len().min(b.len());
-        let begins_alike = |a: &[f64], b: &[f64]| {
-            let [a, b] = [a, b].map(|all| &all[..rows.min(all.len())]);
-            a == b
-        };
-        2 * rows >= a.len().max(b.len())
-            && (a.joints.iter().zip(&b.joints))
-                .all(|(a, b)| begins_alike(&a.q_raw, &b.q_raw) && begins_alike(&a.tau, &b.tau))
-    };
     (0..runs.len()).find_map(|b| {
-        let first = (0..b).find(|&a| !runs[b].is_empty() && same(runs[a], runs[b]))?;
+        let first = (0..b).find(|&a| holds_of(runs[a], runs[b]) || holds_of(runs[b], runs[a]))?;
         Some((first, b))
     })
+}
+
+/// Whether a recording holds a piece of another.
+fn holds_of(whole: &Run, other: &Run) -> bool {
+    let (rows, steps) = SHARED;
+    let (places, enough) = LOOKED_FOR;
+    let room = other.len().saturating_sub(rows);
+    let found = |k: &usize| {
+        let from = room * k / (places - 1);
+        let piece = |signal: &'_ [f64]| signal.get(from..from + rows).map(<[f64]>::to_vec);
+        let pieces: Option<Vec<[Vec<f64>; 2]>> = (other.joints.iter())
+            .map(|joint| Some([piece(&joint.tau)?, piece(&joint.q_raw)?]))
+            .collect();
+        let Some(pieces) = pieces else { return false };
+        let alive = |part: &[f64]| part.windows(2).filter(|w| w[0] != w[1]).count() >= steps;
+        let moves = pieces.iter().any(|[tau, q]| alive(tau) && alive(q));
+        moves
+            && (0..=whole.len().saturating_sub(rows)).any(|at| {
+                let same = |signal: &[f64], piece: &[f64]| signal.get(at..at + rows) == Some(piece);
+                (whole.joints.iter().zip(&pieces))
+                    .all(|(own, [tau, q])| same(&own.tau, tau) && same(&own.q_raw, q))
+            })
+    };
+    (0..places).filter(found).count() >= enough
 }
 
 /// The least step between two positions of a joint as recorded, rad or m: of an encoder a count, of a filtered position hardly
@@ -170,6 +197,30 @@ pub fn runs_of(
         Ok(())
     })?;
     Ok(gathered.differentiated(position))
+}
+
+/// Reads a recording in which nothing moves: positions as they are, without velocity and acceleration.
+///
+/// # Errors
+/// What reading gives.
+pub(super) fn at_rest(recording: &dyn Recording) -> Result<Vec<Run>, DiagnoseError> {
+    let mut gathered = Gathered::new(&recording.label(), 0, 0.0);
+    recording.each_block(65_536, &mut |block| {
+        gathered.push(block);
+        Ok(())
+    })?;
+    let mut runs = gathered.runs;
+    for run in &mut runs {
+        if let (Some(first), Some(last)) = (run.t.first(), run.t.last()) {
+            run.rate = (run.t.len() - 1) as f64 / (last - first).max(f64::MIN_POSITIVE);
+        }
+        for joint in &mut run.joints {
+            joint.q.clone_from(&joint.q_raw);
+            joint.qd = vec![0.0; joint.q.len()];
+            joint.qdd.clone_from(&joint.qd);
+        }
+    }
+    Ok(runs)
 }
 
 /// [`runs_of`] over blocks that are there.
@@ -282,6 +333,20 @@ fn append(run: &mut Run, block: Block) {
         }
     }
     let before = run.t.len();
+    let modes = block.extra.iter().find(|(name, _)| name == "mode");
+    for (k, mode) in modes
+        .iter()
+        .flat_map(|(_, values)| values.iter().enumerate())
+    {
+        if *mode != f64::from(Mode::Disarmed as u8) {
+            continue;
+        }
+        let sample = before + k;
+        match run.coasting.last_mut() {
+            Some(last) if last.end == sample => last.end += 1,
+            _ => run.coasting.push(sample..sample + 1),
+        }
+    }
     run.t.extend(block.t);
     for (to, from) in run.joints.iter_mut().zip(block.joints) {
         to.q_raw.extend(from.q);

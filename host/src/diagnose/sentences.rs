@@ -224,7 +224,7 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         w.joint,
         number(*described),
         number(*refitted),
-        number(w.floor),
+        number(w.judged_floor()),
     ))
 }
 

@@ -177,6 +177,7 @@ pub fn design(
                 condition_number: best.values.condition_number,
                 seed: options.seed,
             }),
+            drive_off: None,
             joints: robot
                 .joints
                 .iter()

@@ -83,6 +83,7 @@ fn build(kind: StagedKind, a: &Allowance) -> Option<Trajectory<f64>> {
                 amplitude: a.distance,
                 velocity: a.velocity,
                 acceleration: a.acceleration,
+                again: 0.0,
             }))
         }
         StagedKind::Staircase => {
@@ -313,6 +314,7 @@ pub fn staged(
         let file = TrajectoryFile {
             robot: robot.name.clone(),
             design: None,
+            drive_off: None,
             joints: robot
                 .joints
                 .iter()

@@ -28,7 +28,9 @@ pub struct Experiment {
     pub settings: Vec<RequestBody>,
     /// The motion; none to record a rig at rest, disarmed.
     pub trajectory: Option<Trajectory<f32>>,
-    /// How long to record after the trajectory has ended, or in all without one, s.
+    /// When to switch the bridge off in the middle of it, so that the joint coasts, s after its start.
+    pub drive_off: Option<f64>,
+    /// How long to record after the trajectory has ended or the bridge is off, or in all without one, s.
     pub rest: f64,
 }
 
@@ -47,10 +49,11 @@ impl Experiment {
 
     /// Telemetry samples that the experiment takes.
     pub fn samples(&self, sample_rate: f64) -> u64 {
-        let motion = self
+        let whole = self
             .trajectory
             .as_ref()
             .map_or(0.0, |t| t.duration_micros() as f64 * 1e-6);
+        let motion = self.drive_off.map_or(whole, |off| off.min(whole));
         ((motion + self.rest) * sample_rate).ceil() as u64
     }
 }
@@ -80,6 +83,9 @@ pub fn run<P: Port>(
         session.request(RequestBody::SetTrajectory(trajectory.clone()))?;
         when_calibrated(session, RequestBody::Arm)?;
         settings.at_start = vec![RequestBody::Start];
+        // The host's clock is as good as needed: it coasts from wherever it is told to.
+        settings.later =
+            (experiment.drive_off).map(|after| ((after * rate).ceil() as u64, RequestBody::Disarm));
     }
     let mut broken_off = false;
     let recorded = record(session, &settings, |event| {

@@ -50,6 +50,8 @@ pub struct RecordSettings {
     pub samples: Option<u64>,
     /// Requests to send as soon as the stream runs, in this order (`Arm`, `Start`, …).
     pub at_start: Vec<RequestBody>,
+    /// A request to send once so many samples have come or are known to be missing.
+    pub later: Option<(u64, RequestBody)>,
     /// Longest silence of the rig before the recording is given up.
     pub silence: Duration,
 }
@@ -59,6 +61,7 @@ impl Default for RecordSettings {
         Self {
             samples: None,
             at_start: Vec::new(),
+            later: None,
             silence: Duration::from_secs(1),
         }
     }
@@ -162,7 +165,11 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         session: &mut Session<P>,
         settings: &RecordSettings,
     ) -> Result<(), LinkError> {
+        let mut later = settings.later.as_ref();
         while !self.is_complete(settings) {
+            if let Some((_, body)) = later.take_if(|(after, _)| self.so_far() >= *after) {
+                session.request(body.clone())?;
+            }
             let Some(report) = session.next_report(settings.silence)? else {
                 return Err(LinkError::Silent(settings.silence));
             };
@@ -172,9 +179,14 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         Ok(())
     }
 
-    fn is_complete(&self, settings: &RecordSettings) -> bool {
+    /// Samples that have come or are known to be missing.
+    fn so_far(&self) -> u64 {
         let counts = self.reassembly.counts();
-        let so_far = counts.received + counts.missing;
+        counts.received + counts.missing
+    }
+
+    fn is_complete(&self, settings: &RecordSettings) -> bool {
+        let so_far = self.so_far();
         self.broken_off || settings.samples.is_some_and(|wanted| so_far >= wanted)
     }
 

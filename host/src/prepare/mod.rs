@@ -28,7 +28,10 @@ pub(crate) use motion::later;
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub(crate) use pieces::{first_block, stretch};
+pub(crate) use rate::same_rate;
+pub(crate) use resample::{LONGEST_STEP, Resampled};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
+pub(crate) use spool::interpolated;
 pub use spool::{Spooled, surveyed};
 pub use survey::{JointSurvey, Survey};
 pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
@@ -66,7 +69,7 @@ pub enum PrepareError {
     },
     /// The rows are not evenly spaced in time.
     #[error(
-        "{label} is not evenly sampled: near line {line} the time advances by {step} s where {mean} s is usual (the longest step is {longest} s); rows that vary that much are not interpolated, so record or resample it at a constant rate."
+        "{label} is not evenly sampled: near line {line} the time advances by {step:.6} s where {mean:.6} s is usual (the longest step is {longest:.6} s); rows that vary that much are not interpolated, so record or resample it at a constant rate."
     )]
     Irregular {
         /// The recording.
@@ -106,7 +109,7 @@ pub enum PrepareError {
     },
     /// A hold-out whose rate cannot hold the band of the fit.
     #[error(
-        "{label} is sampled at {rate} Hz and can be judged up to {most:.3} Hz only; the fit's band reaches to {band:.3} Hz. Record the hold-out faster, or fit in a lower band with --decimation."
+        "{label} is sampled at {rate:.1} Hz and can be judged up to {most:.1} Hz only; the fit's band reaches to {band:.1} Hz. Record the hold-out faster (`rig identify` can also fit in a lower band, with --decimation)."
     )]
     BandBeyondRate {
         /// The recording.

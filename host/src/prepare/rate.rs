@@ -80,7 +80,7 @@ pub(super) fn trimmed_rows(cutoff: f64, decimation: usize, rate: f64) -> usize {
     ((3.0 * rate / cutoff).ceil() as usize).max(3 * decimation)
 }
 
-pub(super) fn same_rate(survey: &Survey, rate: f64) -> Result<(), PrepareError> {
+pub(crate) fn same_rate(survey: &Survey, rate: f64) -> Result<(), PrepareError> {
     if (survey.sample_rate / rate - 1.0).abs() > 0.01 {
         return Err(PrepareError::RateMismatch {
             label: survey.label.clone(),
@@ -154,7 +154,7 @@ mod tests {
         assert!(matches!(error, PrepareError::BandBeyondRate { .. }));
         let sentence = error.to_string();
         assert!(
-            sentence.contains("20.000 Hz") && sentence.contains("16.000 Hz"),
+            sentence.contains("20.0 Hz") && sentence.contains("16.0 Hz"),
             "{sentence}"
         );
     }

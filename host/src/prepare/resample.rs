@@ -6,38 +6,65 @@ use crate::data::{Block, JointColumns};
 
 /// Longest step between neighbouring rows, as a multiple of the even one, over which it is interpolated: one row may
 /// be missing, two may not.
-pub(super) const LONGEST_STEP: f64 = 2.5;
+pub(crate) const LONGEST_STEP: f64 = 2.5;
 
 /// A recording of which every stretch between gaps is interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …, its time stamps believed.
 ///
 /// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
 /// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
 /// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Time, position, torque,
-/// measured derivatives, temperature and the link's position are kept, other columns left out.
-pub(super) struct Resampled<'a> {
+/// measured derivatives, reference, voltage, temperature and the link's position are kept, other columns left out.
+pub(crate) struct Resampled<'a> {
     source: &'a dyn Recording,
     period: f64,
 }
 
 impl<'a> Resampled<'a> {
-    pub(super) fn new(source: &'a dyn Recording, period: f64) -> Self {
+    pub(crate) fn new(source: &'a dyn Recording, period: f64) -> Self {
         Self { source, period }
     }
 }
 
-/// Signals of a block in a fixed order: position, torque, then velocity, acceleration, temperature and the link's position where
-/// recorded.
+/// Signals of a block in a fixed order: position, torque, then what else was recorded.
 fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
-    [
-        Some(&joint.q),
-        Some(&joint.tau),
-        joint.qd.as_ref(),
-        joint.qdd.as_ref(),
-        joint.temperature.as_ref(),
-        joint.link.as_ref(),
-    ]
-    .into_iter()
-    .flatten()
+    let optional = [
+        &joint.qd,
+        &joint.qdd,
+        &joint.reference,
+        &joint.voltage,
+        &joint.temperature,
+        &joint.link,
+    ];
+    ([&joint.q, &joint.tau].into_iter()).chain(optional.into_iter().flatten())
+}
+
+/// The same to be filled.
+fn signals_mut(joint: &mut JointColumns) -> impl Iterator<Item = &mut Vec<f64>> {
+    let optional = [
+        &mut joint.qd,
+        &mut joint.qdd,
+        &mut joint.reference,
+        &mut joint.voltage,
+        &mut joint.temperature,
+        &mut joint.link,
+    ];
+    ([&mut joint.q, &mut joint.tau].into_iter()).chain(optional.into_iter().flatten())
+}
+
+/// No rows of the same columns.
+fn empty_as(joints: &[JointColumns]) -> Vec<JointColumns> {
+    let none = |column: &Option<Vec<f64>>| column.as_ref().map(|_| Vec::new());
+    (joints.iter())
+        .map(|j| JointColumns {
+            qd: none(&j.qd),
+            qdd: none(&j.qdd),
+            reference: none(&j.reference),
+            voltage: none(&j.voltage),
+            temperature: none(&j.temperature),
+            link: none(&j.link),
+            ..JointColumns::default()
+        })
+        .collect()
 }
 
 /// One row: time, line, values of all signals.
@@ -117,15 +144,7 @@ impl Grid {
                 let values: Vec<f64> = (s..s + count).map(|s| self.value(s, from, t)).collect();
                 s += count;
                 let joint = &mut self.out.joints[j];
-                let lists = [
-                    Some(&mut joint.q),
-                    Some(&mut joint.tau),
-                    joint.qd.as_mut(),
-                    joint.qdd.as_mut(),
-                    joint.temperature.as_mut(),
-                    joint.link.as_mut(),
-                ];
-                for (list, value) in lists.into_iter().flatten().zip(values) {
+                for (list, value) in signals_mut(joint).zip(values) {
                     list.push(value);
                 }
             }
@@ -160,18 +179,7 @@ impl Grid {
     /// What is ready, as a block.
     fn take(&mut self) -> Block {
         let empty = Block {
-            joints: self
-                .out
-                .joints
-                .iter()
-                .map(|j| JointColumns {
-                    qd: j.qd.as_ref().map(|_| Vec::new()),
-                    qdd: j.qdd.as_ref().map(|_| Vec::new()),
-                    temperature: j.temperature.as_ref().map(|_| Vec::new()),
-                    link: j.link.as_ref().map(|_| Vec::new()),
-                    ..Default::default()
-                })
-                .collect(),
+            joints: empty_as(&self.out.joints),
             continues: true,
             ..Default::default()
         };
@@ -215,17 +223,7 @@ impl Recording for Resampled<'_> {
                 grid.end();
                 give(&mut grid)?;
                 grid.out = Block {
-                    joints: block
-                        .joints
-                        .iter()
-                        .map(|j| JointColumns {
-                            qd: j.qd.as_ref().map(|_| Vec::new()),
-                            qdd: j.qdd.as_ref().map(|_| Vec::new()),
-                            temperature: j.temperature.as_ref().map(|_| Vec::new()),
-                            link: j.link.as_ref().map(|_| Vec::new()),
-                            ..Default::default()
-                        })
-                        .collect(),
+                    joints: empty_as(&block.joints),
                     ..Default::default()
                 };
                 started = true;

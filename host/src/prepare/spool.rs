@@ -79,6 +79,13 @@ impl Recording for Spooled<'_> {
     }
 }
 
+/// What is said of a recording whose rows were interpolated to an even step.
+pub(crate) fn interpolated(label: &str, longest: f64, mean: f64) -> String {
+    format!(
+        "{label}: the rows come at uneven steps (up to {longest:.6} s, {mean:.6} s on average); they were interpolated to an even step, their time stamps believed."
+    )
+}
+
 /// Surveys of recordings, and the recordings as they are to be used: each read from its source once, and
 /// interpolated to an even step where its rows come at steps that differ from their mean by more than a fifth but
 /// never by more than two and a half times of it. Its survey then says so in [`Survey::note`].
@@ -102,10 +109,7 @@ pub fn surveyed<'a>(
             {
                 let even = Resampled::new(recording, mean);
                 let mut survey = Survey::take(&even, joints)?;
-                survey.note = Some(format!(
-                    "{}: the rows come at uneven steps (up to {longest:.6} s, {mean:.6} s on average); they were interpolated to an even step, their time stamps believed.",
-                    recording.label()
-                ));
+                survey.note = Some(interpolated(&recording.label(), longest, mean));
                 surveys.push(survey);
                 usable.push(Box::new(even));
             }

@@ -175,7 +175,7 @@ impl Survey {
             })
             .collect();
         let (mut rows, mut longest, mut run) = (0u64, 0u64, 0u64);
-        let (mut span, mut steps) = (0.0, 0u64);
+        let (mut span, mut steps, mut longest_step) = (0.0, 0u64, 0.0f64);
         let mut last_time = 0.0;
         let mut recent = [0.0; STEPS_TOGETHER];
         let (mut shortest, mut widest) = ((f64::INFINITY, 0u64), (0.0f64, 0u64));
@@ -193,6 +193,7 @@ impl Survey {
                 if follows {
                     let step = t - last_time;
                     span += step;
+                    longest_step = longest_step.max(step);
                     steps += 1;
                     let line = block.first_line + k as u64;
                     if run >= STEPS_TOGETHER as u64 {
@@ -249,7 +250,7 @@ impl Survey {
                     line,
                     step,
                     mean,
-                    longest: widest.0,
+                    longest: longest_step,
                 });
             }
         }

@@ -30,7 +30,7 @@ pub struct Chirp<T> {
     pub end_hz: T,
     /// How it runs between them.
     pub sweep: Sweep,
-    /// Length with both ramps, µs.
+    /// Length of one pass with both ramps, µs.
     pub duration_us: u32,
     /// Length of the ramps of the amplitude at start and end, µs.
     pub ramp_us: u32,
@@ -40,6 +40,9 @@ pub struct Chirp<T> {
     pub velocity: T,
     /// Largest acceleration a, rad/s².
     pub acceleration: T,
+    /// Share of the first pass at which a second one of the same length follows, at most 1; 0 for none. What is linear
+    /// answers both alike, play and friction do not.
+    pub again: T,
 }
 
 impl<T: Scalar> Chirp<T> {
@@ -53,7 +56,14 @@ impl<T: Scalar> Chirp<T> {
             amplitude: f(self.amplitude),
             velocity: f(self.velocity),
             acceleration: f(self.acceleration),
+            again: f(self.again),
         }
+    }
+
+    /// Length of all passes, µs.
+    pub(super) fn duration_micros(&self) -> u64 {
+        let twice = T::ZERO.lt(self.again);
+        u64::from(self.duration_us) << u32::from(twice)
     }
 
     /// What its phase follows from.
@@ -112,8 +122,18 @@ impl<T: Scalar> Chirp<T> {
         (amplitude, angle, w, w1)
     }
 
+    /// The same time in its pass, and the share at which that runs.
+    #[inline(always)]
+    fn pass(&self, time: Elapsed<T>) -> (Elapsed<T>, T) {
+        match time.micros.checked_sub(u64::from(self.duration_us)) {
+            Some(micros) => (Elapsed { micros, ..time }, self.again),
+            None => (time, T::ONE),
+        }
+    }
+
     #[inline(always)]
     pub(super) fn at(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
+        let (time, share) = self.pass(time);
         let (amplitude, angle, w, w1) = self.carrier(time, phase);
         let (s, c) = angle.sin_cos();
         let sine = Reference {
@@ -121,10 +141,11 @@ impl<T: Scalar> Chirp<T> {
             velocity: w * c,
             acceleration: w1 * c - w.squared() * s,
         };
-        sine.under(amplitude)
+        sine.under(amplitude).scaled(share)
     }
 
-    /// What position, velocity and acceleration cannot exceed at a time, whatever the phase.
+    /// What position, velocity and acceleration cannot exceed at a time of the first pass, whatever the phase; the second
+    /// stays below.
     pub(super) fn bound(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         let (amplitude, _, w, w1) = self.carrier(time, phase);
         let two = T::from_f64(2.0);

@@ -167,7 +167,9 @@ impl<T: Scalar> Trajectory<T> {
                 check(m.ramp_us > 0 && m.ramp_us <= m.duration_us / 2, "ramp_us")?;
                 check(positive(&m.amplitude), "amplitude")?;
                 check(positive(&m.velocity), "velocity")?;
-                check(positive(&m.acceleration), "acceleration")
+                check(positive(&m.acceleration), "acceleration")?;
+                let share = T::ZERO.le(m.again) && m.again.le(T::ONE);
+                check(share, "again")
             }
             Self::Staircase(m) => {
                 check(m.levels.iter().all(finite), "levels")?;

@@ -63,6 +63,15 @@ impl<T: Real> Reference<T> {
         }
     }
 
+    /// All three times a number.
+    fn scaled(self, share: T) -> Self {
+        Self {
+            position: share * self.position,
+            velocity: share * self.velocity,
+            acceleration: share * self.acceleration,
+        }
+    }
+
     /// The motion times an envelope that has its own rate and second derivative (product rule).
     fn under(self, envelope: Self) -> Self {
         let two = T::from_f64(2.0);
@@ -140,7 +149,7 @@ impl<T: Scalar> Trajectory<T> {
         match self {
             Self::Hold(micros) => u64::from(*micros),
             Self::Fourier(motion) => motion.duration_micros(),
-            Self::Chirp(motion) => u64::from(motion.duration_us),
+            Self::Chirp(motion) => motion.duration_micros(),
             Self::Staircase(motion) => motion.duration_micros(),
             Self::SlowReversals(motion) => motion.duration_micros(),
             Self::FrictionSweep(motion) => motion.duration_micros(),

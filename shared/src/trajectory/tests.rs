@@ -25,6 +25,7 @@ fn chirp(sweep: Sweep, duration_us: u32) -> Trajectory<f64> {
         amplitude: 0.5,
         velocity: 3.0,
         acceleration: 40.0,
+        again: 0.25,
     })
 }
 
@@ -326,6 +327,7 @@ fn hostile_values_neither_panic_nor_run_for_ever() {
             amplitude: 0.0,
             velocity: 0.0,
             acceleration: 0.0,
+            again: 0.0,
         }),
     ];
     // Frequencies whose ratio no scalar holds.
@@ -338,6 +340,7 @@ fn hostile_values_neither_panic_nor_run_for_ever() {
         amplitude: 0.1,
         velocity: 1.0,
         acceleration: 1.0,
+        again: 0.0,
     });
     let limits = Limits {
         position_low: -3.0_f32,

@@ -43,7 +43,6 @@ use super::search::is_gear;
 use super::solve::{Solution, jackknifed, solve};
 use super::type_b::widened;
 use super::{DiagnoseError, Options};
-use crate::prepare::LowPass;
 use crate::robot::unit_of;
 
 pub(super) use self::tell::tell;
@@ -73,7 +72,7 @@ struct Named {
 }
 
 /// What the encoders on the links say, joint by joint where there are any. `after` are the coefficients of the free nominal
-/// directions, with their covariance; `filter` is that of the positions.
+/// directions, with their covariance.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -83,16 +82,19 @@ pub(super) fn across(
     after: &Solution,
     loaded: &Loaded,
     sealed: Option<(&Source, &Loaded)>,
-    filter: &LowPass,
     options: &Options,
 ) -> Result<Vec<Across>, DiagnoseError> {
     let mut list = Vec::new();
     for joint in 0..source.robot.joints.len() {
-        let Some(training) = Equation::of(source, joint, loaded, filter, None)? else {
+        let Some(training) = Equation::of(source, joint, loaded, &loaded.position_filter()?, None)?
+        else {
             continue;
         };
         let held = match sealed {
-            Some((of, sealed)) => Equation::of(of, joint, sealed, filter, Some(&training.sides))?,
+            Some((of, sealed)) => {
+                let filter = sealed.position_filter()?;
+                Equation::of(of, joint, sealed, &filter, Some(&training.sides))?
+            }
             None => None,
         };
         list.extend(

@@ -80,6 +80,10 @@ impl Method for Diagnose {
                 .map(|log| crate::diagnose::sensor_zeros(log))
                 .transpose()?
                 .unwrap_or_default(),
+            clamped: (made.clamped.as_ref())
+                .map(|log| crate::diagnose::clamped(log))
+                .transpose()?
+                .unwrap_or_default(),
             no_offsets: false,
         };
         let (diagnosis, _) = made.diagnose(&made.robot, &options)?;

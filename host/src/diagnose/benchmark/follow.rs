@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::answer::{Answer, Method};
 use super::cases::Case;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::experiment::{FILE, OFF_LOG, PULLS_OFF};
+use crate::diagnose::experiment::{FILE, Family, OFF_LOG, PULLS_OFF};
 use crate::diagnose::scenario::Made;
 use crate::excite::TrajectoryFile;
 
@@ -39,6 +39,9 @@ pub(super) fn follow(
     };
     let more = match &next.trajectory {
         Some(trajectory) if next.kind == PULLS_OFF => Some(unburdened(case, made, trajectory)),
+        Some(trajectory) if next.kind == Family::LockedRotor.name() => {
+            Some(clamped(case, made, trajectory))
+        }
         Some(trajectory) => Some(moved(case, made, trajectory)),
         None if next.kind == OFF_LOG => Some(at_rest(case, made)),
         None => None,
@@ -56,6 +59,14 @@ fn moved(case: &Case, made: &Made, trajectory: &str) -> Result<Made, DiagnoseErr
     let mut more = made.clone();
     (more.further).push(case.scenario.proposed(made, &file(trajectory)?)?);
     Ok(more)
+}
+
+/// The recordings with that of the rig whose shaft is clamped.
+fn clamped(case: &Case, made: &Made, trajectory: &str) -> Result<Made, DiagnoseError> {
+    Ok(Made {
+        clamped: Some(case.scenario.clamped(made, &file(trajectory)?)?),
+        ..made.clone()
+    })
 }
 
 /// The recordings with that of the proposed motion of the rig with what pulls on it taken off.

@@ -45,15 +45,7 @@ impl<'a> Pass<'a> {
         let refit = Refit::of(bench, &loaded.rows)?;
         let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
         // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
-        let across = across(
-            &source,
-            &bench.anchor,
-            &refit.before,
-            loaded,
-            None,
-            &bench.position_filter()?,
-            options,
-        )?;
+        let across = across(&source, &bench.anchor, &refit.before, loaded, None, options)?;
         let mut library = library(bench.robot, &loaded.runs, &options.without);
         library.retain(|c| !refutes(&across, c));
         let mut described = bench.stated.free();

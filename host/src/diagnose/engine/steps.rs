@@ -22,6 +22,7 @@ pub(super) fn steps(
     motion: &[Option<Errors>],
 ) -> Result<Vec<Step>, DiagnoseError> {
     let Judged { chosen, floors, .. } = judged;
+    let held_floors = descent.floors(floors);
     let trials = search.trials();
     let source = &search.source;
     let mut steps = Vec::new();
@@ -45,7 +46,7 @@ pub(super) fn steps(
             holdout_rms: unseen,
             motion_rms: (motion[at].as_ref().zip(motion[at + 1].as_ref()))
                 .map(|pair| <[&Errors; 2]>::from(pair).map(|e| e.rms(j))),
-            gap_closed: closed(unseen.unwrap_or(train), floors[j]),
+            gap_closed: closed(unseen.unwrap_or(train), held_floors[j]),
             why: String::new(),
         };
         if search.is_measured(&profile.candidate) {
@@ -108,6 +109,7 @@ pub(super) fn change_step(
     floors: &[f64],
 ) -> Option<Step> {
     let about = change.effect?.about();
+    let held_floors = descent.floors(floors);
     let j = robot.joints.len() - 1;
     let [refitted, last] = descent.train.whole(j);
     let train = [descent.train.frozen[j].max(refitted), last];
@@ -125,7 +127,7 @@ pub(super) fn change_step(
         train_rms: train,
         holdout_rms: unseen,
         motion_rms: None,
-        gap_closed: closed(unseen.unwrap_or(train), floors[j]),
+        gap_closed: closed(unseen.unwrap_or(train), held_floors[j]),
         why: change.words.clone(),
     })
 }

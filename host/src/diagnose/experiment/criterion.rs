@@ -47,28 +47,29 @@ impl Course {
     pub(super) fn of(place: &Place, primitive: &Primitive) -> Self {
         let [_, cosine, sine, ..] = place.nominal;
         let length = cosine.hypot(sine);
-        let duration = primitive.trajectory.duration();
+        let duration = primitive.duration();
         let rows = (duration * FLOOR_RATE).ceil().clamp(1.0, MOST as f64) as usize;
         let period = duration / rows as f64;
         let [inertia, _, _, viscous, coulomb, offset] = place.nominal;
         let instants = primitive.hands.passes().iter().map(|[mass, gravity]| {
             let mut direction = 0.0;
             let mut before: Option<f64> = None;
-            (0..rows)
-                .map(|k| {
+            let way = primitive.way(place, rows);
+            (way.into_iter().enumerate())
+                .map(|(k, (at, driven))| {
                     let time = (k as f64 + 0.5) * period;
-                    let at = primitive.trajectory.at(time);
                     if at.velocity != 0.0 {
                         direction = at.velocity.signum();
                     }
                     let position = primitive.start + at.position;
                     let load = (mass * inertia - place.drive_inertia).max(0.0) * at.acceleration
                         + gravity * place.weight(position);
-                    let drive_torque = load
+                    let asked = load
                         + place.drive_inertia * at.acceleration
                         + viscous * at.velocity
                         + coulomb * direction
                         + offset;
+                    let drive_torque = if driven { asked } else { 0.0 };
                     let drive_rate = before.map_or(0.0, |b| (drive_torque - b) / period);
                     before = Some(drive_torque);
                     Instant {

@@ -27,8 +27,8 @@ const TAKE_OFF: &str = "Take off whatever can pull on the joint from outside (ho
 const TURNED: &str = "Run the motion twice: as the robot stands, and with its base turned by 180 degrees about the vertical or, better, laid on its side so that gravity does nothing. Record t, q{k} and tau{k} each time and diagnose each by itself, the second with `gravity` in its description as it then acts on the base. What belongs to gravity changes with the base; what belongs to the encoder, the gear or a cable stays.";
 const GRAVITY_CLOSES: &str = "Run the reversals where gravity is strongest, and again about a position where it does nothing; record t, q{k} and tau{k}. Gravity keeps the teeth together, so lost motion from backlash shows at the second place only; what winds up by friction or twist shows at both. A second encoder on the link (ql{k}) shows it directly.";
 const FAST_AND_SLOW: &str = "Run the sine, and again at a third of its speed; record t, q{k} and tau{k}. An error of the encoder or of the timing grows with the square of the speed, inertia included; a torque of gear, gravity or cable stays the same at both.";
-const BEYOND_RESONANCE: &str = "Run the chirp, and again at a third of its amplitude; record t, q{k} and tau{k} at 500 Hz or more. A delay goes on turning the phase in proportion to the frequency; a twisting shaft has an antiresonance, which a payload moves to lower frequency; play changes with the amplitude.";
-const CURRENT_TOO: &str = "Record the motor's current i{k} beside its voltage u{k} during the reversals; with the shaft locked by hand or clamp, a few steps of the voltage each way do as well. What the bridge loses stands between voltage and current; friction stands in the current itself.";
+const BEYOND_RESONANCE: &str = "Run the chirp, whose second pass is smaller; record t, q{k} and tau{k} at 500 Hz or more. A delay goes on turning the phase in proportion to the frequency; a twisting shaft has an antiresonance, which a payload moves to lower frequency; play changes with the amplitude.";
+const CURRENT_TOO: &str = "Record the motor's current i{k} beside its voltage u{k}: with the joint clamped, so that the controller makes steps of the torque each way of positions that it cannot reach (give that recording with --clamped), or, where it cannot be clamped, during slow reversals (with --data). What the bridge loses stands between voltage and current; friction stands in the current itself.";
 const ONE_AT_A_TIME: &str = "Run the motion of this joint alone, the others held, then that of the other joint alone, then both together; record t, q and tau of all joints. A coupling shows in this joint while only the other one moves; what belongs to this joint alone does not.";
 const LIFT: &str = "Run the sine at full speed; record t, q{k} and tau{k}, and give a description identified before the change as --robot. A payload adds inertia in a fixed proportion to its weight, a tilt adds none.";
 const TWO_LOADS: &str = "Run the constant speeds twice: as the robot is, and with a payload of about half the link's mass; record t, q{k} and tau{k} and diagnose each by itself, the second with the payload in its description. What belongs to load or current grows with it, what belongs to the position or the magnets stays.";
@@ -69,12 +69,12 @@ pub(super) fn split([a, b]: [Kind; 2]) -> Split {
         by_hand(
             "current-and-voltage",
             CURRENT_TOO,
-            Some(Family::NestedReversals),
+            Some(Family::LockedRotor),
         )
     } else if has("inertia_coupling") {
         made("one-joint-at-a-time", ONE_AT_A_TIME, Some(Family::Sine))
     } else if is("joint_elasticity", "measurement_delay") {
-        made("chirp", BEYOND_RESONANCE, Some(Family::Chirp))
+        made(Family::Chirp.name(), BEYOND_RESONANCE, Some(Family::Chirp))
     } else if has("backlash") || has("joint_elasticity") {
         made(
             Family::ReversalsUnderLoad.name(),

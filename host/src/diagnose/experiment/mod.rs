@@ -22,6 +22,7 @@ use rig_shared::trajectory::Trajectory;
 pub use criterion::{FLOOR_RATE, Held};
 pub use lookup::{OFF_LOG, PULLS_OFF};
 pub use place::Nominal;
+pub(super) use primitives::COASTING;
 pub use primitives::{Family, Hands};
 
 use super::DiagnoseError;
@@ -32,7 +33,7 @@ use crate::robot::Robot;
 use criterion::{Course, predictable};
 use lookup::{confused, split};
 use place::Place;
-use primitives::{Primitive, of_family};
+use primitives::{Primitive, clamped, of_family};
 
 /// The file that the experiment's text speaks of; the caller writes it beside `diagnosis.json`.
 pub const FILE: &str = "next_experiment.toml";
@@ -140,7 +141,7 @@ pub fn next(
             text,
             file: Some(FILE.to_owned()),
             separation: Some(*apart),
-            duration: Some(primitive.hands.passes().len() as f64 * primitive.trajectory.duration()),
+            duration: Some(primitive.hands.passes().len() as f64 * primitive.duration()),
             hands: primitive.hands != Hands::None || pulls_off.is_some(),
             trajectory: None,
         },
@@ -188,7 +189,7 @@ type Apart = (Primitive, f64);
 /// Distance that the same motion would give in one second: what lasts longer decides more by lasting alone.
 fn rate((primitive, apart): &Apart) -> f64 {
     let passes = primitive.hands.passes().len() as f64;
-    apart / (passes * primitive.trajectory.duration()).max(1.0).sqrt()
+    apart / (passes * primitive.duration()).max(1.0).sqrt()
 }
 
 /// The motion that takes the closest pair apart fastest, of those that decide; where none does, the one that takes them
@@ -201,7 +202,7 @@ fn best(place: &Place, rivals: &[(Effect<f64>, Nominal)], floor: f64) -> Option<
             break;
         }
         let mut own: Option<Apart> = None;
-        for family in Family::ALL {
+        for family in Family::MOVING {
             for primitive in of_family(place, family, hands) {
                 let course = Course::of(place, &primitive);
                 let apart = closest(&course, rivals, place.revolute, floor);
@@ -258,10 +259,18 @@ fn nearest(
 
 /// How the motion is run, sentences.
 fn running(robot: &Robot, primitive: &Primitive) -> String {
-    let (start, seconds) = (primitive.start, primitive.trajectory.duration());
+    let (start, seconds) = (primitive.start, primitive.duration());
     let how = if robot.joints.len() == 1 {
+        let clamp = match primitive.family {
+            Family::LockedRotor => ", clamp it",
+            _ => "",
+        };
+        let after = match primitive.drive_off {
+            Some(_) => format!(" --seconds {COASTING}"),
+            None => String::new(),
+        };
         format!(
-            "bring the joint to {start:.4} and run it with `rig record --robot R --trajectory {FILE} --home {start:.4} --out next.csv`"
+            "bring the joint to {start:.4}{clamp} and run it with `rig record --port PORT --robot R --trajectory {FILE} --home {start:.4}{after} --out next.csv` (`--emulated` for the emulated rig; {FILE} lies in the folder of --out)"
         )
     } else {
         format!(
@@ -298,6 +307,7 @@ fn file_of(robot: &Robot, joint: usize, stand: &[f64], primitive: &Primitive) ->
     TrajectoryFile {
         robot: robot.name.clone(),
         design: None,
+        drive_off: primitive.drive_off,
         joints: joints.collect(),
     }
 }
@@ -313,20 +323,31 @@ fn by_lookup(
     let found = split(pair);
     let mut text = found.text.replace("{k}", &(joint + 1).to_string());
     let motion = found.motion.zip(place).and_then(|(family, place)| {
-        let list = of_family(place, family, Hands::None);
-        list.into_iter().next().map(|p| (p, place.stand.clone()))
+        let first = |family| of_family(place, family, Hands::None).into_iter().next();
+        let primitive = match family {
+            // Steps of the torque where they are known, else of the friction.
+            Family::LockedRotor => clamped(place).or_else(|| first(Family::NestedReversals)),
+            other => first(other),
+        };
+        Some((primitive?, place.stand.clone()))
     });
+    let kind = match &motion {
+        Some((primitive, _)) if found.motion == Some(Family::LockedRotor) => {
+            primitive.family.name()
+        }
+        _ => found.kind,
+    };
     if let Some((primitive, _)) = &motion {
         text = format!("{text} {}", running(robot, primitive));
     }
     Proposal {
         experiment: NextExperiment {
-            kind: found.kind.to_owned(),
+            kind: kind.to_owned(),
             separates,
             text,
             file: motion.as_ref().map(|_| FILE.to_owned()),
             separation: None,
-            duration: motion.as_ref().map(|(p, _)| p.trajectory.duration()),
+            duration: motion.as_ref().map(|(p, _)| p.duration()),
             hands: found.hands,
             trajectory: None,
         },

@@ -5,8 +5,9 @@ use rig_shared::trajectory::Trajectory;
 
 use super::super::DiagnoseError;
 use super::criterion::Held;
-use super::primitives::Hands;
+use super::primitives::{COASTING, Hands, Primitive};
 use crate::batch::ModelBatch;
+use crate::emulated::Nameplate;
 use crate::identify::chain_of;
 use crate::robot::{JointKind, Robot};
 
@@ -16,6 +17,12 @@ pub type Nominal = [f64; 6];
 
 /// Share of the torque limit that may be used.
 const TORQUE: f64 = 0.8;
+/// Steps of half a period of a joint that coasts.
+const COAST_STEPS: u32 = 10;
+/// Period in which such a joint is looked at, s.
+const COAST_PERIOD: f64 = 0.01;
+/// Share of the friction that is counted on to keep a joint within its range.
+const SURE_OF_FRICTION: f64 = 0.5;
 /// Instants at which the torque is looked at.
 const LOOKS: usize = 2000;
 
@@ -26,7 +33,11 @@ pub(super) struct Place {
     pub(super) high: f64,
     pub(super) velocity: f64,
     pub(super) acceleration: f64,
-    torque: Option<f64>,
+    pub(super) torque: Option<f64>,
+    /// Torque per position error that the rig's controller answers with, where it is known; N·m/rad or N/m.
+    pub(super) stiffness: Option<f64>,
+    /// Whether the robot has no other joint.
+    pub(super) alone: bool,
     /// Where all joints stand.
     pub(super) stand: Vec<f64>,
     /// Middle of the range.
@@ -85,6 +96,8 @@ impl Place {
                 .acceleration
                 .unwrap_or(10.0 * limits.velocity * limits.velocity / (high - low)),
             torque: limits.torque,
+            stiffness: stiffness(robot, joint),
+            alone: robot.joints.len() == 1,
             stand,
             middle,
             heavy: middle,
@@ -131,6 +144,61 @@ impl Place {
         if self.revolute { "rad" } else { "m" }
     }
 
+    pub(super) fn effort_unit(&self) -> &'static str {
+        if self.revolute { "N*m" } else { "N" }
+    }
+
+    /// Position, velocity and acceleration of the joint with its drive off at the middles of so many periods (s), with a share of
+    /// its dry and viscous friction: it stops where friction holds its weight.
+    pub(super) fn coast(
+        &self,
+        [mut position, mut velocity]: [f64; 2],
+        friction: f64,
+        period: f64,
+        count: usize,
+    ) -> Vec<[f64; 3]> {
+        let [inertia, _, _, viscous, coulomb, offset] = self.nominal;
+        let step = period / f64::from(2 * COAST_STEPS);
+        let mut tick = || {
+            let pull = self.weight(position) + offset;
+            let held = friction * coulomb.abs();
+            let direction = if velocity != 0.0 {
+                velocity.signum()
+            } else if pull.abs() <= held {
+                return [position, 0.0, 0.0];
+            } else {
+                -pull.signum()
+            };
+            let acceleration =
+                -(pull + friction * viscous.abs() * velocity + held * direction) / inertia;
+            let next = velocity + acceleration * step;
+            // Dry friction turns nothing round.
+            velocity = if next * direction < 0.0 { 0.0 } else { next };
+            position += velocity * step;
+            [position, velocity, acceleration]
+        };
+        let mut half = |count: u32| (0..count).map(|_| tick()).last().unwrap_or_default();
+        (0..count)
+            .map(|_| {
+                let middle = half(COAST_STEPS);
+                half(COAST_STEPS);
+                middle
+            })
+            .collect()
+    }
+
+    /// Whether a joint whose drive is switched off stays within its range on half its friction.
+    pub(super) fn stops(&self, primitive: &Primitive) -> bool {
+        let Some(off) = primitive.drive_off else {
+            return true;
+        };
+        let at = primitive.trajectory.at(off);
+        let begin = [primitive.start + at.position, at.velocity];
+        let rows = (COASTING / COAST_PERIOD) as usize;
+        let way = self.coast(begin, SURE_OF_FRICTION, COAST_PERIOD, rows);
+        self.nominal[0] > 0.0 && (way.iter()).all(|[q, ..]| (self.low..=self.high).contains(q))
+    }
+
     /// Torque of gravity per first moment along x.
     pub(super) fn pull_at(&self, q: f64) -> f64 {
         let (sine, cosine) = q.sin_cos();
@@ -165,4 +233,14 @@ impl Place {
             })
         })
     }
+}
+
+/// What the controller answers a position error with: as `rig record` tells the rig, else as the description states it.
+fn stiffness(robot: &Robot, joint: usize) -> Option<f64> {
+    let own = robot.joints.get(joint)?;
+    let told = Nameplate::from_robot(robot)
+        .map(|nameplate| f64::from(nameplate.settings.gains.proportional));
+    let stated =
+        (own.controller.as_ref()).map(|c| c.torque_gain * c.velocity_gain * c.position_gain);
+    told.ok().or(stated).filter(|gain| *gain > 0.0)
 }

@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use rig_shared::safety::Limits;
 use rig_shared::trajectory::{
-    Chirp, Fourier, FrictionSweep, SlowReversals, Staircase, Sweep, Trajectory,
+    Chirp, Fourier, FrictionSweep, Reference, SlowReversals, Staircase, Sweep, Trajectory,
 };
 
 use super::place::Place;
@@ -16,6 +16,19 @@ const BRISKNESS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 /// Longest motion, s; the warm-up alone takes longer.
 const LONGEST: f64 = 120.0;
 const WARM_UP: f64 = 600.0;
+/// What is recorded after the drive is off, s: a geared joint comes to rest in one, a free link swings some times.
+pub(in crate::diagnose) const COASTING: f64 = 5.0;
+/// Shortest time at constant speed on either side of it, s: a host on a slow line is late by less.
+const CRUISE: f64 = 0.25;
+/// Share of the amplitude with which a chirp is repeated.
+const AGAIN: f64 = 0.3;
+/// Levels of a clamped joint, in shares of the torque that may be used: up and down on either side, so that what depends on
+/// the direction shows.
+const LEVELS: [f64; 13] = [
+    0.2, 0.5, 1.0, 0.5, 0.2, 0.05, -0.05, -0.2, -0.5, -1.0, -0.5, -0.2, -0.05,
+];
+/// Share of the torque limit that a clamp and a winding at rest are asked to bear.
+const CLAMPED: f64 = 0.4;
 /// Peaks of the quintic's velocity and acceleration, in distance over time and over time squared.
 const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
 
@@ -28,7 +41,7 @@ pub enum Family {
     NestedReversals,
     /// The same where gravity is strongest, so that it closes a gap.
     ReversalsUnderLoad,
-    /// Swept sine.
+    /// Swept sine, and again at a third of its amplitude.
     Chirp,
     /// A slow way to each of several levels after a rest.
     RampsAfterRest,
@@ -36,11 +49,15 @@ pub enum Family {
     Sine,
     /// A sine repeated for ten minutes from cold.
     WarmUp,
+    /// A constant speed, and in the middle of it the drive is switched off.
+    CoastDown,
+    /// Levels of the position that a clamped joint cannot reach, and so of the torque and the voltage.
+    LockedRotor,
 }
 
 impl Family {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
+    /// All along which a joint moves.
+    pub const MOVING: [Self; 8] = [
         Self::ConstantSpeeds,
         Self::NestedReversals,
         Self::ReversalsUnderLoad,
@@ -48,6 +65,7 @@ impl Family {
         Self::RampsAfterRest,
         Self::Sine,
         Self::WarmUp,
+        Self::CoastDown,
     ];
 
     /// Name in results.
@@ -56,10 +74,12 @@ impl Family {
             Self::ConstantSpeeds => "constant-speed-pairs",
             Self::NestedReversals => "nested-reversals",
             Self::ReversalsUnderLoad => "reversals-under-load",
-            Self::Chirp => "chirp",
+            Self::Chirp => "two-amplitude-chirp",
             Self::RampsAfterRest => "ramps-after-rest",
             Self::Sine => "sine",
             Self::WarmUp => "warm-up",
+            Self::CoastDown => "coast-down",
+            Self::LockedRotor => "locked-rotor-staircase",
         }
     }
 }
@@ -108,8 +128,47 @@ pub(super) struct Primitive {
     /// Where it starts, rad or m.
     pub(super) start: f64,
     pub(super) trajectory: Trajectory<f64>,
+    /// When the drive is switched off, s after the start.
+    pub(super) drive_off: Option<f64>,
     /// Its figures in words.
     pub(super) figures: String,
+}
+
+impl Primitive {
+    /// How long one pass is recorded, s.
+    pub(super) fn duration(&self) -> f64 {
+        (self.drive_off).map_or_else(|| self.trajectory.duration(), |off| off + COASTING)
+    }
+
+    /// Position, velocity and acceleration from the start at the middles of so many pieces of one pass, and whether the drive is on.
+    pub(super) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
+        let period = self.duration() / rows as f64;
+        let time = |k: usize| (k as f64 + 0.5) * period;
+        let off = self.drive_off.unwrap_or(f64::INFINITY);
+        let mut way: Vec<_> = (0..rows)
+            .take_while(|k| time(*k) < off)
+            .map(|k| (self.trajectory.at(time(k)), true))
+            .collect();
+        if way.len() < rows {
+            let from = self.trajectory.at(off);
+            let begin = [self.start + from.position, from.velocity];
+            let coasted = place.coast(begin, 1.0, period, rows - way.len());
+            way.extend(
+                coasted
+                    .into_iter()
+                    .map(|[position, velocity, acceleration]| {
+                        let position = position - self.start;
+                        let at = Reference {
+                            position,
+                            velocity,
+                            acceleration,
+                        };
+                        (at, false)
+                    }),
+            );
+        }
+        way
+    }
 }
 
 fn micros(seconds: f64) -> Option<u32> {
@@ -168,9 +227,9 @@ impl Allowance {
             Family::Chirp => {
                 let start_hz = 0.25 * v / (TAU * a);
                 let end_hz = (4.0 * self.acceleration / (TAU * v)).max(8.0 * start_hz);
-                let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(LONGEST);
+                let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(0.5 * LONGEST);
                 let text = format!(
-                    "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}"
+                    "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}, and again at {AGAIN} of its amplitude"
                 );
                 Some((
                     Trajectory::Chirp(Chirp {
@@ -182,6 +241,7 @@ impl Allowance {
                         amplitude: a,
                         velocity: v,
                         acceleration: self.acceleration,
+                        again: AGAIN,
                     }),
                     text,
                 ))
@@ -202,6 +262,21 @@ impl Allowance {
                     text,
                 ))
             }
+            Family::CoastDown => {
+                let ramp = 1.5 * v / self.acceleration;
+                let travel = (2.0 * a - v * ramp).min(4.0 * CRUISE * v);
+                if travel < 2.0 * CRUISE * v {
+                    return None;
+                }
+                let half = 0.5 * (travel + v * ramp);
+                let sweep = FrictionSweep::new(&[v], travel, ramp, 0.2, self.move_time(half))?;
+                let text = format!(
+                    "a pass at {v:.4} {unit}/s, in the middle of which the drive is switched off and the joint coasts"
+                );
+                Some((Trajectory::FrictionSweep(sweep), text))
+            }
+            // A clamped joint has no speed.
+            Family::LockedRotor => None,
             Family::Sine | Family::WarmUp => {
                 let omega = (v / a).min((self.acceleration / a).sqrt());
                 let period = TAU / omega;
@@ -232,6 +307,41 @@ impl Allowance {
     }
 }
 
+/// When a coast-down's drive is switched off, s after the start: half way through its first pass.
+fn half_way(trajectory: &Trajectory<f64>) -> Option<f64> {
+    let Trajectory::FrictionSweep(sweep) = trajectory else {
+        return None;
+    };
+    let cruise = *sweep.cruise_us.first()?;
+    Some(f64::from(sweep.lead_us + sweep.ramp_us + cruise / 2) * 1e-6)
+}
+
+/// The staircase of a clamped joint; none where the controller's gain or the torque limit is not known.
+pub(super) fn clamped(place: &Place) -> Option<Primitive> {
+    let highest = CLAMPED * place.torque?;
+    let levels = LEVELS.map(|share| share * highest / place.stiffness.unwrap_or(0.0));
+    if !levels.iter().all(|level| level.is_finite()) {
+        return None;
+    }
+    Some(Primitive {
+        family: Family::LockedRotor,
+        hands: Hands::None,
+        start: place.middle,
+        trajectory: Trajectory::Staircase(Staircase {
+            levels: levels.into_iter().collect(),
+            move_us: 200_000,
+            dwell_us: 1_000_000,
+        }),
+        drive_off: None,
+        figures: format!(
+            "thirteen levels of up to {:.5} {} to either side, of which the controller makes up to {highest:.3} {} while the joint is clamped",
+            levels[2],
+            place.unit(),
+            place.effort_unit()
+        ),
+    })
+}
+
 /// All motions of a family at a place, over amplitudes and speeds.
 pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Primitive> {
     let heavy = family == Family::ReversalsUnderLoad;
@@ -245,6 +355,9 @@ pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
         Family::WarmUp => (&[1.0], &[1.0]),
         Family::Chirp | Family::RampsAfterRest => (&[1.0, 0.2], &[1.0, 0.2]),
         Family::ConstantSpeeds => (&[1.0], &[1.0, 0.4, 0.15, 0.05, 0.02]),
+        // What is done by hand between two passes is not done to a joint that coasts: weight may carry it anywhere then.
+        Family::CoastDown if place.alone && hands == Hands::None => (&[1.0], &[1.0, 0.4, 0.15]),
+        Family::CoastDown | Family::LockedRotor => (&[], &[]),
     };
     let limits = Limits {
         position_low: place.low,
@@ -272,17 +385,21 @@ pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Prim
                 // In single precision, as the rig runs it.
                 let runs = trajectory.to_f32().to_f64().check(&limits, start).is_ok();
                 let fits = runs && trajectory.duration() <= long;
-                (fits && place.bears(&trajectory, start, hands)).then_some((trajectory, figures))
-            });
-            if let Some((trajectory, figures)) = found {
-                list.push(Primitive {
+                let drive_off = half_way(&trajectory).filter(|_| family == Family::CoastDown);
+                let primitive = Primitive {
                     family,
                     hands,
                     start,
                     trajectory,
+                    drive_off,
                     figures,
-                });
-            }
+                };
+                (fits
+                    && place.bears(&primitive.trajectory, start, hands)
+                    && place.stops(&primitive))
+                .then_some(primitive)
+            });
+            list.extend(found);
         }
     }
     list

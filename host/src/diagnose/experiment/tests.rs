@@ -133,7 +133,7 @@ fn the_choice_beats_the_other_motions_and_fits_the_limits_and_the_rig() {
         .unwrap()
         .unwrap();
     let mut least = f64::INFINITY;
-    for family in Family::ALL {
+    for family in Family::MOVING {
         for primitive in of_family(&place, family, Hands::None) {
             let other = closest(&Course::of(&place, &primitive), &rivals, true, 0.05);
             let other = (primitive, other);
@@ -159,7 +159,7 @@ fn motions_of_every_family_respect_limits_and_torque() {
             let place = Place::of(&robot, joint, nominal, Held::default())
                 .unwrap()
                 .unwrap();
-            for family in Family::ALL {
+            for family in Family::MOVING {
                 for primitive in of_family(&place, family, Hands::None) {
                     within_limits(&robot, &file_of(&robot, joint, &place.stand, &primitive));
                     count += 1;
@@ -176,7 +176,7 @@ fn motions_of_every_family_respect_limits_and_torque() {
         .unwrap()
         .unwrap();
     assert!(
-        Family::ALL
+        Family::MOVING
             .iter()
             .all(|f| of_family(&place, *f, Hands::None).is_empty())
     );
@@ -373,4 +373,95 @@ fn a_tilt_is_told_from_a_constant_by_a_motion_where_neither_is_in_the_standard_m
     assert!(!held.experiment.hands);
     assert!(held.experiment.separation.unwrap() > DECIDES);
     assert_eq!(ask(Held::default()).experiment.kind, "base-turned");
+}
+
+/// What a joint loses while it coasts is what friction takes, and it stays where that holds its weight.
+#[test]
+fn a_joint_that_coasts_keeps_its_energy_balance_and_its_range() {
+    let robot = robot();
+    let place = Place::of(&robot, 0, NOMINAL, Held::default())
+        .unwrap()
+        .unwrap();
+    let [inertia, cosine, sine, viscous, coulomb, _] = NOMINAL;
+    let mut count = 0;
+    for primitive in of_family(&place, Family::CoastDown, Hands::None) {
+        let off = primitive.drive_off.unwrap();
+        let at = primitive.trajectory.at(off);
+        // In the middle of the pass at constant speed.
+        assert!(at.acceleration.abs() < 1e-9 && at.velocity > 0.0);
+        let period = 1e-4;
+        let begin = [primitive.start + at.position, at.velocity];
+        let way = place.coast(begin, 1.0, period, (COASTING / period) as usize);
+        let energy = |q: f64, v: f64| {
+            let (s, c) = q.sin_cos();
+            0.5 * inertia * v * v + cosine * s - sine * c
+        };
+        let lost: f64 = (way.iter())
+            .map(|[_, v, _]| (viscous * v * v + coulomb * v.abs()) * period)
+            .sum();
+        let [end, speed, _] = *way.last().unwrap();
+        let balance = energy(begin[0], begin[1]) - energy(end, speed) - lost;
+        println!(
+            "{}: {speed:.3} rad/s at {end:.4}, {lost:.5} J lost, {balance:.1e} left over",
+            primitive.figures
+        );
+        assert!(balance.abs() < 2e-3 * lost, "{balance} of {lost}");
+        assert!((way.iter()).all(|[q, ..]| (place.low..=place.high).contains(q)));
+        // It stands where friction holds its weight, and only there.
+        assert_eq!(speed == 0.0, place.weight(end).abs() <= coulomb);
+        count += 1;
+    }
+    assert!(count > 1);
+    // It would fall through the end of a narrow range, and an arm's controller has no such file.
+    let mut narrow = place.clone();
+    (narrow.low, narrow.high) = (-1.0, 1.0);
+    assert!(of_family(&narrow, Family::CoastDown, Hands::None).is_empty());
+    let mut arm = place;
+    arm.alone = false;
+    assert!(of_family(&arm, Family::CoastDown, Hands::None).is_empty());
+}
+
+#[test]
+fn a_clamped_joint_is_asked_for_steps_of_the_torque_within_its_limit() {
+    let robot = robot();
+    let pair = [
+        middle_of_range(Kind::DriveDeadzone),
+        middle_of_range(Kind::Stribeck),
+    ];
+    let found = next(&robot, 0, &pair, Held::default(), 0.05)
+        .unwrap()
+        .unwrap();
+    println!("{}", found.experiment.text);
+    assert_eq!(found.experiment.kind, "locked-rotor-staircase");
+    assert!(found.experiment.hands && found.experiment.text.contains("clamp"));
+    let file = found.trajectory.unwrap();
+    let Trajectory::Staircase(steps) = &file.joints[0].trajectory else {
+        panic!("{file:?}");
+    };
+    let gain = f64::from(
+        crate::emulated::Nameplate::from_robot(&robot)
+            .unwrap()
+            .settings
+            .gains
+            .proportional,
+    );
+    let torques: Vec<f64> = steps.levels.iter().map(|level| gain * level).collect();
+    let limit = robot.joints[0].limits.as_ref().unwrap().torque.unwrap();
+    let highest = torques.iter().copied().fold(0.0, f64::max);
+    assert!(
+        highest > 0.2 * limit && highest < 0.5 * limit,
+        "{torques:?}"
+    );
+    assert!(torques.contains(&-highest));
+    // Whose gain nobody states is asked for slow reversals.
+    let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
+    let mut unknown = emps.clone();
+    unknown.joints[0].controller = None;
+    let asked = |robot: &Robot| {
+        let found = next(robot, 0, &pair, Held::default(), 2.0)
+            .unwrap()
+            .unwrap();
+        found.experiment.kind
+    };
+    assert_eq!(asked(&unknown), "nested-reversals");
 }

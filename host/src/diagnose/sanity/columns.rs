@@ -13,6 +13,8 @@ use crate::robot::{JointKind, Robot};
 const SHORTEST: f64 = 1.0;
 /// Less than this in all holds too few stretches of a motion to learn a name from some and to try it on others, s.
 const LEAST_TO_LEARN: f64 = 5.0;
+/// … and to judge by.
+const LEAST_TO_JUDGE: f64 = 2.0;
 /// Fewer rows than this cannot hold the parameters of one joint.
 const FEWEST: usize = 100;
 /// Share of the moving time at the torque limit that leaves too little to learn from.
@@ -124,6 +126,23 @@ pub(in crate::diagnose) fn too_short_to_learn(runs: &[Run]) -> Option<DataFault>
     too_short_as("training data", &all).or_else(|| (!free.is_empty()).then(of_free).flatten())
 }
 
+/// Recordings held back in which hardly anything moves, so that nothing is to be judged by.
+pub(in crate::diagnose) fn too_short_to_judge(runs: &[Run]) -> Option<DataFault> {
+    let all: Vec<&Run> = runs.iter().collect();
+    let moving: f64 = 0.0 + runs.iter().map(in_motion).sum::<f64>();
+    (moving < LEAST_TO_JUDGE).then(|| {
+        fault(
+            &all,
+            "too-short",
+            About::Recording,
+            "",
+            format!(
+                "The recordings held back hold {moving:.2} s of motion beyond the noise and the steps of its position; nothing is judged by less than {LEAST_TO_JUDGE} s, and half a minute with reversals would be right."
+            ),
+        )
+    })
+}
+
 fn too_short_as(what: &str, runs: &[&Run]) -> Option<DataFault> {
     let time: f64 = (runs.iter())
         .map(|run| run.len() as f64 / run.rate.max(f64::MIN_POSITIVE))
@@ -202,7 +221,9 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 | Implausible::Velocity { joint, .. }
                 | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
                 Implausible::EffortTooLarge { joint, .. }
-                | Implausible::EffortTooSmall { joint, .. } => (*joint, About::TorqueScale),
+                | Implausible::EffortTooSmall { joint, .. }
+                | Implausible::NoEffort { joint } => (*joint, About::TorqueScale),
+                Implausible::Spike { joint, .. } => (*joint, About::Torque),
                 Implausible::NotSeconds { .. } | Implausible::ReferenceScale { .. } => continue,
             };
             let joint = joint.saturating_sub(1);
@@ -211,7 +232,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
             }
             let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
             let kind = match problem {
-                Implausible::Jump { .. } => JUMP,
+                Implausible::Jump { .. } | Implausible::Spike { .. } => JUMP,
                 _ => "unit",
             };
             let mut text = format!("{problem}.");

@@ -24,7 +24,7 @@ mod swaps;
 #[cfg(test)]
 mod tests;
 
-pub(super) use columns::{moves, too_short_to_learn};
+pub(super) use columns::{moves, too_short_to_judge, too_short_to_learn};
 
 use super::outcome::{About, DataFault};
 use super::runs::runs_of_blocks;

@@ -39,7 +39,7 @@ use crate::files::write_whole;
 use crate::plant::PlantConfig;
 use crate::prepare::{InMemory, Recording};
 use crate::robot::{Drive, Robot};
-use record::{Nominal, record};
+use record::{Manner, Nominal, record};
 use size::{Equation, Problem, beyond};
 
 /// Which rig is recorded.
@@ -122,7 +122,7 @@ impl Scenario {
         let motion = reference::reference(self.excitation, seconds, self.seed, 2);
         let other = reference::reference(self.excitation, later, self.seed, 3);
         let recording = |label: &str, motion: &[f64], run: u64| {
-            self.run(&healthy, &robot, motion, run)
+            self.run(&healthy, &robot, motion, run, Manner::Driven)
                 .map(|block| InMemory {
                     label: label.into(),
                     blocks: vec![block],
@@ -138,6 +138,7 @@ impl Scenario {
             further: Vec::new(),
             unburdened: Vec::new(),
             drive_off: None,
+            clamped: None,
             holdout: recording("holdout", &other, 2)?,
             truth: Truth {
                 hidden: self.hidden.clone(),
@@ -164,7 +165,7 @@ impl Scenario {
                 intrusion: None,
                 ..self.clone()
             };
-            scenario.run(config, &robot, &motion, 0)
+            scenario.run(config, &robot, &motion, 0, Manner::Driven)
         };
         let noisy = recorded(&[], &healthy)?;
         let without = recorded(&[], &quiet)?;
@@ -196,6 +197,7 @@ impl Scenario {
         robot: &Robot,
         motion: &[f64],
         run: u64,
+        manner: Manner,
     ) -> Result<Block, DiagnoseError> {
         // The controller is tuned to the rig as it was before anything was hidden in it.
         let equivalent = healthy.equivalent();
@@ -213,6 +215,7 @@ impl Scenario {
             motion,
             seed,
             intrusion,
+            manner,
         ))
     }
 
@@ -321,6 +324,8 @@ pub struct Made {
     pub unburdened: Vec<InMemory>,
     /// The rig with its drive off; none unless asked for.
     pub drive_off: Option<InMemory>,
+    /// … and with the motor's shaft clamped.
+    pub clamped: Option<InMemory>,
     /// Another reference.
     pub holdout: InMemory,
     /// What is true.

@@ -2,12 +2,13 @@
 
 use rig_shared::effects::Kind;
 
-use super::record::drive_off;
+use super::record::{Manner, drive_off};
 use super::reference::RATE;
 use super::{Effect, Made, Scenario, drive_of, rig};
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::experiment::COASTING;
 use crate::diagnose::pull::is_outside;
-use crate::excite::TrajectoryFile;
+use crate::excite::{JointTrajectory, TrajectoryFile};
 use crate::prepare::InMemory;
 
 /// Time to come from rest where the link hangs to where the motion begins, and back, s.
@@ -17,14 +18,26 @@ const RUN: u64 = 3;
 /// … and of the log with the drive off, which lasts so long, s.
 const OFF: (u64, f64) = (4, 2.0);
 
+/// The one joint of a proposed motion.
+fn joint_of(file: &TrajectoryFile) -> Result<&JointTrajectory, DiagnoseError> {
+    (file.joints.first())
+        .ok_or_else(|| DiagnoseError::Scenario("the proposed motion has no joint".into()))
+}
+
+/// Its references from `start` on, for so long (s).
+fn sampled(own: &JointTrajectory, start: f64, duration: f64) -> impl Iterator<Item = f64> {
+    let samples = (duration * RATE).ceil() as usize;
+    (0..samples).map(move |k| start + own.trajectory.at(k as f64 / RATE).position)
+}
+
 impl Scenario {
-    /// Records a motion on the rig that `made` was recorded on, from rest where it hangs and back.
+    /// Records a motion on the rig that `made` was recorded on, from rest where it hangs and back; of one in which the drive is
+    /// switched off until it has come to rest.
     ///
     /// # Errors
     /// [`DiagnoseError::Scenario`] where the file has no joint.
     pub fn proposed(&self, made: &Made, file: &TrajectoryFile) -> Result<InMemory, DiagnoseError> {
-        let own = (file.joints.first())
-            .ok_or_else(|| DiagnoseError::Scenario("the proposed motion has no joint".into()))?;
+        let own = joint_of(file)?;
         let approach = (APPROACH * RATE) as usize;
         let there: Vec<f64> = (0..approach)
             .map(|k| {
@@ -32,16 +45,37 @@ impl Scenario {
                 own.start * s.powi(3) * (10.0 + s * (6.0 * s - 15.0))
             })
             .collect();
-        let samples = (own.trajectory.duration() * RATE).ceil() as usize;
-        let motion = (0..samples).map(|k| own.start + own.trajectory.at(k as f64 / RATE).position);
-        let reference: Vec<f64> = (there.iter().copied())
-            .chain(motion)
-            .chain(there.iter().rev().copied())
-            .collect();
+        let mut reference = there.clone();
+        let Some(off) = file.drive_off else {
+            reference.extend(sampled(own, own.start, own.trajectory.duration()));
+            reference.extend(there.iter().rev());
+            return self.recorded(made, &reference, Manner::Driven);
+        };
+        let from = approach + (off * RATE).ceil() as usize;
+        reference.extend(sampled(own, own.start, off + COASTING));
+        self.recorded(made, &reference, Manner::CoastingFrom(from))
+    }
+
+    /// Records a motion with the motor's shaft clamped where the link hangs.
+    ///
+    /// # Errors
+    /// Those of [`proposed`](Self::proposed).
+    pub fn clamped(&self, made: &Made, file: &TrajectoryFile) -> Result<InMemory, DiagnoseError> {
+        let own = joint_of(file)?;
+        let reference: Vec<f64> = sampled(own, 0.0, own.trajectory.duration()).collect();
+        self.recorded(made, &reference, Manner::Clamped)
+    }
+
+    fn recorded(
+        &self,
+        made: &Made,
+        reference: &[f64],
+        manner: Manner,
+    ) -> Result<InMemory, DiagnoseError> {
         let healthy = rig::healthy(self.seed, &self.noise);
         Ok(InMemory {
             label: "proposed".into(),
-            blocks: vec![self.run(&healthy, &made.robot, &reference, RUN)?],
+            blocks: vec![self.run(&healthy, &made.robot, reference, RUN, manner)?],
         })
     }
 

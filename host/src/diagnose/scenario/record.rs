@@ -8,6 +8,7 @@
 use core::f64::consts::TAU;
 
 use rig_firmware::sample::{Command, Sample};
+use rig_shared::safety::Mode;
 use rig_shared::units::Duty;
 
 use super::reference::RATE;
@@ -52,6 +53,20 @@ impl Intrusion {
         self.torque * (0.5 * TAU * place).sin() * (9.0 * TAU * place).sin().powi(2)
     }
 }
+
+/// How a recording is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Under the controller from the first sample to the last.
+    Driven,
+    /// From this sample on with the drive off, which the rig's mode says.
+    CoastingFrom(usize),
+    /// With the motor's shaft in a clamp.
+    Clamped,
+}
+
+/// Inertia that a shaft in a clamp has as good as, kg·m².
+const CLAMP: f64 = 1e6;
 
 struct Loop {
     drive: Drive,
@@ -100,13 +115,21 @@ impl Loop {
 /// Runs the rig along `reference` and records t, q, torque by the nominal constant, reference, voltage in force
 /// (that of the control period before the sample) and what an encoder on the link reads, where there is one.
 pub(super) fn record(
-    config: PlantConfig,
+    mut config: PlantConfig,
     drive: &Drive,
     nominal: Nominal,
     reference: &[f64],
     seed: u64,
     intrusion: Option<Intrusion>,
+    manner: Manner,
 ) -> Block {
+    let off = match manner {
+        Manner::CoastingFrom(sample) => Some(sample),
+        Manner::Driven | Manner::Clamped => None,
+    };
+    if manner == Manner::Clamped {
+        config.motor.rotor_inertia = CLAMP;
+    }
     let mut control = Loop {
         drive: drive.clone(),
         nominal,
@@ -142,7 +165,8 @@ pub(super) fn record(
         joint.q.push(q);
         joint.tau.push(constant * current);
         links.extend(plant.link_angle());
-        references.push(position);
+        // A rig that does not drive asks for where it is.
+        references.push(if command.bridge { position } else { q });
         voltages.push(f64::from(command.duty.0) * control.supply);
 
         let before = reference.get(k.wrapping_sub(1)).copied();
@@ -153,7 +177,19 @@ pub(super) fn record(
             0.5 * (after - before) * RATE,
             (after - 2.0 * position + before) * RATE * RATE,
         ];
-        command.duty = Duty(control.duty(q, wanted) as f32);
+        command.bridge = off.is_none_or(|off| k + 1 < off);
+        command.duty = Duty(if command.bridge {
+            control.duty(q, wanted) as f32
+        } else {
+            0.0
+        });
+    }
+    if let Some(off) = off {
+        let modes = (0..reference.len()).map(|k| match k < off {
+            true => Mode::Running,
+            false => Mode::Disarmed,
+        });
+        block.extra = vec![("mode".into(), modes.map(|m| f64::from(m as u8)).collect())];
     }
     joint.reference = Some(references);
     joint.voltage = Some(voltages);

@@ -165,6 +165,7 @@ impl Told<'_> {
                 train: self.train.clone(),
                 holdout: self.holdout.clone(),
                 floor: self.floor,
+                holdout_floor: self.floor,
             }],
             tried: self.tried(),
             maps: Vec::new(),

@@ -4,6 +4,7 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::locate::Coordinate;
 use crate::diagnose::rows::{Column, Rows, combined};
+use crate::diagnose::runs::Run;
 use crate::prepare::central_difference;
 use crate::robot::Robot;
 
@@ -29,6 +30,11 @@ pub(super) const FADES: [f64; 11] = [
     0.0, 0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.17, 0.25, 0.5,
 ];
 
+/// Share by which clocks of one rate may differ.
+const SAME_RATE: f64 = 1e-3;
+/// Share of a row's neighbourhood in which the drive may be off, as the low-pass has it: a volt less is a volt in the row.
+const COASTS: f64 = 1e-3;
+
 /// Rows of one joint's voltage with the columns of its winding.
 pub(super) struct Equation {
     /// The voltage stands for the torque, V.
@@ -42,14 +48,16 @@ pub(super) struct Equation {
 }
 
 impl Equation {
-    /// Of a joint; none where its voltage was not recorded throughout or its torque stands for no current.
+    /// Of a joint, over runs in motion and others of it clamped; none where its voltage was not recorded throughout or its torque
+    /// stands for no current.
     ///
     /// # Errors
-    /// [`DiagnoseError::Model`] without runs.
+    /// [`DiagnoseError::Clamped`] at another rate.
     pub(super) fn of(
         robot: &Robot,
         joint: usize,
         loaded: &Loaded,
+        clamped: &[Run],
     ) -> Result<Option<Self>, DiagnoseError> {
         let own = robot.joints.get(joint);
         let Some(drive) = own.and_then(|j| j.drive.as_ref()) else {
@@ -67,7 +75,19 @@ impl Equation {
         let mut columns = vec![Vec::new(); COLUMNS];
         let [mut voltage, mut current, mut speed] = [const { Vec::new() }; 3];
         let mut dead = vec![Vec::new(); FADES.len()];
-        for run in &loaded.runs {
+        let mut keep = Vec::new();
+        let mut starts = vec![0];
+        let rate = loaded.runs[0].rate;
+        for run in loaded.runs.iter().chain(clamped) {
+            if (run.rate / rate - 1.0).abs() > SAME_RATE {
+                return Err(DiagnoseError::Clamped {
+                    label: run.label.clone(),
+                    what: format!(
+                        "it is sampled at {:.1} Hz and the others at {rate:.1} Hz; record it as them",
+                        run.rate
+                    ),
+                });
+            }
             let joint = &run.joints[joint];
             let Some(u) = &joint.voltage else { continue };
             let i: Vec<f64> = (joint.recorded().iter())
@@ -96,8 +116,16 @@ impl Equation {
                 let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
                 thinning.push(&lost, dead);
             }
+            let mut coasts = vec![0.0; i.len()];
+            for own in &run.coasting {
+                coasts[own.clone()].fill(1.0);
+            }
+            let mut share = Vec::new();
+            thinning.push(&coasts, &mut share);
+            keep.extend(share.iter().map(|s| s.abs() < COASTS));
             thinning.pick(&smooth, &mut current);
             thinning.pick(&omega, &mut speed);
+            starts.push(speed.len());
         }
         let count = voltage.len();
         let one = |values: Vec<f64>| -> Column { vec![Some(values)] };
@@ -105,10 +133,10 @@ impl Equation {
             rows: Rows {
                 thinning: thinning.clone(),
                 count,
-                starts: loaded.rows.starts.clone(),
+                starts,
                 period: loaded.rows.period,
                 torque: vec![voltage],
-                keep: vec![vec![true; count]],
+                keep: vec![keep],
                 nominal: columns.into_iter().map(one).collect(),
             },
             dead_zones: dead.into_iter().map(one).collect(),
@@ -145,7 +173,9 @@ impl Equation {
     pub(super) fn rms(&self, values: &[f64], dead_zone: Option<usize>) -> f64 {
         let effect = dead_zone.and_then(|k| self.dead_zones.get(k));
         let columns: Vec<&Column> = self.rows.nominal.iter().chain(effect).collect();
+        let keep = &self.rows.keep[0];
         let squares: f64 = (0..self.rows.count)
+            .filter(|k| keep[*k])
             .map(|k| {
                 let explained: f64 = (columns.iter().zip(values))
                     .map(|(column, value)| column[0].as_ref().map_or(0.0, |c| value * c[k]))
@@ -153,7 +183,7 @@ impl Equation {
                 (self.rows.torque[0][k] - explained).powi(2)
             })
             .sum();
-        (squares / self.rows.count.max(1) as f64).sqrt()
+        (squares / self.rows.used(0).max(1) as f64).sqrt()
     }
 }
 

@@ -87,11 +87,17 @@ pub(super) fn windings(
 ) -> Result<(Vec<Winding>, Vec<String>), DiagnoseError> {
     let (mut found, mut silent) = (Vec::new(), Vec::new());
     for joint in 0..bench.robot.joints.len() {
-        let Some(training) = Equation::of(bench.robot, joint, loaded)? else {
+        let Some(training) = Equation::of(bench.robot, joint, loaded, &options.clamped)? else {
+            let name = &bench.robot.joints[joint].name;
+            if (options.clamped.iter()).any(|run| run.joints[joint].voltage.is_some()) {
+                silent.push(format!(
+                    "The motor voltage of joint {name} with the joints clamped is not used: it takes that of all other recordings beside it, and a drive of its own."
+                ));
+            }
             continue;
         };
         let held = match sealed {
-            Some(sealed) => Equation::of(bench.robot, joint, sealed)?,
+            Some(sealed) => Equation::of(bench.robot, joint, sealed, &[])?,
             None => None,
         };
         match winding(bench, joint, loaded, &training, held.as_ref(), options) {

@@ -3,10 +3,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use crate::diagnose::experiment::{Held, next};
 use crate::diagnose::outcome::Verdict;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Scenario};
 use crate::diagnose::{Options, sensor_zeros};
+use crate::excite::{JointTrajectory, TrajectoryFile};
 use rig_shared::effects::Kind;
+use rig_shared::trajectory::{FrictionSweep, Trajectory};
 
 fn made(hidden: Option<Effect>, seed: u64) -> Made {
     let hidden = hidden.map(|effect| Hidden { joint: 0, effect });
@@ -214,4 +217,138 @@ fn a_column_that_is_no_motor_voltage_says_nothing() {
     assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
     let said = |w: &String| w.starts_with("Nothing is concluded from the motor voltage");
     assert!(found.words.iter().any(said), "{:?}", found.words);
+}
+
+/// With the drive off the motor's voltage is its back-EMF and not the inverter's, and no current flows: a joint that coasts
+/// bends nothing that is said of the winding, and what is in the friction shows in it as well.
+#[test]
+fn a_recording_in_which_the_drive_is_switched_off_is_one_to_learn_from() {
+    let dead = Hidden {
+        joint: 0,
+        effect: Effect::DriveDeadzone { voltage: 0.6 },
+    };
+    let scenario = Scenario {
+        seconds: [30.0, 15.0],
+        ..Scenario::new(vec![dead], 5)
+    };
+    let mut made = scenario.make().unwrap();
+    let volts = |made: &Made| {
+        let (found, _) = made.diagnosed(&made.robot, &Options::default());
+        let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
+        assert_eq!(names, ["drive_deadzone"], "{:?}", found.words);
+        assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
+        found.steps[0].parameters["volts"].value
+    };
+    let before = volts(&made);
+    // A pass at constant speed from which it coasts, four times.
+    let sweep = FrictionSweep::new(&[2.0], 1.2, 0.2, 0.2, 1.0).unwrap();
+    let file = TrajectoryFile {
+        robot: "r".into(),
+        design: None,
+        drive_off: Some(1.4),
+        joints: vec![JointTrajectory {
+            name: "link".into(),
+            start: 0.0,
+            trajectory: Trajectory::FrictionSweep(sweep),
+        }],
+    };
+    let coasting = scenario.proposed(&made, &file).unwrap();
+    let block = &coasting.blocks[0];
+    let mode = &block.extra[0].1;
+    let off = mode.iter().position(|m| *m != mode[0]).unwrap();
+    let joint = &block.joints[0];
+    let speed = (joint.q[off] - joint.q[off - 10]) / (block.t[off] - block.t[off - 10]);
+    assert!((speed - 2.0).abs() < 0.3, "{speed}");
+    // It goes on, without a current.
+    assert!(joint.q[off + 50] > joint.q[off] + 0.03);
+    let largest = joint.tau[off + 20..]
+        .iter()
+        .fold(0.0, |m: f64, t| m.max(t.abs()));
+    println!("coasts from {speed:.2} rad/s, up to {largest:.3} N*m read");
+    assert!(
+        largest
+            < 0.2
+                * joint.tau[..off]
+                    .iter()
+                    .fold(0.0, |m: f64, t| m.max(t.abs()))
+    );
+    made.further = vec![coasting];
+    let after = volts(&made);
+    println!("{before:.4} V, {after:.4} V with it");
+    assert!((after / before - 1.0).abs() < 0.01, "{before} {after}");
+    // Unsaid, it is a voltage that no winding has.
+    made.further[0].blocks[0].extra.clear();
+    let (deaf, _) = made.diagnosed(&made.robot, &Options::default());
+    let told = deaf
+        .steps
+        .first()
+        .map_or(0.0, |s| s.parameters["volts"].value);
+    println!("{told:.4} V where the mode is not said");
+}
+
+/// A clamped shaft has no friction and no back-EMF: the staircase of its torque is between voltage and current alone.
+#[test]
+fn a_clamped_shaft_shows_a_dead_zone() {
+    let dead = Hidden {
+        joint: 0,
+        effect: Effect::DriveDeadzone { voltage: 0.3 },
+    };
+    let scenario = Scenario {
+        seconds: [30.0, 15.0],
+        ..Scenario::new(vec![dead], 5)
+    };
+    let made = scenario.make().unwrap();
+    let rivals = [Kind::DriveDeadzone, Kind::Stribeck].map(|kind| {
+        let nominal = [0.2, 0.0, 1.6, 0.3, 0.4, 0.0];
+        (
+            rig_shared::effects::Effect::new(kind, &[0.3], &[0.05]),
+            nominal,
+        )
+    });
+    let found = next(&made.robot, 0, &rivals, Held::default(), 0.05)
+        .unwrap()
+        .unwrap();
+    assert_eq!(found.experiment.kind, "locked-rotor-staircase");
+    let sure = |options: &Options| {
+        let (found, _) = made.diagnosed(&made.robot, options);
+        let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
+        assert_eq!(names, ["drive_deadzone"], "{:?}", found.data_faults);
+        let volts = &found.steps[0].parameters["volts"];
+        println!("{:.4} V ± {:.4}", volts.value, volts.std);
+        assert!(
+            (volts.value - 0.3).abs() < 3.0 * volts.std,
+            "{}",
+            volts.value
+        );
+        volts.value
+    };
+    let mut options = Options::default();
+    let before = sure(&options);
+    let next_file = found.trajectory.unwrap();
+    let clamped = scenario.clamped(&made, &next_file).unwrap();
+    let joint = &clamped.blocks[0].joints[0];
+    let span = |values: &[f64]| {
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        high - values.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    assert_eq!(span(&joint.q), 0.0);
+    println!("torques over {:.2} N*m", span(&joint.tau));
+    assert!(span(&joint.tau) > 1.0);
+    options.clamped = crate::diagnose::clamped(&clamped).unwrap();
+    let after = sure(&options);
+    assert_ne!(after, before);
+    // It counts: of another drive, with four times the dead zone, it adds to what the rest shows.
+    let other = Scenario {
+        hidden: vec![Hidden {
+            joint: 0,
+            effect: Effect::DriveDeadzone { voltage: 1.2 },
+        }],
+        ..scenario
+    };
+    let worse = other.clamped(&made, &next_file).unwrap();
+    options.clamped = crate::diagnose::clamped(&worse).unwrap();
+    let (mixed, _) = made.diagnosed(&made.robot, &options);
+    let volts = (mixed.steps.first()).map_or(0.0, |step| step.parameters["volts"].value);
+    println!("{volts:.4} V with that of another drive");
+    assert!(volts > 1.1 * before);
 }

@@ -84,6 +84,7 @@ fn staged_motions_keep_the_limits_and_every_kind_survives_its_file() {
     files.push(TrajectoryFile {
         robot: "r \"1\"".into(),
         design: None,
+        drive_off: Some(0.1),
         joints: vec![JointTrajectory {
             name: "link".into(),
             start: 0.1,

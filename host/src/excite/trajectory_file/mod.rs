@@ -24,6 +24,8 @@ pub struct TrajectoryFile {
     pub robot: String,
     /// How it was optimised, where it was.
     pub design: Option<DesignRecord>,
+    /// When the drive is switched off in the middle of the motion, so that the joint coasts, s after the start.
+    pub drive_off: Option<f64>,
     /// One entry a joint, in the robot's order.
     pub joints: Vec<JointTrajectory>,
 }

@@ -20,6 +20,8 @@ struct FileText {
     robot: String,
     #[serde(default)]
     design: Option<Spanned<DesignText>>,
+    #[serde(default)]
+    drive_off: Option<Spanned<f64>>,
     #[serde(rename = "joint")]
     joints: Vec<JointText>,
 }
@@ -63,6 +65,8 @@ enum MotionText {
         amplitude: f64,
         velocity: f64,
         acceleration: f64,
+        #[serde(default)]
+        again: f64,
     },
     Staircase {
         levels: Vec<f64>,
@@ -148,6 +152,7 @@ impl MotionText {
                 amplitude,
                 velocity,
                 acceleration,
+                again,
             } => Trajectory::Chirp(Chirp {
                 start_hz: *start_hz,
                 end_hz: *end_hz,
@@ -165,6 +170,7 @@ impl MotionText {
                 amplitude: *amplitude,
                 velocity: *velocity,
                 acceleration: *acceleration,
+                again: *again,
             }),
             Self::Staircase {
                 levels,
@@ -287,10 +293,23 @@ impl TrajectoryFile {
                 trajectory,
             });
         }
-        Ok(Self {
+        let found = Self {
             robot: file.robot,
             design,
+            drive_off: file.drive_off.as_ref().map(|off| *off.get_ref()),
             joints,
-        })
+        };
+        if let Some(off) = &file.drive_off {
+            let (value, end) = (*off.get_ref(), found.duration());
+            if !(value > 0.0 && value < end) {
+                return Err(wrong(
+                    off.span().start,
+                    format!(
+                        "drive_off is {value} s, but it must lie within the motion, between 0 and {end} s"
+                    ),
+                ));
+            }
+        }
+        Ok(found)
     }
 }

@@ -70,13 +70,21 @@ impl TrajectoryFile {
     /// all joints stand again.
     ///
     /// # Errors
-    /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz.
+    /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz, and a motion in which the drive is switched off:
+    /// how the joint coasts is the rig's to say.
     pub fn sampled(&self, rate: f64) -> Result<SampledReference, ExciteError> {
         if !(1.0..=1e6).contains(&rate) {
             return Err(ExciteError::Option {
                 name: "rate",
                 value: format!("{rate} Hz"),
                 right: "it must be between 1 and 1000000 Hz".into(),
+            });
+        }
+        if let Some(off) = self.drive_off {
+            return Err(ExciteError::Option {
+                name: "time of drive_off",
+                value: format!("{off} s"),
+                right: "samples are of a motion that is driven to its end; run this file with `rig record`, which switches the drive off".into(),
             });
         }
         // A duration that is a whole number of samples must not gain one by rounding.

@@ -79,7 +79,7 @@ fn write_motion(out: &mut String, trajectory: &Trajectory<f64>, unit: &str) {
             put(
                 "duration",
                 number(seconds(m.duration_us)),
-                "s, with both ramps",
+                "s of one pass, with both ramps",
             );
             put(
                 "ramp",
@@ -97,6 +97,9 @@ fn write_motion(out: &mut String, trajectory: &Trajectory<f64>, unit: &str) {
                 number(m.acceleration),
                 &format!("{unit}/s^2, likewise"),
             );
+            if m.again > 0.0 {
+                put("again", number(m.again), "of all that, a second pass");
+            }
         }
         Trajectory::Staircase(m) => {
             put(
@@ -180,6 +183,14 @@ impl TrajectoryFile {
             &quoted(&self.robot),
             "for which it was made",
         );
+        if let Some(off) = self.drive_off {
+            line(
+                &mut out,
+                "drive_off",
+                &number(off),
+                "s after the start the drive is switched off, and the joint coasts",
+            );
+        }
         if let Some(d) = &self.design {
             out.push_str("\n[design]\n");
             line(

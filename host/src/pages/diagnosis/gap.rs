@@ -156,7 +156,7 @@ fn figures(found: &Diagnosis) -> Block {
                 }
                 row.extend([
                     shown.unit.clone(),
-                    format!("{} ×", format_significant(judged / w.floor, 3)),
+                    format!("{} ×", format_significant(judged / w.judged_floor(), 3)),
                 ]);
                 row
             })

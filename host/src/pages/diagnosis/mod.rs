@@ -53,7 +53,7 @@ fn left_over(found: &Diagnosis) -> Option<f64> {
         .iter()
         .filter_map(|w| {
             let rms = w.holdout.last().or(w.train.last())?;
-            (w.floor > 0.0).then(|| rms / w.floor)
+            (w.floor > 0.0).then(|| rms / w.judged_floor())
         })
         .reduce(f64::max)
 }

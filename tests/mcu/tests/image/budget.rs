@@ -156,6 +156,7 @@ fn motions() -> [(&'static str, Trajectory<f32>); 7] {
             amplitude: 0.05,
             velocity: 0.5,
             acceleration: 10.0,
+            again: 0.5,
         })
     };
     let mut harmonics = excitation(41, 5, 1);

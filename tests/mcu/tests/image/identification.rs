@@ -170,6 +170,7 @@ fn equal_bit_for_bit(seed: u64, told: &[RequestBody]) {
             settings: vec![],
             trajectory: Some(motion.clone()),
             rest: 0.2,
+            ..Experiment::default()
         },
     );
     assert!(run.faults.is_empty());

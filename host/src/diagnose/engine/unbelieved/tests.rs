@@ -43,6 +43,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
         rows: &loaded.rows,
         coordinates: &[Vec::new()],
         pairs: Vec::new(),
+        rounding: vec![0.0],
         base: &refit.base,
         seed: 1,
     };

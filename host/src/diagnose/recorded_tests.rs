@@ -1,0 +1,277 @@
+//! What recordings do that has nothing to do with the rig: other rates, uneven steps, a coarse encoder, a touch, a piece cut out.
+
+#![allow(clippy::unwrap_used)]
+
+use rand::{RngExt, SeedableRng};
+
+use super::outcome::Verdict;
+use super::scenario::{Effect, Intrusion, Made, Noise, Scenario};
+use super::{Diagnosis, Options};
+use crate::data::Block;
+use crate::robot::Robot;
+
+const STRIBECK: Effect = Effect::Stribeck {
+    ratio: 1.6,
+    velocity: 0.1,
+};
+
+fn names(found: &Diagnosis) -> Vec<&str> {
+    found.steps.iter().map(|s| s.effect.as_str()).collect()
+}
+
+fn diagnosed(made: &Made) -> (Diagnosis, Robot) {
+    made.diagnosed(&made.robot, &Options::default())
+}
+
+/// Every column by itself.
+fn each_column(block: &mut Block, change: impl Fn(&[f64]) -> Vec<f64>) {
+    for joint in &mut block.joints {
+        joint.q = change(&joint.q);
+        joint.tau = change(&joint.tau);
+        for column in [&mut joint.reference, &mut joint.voltage]
+            .into_iter()
+            .flatten()
+        {
+            *column = change(column);
+        }
+    }
+    block.t = change(&block.t);
+}
+
+#[test]
+fn a_hold_out_at_another_rate_is_judged_at_its_own() {
+    let made = Scenario::short([STRIBECK], 31).make().unwrap();
+    let (same, _) = diagnosed(&made);
+    assert_eq!(names(&same), ["stribeck"], "{:?}", same.words);
+    for slower in [2, 5] {
+        let mut other = made.clone();
+        each_column(&mut other.holdout.blocks[0], |column| {
+            column.iter().copied().step_by(slower).collect()
+        });
+        let (found, _) = diagnosed(&other);
+        let (w, all) = (&found.waterfall[0], &same.waterfall[0]);
+        println!(
+            "1/{slower}: {:?} over {:.4}; {:?} over {:.4}",
+            w.holdout, w.holdout_floor, all.holdout, all.floor
+        );
+        assert_eq!(names(&found), ["stribeck"], "{:?}", found.words);
+        assert_eq!(found.verdict, same.verdict, "{:?}", found.words);
+        // One row in so many is as much noisier in its band.
+        let louder = (slower as f64).sqrt();
+        assert!((w.holdout_floor / w.floor - louder).abs() < 1e-3 * louder);
+        assert!(w.holdout[2] < 1.3 * w.holdout_floor, "{w:?}");
+        // What Stribeck friction adds to the noise is what it adds at the other rate.
+        let added =
+            |w: &super::outcome::Waterfall| (w.holdout[1].powi(2) - w.holdout[2].powi(2)).sqrt();
+        assert!(
+            (added(w) / added(all) - 1.0).abs() < 0.15,
+            "{} {}",
+            added(w),
+            added(all)
+        );
+        assert!(
+            found
+                .words
+                .iter()
+                .any(|word| word.contains("judged at its own rate"))
+        );
+    }
+}
+
+#[test]
+fn rows_at_uneven_steps_are_interpolated_and_that_is_said() {
+    let mut made = Scenario::short([STRIBECK], 32).make().unwrap();
+    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+    let block = &mut made.train.blocks[0];
+    // Rows that come early or late by up to 0.4 of a step, read when they came.
+    let exact = block.t.clone();
+    let step = exact[1] - exact[0];
+    let last = exact.len() - 1;
+    let moved: Vec<f64> = (exact.iter().enumerate())
+        .map(|(k, t)| match k {
+            0 => *t,
+            _ if k == last => *t,
+            _ => t + 0.8 * step * (rng.random::<f64>() - 0.5),
+        })
+        .collect();
+    let read = |column: &[f64]| -> Vec<f64> {
+        (moved.iter().enumerate())
+            .map(|(k, t)| {
+                let k = if *t < exact[k] { k - 1 } else { k }.min(last - 1);
+                let u = (t - exact[k]) / step;
+                column[k] + u * (column[k + 1] - column[k])
+            })
+            .collect()
+    };
+    each_column(block, read);
+    let (found, _) = diagnosed(&made);
+    assert!(found.data_faults.is_empty(), "{:?}", found.data_faults);
+    assert_eq!(names(&found), ["stribeck"], "{:?}", found.words);
+    let said: Vec<&String> = (found.words.iter())
+        .filter(|w| w.contains("interpolated"))
+        .collect();
+    assert!(said.len() == 1 && said[0].starts_with("train"), "{said:?}");
+}
+
+#[test]
+fn what_the_steps_of_a_coarse_encoder_leave_is_no_remainder() {
+    let coarse = |hidden: Option<Effect>, seed| {
+        let scenario = Scenario {
+            noise: Noise {
+                // 10 000 a turn of the joint.
+                counts: 200.0,
+                ..Noise::MEDIUM
+            },
+            ..Scenario::short(hidden, seed)
+        };
+        diagnosed(&scenario.make().unwrap()).0
+    };
+    for seed in 33..36 {
+        let found = coarse(None, seed);
+        println!(
+            "{:?} over {:.4}",
+            found.waterfall[0].holdout, found.noise_floor_rms[0]
+        );
+        assert_eq!(names(&found), [""; 0]);
+        assert_ne!(found.verdict, Verdict::Remainder, "{:?}", found.remainder);
+    }
+    let strong = Effect::Stribeck {
+        ratio: 2.2,
+        velocity: 0.3,
+    };
+    let found = coarse(Some(strong), 36);
+    assert_eq!(names(&found), ["stribeck"], "{:?}", found.words);
+}
+
+#[test]
+fn a_touch_in_one_of_two_runs_is_left_out_and_said() {
+    let touched = Scenario {
+        intrusion: Some(Intrusion {
+            torque: 6.0,
+            interval: [12.0, 12.6],
+        }),
+        ..Scenario::short([STRIBECK], 37)
+    };
+    let calm = Scenario {
+        intrusion: None,
+        ..touched.clone()
+    };
+    let [found, same] = [&touched, &calm].map(|s| diagnosed(&s.make().unwrap()).0);
+    println!("{:?}", found.words);
+    assert_eq!(names(&found), ["stribeck"]);
+    assert_eq!(found.verdict, same.verdict);
+    let [floor, without] = [&found, &same].map(|d| d.noise_floor_rms[0]);
+    assert!((floor / without - 1.0).abs() < 0.05, "{floor} {without}");
+    let said = |d: &Diagnosis| {
+        d.words
+            .iter()
+            .filter(|w| w.contains("touched the joint"))
+            .count()
+    };
+    assert_eq!([said(&found), said(&same)], [1, 0]);
+    let word = found
+        .words
+        .iter()
+        .find(|w| w.contains("touched the joint"))
+        .unwrap();
+    assert!(
+        word.contains("train differs from repeat") && word.contains(": from 1"),
+        "{word}"
+    );
+}
+
+#[test]
+fn a_piece_cut_out_of_a_recording_is_a_copy() {
+    let made = Scenario::short([], 38).make().unwrap();
+    let cut = |from: usize, to: usize, late: f64| {
+        let mut cut = made.clone();
+        cut.holdout = made.train.clone();
+        cut.holdout.label = "cut".into();
+        each_column(&mut cut.holdout.blocks[0], |column| {
+            column[from..to].to_vec()
+        });
+        for t in &mut cut.holdout.blocks[0].t {
+            *t += late;
+        }
+        cut.diagnose(&made.robot, &Options::default())
+    };
+    let rows = made.train.blocks[0].t.len();
+    for (from, to, late) in [
+        (100, rows, 0.0),
+        (rows / 3, rows / 2, 0.0),
+        (0, rows - 500, 7.5),
+    ] {
+        let said = cut(from, to, late).unwrap_err().to_string();
+        assert!(said.contains("cut holds samples of train"), "{said}");
+    }
+    assert!(made.diagnose(&made.robot, &Options::default()).is_ok());
+}
+
+/// A link twice as heavy as described is no torque constant of twice the value: friction is as it was.
+#[test]
+fn one_factor_is_said_only_where_all_follow_it() {
+    let made = Scenario::short([], 39).make().unwrap();
+    let said = |robot: &Robot| {
+        let (found, _) = made.diagnosed(robot, &Options::default());
+        assert_eq!(found.verdict, Verdict::ParameterChange, "{:?}", found.words);
+        let words = found.words.join(" ");
+        println!("{words}");
+        words
+    };
+    let mut heavy = made.robot.clone();
+    let body = heavy.joints[0].inertial.as_mut().unwrap();
+    body.mass *= 2.0;
+    for own in body.inertia.iter_mut().chain(&mut body.first_moment) {
+        *own *= 2.0;
+    }
+    if let Some(drive) = &mut heavy.joints[0].drive {
+        drive.rotor_inertia *= 2.0;
+    }
+    assert!(!said(&heavy).contains("have changed by"));
+}
+
+/// An incremental encoder is told its zero by eye: the recording that got another one is named, and by how much.
+#[test]
+fn a_recording_with_another_zero_is_named() {
+    let made = Scenario::short([], 40).make().unwrap();
+    let word = |made: &Made| -> Option<String> {
+        let (found, _) = diagnosed(made);
+        (found.words.into_iter()).find(|word| word.contains("seems to stand"))
+    };
+    assert_eq!(word(&made), None);
+    let moved = |block: &mut Block, by: f64| {
+        let joint = &mut block.joints[0];
+        let reference = joint.reference.as_mut().unwrap();
+        joint.q.iter_mut().chain(reference).for_each(|q| *q += by);
+    };
+    // Another motion to learn from, and the one held back.
+    let mut other = made.clone();
+    other.further = vec![Scenario::short([], 40).make().unwrap().holdout];
+    other.further[0].label = "slow".into();
+    other.holdout = Scenario {
+        seconds: [25.0, 5.0],
+        ..Scenario::short([], 40)
+    }
+    .make()
+    .unwrap()
+    .train;
+    other.holdout.label = "held".into();
+    other.repeat = None;
+    moved(&mut other.further[0].blocks[0], 0.08);
+    let told = word(&other).unwrap();
+    println!("{told}");
+    assert!(
+        told.starts_with("In slow joint link seems to stand −0.08"),
+        "{told}"
+    );
+    for (by, expected) in [(0.1, "−0.1"), (1.6, "−1.5")] {
+        let mut held = made.clone();
+        moved(&mut held.holdout.blocks[0], by);
+        let told = word(&held).unwrap();
+        println!("{told}");
+        assert!(
+            told.starts_with(&format!("In holdout joint link seems to stand {expected}")),
+            "{told}"
+        );
+    }
+}

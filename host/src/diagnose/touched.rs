@@ -1,0 +1,78 @@
+//! What happened in one of two runs of a motion and not in the other: a touch, a knock, a zero that has moved.
+//!
+//! What differs between two runs is noise as far as any model goes. But a few short stretches that hold most of it are an
+//! event, and would drown all else: they are left out of both, and said to be.
+//!
+//! Leaves out: events in both runs at the same place of the motion, which are of the rig; events that last.
+
+use super::bench::Loaded;
+use super::burst::burst;
+use super::floor;
+use super::runs::Run;
+use crate::report::format_significant;
+use crate::robot::Robot;
+
+/// Left out on either side of a loud stretch, s: what a filter carries beyond it.
+const BESIDE: f64 = 0.25;
+
+/// Marks in runs of one motion what is to be left out of them; sentences on that, none where nothing is. `residuals` are what the
+/// refitted model leaves of each joint on their rows.
+pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
+    let rows = &loaded.rows;
+    let mut told = Vec::new();
+    let mut out: Vec<(usize, [f64; 2])> = Vec::new();
+    for (a, b) in floor::repeats(&loaded.runs) {
+        for (j, joint) in robot.joints.iter().enumerate() {
+            let residual = &residuals[j];
+            let mut apart = vec![0.0; rows.count];
+            let mut keep = vec![false; rows.count];
+            let starts = [a, b].map(|run| rows.starts[run]);
+            let length = (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]);
+            for k in 0..length {
+                let [x, y] = starts.map(|start| start + k);
+                keep[x] = rows.keep[j][x] && rows.keep[j][y];
+                apart[x] = residual[x] - residual[y];
+            }
+            let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &loaded.runs) else {
+                continue;
+            };
+            let squares = |run: usize| -> f64 {
+                (burst.rows.iter())
+                    .flat_map(|part| part.clone())
+                    .map(|x| residual[x - starts[0] + rows.starts[run]].powi(2))
+                    .sum()
+            };
+            let (own, other) = if squares(a) > squares(b) {
+                (a, b)
+            } else {
+                (b, a)
+            };
+            let [own_label, other_label] = [own, other].map(|run| &loaded.runs[run].label);
+            let [from, to] = burst
+                .time
+                .map(|t| t - loaded.runs[a].t.first().unwrap_or(&0.0));
+            told.push(format!(
+                "Joint {}: from {from:.1} to {to:.1} s after its start {own_label} differs from {other_label}, the same motion, {} times as much as elsewhere. Something touched the joint or held it there, or that piece is damaged; {} of half a second left out of both.",
+                joint.name,
+                format_significant(burst.times, 2),
+                match burst.count {
+                    1 => "one stretch is".to_owned(),
+                    n => format!("{n} stretches are"),
+                }
+            ));
+            for part in &burst.rows {
+                let span = [part.start, part.end].map(|row| {
+                    (row - starts[0]) as f64 * rows.period + rows.thinning.trimmed(&loaded.runs[a])
+                });
+                out.extend([(a, span), (b, span)]);
+            }
+        }
+    }
+    for (run, [from, to]) in out {
+        let run: &mut Run = &mut loaded.runs[run];
+        let sample = |t: f64| ((t * run.rate).max(0.0).round() as usize).min(run.t.len());
+        let part = sample(from - BESIDE)..sample(to + BESIDE);
+        run.left_out.push(part);
+    }
+    told
+}
