@@ -133,6 +133,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         second_encoder: args.second_encoder,
     };
     let cases = plan.cases()?;
+    if cases.is_empty() && args.arms == 0 {
+        return Err(CommandError::Sentence(
+            "these counts make no case; give at least one of --seeds, --nothing, --combinations, --leave-out or --arms.".into(),
+        ));
+    }
     let arms = arm_cases(args.first_seed, args.arms)?;
     folder(&args.out)?;
     if args.keep {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args as ClapArgs, Subcommand};
 use rig_shared::safety::{FaultRecord, SnapshotSample};
 use rig_shared::wire::message::{
-    Greeting, Health, Report, RequestBody, SettingsOrigin, SnapshotPart,
+    Greeting, Health, Refusal, Report, RequestBody, SettingsOrigin, SnapshotPart,
 };
 
 use super::error::CommandError;
@@ -16,7 +16,7 @@ use super::ui::Ui;
 use crate::data::{Column, CsvWriter};
 use crate::link::experiment::when_calibrated;
 use crate::link::serial::DEFAULT_BAUD;
-use crate::link::{EmulatedPort, Port, SerialLine, Session, SessionSettings};
+use crate::link::{EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings};
 
 /// Health comes once a second.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
@@ -203,7 +203,18 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
             let kept = if *unstored {
                 "until the next power on"
             } else {
-                when_calibrated(&mut session, RequestBody::Store)?;
+                match when_calibrated(&mut session, RequestBody::Store) {
+                    Err(LinkError::Refused {
+                        refusal: Refusal::NoStorage,
+                        ..
+                    }) => {
+                        return Err(CommandError::Sentence(format!(
+                            "{} was sent to the rig, which has no memory to store it in; with --unstored it is not asked to.",
+                            model.display()
+                        )));
+                    }
+                    other => other?,
+                }
                 "and stored"
             };
             ui.say(&format!("{}: sent to the rig {kept}.", model.display()));

@@ -8,7 +8,7 @@ use super::engine::Follower;
 use super::experiment::exact;
 use super::fit::Fit;
 use super::floor;
-use super::locate::{Coordinate, locate};
+use super::locate::{Coordinate, Refitted, locate};
 use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
@@ -210,15 +210,33 @@ impl Judge<'_, '_> {
     pub(super) fn places(&self, base: &Fit, floors: &[f64], described: &[Profile]) -> Vec<Place> {
         let fit = with(base, described, None);
         (0..self.rows.joints())
-            .flat_map(|j| self.places_of(&fit, j, floors[j]))
+            .flat_map(|j| self.refitted_places(&fit, j, floors[j]))
             .collect()
     }
 
+    /// Where a joint's residual sits, chance refitted as it was. What decides on a remainder takes chance as it comes, which asks
+    /// for more.
+    fn refitted_places(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
+        let refitted = Refitted::of(self.rows, fit.counts(joint), joint);
+        self.located(fit, Some(&refitted), joint, floor)
+    }
+
     fn places_of(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
+        self.located(fit, None, joint, floor)
+    }
+
+    fn located(
+        &self,
+        fit: &Fit,
+        refitted: Option<&Refitted>,
+        joint: usize,
+        floor: f64,
+    ) -> Vec<Place> {
         locate(
             self.rows,
             &self.coordinates[joint],
             &fit.counted(joint),
+            refitted,
             fit.block_of_rows(),
             joint,
             &self.robot.joints[joint].name,
@@ -281,7 +299,15 @@ impl Judge<'_, '_> {
         } else {
             shown.is_some()
         };
-        let shown = (shown.or(places.first())).map_or(
+        if !left {
+            return None;
+        }
+        let places = match places.is_empty() {
+            true => self.refitted_places(fit, joint, floor),
+            false => places,
+        };
+        let shown = (places.iter().find(|p| p.p_value < SIGNIFICANT)).or(places.first());
+        let shown = shown.map_or(
             "It goes with no coordinate of the motion beyond chance.",
             |p| &p.text,
         );
@@ -290,7 +316,7 @@ impl Judge<'_, '_> {
             "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {shown}",
             100.0 * (ratio - 1.0)
         );
-        left.then(|| Remainder {
+        Some(Remainder {
             joint: name.clone(),
             unit: kind.units().1.to_owned(),
             rms: (rms * rms - (rms / ratio).powi(2)).max(0.0).sqrt(),
@@ -402,7 +428,7 @@ impl Judge<'_, '_> {
                 format_unit(kind.units().1),
                 format_significant(rms / own, 2)
             ),
-            places: self.places_of(fit, joint, own),
+            places: self.refitted_places(fit, joint, own),
             doubt: true,
         })
     }
@@ -438,7 +464,7 @@ impl Judge<'_, '_> {
                 text: format!(
                     "No effect of the library explains what is left of joint {name}, but {what} takes {percent} % off it, on stretches that it was not fitted to: something is missing that has no name here."
                 ),
-                places: self.places_of(fit, joint, floor),
+                places: self.refitted_places(fit, joint, floor),
                 doubt: true,
             });
         }
@@ -461,7 +487,7 @@ impl Judge<'_, '_> {
             rms: left,
             ratio: rms / floor,
             text,
-            places: self.places_of(fit, joint, floor),
+            places: self.refitted_places(fit, joint, floor),
             doubt: true,
         })
     }

@@ -4,8 +4,11 @@
 //! bootstrap (signs flipped block by block: Cameron, Gelbach & Miller 2008), the probabilities corrected for the number of
 //! coordinates under any dependence (Benjamini & Yekutieli 2001).
 
+mod refitted;
+
 use rand::{RngExt, SeedableRng};
 
+pub(super) use self::refitted::Refitted;
 use super::outcome::Place;
 use super::predicted::Predicted;
 use super::profile::SIGNIFICANT;
@@ -186,11 +189,12 @@ pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<us
 }
 
 /// Where the residual of a joint sits, most of the excess over `floor` first; nowhere where it goes with each coordinate no more
-/// than chance would have it. `block` is the block of each row.
+/// than chance would have it. `block` is the block of each row; chance is refitted where the residual was.
 pub(super) fn locate(
     rows: &Rows,
     coordinates: &[Coordinate],
     residual: &[f64],
+    refitted: Option<&Refitted>,
     block: &[usize],
     joint: usize,
     joint_name: &str,
@@ -199,6 +203,9 @@ pub(super) fn locate(
 ) -> Vec<Place> {
     let keep = &rows.keep[joint];
     let used = rows.used(joint).max(1) as f64;
+    let none = Refitted::none();
+    let refitted = refitted.unwrap_or(&none);
+    let residual = &refitted.rest(residual);
     let squares: f64 = residual.iter().map(|r| r * r).sum();
     let excess = (squares - used * floor * floor).max(0.0);
     let blocks = block.iter().max().map_or(0, |b| b + 1);
@@ -247,9 +254,16 @@ pub(super) fn locate(
             p_value: 1.0,
             text: sentence(coordinate, share, &edges, low, high, &mean, &count),
         });
-        processes.push(sums);
+        processes.push(Process {
+            taken: refitted.in_bins(&place),
+            sums,
+        });
     }
-    for (place, p) in places.iter_mut().zip(probabilities(&processes, seed)) {
+    let along = refitted.along(residual, block, blocks);
+    for (place, p) in places
+        .iter_mut()
+        .zip(probabilities(&processes, &along, seed))
+    {
         place.p_value = p;
     }
     places.retain(|place| place.p_value < BY_CHANCE);
@@ -257,19 +271,24 @@ pub(super) fn locate(
     places
 }
 
-/// Sums of the residual by blocks and bins, one coordinate.
-type Process = Vec<[f64; BINS]>;
+/// One coordinate's sums by bins.
+struct Process {
+    /// Of the residual, block by block.
+    sums: Vec<[f64; BINS]>,
+    /// Of what a refit takes, direction by direction.
+    taken: Vec<[f64; BINS]>,
+}
 
 /// Probability of each process, corrected for their number. Those that no draw reaches get more of them where the
 /// correction asks for it: so few draws could not say more, whatever the process.
-fn probabilities(processes: &[Process], seed: u64) -> Vec<f64> {
+fn probabilities(processes: &[Process], along: &[Vec<f64>], seed: u64) -> Vec<f64> {
     let mut list: Vec<f64> = (processes.iter())
-        .map(|sums| process_p(sums, DRAWS, seed))
+        .map(|process| process_p(process, along, DRAWS, seed))
         .collect();
     if corrected(&list).iter().all(|p| *p >= SIGNIFICANT) {
-        for (p, sums) in list.iter_mut().zip(processes) {
+        for (p, process) in list.iter_mut().zip(processes) {
             if *p <= 1.0 / (DRAWS + 1) as f64 {
-                *p = process_p(sums, MOST_DRAWS, seed);
+                *p = process_p(process, along, MOST_DRAWS, seed);
             }
         }
     }
@@ -291,14 +310,24 @@ fn corrected(list: &[f64]) -> Vec<f64> {
     result
 }
 
-/// Probability of the largest excursion of the cumulated residual, by the wild block bootstrap.
-fn process_p(sums: &[[f64; BINS]], draws: usize, seed: u64) -> f64 {
+/// Probability of the largest excursion of the cumulated residual, by the wild block bootstrap. `along` is the residual along each
+/// direction of the refit, block by block.
+fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> f64 {
     let excursion = |sign: &mut dyn FnMut() -> f64| {
         let mut total = [0.0; BINS];
-        for s in sums {
+        let mut fitted = vec![0.0; process.taken.len()];
+        for (s, own) in process.sums.iter().zip(along) {
             let w = sign();
             for (t, x) in total.iter_mut().zip(s) {
                 *t += w * x;
+            }
+            for (f, x) in fitted.iter_mut().zip(own) {
+                *f += w * x;
+            }
+        }
+        for (f, taken) in fitted.iter().zip(&process.taken) {
+            for (t, x) in total.iter_mut().zip(taken) {
+                *t -= f * x;
             }
         }
         let (mut sum, mut most) = (0.0, 0.0_f64);
@@ -397,20 +426,72 @@ mod tests {
                     let place = |b: usize| if b < BINS / 2 { found } else { -found };
                     std::array::from_fn(|b| noise() + if c == 3 { place(b) } else { 0.0 })
                 };
-                (0..60).map(one).collect()
+                Process {
+                    sums: (0..60).map(one).collect(),
+                    taken: Vec::new(),
+                }
             })
             .collect()
     }
 
+    fn no_refit() -> Vec<Vec<f64>> {
+        vec![Vec::new(); 60]
+    }
+
+    /// A residual that was refitted with x and a constant holds a cubic in x of a tenth of its noise: seen where chance is
+    /// refitted as well, and no more often than asked for where there is none.
+    #[test]
+    fn chance_is_refitted_where_the_residual_was() {
+        const ROWS: usize = 4000;
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(11);
+        let x: Vec<f64> = (0..ROWS).map(|k| (0.013 * k as f64).sin()).collect();
+        let columns = [x.clone(), vec![1.0; ROWS]];
+        let rows = Rows::of_columns(columns.map(|c| vec![Some(c)]).to_vec(), ROWS);
+        let refitted = Refitted::of(&rows, None, 0);
+        let block: Vec<usize> = (0..ROWS).map(|k| k / 40).collect();
+        let coordinate = Coordinate {
+            name: "x".into(),
+            unit: "",
+            values: x.clone(),
+        };
+        let mut found = |size: f64, seed: u64, as_it_was: bool| {
+            let residual: Vec<f64> = (x.iter())
+                .map(|x| size * x.powi(3) + 2.0 * (rng.random::<f64>() - 0.5))
+                .collect();
+            let residual = refitted.rest(&residual);
+            let chance = as_it_was.then_some(&refitted);
+            let coordinates = std::slice::from_ref(&coordinate);
+            let list = locate(
+                &rows,
+                coordinates,
+                &residual,
+                chance,
+                &block,
+                0,
+                "",
+                0.0,
+                seed,
+            );
+            usize::from(!list.is_empty())
+        };
+        let mut of = |size, as_it_was| (0..40).map(|k| found(size, k, as_it_was)).sum::<usize>();
+        let counts = [of(0.5, true), of(0.5, false), of(0.0, true)];
+        println!("{counts:?} of 40");
+        assert!(
+            counts[0] > 30 && counts[1] < 10 && counts[2] < 7,
+            "{counts:?}"
+        );
+    }
+
     #[test]
     fn a_gap_along_one_coordinate_alone_reaches_the_level() {
-        let list = probabilities(&processes(0.2), 1);
+        let list = probabilities(&processes(0.2), &no_refit(), 1);
         assert!(list[3] < SIGNIFICANT, "{list:?}");
         assert!(
             list.iter().enumerate().all(|(c, p)| c == 3 || *p > 0.05),
             "{list:?}"
         );
-        let none = probabilities(&processes(0.0), 1);
+        let none = probabilities(&processes(0.0), &no_refit(), 1);
         assert!(none.iter().all(|p| *p > SIGNIFICANT), "{none:?}");
     }
 

@@ -43,6 +43,7 @@ pub(super) fn maps(found: &Found) -> Vec<Map> {
             rows,
             all,
             &last.residual(j),
+            None,
             last.block_of_rows(),
             j,
             &joint.name,

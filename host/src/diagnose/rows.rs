@@ -442,3 +442,25 @@ impl Rows {
         self.keep[joint].iter().filter(|k| **k).count()
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+impl Rows {
+    /// Of one joint with these nominal columns, in one run.
+    pub(super) fn of_columns(nominal: Vec<Column>, count: usize) -> Self {
+        Self {
+            thinning: Thinning {
+                low_pass: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
+                step: 1,
+                spoilt: 0,
+                smear: 0.0,
+            },
+            count,
+            starts: vec![0, count],
+            period: 1.0,
+            torque: vec![vec![0.0; count]],
+            keep: vec![vec![true; count]],
+            nominal,
+        }
+    }
+}

@@ -221,6 +221,7 @@ impl Between<'_, '_> {
             rows,
             &coordinates,
             &base.residual(0),
+            None,
             base.block_of_rows(),
             0,
             name,

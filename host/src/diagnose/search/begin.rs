@@ -155,7 +155,9 @@ impl<'a> Search<'a> {
                 unsure
             } else {
                 chosen.len() > 1
-                    && (unsure || e.joint_gain < LEAST_GAIN || in_the_shadow(chosen, i))
+                    && (unsure
+                        || e.joint_gain < LEAST_GAIN
+                        || in_the_shadow(self.source.robot, chosen, i))
             };
             if weak || chosen[i].vanished.is_some() {
                 let gone = chosen.remove(i);

@@ -5,6 +5,7 @@ use rig_shared::effects::Kind;
 use super::is_gear;
 use crate::diagnose::fit::sigmas;
 use crate::diagnose::profile::Profile;
+use crate::robot::Robot;
 
 /// Share of the squares that an effect takes away which the difference between its law and the rig's may leave: a law that
 /// closes 93 % of the gap leaves so much …
@@ -19,17 +20,33 @@ const SHADOW_OF_A_GEAR: f64 = 0.02;
 /// Standard deviations between blocks by which an effect stands clear of another's shadow where that other does little.
 const CLEAR: f64 = 3.0;
 
+/// Share of what friction under load takes away that friction by position may take besides where nobody says how much of the inertia
+/// is the motor's: with a motor of half of it a true one leaves a quarter.
+const SHADOW_OF_AN_UNKNOWN_DRIVE: f64 = 0.4;
+
 /// Whether an effect takes away no more than another of its joint leaves because its law is not quite the rig's.
-pub(super) fn in_the_shadow(chosen: &[Profile], i: usize) -> bool {
+pub(super) fn in_the_shadow(robot: &Robot, chosen: &[Profile], i: usize) -> bool {
     let taken = |p: &Profile| -> Vec<f64> { p.evidence.taken().collect() };
     let own = taken(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
-        let (casting, share) = (taken(other), shadow(other));
+        let casting = taken(other);
+        let share = match [other, &chosen[i]].map(|p| p.candidate.kind) {
+            [Kind::LoadFriction, Kind::PositionFriction] if !knows_drive(robot, other) => {
+                SHADOW_OF_AN_UNKNOWN_DRIVE
+            }
+            _ => shadow(other),
+        };
         k != i
             && other.candidate.joint == chosen[i].candidate.joint
             && own.iter().sum::<f64>() < share * casting.iter().sum::<f64>()
             && !(errs_where_it_acts(other.candidate.kind) && clear(&own, &casting, share))
     })
+}
+
+/// Whether the description says what of the inertia is the motor's, which no gear carries.
+fn knows_drive(robot: &Robot, of: &Profile) -> bool {
+    let drive = robot.joints[of.candidate.joint].drive.as_ref();
+    drive.is_some_and(|d| d.joint_inertia + d.rotor_inertia > 0.0)
 }
 
 /// Whether what is wrong with a law is in proportion to what it does: of touches and waves. Friction's curves err between

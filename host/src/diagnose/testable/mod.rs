@@ -136,7 +136,7 @@ fn lacking(
             let [typical, highest] = evidence.speeds();
             (highest < least * typical).then(|| {
                 (
-                    format!("the highest speed, {highest:.3} {unit}, is {:.1} times the typical one, {typical:.3} {unit}; {least} times are needed", highest / typical.max(f64::MIN_POSITIVE)),
+                    format!("the highest speed, {highest:.3} {unit}, is {:.2} times the typical one, {typical:.3} {unit}; {least} times are needed", highest / typical.max(f64::MIN_POSITIVE)),
                     "speeds from slow to the limit: `rig excite --kind sweep`".to_owned(),
                 )
             })
@@ -191,7 +191,7 @@ fn lacking(
         Need::Duration(least) => (evidence.duration < least).then(|| {
             (
                 format!(
-                    "the longest recording lasts {:.0} s, {least:.0} s are needed",
+                    "the longest recording lasts {:.2} s, {least:.0} s are needed",
                     evidence.duration
                 ),
                 format!("one motion repeated from cold for {least:.0} s or more"),

@@ -219,6 +219,7 @@ fn winding(
             rows,
             &coordinates,
             &residual,
+            None,
             blocks,
             0,
             &own.name,

@@ -25,7 +25,7 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
             format!("None has moved by more than {LYING:.0} standard deviations.")
         } else {
             format!(
-                "{lying} of {} {} moved by more than {LYING:.0} standard deviations; their old values should not be used.",
+                "{lying} of {} {} moved by more than {LYING:.0} standard deviations; their old values stood in for what was missing. The new ones belong to the model with the effects, and are no values of a model without them.",
                 list.len(),
                 if lying == 1 { "has" } else { "have" }
             )
