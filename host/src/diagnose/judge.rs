@@ -8,7 +8,7 @@ use super::engine::Follower;
 use super::experiment::exact;
 use super::fit::Fit;
 use super::floor;
-use super::locate::{Coordinate, Refitted, locate};
+use super::locate::{Coordinate, Known, Refitted, locate};
 use super::misfit::misfit;
 use super::outcome::{Place, Remainder, Step};
 use super::profile::{Profile, SIGNIFICANT};
@@ -217,26 +217,23 @@ impl Judge<'_, '_> {
     /// Where a joint's residual sits, chance refitted as it was. What decides on a remainder takes chance as it comes, which asks
     /// for more.
     fn refitted_places(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
-        let refitted = Refitted::of(self.rows, fit.counts(joint), joint);
-        self.located(fit, Some(&refitted), joint, floor)
+        let known = Known {
+            refitted: Refitted::of(self.rows, fit.counts(joint), joint),
+            pairs: &self.pairs,
+        };
+        self.located(fit, Some(&known), joint, floor)
     }
 
     fn places_of(&self, fit: &Fit, joint: usize, floor: f64) -> Vec<Place> {
         self.located(fit, None, joint, floor)
     }
 
-    fn located(
-        &self,
-        fit: &Fit,
-        refitted: Option<&Refitted>,
-        joint: usize,
-        floor: f64,
-    ) -> Vec<Place> {
+    fn located(&self, fit: &Fit, known: Option<&Known>, joint: usize, floor: f64) -> Vec<Place> {
         locate(
             self.rows,
             &self.coordinates[joint],
             &fit.counted(joint),
-            refitted,
+            known,
             fit.block_of_rows(),
             joint,
             &self.robot.joints[joint].name,

@@ -4,10 +4,12 @@
 //! bootstrap (signs flipped block by block: Cameron, Gelbach & Miller 2008), the probabilities corrected for the number of
 //! coordinates under any dependence (Benjamini & Yekutieli 2001).
 
+mod frequency;
 mod refitted;
 
 use rand::{RngExt, SeedableRng};
 
+use self::frequency::{frequency, is_frequency};
 pub(super) use self::refitted::Refitted;
 use super::outcome::Place;
 use super::predicted::Predicted;
@@ -188,13 +190,22 @@ pub(super) fn bins(values: &[f64], keep: &[bool], bins: usize) -> (Vec<Option<us
     (place, edges)
 }
 
+/// What is known of a residual beside its values.
+pub(super) struct Known<'a> {
+    /// What a refit that went before has taken out of it.
+    pub(super) refitted: Refitted,
+    /// Runs that repeat each other.
+    pub(super) pairs: &'a [(usize, usize)],
+}
+
 /// Where the residual of a joint sits, most of the excess over `floor` first; nowhere where it goes with each coordinate no more
-/// than chance would have it. `block` is the block of each row; chance is refitted where the residual was.
+/// than chance would have it. `block` is the block of each row; chance is refitted where it is known
+/// that the residual was.
 pub(super) fn locate(
     rows: &Rows,
     coordinates: &[Coordinate],
     residual: &[f64],
-    refitted: Option<&Refitted>,
+    known: Option<&Known>,
     block: &[usize],
     joint: usize,
     joint_name: &str,
@@ -204,7 +215,7 @@ pub(super) fn locate(
     let keep = &rows.keep[joint];
     let used = rows.used(joint).max(1) as f64;
     let none = Refitted::none();
-    let refitted = refitted.unwrap_or(&none);
+    let refitted = known.map_or(&none, |known| &known.refitted);
     let residual = &refitted.rest(residual);
     let squares: f64 = residual.iter().map(|r| r * r).sum();
     let excess = (squares - used * floor * floor).max(0.0);
@@ -259,6 +270,11 @@ pub(super) fn locate(
             sums,
         });
     }
+    let pairs = known.map_or(&[][..], |known| known.pairs);
+    if let Some((place, process)) = frequency(rows, residual, pairs, joint_name) {
+        places.push(place);
+        processes.push(process);
+    }
     let along = refitted.along(residual, block, blocks);
     for (place, p) in places
         .iter_mut()
@@ -267,7 +283,8 @@ pub(super) fn locate(
         place.p_value = p;
     }
     places.retain(|place| place.p_value < BY_CHANCE);
-    places.sort_by(|a, b| b.share.total_cmp(&a.share));
+    places
+        .sort_by(|a, b| (is_frequency(a).cmp(&is_frequency(b))).then(b.share.total_cmp(&a.share)));
     places
 }
 
@@ -316,11 +333,13 @@ fn process_p(process: &Process, along: &[Vec<f64>], draws: usize, seed: u64) -> 
     let excursion = |sign: &mut dyn FnMut() -> f64| {
         let mut total = [0.0; BINS];
         let mut fitted = vec![0.0; process.taken.len()];
-        for (s, own) in process.sums.iter().zip(along) {
+        for (k, s) in process.sums.iter().enumerate() {
             let w = sign();
             for (t, x) in total.iter_mut().zip(s) {
                 *t += w * x;
             }
+            // Of a process that no refit takes anything of, nothing.
+            let own = along.get(k).map_or(&[][..], Vec::as_slice);
             for (f, x) in fitted.iter_mut().zip(own) {
                 *f += w * x;
             }
@@ -447,7 +466,10 @@ mod tests {
         let x: Vec<f64> = (0..ROWS).map(|k| (0.013 * k as f64).sin()).collect();
         let columns = [x.clone(), vec![1.0; ROWS]];
         let rows = Rows::of_columns(columns.map(|c| vec![Some(c)]).to_vec(), ROWS);
-        let refitted = Refitted::of(&rows, None, 0);
+        let known = Known {
+            refitted: Refitted::of(&rows, None, 0),
+            pairs: &[],
+        };
         let block: Vec<usize> = (0..ROWS).map(|k| k / 40).collect();
         let coordinate = Coordinate {
             name: "x".into(),
@@ -458,8 +480,8 @@ mod tests {
             let residual: Vec<f64> = (x.iter())
                 .map(|x| size * x.powi(3) + 2.0 * (rng.random::<f64>() - 0.5))
                 .collect();
-            let residual = refitted.rest(&residual);
-            let chance = as_it_was.then_some(&refitted);
+            let residual = known.refitted.rest(&residual);
+            let chance = as_it_was.then_some(&known);
             let coordinates = std::slice::from_ref(&coordinate);
             let list = locate(
                 &rows,
