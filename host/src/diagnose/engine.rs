@@ -2,46 +2,44 @@
 
 mod even;
 mod follow;
+mod intake;
 mod pass;
+mod remarks;
 mod steps;
+mod trial;
 mod unbelieved;
 
 use rig_shared::effects::Kind;
 
 use self::even::{Uneven, borrowed};
 pub(super) use self::follow::Follower;
+use self::intake::{Intake, Material, intake};
 use self::pass::Pass;
-use self::steps::{change_step, reconcile, refuse, refuse_guesses, steps};
-use self::unbelieved::{contradicted, unbelieved};
+use self::remarks::remarks;
+use self::steps::{change_step, reconcile, steps};
+use self::trial::{Survivors, Trial};
 use super::across::{across, names_something, refutes, tell as tell_across};
-use super::bench::{Bench, Loaded, library};
 use super::bodies::Fitting;
 use super::change::change;
 use super::descent::Descent;
-use super::described::by_description;
 use super::fault::{faulty, of_preparing};
 use super::finish::{Drawn, Found, finish};
 use super::floor;
 use super::judge::{Judge, Judged, left_of_held, not_carried_over, taken_by_none};
-use super::lead::{differ, leads, moved, slack};
+use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Diagnosis, Residual, Verdict};
 use super::profile::Profile;
-use super::refit::{Refit, open};
+use super::refit::Refit;
 use super::rounding::rounding;
-use super::runs::{Run, copies, in_sessions};
-use super::sanity::{faults, too_short_to_judge, too_short_to_learn};
 use super::search::with;
-use super::sentences::offsets;
 use super::stated::{Now, Stated};
-use super::touched::touched;
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
 use super::zeros::{another_zero, another_zero_held};
 use super::{DiagnoseError, Options};
 use crate::prepare::Recording;
-use crate::report::{format_unit, format_value};
 use crate::robot::Robot;
 
 /// Finds what the model lacks. The second result is the description with the effects and the parameters identified
@@ -104,67 +102,22 @@ fn attempt(
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Attempt, DiagnoseError> {
-    let mut bench = Bench::of(stated, training)?;
-    let mut loaded = bench.load(training)?;
-    let mut sealed = if holdout.is_empty() {
-        None
-    } else {
-        Some(bench.load_held(holdout)?)
+    let material = match intake(stated, training, holdout, options)? {
+        Intake::Fit(material) => *material,
+        Intake::Hold(more) => return Ok(Attempt::Hold(more)),
+        Intake::Faulty(wrong) => {
+            let fault = (faulty(robot, wrong), robot.clone());
+            return Ok(Attempt::Done(Box::new(fault)));
+        }
     };
-    in_sessions(&mut loaded.runs, &[]);
-    if let Some(sealed) = &mut sealed {
-        in_sessions(&mut sealed.runs, &loaded.runs);
-    }
-    {
-        let all: Vec<&Run> = (loaded.runs.iter())
-            .chain(sealed.iter().flat_map(|sealed| &sealed.runs))
-            .collect();
-        if let Some((a, b)) = copies(&all) {
-            let [label, again] = [a, b].map(|k| all[k].label.clone());
-            return Err(DiagnoseError::Copy { label, again });
-        }
-    }
-    let mut wrong = faults(&stated.robot, &loaded.runs)?;
-    if wrong.is_empty() {
-        wrong.extend(too_short_to_learn(&loaded.runs));
-    }
-    if let (true, Some(sealed)) = (wrong.is_empty(), &sealed) {
-        wrong = faults(&stated.robot, &sealed.runs)?;
-        if wrong.is_empty() {
-            wrong.extend(too_short_to_judge(&sealed.runs));
-        }
-    }
-    if !wrong.is_empty() {
-        let fault = (faulty(robot, wrong), robot.clone());
-        return Ok(Attempt::Done(Box::new(fault)));
-    }
-    let mut more = stated.clone();
-    if more.hold_delays(slack(&loaded.runs)) {
-        return Ok(Attempt::Hold(more));
-    }
-    if more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without)) {
-        return Ok(Attempt::Hold(more));
-    }
-    let open = open(&bench, &loaded.rows);
-    if !open.is_empty() {
-        bench.anchor.hold(&open);
-        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
-        loaded = rows(loaded)?;
-        sealed = sealed.map(rows).transpose()?;
-    }
-    let bench = bench;
+    let Material {
+        bench,
+        loaded,
+        sealed,
+        open,
+        touches,
+    } = material;
     progress(0.1);
-    let touches = {
-        let refit = Refit::of(&bench, &loaded.rows)?;
-        let left: Vec<Vec<f64>> = (0..robot.joints.len())
-            .map(|j| refit.base.residual(j))
-            .collect();
-        drop(refit);
-        touched(robot, &left, &mut loaded)
-    };
-    if !touches.is_empty() {
-        loaded = bench.rows(loaded.runs, &loaded.treatment)?;
-    }
     let lead = {
         let refit = Refit::of(&bench, &loaded.rows)?;
         let source = bench.source(&loaded, &bench.anchor.values(&refit.before.values))?;
@@ -192,6 +145,7 @@ fn attempt(
         (&loaded, lead, first)
     };
     let refuted = |c: &_| refutes(&pass.across, c);
+    let mut more = stated.clone();
     if more.hold_what_is_not_refuted(
         &pass.search.source,
         &pass.refit.base,
@@ -239,39 +193,19 @@ fn attempt(
     };
     let values = &search.source.values;
     let fitting = Fitting::new(&bench, &refit, &loaded.runs, values);
-    let trial = Replay::of(&fitting, loaded)?;
+    let learnt = Replay::of(&fitting, loaded)?;
     let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
-    let judged = judge.judged(found.clone())?;
-    refuse_guesses(robot, &mut tried, &judged);
-    let mut judged = by_description(&judge, &refit, &bench.anchor, judged)?;
-    refuse_guesses(robot, &mut tried, &judged);
-    let mut fallen = Vec::new();
-    let mut without = |judged: Judged, k: usize, why: &str| -> Result<Judged, DiagnoseError> {
-        let mut stand = judged.chosen;
-        let gone = stand.remove(k);
-        refuse(robot, &mut tried, &gone, why);
-        if gone.takes_much(search.trials()) {
-            fallen.push(gone);
-        }
-        let judged = judge.judged(search.possible(&refit.base, stand)?)?;
-        refuse_guesses(robot, &mut tried, &judged);
-        Ok(judged)
+    let trial = Trial {
+        judge: &judge,
+        refit: &refit,
+        fitting: &fitting,
+        replay: &learnt,
+        sealed: sealed.as_ref(),
     };
-    // A name that makes the simulated motion worse stands in for something else.
-    while let Some(k) = trial.spoiling(&judged.chosen, search.count_given(&judged.chosen))? {
-        let why = "explains torque, but the simulated motion gets worse with it";
-        judged = without(judged, k, why)?;
-    }
-    while let Some((k, why)) = unbelieved(&refit, &search, &judge, &judged.chosen)? {
-        judged = without(judged, k, why)?;
-    }
-    // The hold-out finds no name; one that it contradicts does not stand.
-    if let Some(sealed) = &sealed {
-        while let Some(k) = contradicted(&fitting, &search, &judged.chosen, sealed)? {
-            let why = "explains the training data, and leaves more of the recordings held back than there is without it";
-            judged = without(judged, k, why)?;
-        }
-    }
+    let Survivors {
+        mut judged,
+        mut fallen,
+    } = trial.stand(found.clone(), &mut tried)?;
     let said = settled(
         &zeros(&options.sensor_zeros, &windings, robot.joints.len()),
         &search,
@@ -293,7 +227,7 @@ fn attempt(
     let described = search.count_described(&judged.chosen);
     let replay = match &sealed {
         Some(sealed) => Replay::of(&fitting, sealed)?,
-        None => trial,
+        None => learnt,
     };
     let descent = Descent::of(
         &fitting,
@@ -442,47 +376,29 @@ fn attempt(
     diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
     diagnosis.words.extend(touches);
-    {
+    let taken = {
         let [before, after] = [&refit.base, &with(&refit.base, chosen, None)].map(|fit| fit.rms(0));
-        let told = another_zero(robot, &search.source, &refit.base, 1.0 - after / before)?;
-        let held = match (&told, &sealed) {
-            (None, Some(sealed)) if left => {
-                let residual = bench.remaining(sealed, stands.fitted(), chosen)?;
-                another_zero_held(&bench, sealed, &search.source.values, &residual)?
-            }
-            _ => None,
-        };
-        diagnosis.words.extend(told.or(held));
-    }
-    diagnosis
-        .words
-        .extend(sealed.as_ref().and_then(|sealed| own_rate(&bench, sealed)));
-    diagnosis
-        .words
-        .extend(read_off(robot, &options.sensor_zeros));
-    diagnosis.words.extend(offsets(&bench, after));
-    diagnosis.words.extend(held(&bench, &open));
-    diagnosis
-        .words
-        .extend((sealed.as_ref()).and_then(|sealed| no_other_motion(loaded, sealed)));
+        1.0 - after / before
+    };
+    let zero = match (another_zero(&search.source, &refit.base, taken)?, &sealed) {
+        (None, Some(sealed)) if left => {
+            let residual = bench.remaining(sealed, stands.fitted(), chosen)?;
+            another_zero_held(&bench, sealed, &search.source.values, &residual)?
+        }
+        (told, _) => told,
+    };
+    diagnosis.words.extend(zero);
+    diagnosis.words.extend(remarks(
+        &bench,
+        loaded,
+        sealed.as_ref(),
+        &open,
+        &options.sensor_zeros,
+        after,
+    ));
     diagnosis.words.extend(change.map(|c| c.words));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
-}
-
-/// That a hold-out is judged at another rate than that of the recordings learnt from.
-fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
-    let [learnt, held] = [bench.rate(), sealed.treatment.sample_rate];
-    let label = &sealed.runs.first()?.label;
-    (learnt != held).then(|| {
-        format!(
-            "{label} is judged at its own rate, {held:.1} Hz where {learnt:.1} Hz were learnt from{}.",
-            match learnt > held {
-                true => format!("; its noise floor is taken as {:.2} times that of the others", (learnt / held).sqrt()),
-                false => String::new(),
-            }
-        )
-    })
 }
 
 /// Orders over the motor's turn of the waves among effects of a joint.
@@ -492,50 +408,6 @@ fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
         (p.candidate.joint == joint && motor).then_some(p.shapes[0])
     };
     found.iter().filter_map(wave).collect()
-}
-
-/// What the sensors read with the drive off.
-fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
-    (robot.joints.iter().zip(zeros))
-        .map(|(joint, [value, std])| {
-            format!(
-                "With the drive off the sensor of joint {} reads {} {}.",
-                joint.name,
-                format_value(*value, *std),
-                format_unit(joint.kind.units().1)
-            )
-        })
-        .collect()
-}
-
-/// A hold-out that is the training motion once more.
-fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
-    let (own, same) = floor::repeated(&loaded.runs, &sealed.runs)?;
-    Some(format!(
-        "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
-        own.label, same.label
-    ))
-}
-
-/// What was left as the description has it.
-fn held(bench: &Bench, open: &[usize]) -> Option<String> {
-    let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "The training motion tells less of {} than the description, so {} as described as far as bodies can be so: {}.",
-            if names.len() == 1 {
-                "one base parameter"
-            } else {
-                "some base parameters"
-            },
-            if names.len() == 1 {
-                "it stays"
-            } else {
-                "they stay"
-            },
-            names.join(", ")
-        )
-    })
 }
 
 /// `named`: whether there is an effect that the description does not state.

@@ -1,6 +1,10 @@
 //! What stands at the end of a search: the noise floor, what is left beyond it, which other names a step may have.
 
-use rig_shared::effects::Kind;
+mod rank;
+mod unseen;
+
+pub(super) use self::rank::{equal, rank};
+pub(super) use self::unseen::{left_of_held, not_carried_over, taken_by_none};
 
 use super::DiagnoseError;
 use super::burst::{Burst, burst};
@@ -10,15 +14,13 @@ use super::fit::Fit;
 use super::floor;
 use super::locate::{Coordinate, Known, Refitted, locate};
 use super::misfit::misfit;
-use super::outcome::{Place, Remainder, Step};
+use super::outcome::{Place, Remainder};
 use super::profile::{Profile, SIGNIFICANT};
 use super::pull;
 use super::rows::Rows;
-use super::runs::Run;
 use super::search::{Search, is_gear, shadow, with};
-use super::testable;
 use crate::report::{format_significant, format_unit, format_value};
-use crate::robot::{Joint, Robot, title_of};
+use crate::robot::{Joint, Robot};
 
 /// A name is doubted where what it leaves is this share of what it takes away: no law holds of a rig to the last per cent, and
 /// what stands in for another leaves more of it.
@@ -37,8 +39,6 @@ pub(super) const BEYOND_FLOOR: f64 = 1.12;
 const TREATED: f64 = 3e-3;
 /// … and beyond this it is so much that names are guesses at it.
 const FAR_BEYOND_FLOOR: f64 = 1.25;
-/// … of the data held back, whose motion is another.
-const BEYOND_FLOOR_HELD: f64 = 1.5;
 /// Times the noise of a torque's reading from which on what names leave is not passed off as noise without a repeat: a drive's
 /// own unrest is as much again, or twice.
 const FAR_BEYOND_READING: f64 = 3.0;
@@ -46,16 +46,8 @@ const FAR_BEYOND_READING: f64 = 3.0;
 const FAR_FAR_BEYOND_READING: f64 = 7.0;
 /// … and, without a repeat, where a coordinate explains this share of its squares.
 const SHARE_LEFT: f64 = 0.1;
-/// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
-const AS_GOOD: f64 = 0.9;
 /// Standard deviations from which on a change between recordings is certain.
 const CERTAIN: f64 = 5.0;
-/// … that a stiffness may be larger than found.
-const SURELY: f64 = 2.0;
-/// How far from the middle of the motion a spring may be at rest, in spans of the motion.
-const SPANS_TO_REST: f64 = 2.0;
-/// Standard deviations of a paired difference between blocks.
-const NO_DIFFERENCE: f64 = 2.5;
 
 /// The training data that effects are judged on.
 pub(super) struct Judge<'a, 'r> {
@@ -488,130 +480,6 @@ impl Judge<'_, '_> {
             doubt: true,
         })
     }
-}
-
-/// What the last model leaves of data held back, where it leaves no more than noise of the training data: in the joint where
-/// it is most beyond the floor.
-pub(super) fn left_of_held(robot: &Robot, held: &[f64], floors: &[f64]) -> Option<Remainder> {
-    let ratio = |j: usize| held[j] / floors[j];
-    let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
-    let Joint { name, kind, .. } = &robot.joints[j];
-    (ratio(j) > BEYOND_FLOOR_HELD).then(|| Remainder {
-        joint: name.clone(),
-        unit: kind.units().1.to_owned(),
-        rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
-        ratio: ratio(j),
-        text: format!(
-            "The data held back are left at {:.1} times the noise floor in joint {name}, the training data are not: they show something that the training data hardly do. Give a recording like them with --data.",
-            ratio(j)
-        ),
-        places: Vec::new(),
-        doubt: false,
-    })
-}
-
-/// Names that take something off the training data and nothing off those held back: in the joint where these gain least.
-/// `steps` are each named joint's RMS held back before and after all of them.
-pub(super) fn not_carried_over(
-    robot: &Robot,
-    steps: &[(usize, [f64; 2])],
-    floors: &[f64],
-) -> Option<Remainder> {
-    let grown = |(_, [before, after]): &&(usize, [f64; 2])| after / before;
-    let worst = steps.iter().max_by(|a, b| grown(a).total_cmp(&grown(b)))?;
-    let (joint, [before, after]) = *worst;
-    let Joint { name, kind, .. } = &robot.joints[joint];
-    (after >= before).then(|| Remainder {
-        joint: name.clone(),
-        unit: kind.units().1.to_owned(),
-        rms: (after.powi(2) - floors[joint].powi(2)).max(0.0).sqrt(),
-        ratio: after / floors[joint],
-        text: format!(
-            "Of the data held back the names take nothing off in joint {name}: they explain the training data alone, and are no more than guesses. Record more to learn from.",
-        ),
-        places: Vec::new(),
-        doubt: true,
-    })
-}
-
-/// What was taken off by a law that could not stand, on a joint where nothing was found that could.
-pub(super) fn taken_by_none(
-    robot: &Robot,
-    fallen: &[Profile],
-    chosen: &[Profile],
-    floors: &[f64],
-) -> Option<Remainder> {
-    let bare = |p: &&Profile| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
-    let gain = |p: &&Profile| p.evidence.joint_gain;
-    let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
-    let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
-    let Joint { name, kind, .. } = &robot.joints[joint];
-    Some(Remainder {
-        joint: name.clone(),
-        unit: kind.units().1.to_owned(),
-        rms: floors[joint] * (1.0 - left * left).max(0.0).sqrt(),
-        ratio: 1.0 / left,
-        text: format!(
-            "The law of {} takes {:.0} % off what is left of joint {name}, on stretches that it was not fitted to, but not with values that such a rig has: something is missing that has no name here.",
-            title_of(most.candidate.kind),
-            100.0 * gain(&most)
-        ),
-        places: Vec::new(),
-        doubt: true,
-    })
-}
-
-/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first; one on another joint
-/// takes away something else.
-pub(super) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
-    let mut names = vec![step.effect.clone()];
-    let mut exact = |kind: Kind| {
-        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
-            if !names.iter().any(|n| n == confusion.with) {
-                names.push(confusion.with.to_owned());
-            }
-        }
-    };
-    exact(own.candidate.kind);
-    for rival in rivals.iter().filter(|rival| may_stand(rival, runs)) {
-        let name = rival.candidate.kind.about().name;
-        if names.iter().any(|n| n == name) {
-            continue;
-        }
-        if equal(own, rival) {
-            names.push(name.to_owned());
-        } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
-            step.runner_up = Some(name.to_owned());
-            step.runner_up_gap_closed =
-                Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
-        }
-    }
-    step.set = names;
-}
-
-/// Whether a rival may be what is there: none whose law has run to its limit, but a spring that is at rest not far from where the
-/// joint goes, were it a little stiffer than found.
-fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
-    let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
-    let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
-        return rival.vanished.is_none();
-    };
-    if rival.vanished.is_none() || rival.candidate.kind != Kind::Spring {
-        return rival.vanished.is_none();
-    }
-    let places = (runs.iter()).flat_map(|run| &run.joints[rival.candidate.joint].q);
-    let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
-        [low.min(*q), high.max(*q)]
-    });
-    let pull = stiffness * 0.5 * (low + high) + preload;
-    pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
-}
-
-/// Whether the data support a rival as well as what stands.
-pub(super) fn equal(own: &Profile, rival: &Profile) -> bool {
-    rival.candidate.joint == own.candidate.joint
-        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
-        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
 }
 
 /// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.

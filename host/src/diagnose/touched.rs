@@ -5,6 +5,8 @@
 //!
 //! Leaves out: events in both runs at the same place of the motion, which are of the rig; events that last.
 
+use std::ops::Range;
+
 use super::bench::Loaded;
 use super::burst::burst;
 use super::floor;
@@ -20,7 +22,8 @@ const BESIDE: f64 = 0.25;
 pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
     let rows = &loaded.rows;
     let mut told = Vec::new();
-    let mut out: Vec<(usize, [f64; 2])> = Vec::new();
+    // Rows of a run from its first on.
+    let mut out: Vec<(usize, Range<usize>)> = Vec::new();
     for (a, b) in floor::repeats(&loaded.runs) {
         for (j, joint) in robot.joints.iter().enumerate() {
             let residual = &residuals[j];
@@ -28,9 +31,13 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             let mut keep = vec![false; rows.count];
             let starts = [a, b].map(|run| rows.starts[run]);
             let length = (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]);
+            let known = |run: usize, row: usize| {
+                let mut rows = (out.iter()).filter(|(known, _)| *known == run);
+                rows.any(|(_, part)| part.contains(&row))
+            };
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
-                keep[x] = rows.keep[j][x] && rows.keep[j][y];
+                keep[x] = rows.keep[j][x] && rows.keep[j][y] && !known(a, k) && !known(b, k);
                 apart[x] = residual[x] - residual[y];
             }
             let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &loaded.runs) else {
@@ -61,15 +68,16 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
                 }
             ));
             for part in &burst.rows {
-                let span = [part.start, part.end].map(|row| {
-                    (row - starts[0]) as f64 * rows.period + rows.thinning.trimmed(&loaded.runs[a])
-                });
-                out.extend([(a, span), (b, span)]);
+                let own = part.start - starts[0]..part.end - starts[0];
+                out.extend([(a, own.clone()), (b, own)]);
             }
         }
     }
-    for (run, [from, to]) in out {
+    let (period, thinning) = (rows.period, &rows.thinning);
+    for (run, part) in out {
         let run: &mut Run = &mut loaded.runs[run];
+        let trimmed = thinning.trimmed(run);
+        let [from, to] = [part.start, part.end].map(|row| row as f64 * period + trimmed);
         let sample = |t: f64| ((t * run.rate).max(0.0).round() as usize).min(run.t.len());
         let part = sample(from - BESIDE)..sample(to + BESIDE);
         run.left_out.push(part);

@@ -14,9 +14,9 @@ use super::fit::Fit;
 use super::floor;
 use super::predicted::predict;
 use super::profile::SIGNIFICANT;
-use super::rows::Column;
+use super::runs::Run;
 use crate::report::format_value;
-use crate::robot::{JointKind, Robot};
+use crate::robot::{Joint, JointKind};
 
 /// Least share of the RMS that another zero takes off for it to be said.
 const LEAST: f64 = 0.2;
@@ -32,12 +32,38 @@ const TURNS: u32 = 24;
 /// … and share of the RMS that one has to take off.
 const MOST_OF_IT: f64 = 0.5;
 
-/// What one recording's zero says of a joint.
+/// What one recording's zero says.
 struct Shift {
-    joint: usize,
     label: String,
+    /// With its deviation.
     by: [f64; 2],
     gain: f64,
+}
+
+impl Shift {
+    fn of(run: Option<&Run>, by: [f64; 2], gain: f64) -> Self {
+        let label = run.map_or_else(String::new, |run| run.label.clone());
+        Self { label, by, gain }
+    }
+
+    /// The one that takes more off.
+    fn or(self, other: Option<Self>) -> Self {
+        match other {
+            Some(other) if other.gain >= self.gain => other,
+            _ => self,
+        }
+    }
+
+    fn told(&self, joint: &Joint, others: &str) -> String {
+        format!(
+            "In {} joint {} seems to stand {} {} off against {others}: with a zero of its own {:.0} % less is left. Give all recordings one zero (--home), or look whether something else has changed.",
+            self.label,
+            joint.name,
+            format_value(-self.by[0], self.by[1]),
+            joint.kind.units().0,
+            100.0 * self.gain
+        )
+    }
 }
 
 /// That another zero of one of the recordings would do most of what the effects found do, a sentence; `base` is the refitted model
@@ -46,40 +72,29 @@ struct Shift {
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(super) fn another_zero(
-    robot: &Robot,
     source: &Source,
     base: &Fit,
     taken: f64,
 ) -> Result<Option<String>, DiagnoseError> {
-    if robot.joints.len() > 1 {
+    let [joint] = &source.robot.joints[..] else {
         return Ok(None);
-    }
+    };
     let recordings: BTreeSet<usize> = source.runs.iter().map(|run| run.recording).collect();
     let mut most: Option<Shift> = None;
-    for joint in 0..robot.joints.len() {
-        for recording in recordings.iter().filter(|_| recordings.len() > 1) {
-            let column = shifted(source, joint, Some(*recording))?;
-            let open = [[f64::NEG_INFINITY, f64::INFINITY]];
-            let evidence = (base.distinct(&[column])).and_then(|own| base.evidence(&own, &open));
-            let Some(e) = evidence else { continue };
-            let tried = recordings.len() * robot.joints.len();
-            let by = [e.gains[0], e.stds[0]];
-            let sure = by[0].abs() > SHIFT.max(SURE * by[1]) && e.corrected(tried) < SIGNIFICANT;
-            if sure
-                && e.gain > LEAST.max(IN_THEIR_PLACE * taken)
-                && most.as_ref().is_none_or(|m| e.gain > m.gain)
-            {
-                let own = source.runs.iter().find(|run| run.recording == *recording);
-                most = Some(Shift {
-                    joint,
-                    label: own.map_or_else(String::new, |run| run.label.clone()),
-                    by,
-                    gain: e.gain,
-                });
-            }
+    for &recording in recordings.iter().filter(|_| recordings.len() > 1) {
+        let column = vec![Some(shifted(source, Some(recording))?)];
+        let open = [[f64::NEG_INFINITY, f64::INFINITY]];
+        let evidence = (base.distinct(&[column])).and_then(|own| base.evidence(&own, &open));
+        let Some(e) = evidence else { continue };
+        let by = [e.gains[0], e.stds[0]];
+        let sure =
+            by[0].abs() > SHIFT.max(SURE * by[1]) && e.corrected(recordings.len()) < SIGNIFICANT;
+        if sure && e.gain > LEAST.max(IN_THEIR_PLACE * taken) {
+            let run = source.runs.iter().find(|run| run.recording == recording);
+            most = Some(Shift::of(run, by, e.gain).or(most));
         }
     }
-    Ok(most.map(|shift| told(robot, &shift, "the other recordings")))
+    Ok(most.map(|shift| shift.told(joint, "the other recordings")))
 }
 
 /// The same of recordings held back, of which the model leaves `residual`.
@@ -92,49 +107,29 @@ pub(super) fn another_zero_held(
     values: &[f64],
     residual: &[Vec<f64>],
 ) -> Result<Option<String>, DiagnoseError> {
-    if bench.robot.joints.len() > 1 {
+    let [joint] = &bench.robot.joints[..] else {
         return Ok(None);
-    }
-    let source = bench.source(sealed, values)?;
-    let (robot, rows) = (bench.robot, &sealed.rows);
-    let mut most: Option<Shift> = None;
-    for joint in 0..robot.joints.len() {
-        let column = shifted(&source, joint, None)?;
-        let (Some(own), keep) = (&column[joint], &rows.keep[joint]) else {
-            continue;
-        };
-        let used = || (own.iter().zip(&residual[joint]).zip(keep)).filter(|(_, keep)| **keep);
-        let (xx, xy) = used().fold((0.0, 0.0), |(xx, xy), ((x, r), _)| (xx + x * x, xy + x * r));
-        if xx == 0.0 {
-            continue;
-        }
+    };
+    let (residual, keep) = (&residual[0], &sealed.rows.keep[0]);
+    let own = shifted(&bench.source(sealed, values)?, None)?;
+    let used = || (own.iter().zip(residual).zip(keep)).filter(|(_, keep)| **keep);
+    let (xx, xy) = used().fold((0.0, 0.0), |(xx, xy), ((x, r), _)| (xx + x * x, xy + x * r));
+    let mut most = None;
+    if xx > 0.0 {
         let by = xy / xx;
-        let left: Vec<f64> = (own.iter().zip(&residual[joint]))
-            .map(|(x, r)| r - by * x)
-            .collect();
-        let [before, after] = [&residual[joint], &left].map(|r| floor::rms(r, keep));
+        let left: Vec<f64> = own.iter().zip(residual).map(|(x, r)| r - by * x).collect();
+        let [before, after] = [residual, &left].map(|r| floor::rms(r, keep));
         // Noise of a row counts as independent once in ten rows at least.
         let std = after * (10.0 / xx).sqrt();
         let gain = 1.0 - after / before;
-        if by.abs() > SHIFT.max(SURE * std)
-            && gain > LEAST
-            && most.as_ref().is_none_or(|m| gain > m.gain)
-        {
-            most = Some(Shift {
-                joint,
-                label: sealed
-                    .runs
-                    .first()
-                    .map_or_else(String::new, |run| run.label.clone()),
-                by: [by, std],
-                gain,
-            });
+        if by.abs() > SHIFT.max(SURE * std) && gain > LEAST {
+            most = Some(Shift::of(sealed.runs.first(), [by, std], gain));
         }
     }
-    if most.is_none() && robot.joints[0].kind == JointKind::Revolute {
+    if most.is_none() && joint.kind == JointKind::Revolute {
         most = turned(bench, sealed, values, residual)?;
     }
-    Ok(most.map(|shift| told(robot, &shift, "those to learn from")))
+    Ok(most.map(|shift| shift.told(joint, "those to learn from")))
 }
 
 /// The same for a single joint that turns, where the zero is far off.
@@ -142,7 +137,7 @@ fn turned(
     bench: &Bench,
     sealed: &Loaded,
     values: &[f64],
-    residual: &[Vec<f64>],
+    residual: &[f64],
 ) -> Result<Option<Shift>, DiagnoseError> {
     let (rows, nominal) = (&sealed.rows, &bench.nominal);
     let torque = |by: f64| -> Result<Vec<f64>, DiagnoseError> {
@@ -158,58 +153,34 @@ fn turned(
         Ok(thin)
     };
     let here = torque(0.0)?;
-    let before = floor::rms(&residual[0], &rows.keep[0]);
+    let before = floor::rms(residual, &rows.keep[0]);
     let mut most: Option<Shift> = None;
     for k in 1..TURNS {
         let by = f64::from(k) * TAU / f64::from(TURNS);
         let there = torque(by)?;
-        let left: Vec<f64> = (residual[0].iter().zip(here.iter().zip(&there)))
+        let left: Vec<f64> = (residual.iter().zip(here.iter().zip(&there)))
             .map(|(r, (here, there))| r + here - there)
             .collect();
         let gain = 1.0 - floor::rms(&left, &rows.keep[0]) / before;
-        if gain > MOST_OF_IT && most.as_ref().is_none_or(|m| gain > m.gain) {
+        if gain > MOST_OF_IT {
             let by = if by > PI { by - TAU } else { by };
-            most = Some(Shift {
-                joint: 0,
-                label: sealed
-                    .runs
-                    .first()
-                    .map_or_else(String::new, |run| run.label.clone()),
-                by: [by, PI / f64::from(TURNS)],
-                gain,
-            });
+            let std = PI / f64::from(TURNS);
+            most = Some(Shift::of(sealed.runs.first(), [by, std], gain).or(most));
         }
     }
     Ok(most)
 }
 
-/// Torque per rad or m by which a joint's zero is off in one recording, or all of them.
-fn shifted(
-    source: &Source,
-    joint: usize,
-    recording: Option<usize>,
-) -> Result<Column, DiagnoseError> {
-    let joints = source.robot.joints.len();
-    let mut column: Column = vec![Some(Vec::new()); joints];
+/// Torque per rad or m by which the joint's zero is off in one recording, or all of them.
+fn shifted(source: &Source, recording: Option<usize>) -> Result<Vec<f64>, DiagnoseError> {
+    let mut column = Vec::new();
     for (r, run) in source.runs.iter().enumerate() {
         let there = recording.is_none_or(|own| own == run.recording);
         let one = vec![f64::from(u8::from(there)); run.len()];
-        let torque = source.slopes(joint, r)?.misread(&one, 1.0 / run.rate);
-        for (to, from) in column.iter_mut().flatten().zip(torque.iter().flatten()) {
-            source.thinning.push(from, to);
+        let torque = source.slopes(0, r)?.misread(&one, 1.0 / run.rate);
+        for from in torque.iter().flatten() {
+            source.thinning.push(from, &mut column);
         }
     }
     Ok(column)
-}
-
-fn told(robot: &Robot, shift: &Shift, others: &str) -> String {
-    let own = &robot.joints[shift.joint];
-    format!(
-        "In {} joint {} seems to stand {} {} off against {others}: with a zero of its own {:.0} % less is left. Give all recordings one zero (--home), or look whether something else has changed.",
-        shift.label,
-        own.name,
-        format_value(-shift.by[0], shift.by[1]),
-        own.kind.units().0,
-        100.0 * shift.gain
-    )
 }

@@ -5,10 +5,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use rig_shared::effects::Kind;
+
+use super::rank::may_stand;
 use super::*;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Evidence;
-use crate::diagnose::runs::JointRun;
+use crate::diagnose::outcome::Step;
+use crate::diagnose::runs::{JointRun, Run};
 
 fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
     Profile {

@@ -153,7 +153,10 @@ impl Evidence {
                 .clone()
                 .filter_map(|r| r.t.first().copied())
                 .reduce(f64::min);
-            let last = own.filter_map(|r| r.t.last().copied()).reduce(f64::max);
+            // The last sample stands for a period as the others do.
+            let last = own
+                .filter_map(|r| Some(r.t.last()? + 1.0 / r.rate))
+                .reduce(f64::max);
             first.zip(last).map_or(0.0, |(a, b)| b - a)
         };
         let recordings = runs.iter().map(|r| r.recording + 1).max().unwrap_or(0);

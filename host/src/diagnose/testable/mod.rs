@@ -191,7 +191,7 @@ fn lacking(
         Need::Duration(least) => (evidence.duration < least).then(|| {
             (
                 format!(
-                    "the longest recording lasts {:.2} s, {least:.0} s are needed",
+                    "the longest recording lasts {:.1} s, {least:.0} s are needed",
                     evidence.duration
                 ),
                 format!("one motion repeated from cold for {least:.0} s or more"),

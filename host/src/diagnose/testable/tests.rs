@@ -124,7 +124,7 @@ fn columns_that_are_missing_are_named() {
     assert!(
         why(Kind::ViscousWarmupTime, &[some.clone()])
             .unwrap()
-            .contains("20 s")
+            .contains("20.0 s")
     );
     assert!(
         why(Kind::InertiaCoupling, &[some.clone()])

@@ -1,0 +1,119 @@
+//! Recordings taken in: read, looked through for faults, freed of touches, under one treatment.
+
+use crate::diagnose::bench::{Bench, Loaded, library};
+use crate::diagnose::lead::slack;
+use crate::diagnose::outcome::DataFault;
+use crate::diagnose::refit::{Refit, open};
+use crate::diagnose::runs::{Run, copies, in_sessions};
+use crate::diagnose::sanity::{faults, too_short_to_judge, too_short_to_learn};
+use crate::diagnose::stated::Stated;
+use crate::diagnose::touched::touched;
+use crate::diagnose::{DiagnoseError, Options};
+use crate::prepare::Recording;
+
+/// What came of looking at the recordings.
+pub(super) enum Intake<'a> {
+    /// They can be learnt from.
+    Fit(Box<Material<'a>>),
+    /// They cannot.
+    Faulty(Vec<DataFault>),
+    /// The same with more of the description's effects held.
+    Hold(Stated),
+}
+
+/// Recordings that can be learnt from.
+pub(super) struct Material<'a> {
+    /// Robot and treatment.
+    pub(super) bench: Bench<'a>,
+    /// The training data.
+    pub(super) loaded: Loaded,
+    /// Those held back.
+    pub(super) sealed: Option<Loaded>,
+    /// Base parameters that the training data tell less of than the description, which stay as described.
+    pub(super) open: Vec<usize>,
+    /// What was left out of them, sentences.
+    pub(super) touches: Vec<String>,
+}
+
+/// Reads the recordings.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub(super) fn intake<'a>(
+    stated: &'a Stated,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+) -> Result<Intake<'a>, DiagnoseError> {
+    let mut bench = Bench::of(stated, training)?;
+    let mut loaded = bench.load(training)?;
+    let mut sealed = if holdout.is_empty() {
+        None
+    } else {
+        Some(bench.load_held(holdout)?)
+    };
+    in_sessions(&mut loaded.runs, &[]);
+    if let Some(sealed) = &mut sealed {
+        in_sessions(&mut sealed.runs, &loaded.runs);
+    }
+    let wrong = wrong(stated, &loaded, sealed.as_ref())?;
+    if !wrong.is_empty() {
+        return Ok(Intake::Faulty(wrong));
+    }
+    let mut more = stated.clone();
+    if more.hold_delays(slack(&loaded.runs))
+        || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without))
+    {
+        return Ok(Intake::Hold(more));
+    }
+    let open = open(&bench, &loaded.rows);
+    if !open.is_empty() {
+        bench.anchor.hold(&open);
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
+    let left: Vec<Vec<f64>> = {
+        let refit = Refit::of(&bench, &loaded.rows)?;
+        (0..bench.robot.joints.len())
+            .map(|j| refit.base.residual(j))
+            .collect()
+    };
+    let touches = touched(bench.robot, &left, &mut loaded);
+    if !touches.is_empty() {
+        loaded = bench.rows(loaded.runs, &loaded.treatment)?;
+    }
+    Ok(Intake::Fit(Box::new(Material {
+        bench,
+        loaded,
+        sealed,
+        open,
+        touches,
+    })))
+}
+
+/// What about the recordings cannot be.
+fn wrong(
+    stated: &Stated,
+    loaded: &Loaded,
+    sealed: Option<&Loaded>,
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let all: Vec<&Run> = (loaded.runs.iter())
+        .chain(sealed.iter().flat_map(|sealed| &sealed.runs))
+        .collect();
+    if let Some((a, b)) = copies(&all) {
+        let [label, again] = [a, b].map(|k| all[k].label.clone());
+        return Err(DiagnoseError::Copy { label, again });
+    }
+    let mut wrong = faults(&stated.robot, &loaded.runs)?;
+    if wrong.is_empty() {
+        wrong.extend(too_short_to_learn(&loaded.runs));
+    }
+    if let (true, Some(sealed)) = (wrong.is_empty(), sealed) {
+        wrong = faults(&stated.robot, &sealed.runs)?;
+        if wrong.is_empty() {
+            wrong.extend(too_short_to_judge(&sealed.runs));
+        }
+    }
+    Ok(wrong)
+}

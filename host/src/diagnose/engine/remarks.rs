@@ -1,0 +1,86 @@
+//! What is said besides the verdict: how recordings were treated, what stayed as described, what they are too much alike for.
+
+use crate::diagnose::bench::{Bench, Loaded};
+use crate::diagnose::floor;
+use crate::diagnose::sentences::offsets;
+use crate::diagnose::solve::Solution;
+use crate::report::{format_unit, format_value};
+use crate::robot::Robot;
+
+/// Sentences on recordings learnt from and held back, the base parameters `open` to doubt, what the sensors read with the drive off,
+/// and the constants of the last model.
+pub(super) fn remarks(
+    bench: &Bench,
+    loaded: &Loaded,
+    sealed: Option<&Loaded>,
+    open: &[usize],
+    sensor_zeros: &[[f64; 2]],
+    last: &Solution,
+) -> Vec<String> {
+    let mut words = Vec::new();
+    words.extend(sealed.and_then(|sealed| own_rate(bench, sealed)));
+    words.extend(read_off(bench.robot, sensor_zeros));
+    words.extend(offsets(bench, last));
+    words.extend(held(bench, open));
+    words.extend(sealed.and_then(|sealed| no_other_motion(loaded, sealed)));
+    words
+}
+
+/// That a hold-out is judged at another rate than that of the recordings learnt from.
+fn own_rate(bench: &Bench, sealed: &Loaded) -> Option<String> {
+    let [learnt, held] = [bench.rate(), sealed.treatment.sample_rate];
+    let label = &sealed.runs.first()?.label;
+    (learnt != held).then(|| {
+        format!(
+            "{label} is judged at its own rate, {held:.1} Hz where {learnt:.1} Hz were learnt from{}.",
+            match learnt > held {
+                true => format!("; its noise floor is taken as {:.2} times that of the others", (learnt / held).sqrt()),
+                false => String::new(),
+            }
+        )
+    })
+}
+
+/// What the sensors read with the drive off.
+fn read_off(robot: &Robot, zeros: &[[f64; 2]]) -> Vec<String> {
+    (robot.joints.iter().zip(zeros))
+        .map(|(joint, [value, std])| {
+            format!(
+                "With the drive off the sensor of joint {} reads {} {}.",
+                joint.name,
+                format_value(*value, *std),
+                format_unit(joint.kind.units().1)
+            )
+        })
+        .collect()
+}
+
+/// A hold-out that is the training motion once more.
+fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
+    let (own, same) = floor::repeated(&loaded.runs, &sealed.runs)?;
+    Some(format!(
+        "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
+        own.label, same.label
+    ))
+}
+
+/// What was left as the description has it.
+fn held(bench: &Bench, open: &[usize]) -> Option<String> {
+    let names: Vec<String> = (open.iter().map(|&k| bench.nominal.base.expression(k))).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The training motion tells less of {} than the description, so {} as described as far as bodies can be so: {}.",
+            if names.len() == 1 {
+                "one base parameter"
+            } else {
+                "some base parameters"
+            },
+            if names.len() == 1 {
+                "it stays"
+            } else {
+                "they stay"
+            },
+            names.join(", ")
+        )
+    })
+}

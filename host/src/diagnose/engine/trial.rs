@@ -1,0 +1,97 @@
+//! Which of the effects that a search has found stand before the simulated motion, all the others and the recordings held back.
+
+use super::steps::{refuse, refuse_guesses};
+use super::unbelieved::{contradicted, unbelieved};
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::bench::Loaded;
+use crate::diagnose::bodies::Fitting;
+use crate::diagnose::described::by_description;
+use crate::diagnose::judge::{Judge, Judged};
+use crate::diagnose::motion::Replay;
+use crate::diagnose::outcome::Tried;
+use crate::diagnose::profile::Profile;
+use crate::diagnose::refit::Refit;
+
+/// What effects are held against.
+pub(super) struct Trial<'a, 'r> {
+    /// The training data.
+    pub(super) judge: &'a Judge<'a, 'r>,
+    /// The nominal model on them.
+    pub(super) refit: &'a Refit<'r>,
+    /// Its models with effects.
+    pub(super) fitting: &'a Fitting<'a, 'r>,
+    /// The training motion simulated.
+    pub(super) replay: &'a Replay<'a>,
+    /// Recordings held back.
+    pub(super) sealed: Option<&'a Loaded>,
+}
+
+/// What is left of the effects.
+pub(super) struct Survivors {
+    /// Those that stand.
+    pub(super) judged: Judged,
+    /// Those that took much away and could not stand.
+    pub(super) fallen: Vec<Profile>,
+}
+
+impl Trial<'_, '_> {
+    /// Takes the effects `found` that do not stand out, one by one. Why goes to `tried`.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn stand(
+        &self,
+        found: Vec<Profile>,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let Self { judge, refit, .. } = self;
+        let (robot, search) = (judge.robot, judge.search);
+        let judged = judge.judged(found)?;
+        refuse_guesses(robot, tried, &judged);
+        let judged = by_description(judge, refit, &self.fitting.bench.anchor, judged)?;
+        refuse_guesses(robot, tried, &judged);
+        let mut left = Survivors {
+            judged,
+            fallen: Vec::new(),
+        };
+        // A name that makes the simulated motion worse stands in for something else.
+        while let Some(k) = {
+            let chosen = &left.judged.chosen;
+            (self.replay).spoiling(chosen, search.count_given(chosen))?
+        } {
+            let why = "explains torque, but the simulated motion gets worse with it";
+            left = self.without(left, k, why, tried)?;
+        }
+        while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
+            left = self.without(left, k, why, tried)?;
+        }
+        // The hold-out finds no name; one that it contradicts does not stand.
+        if let Some(sealed) = self.sealed {
+            while let Some(k) = contradicted(self.fitting, search, &left.judged.chosen, sealed)? {
+                let why = "explains the training data, and leaves more of the recordings held back than there is without it";
+                left = self.without(left, k, why, tried)?;
+            }
+        }
+        Ok(left)
+    }
+
+    fn without(
+        &self,
+        Survivors { judged, mut fallen }: Survivors,
+        k: usize,
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let (robot, search) = (self.judge.robot, self.judge.search);
+        let mut stand = judged.chosen;
+        let gone = stand.remove(k);
+        refuse(robot, tried, &gone, why);
+        if gone.takes_much(search.trials()) {
+            fallen.push(gone);
+        }
+        let stand = search.possible(&self.refit.base, stand)?;
+        let judged = self.judge.judged(stand)?;
+        refuse_guesses(robot, tried, &judged);
+        Ok(Survivors { judged, fallen })
+    }
+}

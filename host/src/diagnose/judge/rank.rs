@@ -1,0 +1,70 @@
+//! Which other names a step may have.
+
+use rig_shared::effects::Kind;
+
+use crate::diagnose::outcome::Step;
+use crate::diagnose::profile::Profile;
+use crate::diagnose::runs::Run;
+use crate::diagnose::testable;
+
+/// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
+const AS_GOOD: f64 = 0.9;
+/// … that a stiffness may be larger than found.
+const SURELY: f64 = 2.0;
+/// How far from the middle of the motion a spring may be at rest, in spans of the motion.
+const SPANS_TO_REST: f64 = 2.0;
+/// Standard deviations of a paired difference between blocks.
+const NO_DIFFERENCE: f64 = 2.5;
+
+/// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first; one on another joint
+/// takes away something else.
+pub(in crate::diagnose) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
+    let mut names = vec![step.effect.clone()];
+    let mut exact = |kind: Kind| {
+        for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+            if !names.iter().any(|n| n == confusion.with) {
+                names.push(confusion.with.to_owned());
+            }
+        }
+    };
+    exact(own.candidate.kind);
+    for rival in rivals.iter().filter(|rival| may_stand(rival, runs)) {
+        let name = rival.candidate.kind.about().name;
+        if names.iter().any(|n| n == name) {
+            continue;
+        }
+        if equal(own, rival) {
+            names.push(name.to_owned());
+        } else if step.runner_up.is_none() && rival.candidate.joint == own.candidate.joint {
+            step.runner_up = Some(name.to_owned());
+            step.runner_up_gap_closed =
+                Some(step.gap_closed * (rival.evidence.gain / own.evidence.gain).clamp(0.0, 1.0));
+        }
+    }
+    step.set = names;
+}
+
+/// Whether a rival may be what is there: none whose law has run to its limit, but a spring that is at rest not far from where the
+/// joint goes, were it a little stiffer than found.
+pub(super) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
+    let (gains, stds) = (&rival.evidence.gains, &rival.evidence.stds);
+    let (&[stiffness, preload], &[std, _]) = (&gains[..], &stds[..]) else {
+        return rival.vanished.is_none();
+    };
+    if rival.vanished.is_none() || rival.candidate.kind != Kind::Spring {
+        return rival.vanished.is_none();
+    }
+    let places = (runs.iter()).flat_map(|run| &run.joints[rival.candidate.joint].q);
+    let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+        [low.min(*q), high.max(*q)]
+    });
+    let pull = stiffness * 0.5 * (low + high) + preload;
+    pull.abs() <= (stiffness + SURELY * std) * SPANS_TO_REST * (high - low)
+}
+
+/// Whether the data support a rival as well as what stands.
+pub(in crate::diagnose) fn equal(own: &Profile, rival: &Profile) -> bool {
+    rival.candidate.joint == own.candidate.joint
+        && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+        && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
+}

@@ -1,0 +1,83 @@
+//! What is left that only recordings held back show, or that a law took which could not stand.
+
+use crate::diagnose::outcome::Remainder;
+use crate::diagnose::profile::Profile;
+use crate::robot::{Joint, Robot, title_of};
+
+/// … of the data held back, whose motion is another.
+const BEYOND_FLOOR_HELD: f64 = 1.5;
+
+/// What the last model leaves of data held back, where it leaves no more than noise of the training data: in the joint where
+/// it is most beyond the floor.
+pub(in crate::diagnose) fn left_of_held(
+    robot: &Robot,
+    held: &[f64],
+    floors: &[f64],
+) -> Option<Remainder> {
+    let ratio = |j: usize| held[j] / floors[j];
+    let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
+    let Joint { name, kind, .. } = &robot.joints[j];
+    (ratio(j) > BEYOND_FLOOR_HELD).then(|| Remainder {
+        joint: name.clone(),
+        unit: kind.units().1.to_owned(),
+        rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
+        ratio: ratio(j),
+        text: format!(
+            "The data held back are left at {:.1} times the noise floor in joint {name}, the training data are not: they show something that the training data hardly do. Give a recording like them with --data.",
+            ratio(j)
+        ),
+        places: Vec::new(),
+        doubt: false,
+    })
+}
+
+/// Names that take something off the training data and nothing off those held back: in the joint where these gain least.
+/// `steps` are each named joint's RMS held back before and after all of them.
+pub(in crate::diagnose) fn not_carried_over(
+    robot: &Robot,
+    steps: &[(usize, [f64; 2])],
+    floors: &[f64],
+) -> Option<Remainder> {
+    let grown = |(_, [before, after]): &&(usize, [f64; 2])| after / before;
+    let worst = steps.iter().max_by(|a, b| grown(a).total_cmp(&grown(b)))?;
+    let (joint, [before, after]) = *worst;
+    let Joint { name, kind, .. } = &robot.joints[joint];
+    (after >= before).then(|| Remainder {
+        joint: name.clone(),
+        unit: kind.units().1.to_owned(),
+        rms: (after.powi(2) - floors[joint].powi(2)).max(0.0).sqrt(),
+        ratio: after / floors[joint],
+        text: format!(
+            "Of the data held back the names take nothing off in joint {name}: they explain the training data alone, and are no more than guesses. Record more to learn from.",
+        ),
+        places: Vec::new(),
+        doubt: true,
+    })
+}
+
+/// What was taken off by a law that could not stand, on a joint where nothing was found that could.
+pub(in crate::diagnose) fn taken_by_none(
+    robot: &Robot,
+    fallen: &[Profile],
+    chosen: &[Profile],
+    floors: &[f64],
+) -> Option<Remainder> {
+    let bare = |p: &&Profile| (chosen.iter()).all(|c| c.candidate.joint != p.candidate.joint);
+    let gain = |p: &&Profile| p.evidence.joint_gain;
+    let most = (fallen.iter().filter(bare)).max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
+    let (joint, left) = (most.candidate.joint, 1.0 - gain(&most));
+    let Joint { name, kind, .. } = &robot.joints[joint];
+    Some(Remainder {
+        joint: name.clone(),
+        unit: kind.units().1.to_owned(),
+        rms: floors[joint] * (1.0 - left * left).max(0.0).sqrt(),
+        ratio: 1.0 / left,
+        text: format!(
+            "The law of {} takes {:.0} % off what is left of joint {name}, on stretches that it was not fitted to, but not with values that such a rig has: something is missing that has no name here.",
+            title_of(most.candidate.kind),
+            100.0 * gain(&most)
+        ),
+        places: Vec::new(),
+        doubt: true,
+    })
+}
