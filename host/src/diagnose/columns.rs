@@ -17,6 +17,7 @@ use super::search::is_gear;
 use super::slopes::Slopes;
 use super::transmission::{ABREAST, Driven, Seen};
 use crate::batch::each_by;
+use crate::effects::outruns;
 use crate::robot::{Robot, unit_of};
 
 mod gears;
@@ -358,7 +359,12 @@ impl Source<'_> {
                 drive_rate: 0.0,
                 gravity: 0.0,
             };
-            let terms: [f64; GAINS] = candidate.kind.terms(shapes, &mut memory, &at);
+            let terms: [f64; GAINS] =
+                if outruns(candidate.kind, shapes, ratio * joint.qd[k], at.period) {
+                    [0.0; GAINS]
+                } else {
+                    candidate.kind.terms(shapes, &mut memory, &at)
+                };
             for (list, term) in out.iter_mut().zip(terms) {
                 list.push(term);
             }

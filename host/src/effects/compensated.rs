@@ -4,7 +4,7 @@ use rig_shared::effects::{Kind, Memory};
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
 use rig_shared::scalar::Real as _;
 
-use super::{Effects, State, at_the_link, is_torque, shifted};
+use super::{Effects, State, at_the_link, is_torque, outruns, shifted};
 use crate::data::{Block, JointColumns};
 use crate::prepare::{
     LowPass, Piece, PrepareError, Recording, Treatment, central_difference, each_piece, later,
@@ -165,6 +165,7 @@ impl Compensated<'_> {
             .collect();
         let mut row = [vec![0.0; joints], vec![0.0; joints], vec![0.0; joints]];
         let (mut motor, mut drive) = (vec![0.0; joints], vec![0.0; joints]);
+        let mut motor_velocity = vec![0.0; joints];
         let (mut warming, mut sum) = (vec![0.0; joints], vec![0.0; joints]);
         for r in piece.core_start..piece.core_end {
             for (j, s) in seen.iter().enumerate() {
@@ -181,6 +182,9 @@ impl Compensated<'_> {
             self.effects
                 .motor_angles(&row[0], &mut motor)
                 .map_err(stopped)?;
+            (self.effects.transmission)
+                .motor_velocity(&row[0], &row[1], &mut motor_velocity)
+                .map_err(stopped)?;
             let state = State {
                 q: &row[0],
                 qd: &row[1],
@@ -191,7 +195,7 @@ impl Compensated<'_> {
                 warming: &warming,
                 period: self.period,
             };
-            self.torques(&state, &mut running.memory, &mut sum);
+            self.torques(&state, &motor_velocity, &mut running.memory, &mut sum);
             if self.loads && self.effects.loads.iter().flatten().any(|x| *x != 0.0) {
                 let mut load = vec![0.0; joints];
                 let loads = &self.effects.loads;
@@ -212,7 +216,13 @@ impl Compensated<'_> {
     }
 
     /// Torques of all joints along a motion; the hidden states go on.
-    fn torques(&self, at: &State<'_>, memory: &mut [Memory<f64>], sum: &mut [f64]) {
+    fn torques(
+        &self,
+        at: &State<'_>,
+        motor_velocity: &[f64],
+        memory: &mut [Memory<f64>],
+        sum: &mut [f64],
+    ) {
         sum.fill(0.0);
         let placed = &self.effects.placed;
         let mut behind: Vec<f64> = self
@@ -231,6 +241,9 @@ impl Compensated<'_> {
         for (k, p) in placed.iter().enumerate() {
             let kind = p.effect.kind;
             if !is_torque(kind) || kind == Kind::LoadFriction {
+                continue;
+            }
+            if outruns(kind, &p.effect.shapes, motor_velocity[p.joint], at.period) {
                 continue;
             }
             let mut instant = self.effects.instant(k, at);

@@ -10,8 +10,10 @@ mod compensated;
 #[cfg(test)]
 mod tests;
 
+use std::f64::consts::PI;
+
 use rig_shared::dual::Dual;
-use rig_shared::effects::{Channel, Instant, Kind, Memory};
+use rig_shared::effects::{Channel, Instant, Kind, Memory, Periodic, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{Transmission, TransmissionError};
 
@@ -61,6 +63,24 @@ pub(crate) fn at_the_link(kind: Kind) -> bool {
 /// Whether the effect is a torque of the joint that its law gives along a motion.
 pub(crate) fn is_torque(kind: Kind) -> bool {
     kind.about().channel == Channel::Torque || kind == Kind::GravityTilt
+}
+
+/// Whether more than half a wave of the motor's angle passes from one sample to the next: what acts between two samples is then
+/// nearly nothing on average, and the samples make a slow wave of it that is not there.
+pub(crate) fn outruns(
+    kind: Kind,
+    shapes: &[f64; SHAPES],
+    motor_velocity: f64,
+    period: f64,
+) -> bool {
+    let about = kind.about();
+    let of_the_motor = matches!(
+        kind.periodic(),
+        Some(Periodic::Motor | Periodic::MotorTimesDrive)
+    );
+    of_the_motor
+        && about.channel == Channel::Torque
+        && (shapes[0] * motor_velocity * period).abs() > PI
 }
 
 impl Effects {
