@@ -8,9 +8,7 @@
 //! Leaves out: that effects are formed with the base parameters of the free fit; of a tilted arm, that its moments are by the
 //! cosine too small in what gravity does alone.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::DMatrix;
 
@@ -72,7 +70,7 @@ pub(super) struct Fitting<'a, 'r> {
     /// Base parameters that the effects' columns are formed with.
     formed_at: &'a [f64],
     /// By the columns of its effects.
-    known: RefCell<Vec<(Vec<Arc<Vec<Column>>>, Rc<Standing>)>>,
+    known: Mutex<Vec<(Vec<Arc<Vec<Column>>>, Arc<Standing>)>>,
 }
 
 /// Base parameters as columns and as a description take them, gains, and the description with its links.
@@ -91,7 +89,7 @@ impl<'a, 'r> Fitting<'a, 'r> {
             refit,
             runs,
             formed_at,
-            known: RefCell::default(),
+            known: Mutex::default(),
         }
     }
 
@@ -99,18 +97,26 @@ impl<'a, 'r> Fitting<'a, 'r> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] where the motion does not tell its parameters apart.
-    pub(super) fn of(&self, chosen: &[Profile]) -> Result<Rc<Standing>, DiagnoseError> {
+    pub(super) fn of(&self, chosen: &[Profile]) -> Result<Arc<Standing>, DiagnoseError> {
         let same = |known: &[Arc<Vec<Column>>]| {
             known.len() == chosen.len()
                 && (known.iter().zip(chosen)).all(|(k, p)| Arc::ptr_eq(k, &p.columns))
         };
-        if let Some((_, standing)) = (self.known.borrow().iter()).find(|(k, _)| same(k)) {
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, standing)) = known().iter().find(|(k, _)| same(k)) {
             return Ok(standing.clone());
         }
-        let standing = Rc::new(self.fitted(chosen)?);
+        let standing = Arc::new(self.fitted(chosen)?);
         let key = chosen.iter().map(|p| p.columns.clone()).collect();
-        self.known.borrow_mut().push((key, standing.clone()));
+        known().push((key, standing.clone()));
         Ok(standing)
+    }
+
+    /// Takes `standing` for the model of these effects.
+    pub(super) fn adopt(&self, chosen: &[Profile], standing: Standing) {
+        let key = chosen.iter().map(|p| p.columns.clone()).collect();
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.insert(0, (key, Arc::new(standing)));
     }
 
     /// RMS that the model of these effects leaves of other recordings, joint by joint.
@@ -126,33 +132,18 @@ impl<'a, 'r> Fitting<'a, 'r> {
     }
 
     fn fitted(&self, chosen: &[Profile]) -> Result<Standing, DiagnoseError> {
-        let Bench {
-            robot,
-            nominal,
-            anchor,
-            ..
-        } = self.bench;
         let coefficients = self.refit.solution(chosen)?.values;
+        if self.bench.robot.joints.len() == 1 {
+            return Ok(self.alone(&coefficients, chosen));
+        }
+        let Bench { robot, anchor, .. } = self.bench;
         let (free, gains) = coefficients.split_at(anchor.free.len());
         let values = anchor.values(free);
         let mut upright = values.clone();
-        let turned = |gains: &[f64], values: &mut [f64]| {
-            gravity_with(
-                robot,
-                nominal,
-                self.formed_at,
-                &with_gains(chosen, gains),
-                values,
-            )
-        };
-        turned(gains, &mut upright);
-        let ([values, described], gains, links) = if robot.joints.len() == 1 {
-            let links = redistributed_over(robot, nominal, &upright);
-            ([values.clone(), values], gains.to_vec(), links)
-        } else {
-            self.embodied(&coefficients, [values, upright], chosen)
-        };
-        let gravity = turned(&gains, &mut values.clone());
+        self.turned(chosen, gains, &mut upright);
+        let ([values, described], gains, links) =
+            self.embodied(&coefficients, [values, upright], chosen);
+        let gravity = self.turned(chosen, &gains, &mut values.clone());
         let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, &gains));
         Ok(Standing {
             values,
@@ -161,6 +152,36 @@ impl<'a, 'r> Fitting<'a, 'r> {
             model,
             remarks,
         })
+    }
+
+    /// The model of one joint with these coefficients of free directions and effects' columns.
+    pub(super) fn alone(&self, coefficients: &[f64], chosen: &[Profile]) -> Standing {
+        let Bench {
+            robot,
+            nominal,
+            anchor,
+            ..
+        } = self.bench;
+        let (free, gains) = coefficients.split_at(anchor.free.len());
+        let values = anchor.values(free);
+        let mut upright = values.clone();
+        let gravity = self.turned(chosen, gains, &mut upright);
+        let links = redistributed_over(robot, nominal, &upright);
+        let (model, remarks) = completed(links, robot, gravity, &with_gains(chosen, gains));
+        Standing {
+            described: values.clone(),
+            values,
+            gains: gains.to_vec(),
+            model,
+            remarks,
+        }
+    }
+
+    /// Gravity turned as the effects say, and `values` for it.
+    fn turned(&self, chosen: &[Profile], gains: &[f64], values: &mut [f64]) -> [f64; 3] {
+        let effects = with_gains(chosen, gains);
+        let Bench { robot, nominal, .. } = self.bench;
+        gravity_with(robot, nominal, self.formed_at, &effects, values)
     }
 
     /// The nearest bodies to base parameters of a free fit, and the gains beside them.

@@ -20,6 +20,7 @@ use self::steps::{change_step, reconcile, steps};
 use self::trial::{Survivors, Trial};
 use super::across::{across, names_something, refutes, tell as tell_across};
 use super::bodies::Fitting;
+use super::by_motion::by_motion;
 use super::change::change;
 use super::descent::Descent;
 use super::fault::{faulty, of_preparing};
@@ -225,6 +226,16 @@ fn attempt(
         source = &followed;
     }
     let described = search.count_described(&judged.chosen);
+    let mut joint = refit.joint(source, &judged.chosen, &judge.pairs, &coordinates)?;
+    let threads = crate::prepare::threads(options.threads);
+    let again = by_motion(&fitting, &learnt, source, &judged.chosen, &joint, threads)?;
+    let by_motion = again.map(|again| {
+        if let Some((standing, effects)) = again.adopted {
+            fitting.adopt(&effects, standing);
+            judged.chosen = effects;
+        }
+        again.told
+    });
     let replay = match &sealed {
         Some(sealed) => Replay::of(&fitting, sealed)?,
         None => learnt,
@@ -254,7 +265,6 @@ fn attempt(
     let left = judged.left.is_some();
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));
     let Judged { chosen, floors, .. } = &judged;
-    let mut joint = refit.joint(source, chosen, &judge.pairs, &coordinates)?;
     let stands = fitting.of(chosen)?;
     joint.solution.values = stands.coefficients(&bench.anchor);
     let after = &joint.solution;
@@ -331,6 +341,7 @@ fn attempt(
         described: stood,
         steps,
         absorbed: refit.absorbed(&bench, &before.coefficients(&bench.anchor), after),
+        by_motion,
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,
@@ -376,6 +387,8 @@ fn attempt(
     diagnosis.words.extend(told);
     diagnosis.words.extend(silent);
     diagnosis.words.extend(touches);
+    let by_motion = diagnosis.by_motion.as_ref().map(|m| m.text.clone());
+    diagnosis.words.extend(by_motion);
     let taken = {
         let [before, after] = [&refit.base, &with(&refit.base, chosen, None)].map(|fit| fit.rms(0));
         1.0 - after / before

@@ -41,6 +41,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         steps: Vec::new(),
         gap_closed: None,
         absorbed: Vec::new(),
+        by_motion: None,
         not_testable: Vec::new(),
         detectable: Vec::new(),
         next_experiment: None,

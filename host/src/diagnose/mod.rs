@@ -9,6 +9,7 @@ mod bench;
 pub mod benchmark;
 mod bodies;
 mod burst;
+mod by_motion;
 mod change;
 mod clamped;
 mod columns;

@@ -13,6 +13,7 @@
 use super::DiagnoseError;
 use super::bench::Loaded;
 use super::bodies::Fitting;
+use super::floor;
 use super::profile::Profile;
 use super::pull;
 use super::runs::{JointRun, Run};
@@ -23,6 +24,8 @@ mod controller;
 
 /// Longest step, s.
 const STEP: f64 = 1.0e-3;
+/// Departures a second: the positions that joints depart by are smooth.
+const DEPARTURES: f64 = 100.0;
 /// Length of the blocks that are compared, s.
 const BLOCK: f64 = 1.0;
 /// A motion is worse when its RMS grows by more than this share …
@@ -44,7 +47,7 @@ impl Errors {
     }
 
     /// Whether those of a joint are larger than `before` by more than noise makes them.
-    fn worse_than(&self, before: &Self, joint: usize) -> bool {
+    pub(super) fn worse_than(&self, before: &Self, joint: usize) -> bool {
         let changes: Vec<f64> = (self.0[joint].iter().zip(&before.0[joint]))
             .map(|(a, b)| a[0] - b[0])
             .collect();
@@ -56,9 +59,18 @@ impl Errors {
     }
 }
 
+/// By how much the simulated positions of a single joint depart from those recorded, rad or m, a hundred times a second.
+pub(super) struct Departures {
+    pub(super) of: Vec<f64>,
+    /// Motion and stretch of it, a second long; runs of one motion share theirs.
+    pub(super) stretch: Vec<(usize, usize)>,
+}
+
 /// Recordings to be simulated.
 pub(super) struct Replay<'a> {
     fitting: &'a Fitting<'a, 'a>,
+    /// What models are judged on.
+    pub(super) judged: &'a Loaded,
     runs: &'a [Run],
     /// One a joint; none where nothing is simulated.
     controllers: Option<Vec<Controller>>,
@@ -80,6 +92,7 @@ impl<'a> Replay<'a> {
             controller::of_joints(fitting.bench.robot, &moving.model, &judged.runs);
         Ok(Self {
             fitting,
+            judged,
             runs: &judged.runs,
             controllers,
             how,
@@ -152,6 +165,29 @@ impl<'a> Replay<'a> {
             blocks
         };
         Some(Errors(joints.map(of_joint).collect()))
+    }
+
+    /// What a description of one joint departs by; none where it cannot be simulated.
+    pub(super) fn departures(&self, robot: &Robot) -> Option<Departures> {
+        let simulated = self.simulated(robot).ok()?;
+        let repeats = floor::repeats(self.runs);
+        let mut found = Departures {
+            of: Vec::new(),
+            stretch: Vec::new(),
+        };
+        for (r, (run, q)) in self.runs.iter().zip(&simulated).enumerate() {
+            let first = (repeats.iter().filter(|(_, b)| *b == r))
+                .map(|(a, _)| *a)
+                .min();
+            let step = ((run.rate / DEPARTURES).round() as usize).max(1);
+            let errors = q[0].iter().zip(&run.joints[0].q).map(|(a, b)| a - b);
+            for (k, error) in errors.enumerate().step_by(step) {
+                found.of.push(error);
+                let stretch = (k as f64 / run.rate / BLOCK) as usize;
+                found.stretch.push((first.unwrap_or(r), stretch));
+            }
+        }
+        Some(found)
     }
 
     /// The same of the model with `chosen`.

@@ -162,6 +162,44 @@ pub struct Absorbed {
     pub sigmas: f64,
 }
 
+/// All parameters fitted once more, to the simulated motion of the training data.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ByMotion {
+    /// Of the motion, ASCII.
+    pub unit: String,
+    /// What the simulated motion departs by with the torque's values, and with its own.
+    pub motion_rms: [f64; 2],
+    /// Of the torque, ASCII.
+    pub torque_unit: String,
+    /// What the two leave of the torque.
+    pub torque_rms: [f64; 2],
+    /// Whether the motion's values stand.
+    pub adopted: bool,
+    /// Each parameter by both.
+    pub parameters: Vec<Twice>,
+    /// In words.
+    pub text: String,
+}
+
+/// A parameter by torque and by motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Twice {
+    /// Base parameter's expression, or the effect's name and the parameter's with a dot between.
+    pub parameter: String,
+    /// ASCII
+    pub unit: String,
+    /// By the torque.
+    pub torque: f64,
+    /// Of that.
+    pub torque_std: f64,
+    /// By the simulated motion.
+    pub motion: f64,
+    /// Of that.
+    pub motion_std: f64,
+    /// Their difference in standard deviations of both.
+    pub sigmas: f64,
+}
+
 /// An effect that these data cannot show.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotTestable {
@@ -398,6 +436,8 @@ pub struct Diagnosis {
     pub gap_closed: Option<f64>,
     /// Nominal parameters that had been lying.
     pub absorbed: Vec<Absorbed>,
+    /// All of them by torque and by motion; none where that was not done.
+    pub by_motion: Option<ByMotion>,
     /// Effects that these data cannot show.
     pub not_testable: Vec<NotTestable>,
     /// The smallest size of each other effect that they would have shown.

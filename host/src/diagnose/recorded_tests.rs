@@ -143,6 +143,23 @@ fn what_the_steps_of_a_coarse_encoder_leave_is_no_remainder() {
     assert_eq!(names(&found), ["stribeck"], "{:?}", found.words);
 }
 
+/// Above 0.75 rad/s half a wave passes between two samples: what they make of it there bent the amplitude by an eighth.
+#[test]
+fn a_wave_that_outruns_the_samples_keeps_its_amplitude() {
+    let hidden = Effect::Cogging {
+        amplitude: 0.21,
+        order: 84.0,
+        phase: 2.8,
+    };
+    let made = Scenario::short([hidden], 2800).make().unwrap();
+    let (found, _) = diagnosed(&made);
+    assert_eq!(names(&found), ["cogging"], "{:?}", found.words);
+    let part = |name: &str| found.steps[0].parameters[name].value;
+    let amplitude = part("cosine").hypot(part("sine"));
+    println!("{amplitude}");
+    assert!((amplitude / 0.21 - 1.0).abs() < 0.05, "{amplitude}");
+}
+
 #[test]
 fn a_touch_in_one_of_two_runs_is_left_out_and_said() {
     let touched = Scenario {

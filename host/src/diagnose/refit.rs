@@ -250,14 +250,8 @@ impl<'r> Refit<'r> {
         before: &[f64],
         after: &Solution,
     ) -> Vec<Absorbed> {
-        let base = &bench.nominal.base;
-        let mut list: Vec<Absorbed> = (bench.anchor.free.iter().enumerate())
-            .map(|(k, direction)| {
-                let (parameter, unit, scale) = match direction.as_slice() {
-                    [(b, _)] => (base.expression(*b), base.unit(*b).to_owned(), 1.0),
-                    // The one direction of several parameters is that of gravity, along the first moment as described.
-                    _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
-                };
+        let mut list: Vec<Absorbed> = (of_directions(bench).enumerate())
+            .map(|(k, (parameter, unit, scale))| {
                 let (before, now) = (scale * before[k], scale * after.values[k]);
                 Absorbed {
                     parameter,
@@ -271,6 +265,38 @@ impl<'r> Refit<'r> {
         list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
         list
     }
+}
+
+/// Name and unit of each free nominal direction, and what its coefficient is to be multiplied by for that.
+fn of_directions(bench: &Bench) -> impl Iterator<Item = (String, String, f64)> {
+    let base = &bench.nominal.base;
+    (bench.anchor.free.iter()).map(|direction| match direction.as_slice() {
+        [(b, _)] => (base.expression(*b), base.unit(*b).to_owned(), 1.0),
+        // The one direction of several parameters is that of gravity, along the first moment as described.
+        _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
+    })
+}
+
+/// The same of everything that is fitted together: nominal directions, the effects' gains, these of their shapes (effect and place).
+pub(super) fn named(
+    bench: &Bench,
+    source: &Source,
+    chosen: &[Profile],
+    shapes: &[(usize, usize)],
+) -> Vec<(String, String, f64)> {
+    let of_effect = |profile: &Profile, parameter: &Parameter| {
+        let name = profile.candidate.kind.about().name;
+        let unit = source.unit(&profile.candidate, parameter);
+        (format!("{name}.{}", parameter.name), unit, 1.0)
+    };
+    let gains = chosen.iter().flat_map(|profile| {
+        (source.gains(&profile.candidate).into_iter()).map(move |gain| of_effect(profile, &gain))
+    });
+    let shapes = (shapes.iter()).map(|(k, place)| {
+        let profile = &chosen[*k];
+        of_effect(profile, &profile.candidate.kind.about().shapes[*place])
+    });
+    of_directions(bench).chain(gains).chain(shapes).collect()
 }
 
 /// Columns that are fitted, and those of a known torque.
@@ -428,6 +454,18 @@ impl Joint {
     pub(super) fn gains(&self, chosen: &[Profile], free: usize, k: usize) -> &[f64] {
         let at = place(chosen, free, k);
         &self.solution.values[at..at + chosen[k].columns.len()]
+    }
+
+    /// Effect and place of each shape that the motion tells, with value and standard deviation.
+    pub(super) fn shapes(&self, chosen: &[Profile]) -> Vec<((usize, usize), [f64; 2])> {
+        let of_effect = |(k, profile): (usize, &Profile)| {
+            let stds = self.stds[k];
+            let places = 0..profile.candidate.kind.about().shapes.len();
+            (places.filter(move |s| stds[*s] > 0.0 && stds[*s].is_finite()))
+                .map(|s| ((k, s), [profile.shapes[s], stds[s]]))
+                .collect::<Vec<_>>()
+        };
+        chosen.iter().enumerate().flat_map(of_effect).collect()
     }
 
     /// Gains and shapes of the `k`-th effect with their standard deviations.

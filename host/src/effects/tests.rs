@@ -527,3 +527,17 @@ fn a_measured_temperature_takes_viscous_friction_down() {
         "{own} {right} {wrong}"
     );
 }
+
+#[test]
+fn a_wave_outruns_its_samples_from_half_a_wave_a_sample_on() {
+    let shapes = [84.0, 0.0, 0.0, 0.0];
+    // 84 waves a turn, 1 kHz: half a wave a sample at 37.4 rad/s of the motor.
+    for (velocity, outrun) in [(37.0, false), (-37.0, false), (38.0, true), (-38.0, true)] {
+        assert_eq!(outruns(Kind::Cogging, &shapes, velocity, 1e-3), outrun);
+        assert_eq!(outruns(Kind::TorqueRipple, &shapes, velocity, 1e-3), outrun);
+    }
+    // What an encoder misreads its samples hold, however fast it turns; friction along the joint has no motor's wave.
+    for kind in [Kind::EncoderEccentricityMotor, Kind::PositionFriction] {
+        assert!(!outruns(kind, &shapes, 1e3, 1e-3));
+    }
+}

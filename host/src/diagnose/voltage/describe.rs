@@ -151,6 +151,7 @@ impl Told<'_> {
             described,
             steps,
             absorbed: self.absorbed(),
+            by_motion: None,
             not_testable: Vec::new(),
             detectable: Vec::new(),
             next_experiment: None,

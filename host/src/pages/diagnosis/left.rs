@@ -57,6 +57,43 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     )
 }
 
+/// The parameters by torque and by simulated motion.
+pub(super) fn by_motion(found: &Diagnosis) -> Option<Section> {
+    let by_motion = found.by_motion.as_ref()?;
+    Some(
+        Section::new(
+            "by-motion",
+            "The same parameters, fitted to the motion",
+            "Two ways to the same numbers: the torque that the measured motion asks for, and the motion that the measured torque makes in a simulation. Noise of the position spoils the one and not the other. Where the model is right both agree within their deviations.",
+        )
+        .with(Block::Text(by_motion.text.clone()))
+        .with(Block::Table(Table {
+            caption: "By torque and by simulated motion".into(),
+            columns: vec![
+                Column::text("Parameter"),
+                Column::number("By the torque ± std", ""),
+                Column::number("By the motion ± std", ""),
+                Column::text("Unit"),
+                Column::number("Apart by", "std"),
+            ],
+            rows: by_motion
+                .parameters
+                .iter()
+                .map(|p| {
+                    vec![
+                        p.parameter.clone(),
+                        format_value(p.torque, p.torque_std),
+                        format_value(p.motion, p.motion_std),
+                        parts::unit(&p.unit),
+                        format_significant(p.sigmas, 2),
+                    ]
+                })
+                .collect(),
+            note: String::new(),
+        })),
+    )
+}
+
 /// What no known effect explains; without it, what the residual looks like at the end.
 pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     let maps: Vec<Block> = found

@@ -27,6 +27,7 @@ pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
     sections.extend((0..found.steps.len()).map(|k| steps::section(found, k)));
     sections.extend(curves::section(found));
     sections.extend(left::absorbed(found));
+    sections.extend(left::by_motion(found));
     sections.extend(left::remainder(found));
     sections.extend(limits::next(found));
     sections.extend(limits::limits(found));
