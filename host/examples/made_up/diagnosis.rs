@@ -238,7 +238,7 @@ pub(super) fn explained() -> Diagnosis {
                 Twice { parameter: "Izz1 + Ia1".into(), unit: "kg*m^2".into(), torque: 0.11757, torque_std: 2.1e-4, motion: 0.11739, motion_std: 1.2e-4, sigmas: 0.7 },
                 Twice { parameter: "stribeck.breakaway".into(), unit: "N*m".into(), torque: 0.312, torque_std: 0.011, motion: 0.321, motion_std: 0.006, sigmas: 0.7 },
             ],
-            text: "Fitted once more, all 6 parameters together, to the simulated motion of the training data, the model departs from it by 0.108 mrad RMS instead of 0.112; the torque's values stand. The two agree within their deviations.".into(),
+            text: "Fitted once more, all 6 parameters together, to the simulated motion of the training data, the model departs from it by 0.108 mrad RMS instead of 0.112; the torque's values stand. The two agree within 0.70 of their standard deviations.".into(),
         }),
         not_testable: vec![
             NotTestable { effect: "load_friction".into(), joint: "link".into(), why: "one payload only, and gravity changes too little".into(), experiment: "the same motion with two payloads".into() },

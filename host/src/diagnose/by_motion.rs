@@ -263,17 +263,18 @@ fn sentence(told: &ByMotion) -> String {
     } else {
         "; the torque's values stand."
     };
-    let apart: Vec<&str> = (told.parameters.iter())
-        .filter(|p| p.sigmas > APART)
-        .map(|p| p.parameter.as_str())
-        .collect();
-    let agree = if apart.is_empty() {
-        "The two agree within their deviations.".to_owned()
-    } else {
-        format!(
-            "The two differ by more than {APART:.0} standard deviations in {}: trust no more digits than they share.",
-            apart.join(", "),
-        )
+    let furthest = (told.parameters.iter()).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas));
+    let agree = match furthest {
+        Some(p) if p.sigmas > APART => format!(
+            "The two differ by {} standard deviations in {}: trust no more digits than they share.",
+            format_significant(p.sigmas, 2),
+            p.parameter
+        ),
+        Some(p) => format!(
+            "The two agree within {} of their standard deviations.",
+            format_significant(p.sigmas, 2)
+        ),
+        None => String::new(),
     };
     format!(
         "Fitted once more, all {} parameters together, to the simulated motion of the training data, the model departs from it by {is} m{} RMS instead of {was}{stands} {agree}",

@@ -12,6 +12,8 @@ const STILL_WHITE: f64 = 3.2;
 const ALIKE: f64 = 0.02;
 /// Share of the torque by which runs may differ that are driven alike.
 const DRIVEN_ALIKE: f64 = 0.2;
+/// Stretches over which two runs of a motion are compared, s.
+const STRETCH: f64 = 1.0;
 /// Lags looked at for the memory of a residual, s.
 const LONGEST_MEMORY: f64 = 2.0;
 
@@ -96,6 +98,34 @@ pub(super) fn from_repeats(
         }
     }
     (used > 0.0).then(|| (squares / used).sqrt())
+}
+
+/// How much more is left of a joint on average in the second of two runs of one motion than in the first, and its standard deviation
+/// by what that differs by between stretches of a second; none where there are not three of them.
+pub(super) fn between(
+    rows: &Rows,
+    (a, b): (usize, usize),
+    residual: &[f64],
+    joint: usize,
+) -> Option<[f64; 2]> {
+    let starts = [a, b].map(|run| rows.starts[run]);
+    let length = (rows.starts[a + 1] - starts[0]).min(rows.starts[b + 1] - starts[1]);
+    let stretch = ((STRETCH / rows.period).ceil() as usize).max(1);
+    let means: Vec<f64> = (0..length)
+        .step_by(stretch)
+        .filter_map(|first| {
+            let pairs = (first..(first + stretch).min(length)).map(|k| starts.map(|s| s + k));
+            let used = pairs.filter(|row| row.iter().all(|k| rows.keep[joint][*k]));
+            let (count, sum) = used.fold((0, 0.0), |(n, sum), [x, y]| {
+                (n + 1, sum + residual[y] - residual[x])
+            });
+            (2 * count > stretch).then(|| sum / count as f64)
+        })
+        .collect();
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
+    (n > 2.0).then(|| [mean, (squares / (n * (n - 1.0))).sqrt()])
 }
 
 /// RMS of a signal over the rows that are used.

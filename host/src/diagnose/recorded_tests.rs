@@ -198,6 +198,27 @@ fn a_touch_in_one_of_two_runs_is_left_out_and_said() {
 }
 
 #[test]
+fn a_constant_that_changes_between_two_runs_is_said_and_is_no_noise() {
+    let mut made = Scenario::short([], 39).make().unwrap();
+    let (same, _) = diagnosed(&made);
+    assert_eq!(same.verdict, Verdict::NothingMissing, "{:?}", same.words);
+    let repeat = made.repeat.as_mut().unwrap();
+    for tau in repeat.blocks.iter_mut().flat_map(|b| &mut b.joints[0].tau) {
+        *tau += 0.1;
+    }
+    let (found, _) = diagnosed(&made);
+    assert!(names(&found).is_empty(), "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::Remainder, "{:?}", found.words);
+    let left = found.remainder.unwrap();
+    println!("{left:?}");
+    assert!((left.rms / 0.05 - 1.0).abs() < 0.1, "{left:?}");
+    assert!(
+        left.text
+            .contains("more are left on average in repeat than in train")
+    );
+}
+
+#[test]
 fn a_piece_cut_out_of_a_recording_is_a_copy() {
     let made = Scenario::short([], 38).make().unwrap();
     let cut = |from: usize, to: usize, late: f64| {

@@ -34,7 +34,7 @@ fn torque_and_motion_agree_where_the_model_is_right() {
         found
             .words
             .iter()
-            .any(|w| w.contains("within their deviations"))
+            .any(|w| w.contains("of their standard deviations"))
     );
     let truth = &made.truth.nominal;
     for (name, truth) in [("fv1", truth["viscous"]), ("fc1", truth["coulomb"])] {

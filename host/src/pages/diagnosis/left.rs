@@ -64,7 +64,7 @@ pub(super) fn by_motion(found: &Diagnosis) -> Option<Section> {
         Section::new(
             "by-motion",
             "The same parameters, fitted to the motion",
-            "Two ways to the same numbers: the torque that the measured motion asks for, and the motion that the measured torque makes in a simulation. Noise of the position spoils the one and not the other. Where the model is right both agree within their deviations.",
+            "Two ways to the same numbers: the torque that the measured motion asks for, and the motion that the measured torque makes in a simulation. Noise of the position spoils the one and not the other. Where the model is right both agree within a few of their deviations.",
         )
         .with(Block::Text(by_motion.text.clone()))
         .with(Block::Table(Table {

@@ -47,7 +47,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
         .with(Block::Note {
             kind: NoteKind::Good,
             text: format!(
-                "Why to believe it. {} Chance alone would look like this with p = {}, corrected for all that was tried.",
+                "Why to believe it. {} The probability that chance alone looks like this, corrected for all that was tried: {}.",
                 step.why,
                 format_p_value(step.p_value)
             ),
