@@ -122,10 +122,16 @@ pub(super) fn between(
             (2 * count > stretch).then(|| sum / count as f64)
         })
         .collect();
-    let n = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / n;
-    let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
-    (n > 2.0).then(|| [mean, (squares / (n * (n - 1.0))).sqrt()])
+    let [mean, variance] = mean(&means)?;
+    Some([mean, variance.sqrt()])
+}
+
+/// Mean of independent values and its variance; none of fewer than three.
+pub(super) fn mean(values: &[f64]) -> Option<[f64; 2]> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (n > 2.0).then(|| [mean, squares / (n * (n - 1.0))])
 }
 
 /// RMS of a signal over the rows that are used.

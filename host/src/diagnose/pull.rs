@@ -6,6 +6,7 @@
 
 use rig_shared::effects::Kind;
 
+use super::floor;
 use super::runs::Run;
 use crate::data::Block;
 use crate::prepare::{PrepareError, Recording};
@@ -77,13 +78,8 @@ pub(super) fn step(
             })
             .collect()
     };
-    let of = |means: Vec<f64>| {
-        let n = means.len() as f64;
-        let mean = means.iter().sum::<f64>() / n;
-        let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
-        (n > 2.0).then(|| [mean, squares / (n * (n - 1.0))])
-    };
-    let ([free, a], [pulled, b]) = (of(means(true))?, of(means(false))?);
+    let of = |unburdened: bool| floor::mean(&means(unburdened));
+    let ([free, a], [pulled, b]) = (of(true)?, of(false)?);
     Some([free - pulled, (a + b).sqrt()])
 }
 
