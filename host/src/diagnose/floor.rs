@@ -147,13 +147,12 @@ pub(super) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
 /// By third differences, in which a smooth torque leaves nothing: of white noise they have 20 times its variance, and second
 /// ones 6 times.
 pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
-    let (mut second, mut third, mut count) = (0.0, 0.0, 0_u64);
+    let (mut second, mut third, mut count) = (0.0, 0.0, 0);
     for run in runs {
-        for w in run.joints[joint].recorded().windows(4) {
-            second += (w[0] - 2.0 * w[1] + w[2]).powi(2);
-            third += (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2);
-            count += 1;
-        }
+        let own = run.joints[joint].differences();
+        second += own.second;
+        third += own.third;
+        count += own.count;
     }
     let rate = runs.first()?.rate;
     let passed = (PASSED / (period * rate)).min(1.0);

@@ -21,6 +21,8 @@ pub struct JointRun {
     pub tau: Vec<f64>,
     /// What of the recorded torque is that of effects that the recording was freed of, where there are any.
     pub taken_off: Option<Vec<f64>>,
+    /// Of a torque that was moved in time, which smooths it: what the recorded one differed by from sample to sample.
+    pub differences: Option<Differences>,
     /// Filtered position.
     pub q: Vec<f64>,
     /// Velocity, rad/s or m/s.
@@ -41,6 +43,30 @@ pub struct JointRun {
     /// The link's position: the filtered one less what is read across the transmission in its band; with velocity and
     /// acceleration.
     pub link: Option<[Vec<f64>; 3]>,
+}
+
+/// Sums of the squares of a signal's second and third differences, over so many places.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Differences {
+    /// Second differences, squared.
+    pub second: f64,
+    /// Third differences, squared.
+    pub third: f64,
+    /// Places.
+    pub count: usize,
+}
+
+impl Differences {
+    /// Those of a signal.
+    pub fn of(signal: &[f64]) -> Self {
+        let mut sums = Self::default();
+        for w in signal.windows(4) {
+            sums.second += (w[0] - 2.0 * w[1] + w[2]).powi(2);
+            sums.third += (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2);
+            sums.count += 1;
+        }
+        sums
+    }
 }
 
 /// A stretch of a recording without a gap.
@@ -73,6 +99,11 @@ impl JointRun {
             None => Cow::Borrowed(&self.tau),
             Some(held) => Cow::Owned((self.tau.iter().zip(held)).map(|(t, h)| t + h).collect()),
         }
+    }
+
+    /// What the torque as recorded differs by from sample to sample.
+    pub fn differences(&self) -> Differences {
+        (self.differences).unwrap_or_else(|| Differences::of(&self.recorded()))
     }
 }
 
