@@ -16,8 +16,11 @@ use crate::prepare::{LowPass, Treatment};
 use crate::robot::{JointKind, Robot};
 
 /// Share of a row's neighbourhood that may be slow or saturated before the row is left out: what the low-pass makes of an
-/// indicator that is 1 on such samples.
-const SPOILT: f64 = 0.1;
+/// indicator that is 1 on such samples. Where a joint sticks before it turns back its friction may be anything between both
+/// directions', so that twice this share of the dry friction is what a kept row may be off by.
+const SPOILT: f64 = 0.03;
+/// … and before its torque says nothing of a link behind a gear, whose touches are many times that.
+const ILLEGIBLE: f64 = 0.1;
 
 /// Periods of the position filter's cut-off by which it may move a reversal: it rounds the corner where friction changes its
 /// sign, or stops the joint for a moment.
@@ -162,6 +165,8 @@ pub(super) struct Rows {
     pub(super) torque: Vec<Vec<f64>>,
     /// Whether the row is used, joint by joint.
     pub(super) keep: Vec<Vec<bool>>,
+    /// Whether its torque tells of a link behind a gear, joint by joint; empty where none is followed.
+    pub(super) legible: Vec<Vec<bool>>,
     /// Nominal columns, one a base parameter.
     pub(super) nominal: Vec<Column>,
 }
@@ -379,7 +384,7 @@ impl Rows {
         let n = nominal.joints();
         let mut starts = vec![0];
         let mut torque = vec![Vec::new(); n];
-        let mut keep = vec![Vec::new(); n];
+        let [mut keep, mut legible] = [(); 2].map(|()| vec![Vec::new(); n]);
         let mut columns: Vec<Column> = vec![vec![None; n]; nominal.base.len()];
         for run in runs {
             let before = starts.last().copied().unwrap_or(0);
@@ -400,7 +405,9 @@ impl Rows {
                 }
                 let mut share = Vec::new();
                 thinning.push(&spoilt, &mut share);
-                keep[j].extend(share.iter().map(|s| *s < SPOILT));
+                // The low-pass rings: a share below 0 is as spoilt as one above.
+                keep[j].extend(share.iter().map(|s| s.abs() < SPOILT));
+                legible[j].extend(share.iter().map(|s| *s < ILLEGIBLE));
             }
             let motion = motion_of(run);
             nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, values| {
@@ -416,6 +423,7 @@ impl Rows {
             period: treatment.decimation.max(1) as f64 / treatment.sample_rate,
             torque,
             keep,
+            legible,
             nominal: columns,
         })
     }
@@ -425,14 +433,18 @@ impl Rows {
         self.torque.len()
     }
 
-    /// Of each of a run's `samples`, whether the row nearest to it is used; before the first row and behind the last none is.
+    /// Of each of a run's `samples`, whether the row nearest to it tells of a link behind a gear; before the first row and behind
+    /// the last none does.
     pub(super) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
-        let keep = &self.keep[joint][self.starts[run]..self.starts[run + 1]];
+        let all = self.legible.get(joint).map_or(&[][..], Vec::as_slice);
+        let legible = all
+            .get(self.starts[run]..self.starts[run + 1])
+            .unwrap_or_default();
         let Thinning { step, spoilt, .. } = self.thinning;
         (0..samples)
             .map(|k| {
                 let row = (k + step / 2).checked_sub(spoilt).map(|past| past / step);
-                row.is_some_and(|row| keep.get(row).copied().unwrap_or(false))
+                row.is_some_and(|row| legible.get(row).copied().unwrap_or(false))
             })
             .collect()
     }
@@ -460,6 +472,7 @@ impl Rows {
             period: 1.0,
             torque: vec![vec![0.0; count]],
             keep: vec![vec![true; count]],
+            legible: vec![vec![true; count]],
             nominal,
         }
     }

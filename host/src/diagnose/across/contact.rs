@@ -37,6 +37,7 @@ pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
     let rows = Rows {
         torque: equation.load.iter().flatten().cloned().collect(),
         nominal: Vec::new(),
+        legible: Vec::new(),
         thinning: equation.rows.thinning.clone(),
         starts: equation.rows.starts.clone(),
         keep: equation.rows.keep.clone(),

@@ -214,6 +214,7 @@ impl Equation {
                 period: loaded.rows.period,
                 torque: vec![x],
                 keep: vec![vec![true; count]],
+                legible: Vec::new(),
                 nominal: nominal.into_iter().map(one).collect(),
             },
             constants,

@@ -137,6 +137,7 @@ impl Equation {
                 period: loaded.rows.period,
                 torque: vec![voltage],
                 keep: vec![keep],
+                legible: Vec::new(),
                 nominal: columns.into_iter().map(one).collect(),
             },
             dead_zones: dead.into_iter().map(one).collect(),
