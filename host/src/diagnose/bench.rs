@@ -203,7 +203,8 @@ impl<'a> Bench<'a> {
     ) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let source = (self.source(loaded, values)?)
             .loaded_by(chosen, gains)?
-            .following(&loaded.rows, chosen, gains)?;
+            .following(&loaded.rows, chosen, gains)?
+            .smoothed();
         let rows = &loaded.rows;
         let mut columns = Vec::new();
         for profile in chosen {

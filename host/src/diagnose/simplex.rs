@@ -113,6 +113,11 @@ impl Simplex {
         };
     }
 
+    /// The best place of those known when it last sorted them.
+    pub(super) fn best(&self) -> &[f64] {
+        &self.corners[0].1
+    }
+
     fn sorted(&mut self) -> Stage {
         self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (best, worst) = (self.corners[0].0, self.corners[self.corners.len() - 1].0);

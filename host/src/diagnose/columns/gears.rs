@@ -46,11 +46,18 @@ impl Source<'_> {
                     sure: rows.sure(r, joint, run.len()),
                     noise: floor::of_a_sample(noise, rows.period * run.rate),
                     unrest: noise,
+                    smoothed: false,
                 };
                 self.seen.insert((r, joint), seen);
             }
         }
         Ok(self)
+    }
+
+    /// The same with each stretch of a link that is followed begun where its own readings, too, say that the link was.
+    pub(in crate::diagnose) fn smoothed(mut self) -> Self {
+        self.seen.values_mut().for_each(|seen| seen.smoothed = true);
+        self
     }
 
     /// What a gear adds to the torque of its joint over a run, one signal for each of the shapes: nothing where it is none.

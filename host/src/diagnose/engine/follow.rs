@@ -90,7 +90,7 @@ impl<'a, 'r> Follower<'a, 'r> {
             self.follow(&mut chosen, k, noise)?;
         }
         // The columns with everything else as it has come out.
-        let source = self.source(&chosen)?;
+        let source = self.source(&chosen)?.smoothed();
         for profile in chosen.iter_mut().filter(|p| p.followed.is_some()) {
             profile.columns = Arc::new(source.columns(&profile.candidate, &profile.shapes)?);
         }
@@ -126,6 +126,10 @@ impl<'a, 'r> Follower<'a, 'r> {
             chosen[k].shapes = shapes;
             chosen[k].columns = Arc::new(columns);
         }
+        // Judged as it is going to stand: with its stretches begun where their readings say.
+        let source = self.source(chosen)?.smoothed();
+        let own = &mut chosen[k];
+        own.columns = Arc::new(source.columns(&own.candidate, &own.shapes)?);
         if rms(chosen) >= before {
             let otherwise = Some(chosen[k].shapes);
             chosen[k] = Profile {

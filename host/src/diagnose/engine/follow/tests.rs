@@ -78,7 +78,7 @@ fn an_effect_as_large_as_the_noise_is_found_beside_play() {
 }
 
 /// RMS of the training residual of a rig without a gear that gives: rigid, and with a made-up gear whose link is followed.
-fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
+fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f64; 2] {
     let made = Scenario::short(effect, seed).make().unwrap();
     let stated = Stated::of(&made.robot);
     let training: [&dyn Recording; 2] = [&made.train, made.repeat.as_ref().unwrap()];
@@ -97,13 +97,13 @@ fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
         2,
     );
     let candidate = Candidate {
-        kind: Kind::JointElasticity,
+        kind,
         joint: 0,
         other: None,
     };
     let shapes = {
         let mut shapes = [0.0; SHAPES];
-        shapes[..3].copy_from_slice(&[1000.0, 0.5, 0.25]);
+        shapes[..made_of.len()].copy_from_slice(made_of);
         shapes
     };
     let made_up = Profile {
@@ -128,12 +128,20 @@ fn made_up(effect: Option<Effect>, seed: u64) -> [f64; 2] {
     [rigid, followed]
 }
 
-/// What is heard of the torque up to the beginning of a stretch must not pass for a law of the gear within it.
+/// What is heard of the torque up to the beginning of a stretch, or of where the link begins it, must not pass for a law of the
+/// gear within it.
 #[test]
 fn a_gear_that_is_none_gains_nothing_by_being_followed() {
     let drag = Effect::draw("quadratic_drag", 1.0, 7);
-    for (effect, most) in [(None, 0.02), (drag, 0.05)] {
-        let [rigid, followed] = made_up(effect, 7);
-        assert!(followed > (1.0 - most) * rigid, "{followed} {rigid}");
+    let soft = (Kind::JointElasticity, &[1000.0, 0.5, 0.25][..]);
+    let play = (Kind::Backlash, &[0.006, 2000.0, 8.0, 0.25][..]);
+    for (kind, shapes) in [soft, play] {
+        for (effect, most) in [(None, 0.02), (drag, 0.05)] {
+            let [rigid, followed] = made_up(kind, shapes, effect, 7);
+            assert!(
+                followed > (1.0 - most) * rigid,
+                "{kind:?} {followed} {rigid}"
+            );
+        }
     }
 }
