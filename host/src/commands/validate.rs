@@ -14,6 +14,10 @@ use crate::validate::{Motion, Options, Validation, validate};
 
 /// Predicts torque and simulates motion on data not used before.
 ///
+/// Where the description has a [joint.controller] for every joint, the motion is that of the closed loop that follows the
+/// recorded references; else the recorded torque drives the model, and a controller answers what it departs from the recorded
+/// motion by, as in `rig diagnose`.
+///
 /// Writes validation.json and report.html into the folder given with --out.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
@@ -105,14 +109,25 @@ fn summary(validation: &Validation) -> Vec<String> {
         match &checked.motion {
             // A remark says why.
             Motion::NotSimulated { .. } => {}
-            Motion::Simulated { joints, .. } => lines.extend(joints.iter().map(|joint| {
+            Motion::Simulated {
+                joints,
+                uncontrolled,
+                ..
+            } => lines.extend(joints.iter().map(|joint| {
                 format!(
-                    "{}, {}: simulated position off by {} {} rms, {:.2} % of the tracking error; torque by {} {} rms",
+                    "{}, {}: position simulated {} off by {} {} rms, {:.2} % of the tracking error of {} {}; torque by {} {} rms",
                     checked.recording,
                     joint.joint,
+                    if uncontrolled.is_empty() {
+                        "in closed loop"
+                    } else {
+                        "under the recorded torque"
+                    },
                     format_significant(joint.position_rms_error, 4),
                     joint.position_unit,
                     100.0 * joint.tracking_relative_error,
+                    format_significant(joint.tracking_rms, 4),
+                    joint.position_unit,
                     format_significant(joint.torque_rms_error, 4),
                     joint.torque_unit
                 )

@@ -61,8 +61,10 @@ mod zeros;
 pub use clamped::clamped;
 pub use drive_off::sensor_zeros;
 pub use engine::diagnose;
+pub(crate) use motion::{of_joints, replayed};
 pub use outcome::Diagnosis;
 pub use pull::Unburdened;
+pub(crate) use runs::runs_of_blocks;
 pub use runs::{JointRun, Run};
 
 use rig_shared::effects::Kind;

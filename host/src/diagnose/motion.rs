@@ -18,9 +18,11 @@ use super::profile::Profile;
 use super::pull;
 use super::runs::{JointRun, Run};
 use crate::robot::{Controller, Robot, title_of};
-use crate::simulate::{Inputs, Model, SimulateError, closed_loop};
+use crate::simulate::{Inputs, Model, Motion, SimulateError, closed_loop};
 
 mod controller;
+
+pub(crate) use controller::of_joints;
 
 /// Longest step, s.
 const STEP: f64 = 1.0e-3;
@@ -88,8 +90,7 @@ impl<'a> Replay<'a> {
         judged: &'a Loaded,
     ) -> Result<Self, DiagnoseError> {
         let moving = fitting.of(&[])?;
-        let (controllers, how) =
-            controller::of_joints(fitting.bench.robot, &moving.model, &judged.runs);
+        let (controllers, how) = of_joints(fitting.bench.robot, &moving.model, &judged.runs);
         Ok(Self {
             fitting,
             judged,
@@ -112,11 +113,12 @@ impl<'a> Replay<'a> {
             return Err(what);
         }
         let one = |run: &Run| {
-            if run.unburdened {
-                replayed(&alone, &unburdened, controllers, run)
-            } else {
-                replayed(robot, &model, controllers, run)
-            }
+            let (robot, model) = match run.unburdened {
+                true => (&alone, &unburdened),
+                false => (robot, &model),
+            };
+            let substeps = (1.0 / run.rate / STEP).ceil().max(1.0) as u32;
+            Ok(replayed(robot, model, controllers, run, substeps)?.q)
         };
         let all: Result<_, SimulateError> = self.runs.iter().map(one).collect();
         all.map_err(|e| e.to_string())
@@ -261,15 +263,26 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Positions of `model` under the torques of a run and the controllers' answers to what it departs by.
-fn replayed(
+/// Motion of `model` under the torques of a run and the controllers' answers to what it departs by, which alone its torques are;
+/// `substeps` within a sample.
+///
+/// # Errors
+/// Those of [`closed_loop`].
+pub(crate) fn replayed(
     robot: &Robot,
     model: &Model,
     controllers: &[Controller],
     run: &Run,
-) -> Result<Positions, SimulateError> {
+    substeps: u32,
+) -> Result<Motion, SimulateError> {
     if run.is_empty() {
-        return Ok(vec![Vec::new(); run.joints.len()]);
+        let none = || vec![Vec::new(); run.joints.len()];
+        return Ok(Motion {
+            q: none(),
+            qd: none(),
+            tau: none(),
+            saturated: vec![0; run.joints.len()],
+        });
     }
     let period = 1.0 / run.rate;
     let added: Vec<Vec<f64>> = (run.joints.iter().enumerate())
@@ -290,7 +303,7 @@ fn replayed(
     let first = |of: fn(&JointRun) -> &[f64]| -> Vec<f64> {
         run.joints.iter().map(|joint| of(joint)[0]).collect()
     };
-    let motion = closed_loop(
+    closed_loop(
         robot,
         model,
         controllers,
@@ -300,11 +313,10 @@ fn replayed(
             added: &added,
             q: &first(|joint| &joint.q),
             v: &first(|joint| &joint.qd),
-            substeps: (period / STEP).ceil().max(1.0) as u32,
+            substeps,
         },
         |_| (),
-    )?;
-    Ok(motion.q)
+    )
 }
 
 #[cfg(test)]

@@ -258,7 +258,7 @@ pub(super) fn at_rest(recording: &dyn Recording) -> Result<Vec<Run>, DiagnoseErr
 ///
 /// # Errors
 /// Those of the blocks.
-pub(super) fn runs_of_blocks(
+pub(crate) fn runs_of_blocks(
     blocks: impl Iterator<Item = Result<Block, DiagnoseError>>,
     label: &str,
     number: usize,

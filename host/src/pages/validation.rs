@@ -166,10 +166,17 @@ fn overview(found: &Validation) -> Section {
             ]);
         }
     }
+    let replayed = (found.recordings.iter()).any(
+        |r| matches!(&r.motion, Motion::Simulated { uncontrolled, .. } if !uncontrolled.is_empty()),
+    );
     Section::new(
         "overview",
         "All figures",
-        "Torque: predicted for the measured motion. Simulation: model and controller follow the recorded reference on their own.",
+        if replayed {
+            "Torque: predicted for the measured motion. Simulation: the recorded torque drives the model, and a controller answers what it departs from the recorded motion by; the error of the simulated torque is that answer."
+        } else {
+            "Torque: predicted for the measured motion. Simulation: model and controller follow the recorded reference on their own."
+        },
     )
     .with(Block::Table(Table {
         caption: "Prediction against measurement".into(),

@@ -3,8 +3,10 @@
 //! Two checks a recording. *Torque*: the model's torque for the measured motion against the measured torque,
 //! prepared and evaluated as [`crate::identify`] evaluates its hold-out, so that both figures can be compared.
 //! *Motion*: the closed loop of model and controller, driven by the recorded reference from the recording's
-//! first state, against the measured position and torque; here errors of the model add up over time. A joint without a
-//! controller in the description is moved by the stand-in that `rig simulate` takes, which a warning says.
+//! first state, against the measured position and torque; here errors of the model add up over time. Where the description has
+//! no controller for a joint, the motion of another one would say more of that than of the model: there the recorded torques
+//! drive the model, and a controller answers what it departs from the recorded motion by, as [`crate::diagnose`] simulates,
+//! which a warning says.
 //!
 //! A recording may say that the drive applied more than its controller asked for. Column `added<k>`: torque or
 //! force on joint k beside the controller's, N·m or N. Column `pulses`: added to the output of the first joint's
@@ -31,7 +33,7 @@ use crate::effects::Compensated;
 use crate::identify::{IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals};
 use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
-use crate::simulate::{Model, STAND_IN_BANDWIDTH, SimulateError};
+use crate::simulate::{Model, SimulateError};
 
 /// Settings of a validation.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,9 +164,10 @@ pub enum Motion {
         stretches: usize,
         /// Steps within one sample.
         substeps: u32,
-        /// Joints that a stand-in moved, because the description has no controller for them.
-        stand_ins: Vec<String>,
-        /// Sentences: initial state, step, added torque, what was left out.
+        /// Joints that the description has no controller for; where there are any, no closed loop was simulated, but what the
+        /// recorded torques make of the model.
+        uncontrolled: Vec<String>,
+        /// Sentences: what drives the simulation, initial state, step, added torque, what was left out.
         remarks: Vec<String>,
     },
     /// Not simulated.
@@ -314,19 +317,30 @@ pub fn validate(
             }
         }
         let done = k as f64 * share;
-        let motion = motion::check(robot, &model, *recording, survey, options, &mut |part| {
-            progress(done + share * part);
-        })?;
+        let motion = motion::check(
+            robot,
+            &model,
+            *recording,
+            survey,
+            &treatment,
+            options,
+            &mut |part| progress(done + share * part),
+        )?;
         match &motion {
             Motion::NotSimulated { why } => warnings.push(format!(
                 "{}: the motion was not simulated. {why}",
                 survey.label
             )),
-            Motion::Simulated { stand_ins, .. } if !stand_ins.is_empty() => {
+            Motion::Simulated {
+                uncontrolled,
+                remarks,
+                ..
+            } if !uncontrolled.is_empty() => {
                 warnings.push(format!(
-                    "{}: the description has no [joint.controller] for {}; the stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth that `rig simulate` takes followed ref<k> there. Where another controller ran, the difference of the motions is the controllers', not the model's.",
+                    "{}: the description has no [joint.controller] for {}, so that no closed loop was simulated. {}",
                     survey.label,
-                    stand_ins.join(", ")
+                    uncontrolled.join(", "),
+                    remarks.first().map_or("", String::as_str)
                 ));
             }
             Motion::Simulated { .. } => {}

@@ -1,11 +1,13 @@
-//! The closed loop of model and controller against the recorded motion.
+//! The closed loop of model and controller against the recorded motion; where a joint's controller is not described, the
+//! motion that the recorded torques make of the model.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
-use crate::data::{Block, Implausible, JUDGED_ROWS, strange_references};
+use crate::data::{Block, Implausible, JUDGED_ROWS, JointColumns, strange_references};
+use crate::diagnose::{Run, of_joints, replayed, runs_of_blocks};
 use crate::excite::REPLAY_STEP;
-use crate::prepare::{Recording, Survey, first_block};
+use crate::prepare::{LowPass, Recording, Survey, Treatment, first_block};
 use crate::robot::{Controller, Robot};
 use crate::simulate::{Inputs, Model, SimulateError, closed_loop, controllers};
 
@@ -38,12 +40,75 @@ struct Gathered {
     short: usize,
 }
 
+/// Recorded torques that drive the model, as no closed loop is known.
+struct Replay {
+    /// They answer what a joint departs from the recorded motion by.
+    controllers: Vec<Controller>,
+    /// Which, a sentence.
+    how: String,
+    /// The stretches.
+    runs: Vec<Run>,
+}
+
+impl Replay {
+    /// Of stretches; the error says why there is none.
+    fn of(
+        robot: &Robot,
+        stretches: &[Stretch],
+        rate: f64,
+        treatment: &Treatment,
+    ) -> Result<Self, String> {
+        let filter = LowPass::butterworth(treatment.order, treatment.cutoff, rate);
+        let filter = filter.ok_or("The filter of its positions cannot be built.")?;
+        let blocks = stretches.iter().map(|stretch| {
+            let columns = |j: usize| JointColumns {
+                q: stretch.q[j].clone(),
+                tau: stretch.tau[j].clone(),
+                reference: Some(stretch.reference[j].clone()),
+                ..JointColumns::default()
+            };
+            Ok(Block {
+                t: stretch.t.clone(),
+                joints: (0..stretch.q.len()).map(columns).collect(),
+                ..Block::default()
+            })
+        });
+        let runs = runs_of_blocks(blocks, "", 0, rate, &filter).map_err(|e| e.to_string())?;
+        let (controllers, how) = of_joints(robot, robot, &runs);
+        match controllers {
+            Some(controllers) => Ok(Self {
+                controllers,
+                how,
+                runs,
+            }),
+            None => Err(how),
+        }
+    }
+
+    /// Motion of the model over stretch `k`, with the whole torque that its drives give.
+    fn over(
+        &self,
+        robot: &Robot,
+        model: &Model,
+        k: usize,
+        substeps: u32,
+    ) -> Result<crate::simulate::Motion, SimulateError> {
+        let run = &self.runs[k];
+        let mut motion = replayed(robot, model, &self.controllers, run, substeps)?;
+        for (answer, joint) in motion.tau.iter_mut().zip(&run.joints) {
+            (answer.iter_mut().zip(&joint.tau)).for_each(|(answer, torque)| *answer += torque);
+        }
+        Ok(motion)
+    }
+}
+
 /// Simulates `recording` and compares; `progress` is told the share done.
 pub(super) fn check(
     robot: &Robot,
     model: &Model,
     recording: &dyn Recording,
     survey: &Survey,
+    treatment: &Treatment,
     options: &Options,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Motion, ValidateError> {
@@ -64,7 +129,7 @@ pub(super) fn check(
         Ok(first) => first,
         Err(why) => return not(why),
     };
-    let (controllers, stand_ins) = match controllers(robot, model, &first) {
+    let (controllers, uncontrolled) = match controllers(robot, model, &first) {
         Ok(found) => found,
         Err(e) => return not(sentence(&e.to_string())),
     };
@@ -79,11 +144,27 @@ pub(super) fn check(
         ));
     }
     let period = 1.0 / survey.sample_rate;
+    let replay = if uncontrolled.is_empty() {
+        None
+    } else {
+        match Replay::of(robot, &gathered.stretches, survey.sample_rate, treatment) {
+            Ok(replay) => Some(replay),
+            Err(why) => return not(why),
+        }
+    };
     let run = |substeps: u32, tell: &mut dyn FnMut(f64)| {
         let mut errors = Accumulated::new(robot.joints.len());
         let mut motions = Vec::with_capacity(gathered.stretches.len());
         let mut before = 0;
-        for stretch in &gathered.stretches {
+        for (s, stretch) in gathered.stretches.iter().enumerate() {
+            if let Some(replay) = &replay {
+                let motion = replay.over(robot, model, s, substeps)?;
+                before += stretch.t.len();
+                tell(before as f64 / samples as f64);
+                errors.push(stretch, &motion);
+                motions.push(motion);
+                continue;
+            }
             let (q, v) = first_state(stretch, period);
             // The drive's limit acts on its whole torque. Added torque therefore enters before the limit, as the
             // shift of the reference that makes the controller ask for just as much more.
@@ -118,11 +199,10 @@ pub(super) fn check(
         }
         Ok::<_, SimulateError>((errors, motions))
     };
-    let [begin, most] = if stand_ins.is_empty() {
-        SUBSTEPS
-    } else {
-        // As it was made; a stand-in's motion is not worth sixteen times the work.
-        [(period / REPLAY_STEP).ceil().max(1.0) as u32; 2]
+    let [begin, most] = match replay {
+        None => SUBSTEPS,
+        // A torque held over a whole sample is not worth sixteen times the work.
+        Some(_) => [(period / REPLAY_STEP).ceil().max(1.0) as u32; 2],
     };
     let mut substeps = options.substeps.unwrap_or(begin).max(1);
     let last = options.substeps.unwrap_or(most).max(1);
@@ -149,14 +229,20 @@ pub(super) fn check(
     };
     let step = period / f64::from(substeps);
     let mut remarks = vec![
-        format!(
-            "Every stretch starts from its own first position and velocity (a parabola through its first {FIRST_ROWS} rows, or the recorded velocity). After that only {} the simulation.",
-            if gathered.added.is_empty() {
-                "the reference drives"
-            } else {
-                "the reference and the added torque drive"
-            }
-        ),
+        match &replay {
+            Some(replay) => format!(
+                "{} Every stretch starts from its own first position and velocity.",
+                replay.how
+            ),
+            None => format!(
+                "Every stretch starts from its own first position and velocity (a parabola through its first {FIRST_ROWS} rows, or the recorded velocity). After that only {} the simulation.",
+                if gathered.added.is_empty() {
+                    "the reference drives"
+                } else {
+                    "the reference and the added torque drive"
+                }
+            ),
+        },
         if settled {
             format!(
                 "Step {:.4} ms ({substeps} a sample); halving it changes the motion by less than {:.0} % of the errors shown.",
@@ -171,7 +257,9 @@ pub(super) fn check(
             )
         },
     ];
-    remarks.extend(gathered.added.iter().cloned());
+    if replay.is_none() {
+        remarks.extend(gathered.added.iter().cloned());
+    }
     remarks.extend(model.effects.unsimulated());
     if gathered.short > 0 {
         remarks.push(format!(
@@ -219,7 +307,7 @@ pub(super) fn check(
         of: survey.rows,
         stretches: gathered.stretches.len(),
         substeps,
-        stand_ins,
+        uncontrolled,
         remarks,
     })
 }

@@ -190,14 +190,17 @@ fn what_the_stand_in_made_it_makes_again() {
     let judged = |robot: &Robot| {
         let found = validate(robot, &[&source], &Options::default(), &mut |_| ()).unwrap();
         let Motion::Simulated {
-            joints, stand_ins, ..
+            joints,
+            uncontrolled,
+            ..
         } = found.recordings[0].motion.clone()
         else {
             panic!("{:?}", found.warnings);
         };
-        assert_eq!(stand_ins.len(), n);
-        let said =
-            |w: &String| w.contains("no [joint.controller]") && w.contains("stand-in of 5 Hz");
+        assert_eq!(uncontrolled.len(), n);
+        let said = |w: &String| {
+            w.contains("no [joint.controller]") && w.contains("recorded torques drive")
+        };
         assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
         joints
     };
@@ -217,6 +220,29 @@ fn what_the_stand_in_made_it_makes_again() {
     for joint in judged(&other) {
         assert!(joint.tracking_relative_error > 0.02, "{joint:?}");
     }
+}
+
+/// What moved the joint is in the recorded torque: of a controller that nobody describes nothing need be known.
+#[test]
+fn without_a_controller_the_recorded_torque_drives_the_model() {
+    let robot = pendulum();
+    let block = simulated(&robot, 1.5);
+    let mut open = robot.clone();
+    open.joints[0].controller = None;
+    let mut wrong = open.clone();
+    wrong.joints[0].friction.as_mut().unwrap().coulomb += 0.1;
+    let [right, wrong] = [open, wrong].map(|robot| {
+        let found = run(&robot, block.clone());
+        assert!(matches!(&found.recordings[0].motion, Motion::Simulated { uncontrolled, .. } if uncontrolled == &["link"]));
+        let said = |w: &String| w.contains("no closed loop") && w.contains("recorded torque drives");
+        assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
+        let motion = motion_of(&found).clone();
+        println!("{} {}", motion.tracking_relative_error, motion.torque_relative_error);
+        motion
+    });
+    assert!(right.tracking_relative_error < 0.03, "{right:?}");
+    assert!(right.torque_relative_error < 0.05, "{right:?}");
+    assert!(wrong.position_rms_error > 4.0 * right.position_rms_error);
 }
 
 /// References in another unit are none that a stand-in can follow.

@@ -25,7 +25,7 @@ const SETS: [&[usize]; 4] = [
 
 /// The controllers of all joints, and where they come from, a sentence; where there are none, why. `moving` is the robot with
 /// the inertia that stand-ins are made for.
-pub(super) fn of_joints(
+pub(crate) fn of_joints(
     robot: &Robot,
     moving: &Robot,
     runs: &[Run],

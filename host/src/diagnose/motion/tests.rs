@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 use std::path::Path;
 
-use super::controller::{of_joints, regressed};
+use super::controller::regressed;
 use super::*;
 use crate::diagnose::runs::JointRun;
 use crate::robot::{JointFriction, ONE_LINK_TEMPLATE};
@@ -67,7 +67,7 @@ fn own() -> Controller {
 /// RMS by which each joint of the robot, as simulated, departs from the run.
 fn off(robot: &Robot, controllers: &[Controller], run: &Run) -> Vec<f64> {
     let model = Model::from_robot(robot).unwrap();
-    let q = replayed(robot, &model, controllers, run).unwrap();
+    let q = replayed(robot, &model, controllers, run, 1).unwrap().q;
     let rms = |(q, joint): (&Vec<f64>, &JointRun)| {
         let squares = q.iter().zip(&joint.q).map(|(a, b)| (a - b).powi(2));
         (squares.sum::<f64>() / q.len() as f64).sqrt()
