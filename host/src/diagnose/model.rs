@@ -11,7 +11,7 @@ use super::profile::Profile;
 use super::rows::Nominal;
 use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
-use crate::robot::{Robot, RobotEffect};
+use crate::robot::{Robot, RobotEffect, sane};
 
 /// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -156,7 +156,7 @@ fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<Strin
     let about = kind.about();
     let places = about.gains.iter().zip(&mut effect.gains);
     for (p, value) in places.chain(about.shapes.iter().zip(&mut effect.shapes)) {
-        let [low, high] = p.bounds;
+        let [low, high] = sane(p);
         let kept = value.clamp(low, high);
         if kept != *value {
             remarks.push(format!(

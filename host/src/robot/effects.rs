@@ -7,6 +7,7 @@ use rig_shared::effects::{Channel, Effect, Kind, Parameter};
 use serde::{Deserialize, Serialize};
 
 use super::check::{EFFECT_NAMES, Fault, Step};
+use super::sizes::LARGEST_LINK;
 use super::written::{float, line, quoted};
 use super::{JointKind, Robot};
 
@@ -105,6 +106,41 @@ fn name_found(value: Option<&toml::Value>) -> String {
     }
 }
 
+/// Largest magnitudes of parameters by their unit: beyond what any machine has by orders of magnitude, so that a value is in
+/// another unit or mistyped. By judgement, but for a link's length.
+const LARGEST: [(&str, f64); 12] = [
+    ("kg", 1.0e4),
+    ("m", LARGEST_LINK),
+    ("s", 1.0e6),
+    ("V", 1.0e4),
+    ("rad", 1.0),
+    ("rad/s", 1.0e4),
+    ("kg*m^2", 1.0e6),
+    ("N*m", 1.0e6),
+    ("N*m*s/rad", 1.0e6),
+    ("N*m*s/(rad*K)", 1.0e6),
+    ("N*m*s^2/rad^2", 1.0e6),
+    ("N*m/rad", 1.0e9),
+];
+/// Likewise of orders, per turn …
+const LARGEST_ORDER: f64 = 1.0e4;
+/// … and of shares.
+const LARGEST_SHARE: f64 = 1.0;
+
+/// What a description may hold: within what physics allows, what machines have.
+pub(crate) fn sane(parameter: &Parameter) -> [f64; 2] {
+    let of_unit = LARGEST.iter().find(|(unit, _)| *unit == parameter.unit);
+    let largest = match (of_unit, parameter.unit, parameter.name) {
+        (Some((_, largest)), ..) => *largest,
+        (None, "1", "order") => LARGEST_ORDER,
+        // A bound that physics states is the narrower one.
+        (None, "1", _) if parameter.bounds[1].is_infinite() => LARGEST_SHARE,
+        _ => f64::INFINITY,
+    };
+    let [low, high] = parameter.bounds;
+    [low.max(-largest), high.min(largest)]
+}
+
 /// The rest of a sentence on what a parameter must be.
 fn allowed(parameter: &Parameter) -> String {
     let number = |x: f64| {
@@ -114,7 +150,7 @@ fn allowed(parameter: &Parameter) -> String {
             format!("at least {x}")
         }
     };
-    let [low, high] = parameter.bounds;
+    let [low, high] = sane(parameter);
     let range = match (low.is_finite(), high.is_finite()) {
         (false, false) => "a finite number".to_owned(),
         (true, false) => number(low),
@@ -193,16 +229,15 @@ impl RobotEffect {
                 Some(toml::Value::Integer(x)) => Some(*x as f64),
                 _ => None,
             };
-            number
-                .filter(|x| x.is_finite() && *x >= p.bounds[0] && *x <= p.bounds[1])
-                .ok_or_else(|| {
-                    refuse(
-                        Some(p.name),
-                        &format!("the {}", p.name),
-                        table.get(p.name).map_or_else(missing, ToString::to_string),
-                        allowed(p),
-                    )
-                })
+            let [low, high] = sane(p);
+            number.filter(|x| (low..=high).contains(x)).ok_or_else(|| {
+                refuse(
+                    Some(p.name),
+                    &format!("the {}", p.name),
+                    table.get(p.name).map_or_else(missing, ToString::to_string),
+                    allowed(p),
+                )
+            })
         };
         let gains: Vec<f64> = (kind.about().gains.iter().map(value)).collect::<Result<_, _>>()?;
         let shapes: Vec<f64> = (kind.about().shapes.iter().map(value)).collect::<Result<_, _>>()?;

@@ -81,7 +81,7 @@ fn faults_name_line_value_and_mend() {
         (
             "kind = 'stribeck'\nbreakaway = 0.1",
             -1,
-            &["velocity", "missing", "above 0, in rad/s"],
+            &["velocity", "missing", "above 0 and at most 10000, in rad/s"],
         ),
         (
             "kind = 'stribeck'\nbreakaway = 0.1\nvelocity = 0.0",
@@ -91,7 +91,7 @@ fn faults_name_line_value_and_mend() {
         (
             "kind = 'stribeck'\nbreakaway = -0.1\nvelocity = 0.1",
             1,
-            &["-0.1", "at least 0, in N*m"],
+            &["-0.1", "at least 0 and at most 1000000, in N*m"],
         ),
         (
             "kind = 'stribeck'\nbreakaway = nan\nvelocity = 0.1",
@@ -102,6 +102,26 @@ fn faults_name_line_value_and_mend() {
             "kind = 'stribeck'\nbreakaway = 'much'\nvelocity = 0.1",
             1,
             &["much", "at least 0"],
+        ),
+        (
+            "kind = 'payload'\nmass = 1e6\ndistance = 0.3",
+            1,
+            &["mass of effect 1", "1000000", "at most 10000, in kg"],
+        ),
+        (
+            "kind = 'torque_ripple'\ncosine = 0\nsine = -7.5\norder = 6",
+            2,
+            &["sine", "-7.5", "at least -1 and at most 1"],
+        ),
+        (
+            "kind = 'cogging'\ncosine = 0.1\nsine = 0\norder = 1e9",
+            3,
+            &["order", "at least 2 and at most 10000"],
+        ),
+        (
+            "kind = 'joint_elasticity'\nstiffness = -900\ndamping = 0\nlink_friction = 0",
+            1,
+            &["stiffness", "-900", "above 0"],
         ),
         (
             "kind = 'load_friction'\ncoefficient = 1.5",
@@ -152,6 +172,16 @@ fn faults_name_line_value_and_mend() {
         for word in words {
             assert!(said.contains(word), "{effect}: {said}");
         }
+    }
+}
+
+#[test]
+fn what_is_refused_is_far_from_what_rigs_have() {
+    for p in Kind::ALL.iter().flat_map(|kind| parameters(*kind)) {
+        let [low, high] = sane(p);
+        assert!(low >= p.bounds[0] && high <= p.bounds[1], "{p:?}");
+        let far = if p.bounds[1].is_finite() { 1.0 } else { 4.0 };
+        assert!(high >= far * p.range[1], "{p:?}");
     }
 }
 

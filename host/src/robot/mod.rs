@@ -38,6 +38,7 @@ pub use band::IdentifiedBand;
 pub(crate) use band::MOST_LEAD;
 pub use check::EFFECT_NAMES;
 pub(crate) use check::{sound, written};
+pub(crate) use effects::sane;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
 pub use error::{Place, RobotError};
 pub use screw::Screw;
