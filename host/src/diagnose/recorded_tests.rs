@@ -221,12 +221,12 @@ fn a_constant_that_changes_between_two_runs_is_said_and_is_no_noise() {
 #[test]
 fn a_piece_cut_out_of_a_recording_is_a_copy() {
     let made = Scenario::short([], 38).make().unwrap();
-    let cut = |from: usize, to: usize, late: f64| {
+    let cut = |from: usize, to: usize, every: usize, late: f64| {
         let mut cut = made.clone();
         cut.holdout = made.train.clone();
         cut.holdout.label = "cut".into();
         each_column(&mut cut.holdout.blocks[0], |column| {
-            column[from..to].to_vec()
+            (column[from..to].iter().step_by(every).copied()).collect()
         });
         for t in &mut cut.holdout.blocks[0].t {
             *t += late;
@@ -234,12 +234,15 @@ fn a_piece_cut_out_of_a_recording_is_a_copy() {
         cut.diagnose(&made.robot, &Options::default())
     };
     let rows = made.train.blocks[0].t.len();
-    for (from, to, late) in [
-        (100, rows, 0.0),
-        (rows / 3, rows / 2, 0.0),
-        (0, rows - 500, 7.5),
+    for (from, to, every, late) in [
+        (100, rows, 1, 0.0),
+        (rows / 3, rows / 2, 1, 0.0),
+        (0, rows - 500, 1, 7.5),
+        // Every so manieth sample, whichever is the first.
+        (0, rows, 5, 0.0),
+        (rows / 3 + 1, rows, 4, 7.5),
     ] {
-        let said = cut(from, to, late).unwrap_err().to_string();
+        let said = cut(from, to, every, late).unwrap_err().to_string();
         assert!(said.contains("cut holds samples of train"), "{said}");
     }
     assert!(made.diagnose(&made.robot, &Options::default()).is_ok());

@@ -124,8 +124,12 @@ const SHARED: (usize, usize) = (64, 16);
 /// Places of a recording that are looked for in another, and how many of them are found of a piece that both hold: two may begin
 /// alike without any noise.
 const LOOKED_FOR: (usize, usize) = (8, 3);
+/// Share by which the rates of a recording and of its every so manieth sample may be off a whole ratio: rates are medians of
+/// intervals.
+const RATE_OFF: f64 = 0.01;
 
-/// Two recordings that hold the same samples of position and effort, or a piece of them, by their places among those given.
+/// Two recordings that hold the same samples of position and effort, or every so manieth of a piece of them, by their places among
+/// those given.
 pub(super) fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     (0..runs.len()).find_map(|b| {
         let first = (0..b).find(|&a| holds_of(runs[a], runs[b]) || holds_of(runs[b], runs[a]))?;
@@ -133,10 +137,17 @@ pub(super) fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     })
 }
 
-/// Whether a recording holds a piece of another.
+/// Whether a recording holds a piece of another, sample by sample or of more samples than the other was left with.
 fn holds_of(whole: &Run, other: &Run) -> bool {
     let (rows, steps) = SHARED;
     let (places, enough) = LOOKED_FOR;
+    let ratio = whole.rate / other.rate;
+    let stride = ratio.round();
+    if stride < 1.0 || (ratio - stride).abs() > RATE_OFF * stride {
+        return false;
+    }
+    let stride = stride as usize;
+    let reach = (rows - 1) * stride + 1;
     let room = other.len().saturating_sub(rows);
     let found = |k: &usize| {
         let from = room * k / (places - 1);
@@ -148,8 +159,11 @@ fn holds_of(whole: &Run, other: &Run) -> bool {
         let alive = |part: &[f64]| part.windows(2).filter(|w| w[0] != w[1]).count() >= steps;
         let moves = pieces.iter().any(|[tau, q]| alive(tau) && alive(q));
         moves
-            && (0..=whole.len().saturating_sub(rows)).any(|at| {
-                let same = |signal: &[f64], piece: &[f64]| signal.get(at..at + rows) == Some(piece);
+            && (0..=whole.len().saturating_sub(reach)).any(|at| {
+                let same = |signal: &[f64], piece: &[f64]| {
+                    (signal.get(at..at + reach))
+                        .is_some_and(|own| own.iter().step_by(stride).eq(piece))
+                };
                 (whole.joints.iter().zip(&pieces))
                     .all(|(own, [tau, q])| same(&own.tau, tau) && same(&own.q_raw, q))
             })
