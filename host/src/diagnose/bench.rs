@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use rig_shared::effects::{Channel, Kind};
+use rig_shared::effects::{Channel, Instant, Kind, Memory};
 use rig_shared::multibody::Chain;
 
 use super::DiagnoseError;
@@ -240,7 +240,24 @@ impl<'a> Bench<'a> {
             });
             all.extend(gains);
         }
-        self.unseen(loaded, [&self.anchor.prior, &all], &effects)
+        let mut residual = self.remaining(loaded, [&self.anchor.prior, &all], &effects)?;
+        for placed in self.stated.given_up() {
+            let mut torque = Vec::with_capacity(loaded.rows.count);
+            for run in &loaded.runs {
+                let of_row = |&position: &f64| {
+                    let at = Instant {
+                        position,
+                        ..Instant::default()
+                    };
+                    placed.effect.torque(&mut Memory::default(), &at)
+                };
+                let along: Vec<f64> = run.joints[placed.joint].q.iter().map(of_row).collect();
+                loaded.rows.thinning.pick(&along, &mut torque);
+            }
+            let own = residual[placed.joint].iter_mut().zip(torque);
+            own.for_each(|(left, torque)| *left -= torque);
+        }
+        Ok(rms(&loaded.rows, &residual))
     }
 
     /// RMS per joint of what a model leaves on the rows used.
@@ -253,11 +270,15 @@ impl<'a> Bench<'a> {
         fitted: [&[f64]; 2],
         chosen: &[Profile],
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let residual = self.remaining(sealed, fitted, chosen)?;
-        Ok((residual.iter().zip(&sealed.rows.keep))
-            .map(|(r, keep)| floor::rms(r, keep))
-            .collect())
+        Ok(rms(&sealed.rows, &self.remaining(sealed, fitted, chosen)?))
     }
+}
+
+/// RMS per joint on the rows used.
+fn rms(rows: &Rows, residual: &[Vec<f64>]) -> Vec<f64> {
+    (residual.iter().zip(&rows.keep))
+        .map(|(r, keep)| floor::rms(r, keep))
+        .collect()
 }
 
 fn position_filter(treatment: &Treatment) -> Result<LowPass, DiagnoseError> {

@@ -147,12 +147,14 @@ fn attempt(
     };
     let refuted = |c: &_| refutes(&pass.across, c);
     let mut more = stated.clone();
-    if more.hold_what_is_not_refuted(
-        &pass.search.source,
-        &pass.refit.base,
-        &pass.found,
-        &refuted,
-    )? {
+    if more.give_up_tilts(&pass.found)
+        || more.hold_what_is_not_refuted(
+            &pass.search.source,
+            &pass.refit.base,
+            &pass.found,
+            &refuted,
+        )?
+    {
         return Ok(Attempt::Hold(more));
     }
     let sealed = sealed

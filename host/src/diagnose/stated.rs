@@ -2,7 +2,8 @@
 //!
 //! An effect that a description states is where the search begins, its parameters as first values; it is fitted again
 //! together with everything else. One that these recordings neither show nor contradict is held at its description and
-//! taken off them, as is one that the search has no columns for. A payload is a mass of its link.
+//! taken off them, as is one that the search has no columns for. A tilt is held until the recordings show another beside it: then it
+//! is taken out, and what they show of a tilt is looked for in its place. A payload is a mass of its link.
 //!
 //! Leaves out: effects between motor and link that are held, which no torque for a given motion can be freed of.
 
@@ -38,6 +39,8 @@ enum Way {
     Free,
     /// At its description, for the reason given; whether recordings are freed of it.
     Held { why: String, taken_off: bool },
+    /// Taken out: beside it the recordings show another of its kind, which takes its place.
+    GivenUp,
 }
 
 impl Way {
@@ -106,6 +109,27 @@ impl Stated {
     pub(super) fn held(&self) -> impl Iterator<Item = &RobotEffect> {
         let held = |(_, _, way): &&(RobotEffect, Placed, Way)| matches!(way, Way::Held { .. });
         self.effects.iter().filter(held).map(|(effect, ..)| effect)
+    }
+
+    /// The effects that were taken out.
+    pub(super) fn given_up(&self) -> impl Iterator<Item = &Placed> {
+        let out = |(_, _, way): &&(_, Placed, Way)| *way == Way::GivenUp;
+        self.effects.iter().filter(out).map(|(_, placed, _)| placed)
+    }
+
+    /// Takes held tilts out where a tilt was found beside them: one that is stated and is not there, or is another, would come out
+    /// as the difference. Whether there was one.
+    pub(super) fn give_up_tilts(&mut self, found: &[Profile]) -> bool {
+        let tilted = |kind: Kind| kind == Kind::GravityTilt;
+        let another = found.iter().any(|p| tilted(p.candidate.kind));
+        let mut changed = false;
+        for (_, placed, way) in &mut self.effects {
+            if another && tilted(placed.effect.kind) && *way != Way::GivenUp {
+                *way = Way::GivenUp;
+                changed = true;
+            }
+        }
+        changed
     }
 
     /// Whether an effect of the kind is held on a joint.
@@ -283,7 +307,7 @@ impl Stated {
                         Fate::FittedAgain,
                         format!("The description's {what} stays, fitted again together with everything else."),
                     ),
-                    (Way::Free, None) => {
+                    (Way::Free | Way::GivenUp, _) => {
                         let values = effect.values().map(|(p, value)| {
                             let unit = unit_of(p, joint.kind);
                             format!("{} {} {unit}", p.name, format_significant(value, 3))
@@ -291,7 +315,14 @@ impl Stated {
                         let values: Vec<String> = values.collect();
                         (
                             Fate::Dropped,
-                            format!("The description's {what} ({}) is not in model.toml: beside everything else that these recordings show it does not stand as stated.", values.join(", ")),
+                            format!(
+                                "The description's {what} ({}) is not in model.toml: beside everything else that these recordings show it does not stand as stated.{}",
+                                values.join(", "),
+                                match way {
+                                    Way::GivenUp => " What they show of a tilt is in the direction of gravity.",
+                                    _ => "",
+                                }
+                            ),
                         )
                     }
                 };

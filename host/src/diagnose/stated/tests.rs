@@ -111,6 +111,49 @@ fn an_effect_that_the_recordings_contradict_goes_and_is_told() {
     assert!(w.train[0] > 1.5 * w.train[1], "{w:?}");
 }
 
+/// Across gravity, whose torque on the emulated rig goes with sin q.
+fn tilt(cosine: f64) -> RobotEffect {
+    RobotEffect {
+        joint: Some("link".into()),
+        other: None,
+        effect: Effect::new(Kind::GravityTilt, &[cosine, 0.0], &[]),
+    }
+}
+
+#[test]
+fn a_tilt_that_is_not_there_goes_and_none_is_found_to_make_up_for_it() {
+    let made = recorded(&[], 5, 30.0);
+    let robot = described(&made.robot, tilt(0.3));
+    let (found, model) = diagnosed(&robot, &made, without_gears());
+    assert_eq!(found.verdict, Verdict::ParameterChange, "{:?}", found.words);
+    assert!(found.steps.is_empty(), "{:?}", found.words);
+    assert_eq!(found.described[0].fate, Fate::Dropped);
+    assert!(model.effects.is_empty());
+    assert_eq!(model.gravity, made.robot.gravity);
+    let w = &found.waterfall[0];
+    assert!(w.train[0] > 1.5 * w.train[1], "{w:?}");
+    assert!(w.train[1] < 1.1 * found.noise_floor_rms[0], "{w:?}");
+}
+
+#[test]
+fn a_tilt_that_is_another_gives_way_to_the_one_that_is_there() {
+    let made = recorded(&[scenario::Effect::GravityTilt { angle: 0.08 }], 5, 30.0);
+    let named = |robot: &Robot| {
+        let (found, model) = diagnosed(robot, &made, without_gears());
+        let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
+        assert_eq!(names, ["gravity_tilt"], "{:?}", found.words);
+        let angle = found.steps[0].parameters["angle"].value;
+        (found, model.gravity, angle)
+    };
+    let (_, alone, angle) = named(&made.robot);
+    let (found, gravity, beside) = named(&described(&made.robot, tilt(0.5)));
+    assert_eq!(found.described[0].fate, Fate::Dropped);
+    assert!(found.words.contains(&found.described[0].text));
+    assert!((beside / angle - 1.0).abs() < 0.01, "{beside} {angle}");
+    let apart = (0..3).map(|k| f64::abs(gravity[k] - alone[k]));
+    assert!(apart.fold(0.0, f64::max) < 0.02, "{gravity:?} {alone:?}");
+}
+
 #[test]
 fn an_effect_too_small_to_show_is_held() {
     let made = recorded(&[], 5, 30.0);
