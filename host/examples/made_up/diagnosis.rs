@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::outcome::{
-    About, Absorbed, ByMotion, Curves, DataFault, Detectable, Diagnosis, Map, NextExperiment,
-    NotTestable, Place, Remainder, Residual, Step, Tried, Twice, Value, Verdict, Waterfall,
+    About, Absorbed, Before, ByMotion, Curves, DataFault, Detectable, Diagnosis, Map,
+    NextExperiment, NotTestable, Place, Remainder, Residual, Step, Tried, Twice, Value, Verdict,
+    Waterfall,
 };
 
 /// Nothing in it yet but a name and a verdict.
@@ -24,6 +25,7 @@ fn empty(verdict: Verdict, words: &[&str]) -> Diagnosis {
         steps: Vec::new(),
         gap_closed: None,
         absorbed: Vec::new(),
+        absorbed_before: Before::Described,
         by_motion: None,
         not_testable: Vec::new(),
         detectable: Vec::new(),
@@ -228,6 +230,7 @@ pub(super) fn explained() -> Diagnosis {
             Absorbed { parameter: "fc1".into(), unit: "N*m".into(), before: 0.4931, after: 0.4602, sigmas: -8.1 },
             Absorbed { parameter: "Izz1 + Ia1".into(), unit: "kg*m^2".into(), before: 0.11769, after: 0.11757, sigmas: -0.9 },
         ],
+        absorbed_before: Before::WithoutEffects,
         by_motion: Some(ByMotion {
             unit: "rad".into(),
             motion_rms: [1.12e-4, 1.08e-4],

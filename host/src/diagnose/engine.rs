@@ -30,7 +30,7 @@ use super::judge::{Judge, Judged, left_of_held, not_carried_over, taken_by_none}
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
-use super::outcome::{Diagnosis, Residual, Verdict};
+use super::outcome::{Before, Diagnosis, Residual, Verdict};
 use super::profile::Profile;
 use super::refit::Refit;
 use super::rounding::rounding;
@@ -318,6 +318,21 @@ fn attempt(
             .collect(),
     );
     reconcile(robot, &mut tried, &chosen[described..]);
+    let absorbed = |before: &[f64]| refit.absorbed(&bench, before, after);
+    let (absorbed_before, absorbed) = if chosen.len() > described {
+        let without = before.coefficients(&bench.anchor);
+        (Before::WithoutEffects, absorbed(&without))
+    } else if bench.anchor.stated {
+        let mut stated = bench.anchor.prior_coefficients();
+        for (k, value) in stated.iter_mut().enumerate() {
+            if bench.anchor.is_unstated(k) {
+                *value = f64::NAN;
+            }
+        }
+        (Before::Described, absorbed(&stated))
+    } else {
+        (Before::Described, Vec::new())
+    };
     let mut diagnosis = Diagnosis {
         schema: "rig-diagnosis/1".into(),
         robot: robot.name.clone(),
@@ -342,7 +357,8 @@ fn attempt(
         gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
         described: stood,
         steps,
-        absorbed: refit.absorbed(&bench, &before.coefficients(&bench.anchor), after),
+        absorbed,
+        absorbed_before,
         by_motion,
         not_testable: Vec::new(),
         detectable: Vec::new(),

@@ -1,6 +1,6 @@
 //! The diagnosis of recordings that cannot be what they say.
 
-use super::outcome::{About, DataFault, Diagnosis, Residual, Verdict};
+use super::outcome::{About, Before, DataFault, Diagnosis, Residual, Verdict};
 use super::sentences;
 use crate::prepare::PrepareError;
 use crate::robot::Robot;
@@ -41,6 +41,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         steps: Vec::new(),
         gap_closed: None,
         absorbed: Vec::new(),
+        absorbed_before: Before::Described,
         by_motion: None,
         not_testable: Vec::new(),
         detectable: Vec::new(),

@@ -147,16 +147,26 @@ pub struct Described {
     pub text: String,
 }
 
-/// A nominal parameter that moved when the effects came in.
+/// What [`Absorbed::before`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Before {
+    /// Identified without the effects that were found.
+    WithoutEffects,
+    /// Stated by the description; there was no effect that could have bent it.
+    Described,
+}
+
+/// A nominal parameter that moved: when the effects came in, or against the description.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Absorbed {
     /// Name with the joint's number, or the base parameter's expression.
     pub parameter: String,
     /// ASCII
     pub unit: String,
-    /// Identified without the effects.
+    /// As [`Diagnosis::absorbed_before`] says.
     pub before: f64,
-    /// Identified with them.
+    /// Identified, with the effects where there are any.
     pub after: f64,
     /// Difference in standard deviations of the latter.
     pub sigmas: f64,
@@ -434,8 +444,10 @@ pub struct Diagnosis {
     /// Of the hold-out (else training) residual's excess over the noise floor; null where nothing was found. Of what fitting the
     /// description again leaves; of what it leaves as it stands where its own values are said to have changed.
     pub gap_closed: Option<f64>,
-    /// Nominal parameters that had been lying.
+    /// Nominal parameters that had been lying; without effects, those of the description. Empty where it states none.
     pub absorbed: Vec<Absorbed>,
+    /// What they are compared with.
+    pub absorbed_before: Before,
     /// All of them by torque and by motion; none where that was not done.
     pub by_motion: Option<ByMotion>,
     /// Effects that these data cannot show.

@@ -242,8 +242,8 @@ impl<'r> Refit<'r> {
         frozen
     }
 
-    /// What moved among the nominal parameters when the effects came in, the surest first.
-    /// `before` are the coefficients without them.
+    /// What moved among the nominal parameters, the surest first. `before` are their coefficients without the effects, or as
+    /// described; those that are no number are left out.
     pub(super) fn absorbed(
         &self,
         bench: &Bench,
@@ -261,6 +261,7 @@ impl<'r> Refit<'r> {
                     sigmas: (now - before).abs() / (scale * after.std(k)).max(f64::MIN_POSITIVE),
                 }
             })
+            .filter(|moved| moved.before.is_finite())
             .collect();
         list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
         list

@@ -6,7 +6,7 @@ use rig_shared::multibody::COLUMNS;
 use super::bench::Bench;
 use super::finish::Found;
 use super::floor::repeats;
-use super::outcome::{Diagnosis, Remainder, Step, Verdict, Waterfall};
+use super::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};
 use super::profile::Profile;
 use super::pull;
 use super::solve::Solution;
@@ -98,7 +98,8 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
         }
     }
     let moved = d.absorbed.iter().find(|a| a.sigmas >= MOVED);
-    if let Some(a) = moved.filter(|_| !d.steps.is_empty()) {
+    let bent = !d.steps.is_empty() && d.absorbed_before == Before::WithoutEffects;
+    if let Some(a) = moved.filter(|_| bent) {
         let [before, after] = apart(a.before, a.after);
         words.push(format!(
             "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",

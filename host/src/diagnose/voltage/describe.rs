@@ -6,8 +6,8 @@ use super::plant::{NAMES, NOMINAL, Plant};
 use super::search::{EQUAL, Model, Trial, on_the_voltage};
 use crate::diagnose::judge::closed;
 use crate::diagnose::outcome::{
-    Absorbed, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value, Verdict,
-    Waterfall,
+    Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
+    Verdict, Waterfall,
 };
 use crate::diagnose::stated::{Now, Stated};
 use crate::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
@@ -151,6 +151,7 @@ impl Told<'_> {
             described,
             steps,
             absorbed: self.absorbed(),
+            absorbed_before: Before::WithoutEffects,
             by_motion: None,
             not_testable: Vec::new(),
             detectable: Vec::new(),

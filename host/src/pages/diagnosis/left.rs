@@ -1,7 +1,7 @@
 //! What the missing effects had done to the parameters, and what is left without a name.
 
 use super::{gap, parts, words};
-use crate::diagnose::outcome::{Absorbed, Diagnosis};
+use crate::diagnose::outcome::{Absorbed, Before, Diagnosis};
 use crate::report::{Block, Column, Section, Table, format_significant, format_value};
 
 /// From so many standard deviations on a parameter counts as having been wrong.
@@ -15,45 +15,62 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     let mut list: Vec<&Absorbed> = found.absorbed.iter().collect();
     list.sort_by(|a, b| b.sigmas.abs().total_cmp(&a.sigmas.abs()));
     let lying = list.iter().filter(|a| a.sigmas.abs() >= LYING).count();
-    Some(
-        Section::new(
-            "absorbed",
-            "Parameters that had been lying",
-            "What a model lacks does not all stay in the residual: part of it bends the parameters that are there, because the fit uses them to make up for it. These are the parameters of the standard model, fitted without the effects and with them.",
-        )
-        .with(Block::Text(if lying == 0 {
-            format!("None has moved by more than {LYING:.0} standard deviations.")
-        } else {
-            format!(
-                "{lying} of {} {} moved by more than {LYING:.0} standard deviations; their old values stood in for what was missing. The new ones belong to the model with the effects, and are no values of a model without them.",
-                list.len(),
-                if lying == 1 { "has" } else { "have" }
-            )
-        }))
-        .with(Block::Table(Table {
-            caption: "Before and after, the largest change first".into(),
-            columns: vec![
-                Column::text("Parameter"),
-                Column::number("Without the effects", ""),
-                Column::number("With them ± std", ""),
-                Column::text("Unit"),
-                Column::number("Moved by", "std"),
+    let has = if lying == 1 { "has" } else { "have" };
+    let ([title, intro], moved, heads) = match found.absorbed_before {
+        Before::WithoutEffects => (
+            [
+                "Parameters that had been lying",
+                "What a model lacks does not all stay in the residual: part of it bends the parameters that are there, because the fit uses them to make up for it. These are the parameters of the standard model, fitted without the effects and with them.",
             ],
-            rows: list
-                .iter()
-                .map(|a| {
-                    let std = ((a.after - a.before) / a.sigmas).abs();
-                    vec![
-                        a.parameter.clone(),
-                        format_significant(a.before, 4),
-                        format_value(a.after, std),
-                        parts::unit(&a.unit),
-                        format_significant(a.sigmas, 2),
-                    ]
-                })
-                .collect(),
-            note: String::new(),
-        })),
+            format!(
+                "{lying} of {} {has} moved by more than {LYING:.0} standard deviations; their old values stood in for what was missing. The new ones belong to the model with the effects, and are no values of a model without them.",
+                list.len()
+            ),
+            ["Without the effects", "With them ± std"],
+        ),
+        Before::Described => (
+            [
+                "The description's values and those of the data",
+                "No effect was found that could have bent them: these are the parameters of the standard model, as the description states them and as the training data have them.",
+            ],
+            format!(
+                "{lying} of {} {has} moved by more than {LYING:.0} standard deviations from the description.",
+                list.len()
+            ),
+            ["As described", "Identified ± std"],
+        ),
+    };
+    Some(
+        Section::new("absorbed", title, intro)
+            .with(Block::Text(if lying == 0 {
+                format!("None has moved by more than {LYING:.0} standard deviations.")
+            } else {
+                moved
+            }))
+            .with(Block::Table(Table {
+                caption: "Before and after, the largest change first".into(),
+                columns: vec![
+                    Column::text("Parameter"),
+                    Column::number(heads[0], ""),
+                    Column::number(heads[1], ""),
+                    Column::text("Unit"),
+                    Column::number("Moved by", "std"),
+                ],
+                rows: list
+                    .iter()
+                    .map(|a| {
+                        let std = ((a.after - a.before) / a.sigmas).abs();
+                        vec![
+                            a.parameter.clone(),
+                            format_significant(a.before, 4),
+                            format_value(a.after, std),
+                            parts::unit(&a.unit),
+                            format_significant(a.sigmas, 2),
+                        ]
+                    })
+                    .collect(),
+                note: String::new(),
+            })),
     )
 }
 
