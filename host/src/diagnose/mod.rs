@@ -66,6 +66,7 @@ pub use outcome::Diagnosis;
 pub use pull::Unburdened;
 pub(crate) use runs::runs_of_blocks;
 pub use runs::{JointRun, Run};
+pub(crate) use sentences::WHAT_FALLS;
 
 use rig_shared::effects::Kind;
 

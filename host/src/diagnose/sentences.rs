@@ -19,6 +19,9 @@ const MOVED: f64 = 3.0;
 /// Times the RMS that the description leaves, from which on fitting again has made it worse.
 const WORSE: f64 = 1.1;
 
+/// What the residuals of the description and of the refitted description say.
+pub(crate) const WHAT_FALLS: &str = "What fitting the parameters again takes off a residual had come from wrong values; what it leaves above the noise floor comes from physics that the model does not have.";
+
 fn number(x: f64) -> String {
     format_significant(x, 3)
 }
@@ -75,6 +78,9 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     }
     words.extend(constant(d));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    if d.residual == Residual::Torque && !d.waterfall.is_empty() {
+        words.push(WHAT_FALLS.to_owned());
+    }
     words.extend(worse_refitted(d));
     words.extend(motion(d));
     if let Some(doubted) = d.remainder.as_ref().filter(|r| r.doubt) {

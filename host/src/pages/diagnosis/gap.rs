@@ -1,6 +1,7 @@
 //! How large the gap is and where it sits.
 
 use super::{parts, words};
+use crate::diagnose::WHAT_FALLS;
 use crate::diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
 use crate::report::{
     Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
@@ -24,7 +25,7 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
         "From the description down to the noise",
         match found.residual {
             Residual::Torque => {
-                "How much torque each model leaves unexplained: first the description as it was given, then the same equations with their parameters fitted again, then each effect added in turn. Where the bars reach the line, nothing but noise is left."
+                "How much torque each model leaves unexplained: first the description as it was given (its own values), then the same equations with all their parameters fitted to the training data, then each effect added in turn. Where the bars reach the line, nothing but noise is left."
             }
             Residual::Position => {
                 "How far the position of each model runs away from the recorded one when it is driven by the motor voltage, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
@@ -170,11 +171,15 @@ fn figures(found: &Diagnosis) -> Block {
         columns,
         rows,
         note: format!(
-            "Over the floor: {} over the noise floor; 1 is nothing but noise.",
+            "Over the floor: {} over the noise floor; 1 is nothing but noise.{}",
             if held {
                 "RMS on the data held back"
             } else {
                 "RMS"
+            },
+            match found.residual {
+                Residual::Torque => format!(" {WHAT_FALLS}"),
+                Residual::Position => String::new(),
             }
         ),
     })
@@ -248,9 +253,25 @@ pub(super) fn table(caption: &str, places: &[Place]) -> Block {
     })
 }
 
+/// Least and largest mean residual in all figures of a joint: what goes into one is seen against what is left in the next.
+fn reach(found: &Diagnosis, map: &Map) -> Option<[f64; 2]> {
+    let alike = |m: &&Map| m.joint == map.joint && m.residual_unit == map.residual_unit;
+    let ends = |m: &Map| -> Vec<f64> {
+        let bars = m.before.iter().chain(&m.after);
+        let bars = bars.flat_map(|[mean, half]| [mean - half, mean + half]);
+        bars.chain(m.law.iter().copied()).collect()
+    };
+    let all = (found.maps.iter().filter(alike).flat_map(ends)).filter(|v| v.is_finite());
+    all.fold(None, |reach, v| match reach {
+        None => Some([v; 2]),
+        Some([low, high]) => Some([low.min(v), high.max(v)]),
+    })
+}
+
 /// The mean residual over one coordinate, before and after, and the law that was fitted to it.
-pub(super) fn map(map: &Map) -> Plot {
+pub(super) fn map(found: &Diagnosis, map: &Map) -> Plot {
     let unit = parts::unit(&map.residual_unit);
+    let reach = reach(found, map);
     let bars = |name: &str, role, values: &[[f64; 2]]| {
         Series::new(
             name,
@@ -291,6 +312,7 @@ pub(super) fn map(map: &Map) -> Plot {
             map.law.clone(),
         ));
     }
+    plot.reach = reach;
     plot.mark(Marker::horizontal(0.0, "")).note(format!(
         "n = {} bins; bars are 95 % intervals of the mean.{}",
         map.at.len(),

@@ -117,7 +117,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         .maps
         .iter()
         .filter(|m| m.step.is_none())
-        .map(|m| Block::Plot(gap::map(m)))
+        .map(|m| Block::Plot(gap::map(found, m)))
         .collect();
     let Some(remainder) = &found.remainder else {
         return (!maps.is_empty()).then(|| Section {

@@ -38,7 +38,7 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
     }
     section
         .blocks
-        .extend(maps.iter().map(|m| Block::Plot(gap::map(m))));
+        .extend(maps.iter().map(|m| Block::Plot(gap::map(found, m))));
     if !step.parameters.is_empty() {
         section = section.with(parameters(step));
     }

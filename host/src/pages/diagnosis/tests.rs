@@ -134,6 +134,32 @@ fn the_spread_of_an_absorbed_parameter_follows_from_its_sigmas() {
 }
 
 #[test]
+fn figures_of_one_joint_share_their_ordinates() {
+    let found = made_up::explained();
+    let plots: Vec<_> = found.maps.iter().map(|m| gap::map(&found, m)).collect();
+    let reaches: Vec<_> = plots.iter().filter_map(|p| p.reach).collect();
+    assert!(plots.len() > 1 && reaches.len() == plots.len());
+    assert!(reaches.windows(2).all(|w| w[0] == w[1]), "{reaches:?}");
+    let largest = |p: &crate::report::Plot| {
+        let values = p.series.iter().flat_map(|s| s.y.iter());
+        values.fold(0.0, |most: f64, y| most.max(y.abs()))
+    };
+    let most = plots.iter().map(largest).fold(0.0, f64::max);
+    assert!(
+        reaches[0][0] <= -most || reaches[0][1] >= most,
+        "{reaches:?}"
+    );
+}
+
+#[test]
+fn values_against_the_description_are_no_lies_of_a_fit() {
+    let mut found = made_up::explained();
+    found.absorbed_before = outcome::Before::Described;
+    let text = page(&found);
+    assert!(text.contains("As described") && !text.contains("had been lying"));
+}
+
+#[test]
 fn without_a_holdout_every_figure_says_so() {
     let mut found = made_up::explained();
     found.waterfall[0].holdout.clear();
