@@ -11,6 +11,7 @@ use super::profile::Profile;
 use super::pull;
 use super::solve::Solution;
 use super::transmission::STRETCH;
+use super::waves::{is_of_the_motor, ratio_is_described};
 use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::Joint;
 
@@ -329,8 +330,17 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     } else {
         ""
     };
+    let own = &found.robot.joints[j];
+    let turn = if is_of_the_motor(profile.candidate.kind) && !ratio_is_described(own) {
+        format!(
+            " No gear ratio of this joint is described, so that its motor's angle is not known and the joint's own stands for it: the wave has {} periods to a turn of the joint. Whether it comes from the motor or the gear, [joint.drive] with gear_ratio would tell.",
+            number(profile.shapes[0])
+        )
+    } else {
+        String::new()
+    };
     format!(
-        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{loaded}{runner}{followed}",
+        "{unseen}On stretches of the training data that it was not fitted to it takes away {} of the RMS beside everything else in the model, {} standard deviations between stretches.{gone}{loaded}{turn}{runner}{followed}",
         percent(e.gain),
         format_significant(e.gain_sigmas, 2)
     )

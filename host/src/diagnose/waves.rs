@@ -38,8 +38,12 @@ pub(super) fn is_of_the_motor(kind: Kind) -> bool {
 
 /// Whether the motor's angle is known: a turn of a joint is at least one of a motor that drives it directly, a way is no turn.
 pub(super) fn motor_is_known(joint: &Joint) -> bool {
-    let geared = (joint.drive.as_ref()).is_some_and(|drive| drive.gear_ratio != 0.0);
-    geared || joint.kind == JointKind::Revolute
+    ratio_is_described(joint) || joint.kind == JointKind::Revolute
+}
+
+/// Whether the description says how far the motor turns; else the angle of a revolute joint stands for its motor's.
+pub(super) fn ratio_is_described(joint: &Joint) -> bool {
+    (joint.drive.as_ref()).is_some_and(|drive| drive.gear_ratio != 0.0)
 }
 
 /// Length of the wave of an effect on a joint, rad or m; none of what is none.

@@ -160,8 +160,12 @@ fn lacking(
                 .filter(|r| *r > 0.0);
             let Some(ratio) = ratio else {
                 return Some((
-                    "no drive with a gear ratio is described, so that the motor's angle is not known"
-                        .to_owned(),
+                    if revolute {
+                        "no drive with a gear ratio is described, so that the motor's angle is not known; waves over the joint's own turn alone were looked for"
+                    } else {
+                        "no drive with a gear ratio is described, so that the motor's angle is not known"
+                    }
+                    .to_owned(),
                     if revolute {
                         "give [joint.drive] with gear_ratio"
                     } else {

@@ -195,6 +195,17 @@ fn a_description_without_values_is_no_prior() {
 }
 
 #[test]
+fn a_joint_without_a_described_ratio_has_the_waves_of_its_own_turn_alone() {
+    let mut robot =
+        Robot::from_toml(crate::robot::ONE_LINK_TEMPLATE, Path::new("one.toml")).unwrap();
+    let runs = [run(60.0, |t| 1.5 * (0.2 * t).sin())];
+    robot.joints[0].drive = None;
+    let found = not_testable(Kind::Cogging, &robot, 0, &runs).unwrap();
+    assert!(found.why.contains("own turn alone"), "{}", found.why);
+    assert!(found.experiment.contains("gear_ratio"));
+}
+
+#[test]
 fn a_slide_lacks_a_described_drive_or_the_way() {
     let slide = Robot::from_toml(crate::robot::EMPS, Path::new("emps.toml")).unwrap();
     let runs = [run(60.0, |t| 0.125 + 0.12 * (0.5 * t).sin())];
