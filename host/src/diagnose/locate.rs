@@ -33,6 +33,8 @@ const VELOCITY: &str = "velocity";
 const POSITION: &str = "position";
 const ACCELERATION: &str = "acceleration";
 const DRIVE: &str = "torque of the drive";
+/// The coordinate along which friction drifts.
+pub(super) const SINCE_START: &str = "time since the start, by direction";
 /// What goes with a coordinate at this probability or more goes with it by chance.
 const BY_CHANCE: f64 = 0.05;
 /// Share of the explained squares that the interval has to hold.
@@ -111,8 +113,11 @@ pub(super) fn coordinates(
             .collect()
     });
     add(DRIVE, f, &|r, _| predicted[r].torque[joint].clone());
-    add("time since the start", "s", &|_, run| {
-        run.t.iter().map(|t| t - run.began).collect()
+    // Friction that drifts has no mean of its own over both directions.
+    add(SINCE_START, "s", &|_, run| {
+        (run.t.iter().zip(&run.joints[joint].qd))
+            .map(|(t, v)| v.signum() * (t - run.began))
+            .collect()
     });
     add("way since the last reversal, by direction", p, &|_, run| {
         since_reversal(run, joint).0

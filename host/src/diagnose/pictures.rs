@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::columns::Candidate;
 use super::finish::Found;
 use super::fit::Fit;
-use super::locate::{BINS, Coordinate, bins, locate, velocity_of};
+use super::locate::{BINS, Coordinate, SINCE_START, bins, locate, velocity_of};
 use super::motion::Positions;
 use super::outcome::{Curves, Map};
 use super::profile::Profile;
@@ -104,7 +104,7 @@ fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Co
             "way since the last reversal, by direction"
         }
         Kind::JointElasticity => "acceleration",
-        Kind::ViscousWarmupTime => "time since the start",
+        Kind::ViscousWarmupTime => SINCE_START,
         Kind::ViscousWarmupTemperature => "temperature",
         Kind::LoadFriction => "torque on the gear along the motion",
         Kind::TorqueSaturation => "torque of the drive",

@@ -4,11 +4,13 @@
 
 use rand::{RngExt, SeedableRng};
 
-use super::outcome::Verdict;
+use super::locate::SINCE_START;
+use super::outcome::{Before, Verdict};
 use super::scenario::{Effect, Intrusion, Made, Noise, Scenario};
 use super::{Diagnosis, Options};
 use crate::data::Block;
 use crate::robot::Robot;
+use rig_shared::effects::Kind;
 
 const STRIBECK: Effect = Effect::Stribeck {
     ratio: 1.6,
@@ -218,6 +220,36 @@ fn a_constant_that_changes_between_two_runs_is_said_and_is_no_noise() {
     );
 }
 
+/// Friction that falls has no mean of its own over both directions: by direction it is most of what is left.
+#[test]
+fn friction_that_drifts_is_said_to_go_with_time_before_all_else() {
+    let warming = Effect::ViscousWarmup {
+        fall: 0.5,
+        time_constant: 15.0,
+    };
+    let made = Scenario {
+        seconds: [60.0, 20.0],
+        ..Scenario::short([warming], 41)
+    }
+    .make()
+    .unwrap();
+    let options = Options {
+        without: vec![
+            Kind::ViscousWarmupTime,
+            Kind::ViscousWarmupTemperature,
+            Kind::Backlash,
+            Kind::JointElasticity,
+        ],
+        ..Options::default()
+    };
+    let (found, _) = made.diagnosed(&made.robot, &options);
+    for place in &found.places {
+        println!("{place:?}");
+    }
+    assert_eq!(found.places[0].coordinate, SINCE_START);
+    assert!(found.places[0].share > 0.3, "{:?}", found.places[0]);
+}
+
 #[test]
 fn a_piece_cut_out_of_a_recording_is_a_copy() {
     let made = Scenario::short([], 38).make().unwrap();
@@ -255,6 +287,11 @@ fn one_factor_is_said_only_where_all_follow_it() {
     let said = |robot: &Robot| {
         let (found, _) = made.diagnosed(robot, &Options::default());
         assert_eq!(found.verdict, Verdict::ParameterChange, "{:?}", found.words);
+        // Against the description, as no effect could have bent a parameter.
+        assert_eq!(found.absorbed_before, Before::Described);
+        let most = &found.absorbed[0];
+        assert!(most.sigmas > 10.0, "{most:?}");
+        assert!((most.before / most.after - 1.0).abs() > 0.1, "{most:?}");
         let words = found.words.join(" ");
         println!("{words}");
         words
