@@ -9,10 +9,11 @@ use super::error::CommandError;
 use super::ui::Ui;
 use crate::diagnose::benchmark::peer::{Frols, Stlsq};
 use crate::diagnose::benchmark::{
-    Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
+    Case, Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
 };
-use crate::diagnose::scenario::{Effect, Noise};
+use crate::diagnose::scenario::{Effect, Noise, Size, Truth};
 use crate::files::{folder, write_whole};
+use crate::report::format_significant;
 
 /// Which method is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -83,9 +84,36 @@ pub(crate) struct Args {
     /// Folder for benchmark.json, benchmark.md and, with --keep, the recordings
     #[arg(long, default_value = "benchmark")]
     pub(crate) out: PathBuf,
-    /// Write the recordings and descriptions too, one folder a case, and judge nothing
+    /// Write the recordings and descriptions, one folder a case, with what is hidden in each (truth.json there, truth.md of all),
+    /// and judge nothing
     #[arg(long)]
     pub(crate) keep: bool,
+}
+
+/// What is hidden in which folder.
+const TRUTHS: &str = "truth.md";
+
+fn truth_head() -> String {
+    "| folder | group | noise | seed | hidden | left of it by a refit, over the noise floor |\n| --- | --- | --- | --- | --- | --- |\n"
+        .to_owned()
+}
+
+/// A line of the table.
+fn truth_row(folder: &str, case: &Case, truth: &Truth, sizes: &[Size]) -> String {
+    let names = match truth.names() {
+        none if none.is_empty() => "nothing".to_owned(),
+        names => names.join(", "),
+    };
+    let ratios: Vec<String> = (sizes.iter())
+        .map(|size| format_significant(size.excess_rms / size.floor_rms, 3))
+        .collect();
+    format!(
+        "| {folder} | {:?} | {} | {} | {names} | {} |\n",
+        case.group,
+        case.level,
+        truth.seed,
+        ratios.join(", ")
+    )
 }
 
 /// Runs the command.
@@ -142,8 +170,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     folder(&args.out)?;
     if args.keep {
         let mut progress = ui.progress("recording", cases.len() as u64);
+        let mut table = truth_head();
         for (k, case) in cases.iter().enumerate() {
-            let place = args.out.join(format!("{:04}", k + 1));
+            let name = format!("{:04}", k + 1);
+            let place = args.out.join(&name);
             folder(&place)?;
             let (made, sizes) = case.make()?;
             made.write(&place)?;
@@ -152,10 +182,16 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             });
             let text = format!("{truth:#}\n");
             write_whole(&place.join("truth.json"), text.as_bytes())?;
+            table.push_str(&truth_row(&name, case, &made.truth, &sizes));
             progress.advance(1);
         }
         drop(progress);
-        ui.say(&format!("{}: {} cases.", args.out.display(), cases.len()));
+        write_whole(&args.out.join(TRUTHS), table.as_bytes())?;
+        ui.say(&format!(
+            "{}: {} cases; {TRUTHS} has what is hidden in each.",
+            args.out.display(),
+            cases.len()
+        ));
         return Ok(());
     }
     let methods: Vec<&dyn Method> = args
