@@ -13,7 +13,8 @@ use super::fit::Evidence;
 use super::floor;
 use super::predicted::{Predicted, predict};
 use super::profile::Profile;
-use super::rows::{Column, Nominal, Rows, combined};
+use super::refit::Refit;
+use super::rows::{Column, ILLEGIBLE, Nominal, Rows, combined};
 use super::runs::{Run, runs_of};
 use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
@@ -23,6 +24,9 @@ use crate::robot::{JointKind, Robot};
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
 const LEAST_BAND: f64 = 30.0;
+
+/// Times the squares that a rest explains from which on rows about it hold more than that.
+const LOUD: f64 = 1.2;
 
 /// Recordings under one treatment.
 pub(super) struct Loaded {
@@ -57,6 +61,8 @@ pub(super) struct Bench<'a> {
     /// Which of them are free.
     pub(super) anchor: Anchor,
     treatment: Treatment,
+    /// Joints of which rows about rests are used.
+    rests: Vec<usize>,
 }
 
 impl<'a> Bench<'a> {
@@ -78,6 +84,7 @@ impl<'a> Bench<'a> {
             anchor,
             nominal,
             treatment: treatment_of(training, robot)?,
+            rests: Vec::new(),
         })
     }
 
@@ -138,11 +145,37 @@ impl<'a> Bench<'a> {
         let mut rows = Rows::of(&runs, &self.nominal, treatment)?;
         let held = self.anchor.held_torque(&rows);
         take_off(&mut rows.torque, &held);
+        for &joint in &self.rests {
+            rows.use_rests(joint);
+        }
         Ok(Loaded {
             runs,
             rows,
             treatment: treatment.clone(),
         })
+    }
+
+    /// Decides by the training data of which joints rows about rests are used: where they hold more than a rest makes of dry
+    /// friction that nobody knows, something shows there. Whether there is such a joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] of the fit.
+    pub(super) fn look_about_rests(&mut self, loaded: &Loaded) -> Result<bool, DiagnoseError> {
+        let rows = &loaded.rows;
+        let refit = Refit::of(self, rows)?;
+        let values = &refit.before.values;
+        let source = self.source(loaded, &self.anchor.values(values))?;
+        let known = combined(rows.joints(), refit.free.iter().zip(values.iter().copied()));
+        let mut residual = rows.torque.clone();
+        take_off(&mut residual, &known);
+        let loud = |j: &usize| {
+            let Some([about, elsewhere]) = rows.about_rests(*j, &residual[*j]) else {
+                return true;
+            };
+            about > LOUD * (elsewhere + (ILLEGIBLE * source.coulomb(*j)).powi(2))
+        };
+        self.rests = (0..rows.joints()).filter(loud).collect();
+        Ok(!self.rests.is_empty())
     }
 
     /// Samples a second of what is learnt from.

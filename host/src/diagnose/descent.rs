@@ -4,6 +4,7 @@ use super::DiagnoseError;
 use super::bench::Loaded;
 use super::bodies::Fitting;
 use super::columns::Source;
+use super::floor;
 use super::outcome::Waterfall;
 use super::profile::Profile;
 use super::refit::Refit;
@@ -54,6 +55,8 @@ pub(super) struct Descent {
     louder: f64,
     /// What the steps of the encoders leave in them, joint by joint.
     rounding: Vec<f64>,
+    /// Noise of the rows held back by two runs of one motion among them, joint by joint.
+    repeated: Vec<Option<f64>>,
 }
 
 impl Descent {
@@ -106,26 +109,42 @@ impl Descent {
             )?,
             None => vec![0.0; n],
         };
+        let mut repeated = vec![None; n];
+        if let Some(sealed) = sealed {
+            let stands = fitting.of(chosen)?;
+            let left = bench.remaining(sealed, stands.fitted(), chosen)?;
+            let pairs = floor::repeats(&sealed.runs);
+            for (j, own) in repeated.iter_mut().enumerate() {
+                *own = floor::from_repeats(&sealed.rows, &pairs, &left[j], None, j);
+            }
+        }
         let slower = sealed.map_or(1.0, |sealed| bench.rate() / sealed.treatment.sample_rate);
         Ok(Self {
             train,
             holdout,
             louder: slower.max(1.0).sqrt(),
             rounding,
+            repeated,
         })
+    }
+
+    /// Noise of the data held back where two runs among them repeat one motion, else that of the training data, as loud as
+    /// their rate makes it.
+    fn noise(&self, floors: &[f64]) -> impl Iterator<Item = f64> {
+        (floors.iter().zip(&self.repeated)).map(|(floor, own)| own.unwrap_or(self.louder * floor))
     }
 
     /// Noise floors of the data that a share of the gap is of, the training's given.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
-        (floors.iter().zip(&self.rounding))
-            .map(|(floor, rounding)| rounding.max(self.louder * floor))
+        (self.noise(floors).zip(&self.rounding))
+            .map(|(floor, rounding)| rounding.max(floor))
             .collect()
     }
 
     /// Noise of the data held back with what the steps of the encoders leave besides: less than that is no finding.
     pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
-        (floors.iter().zip(&self.rounding))
-            .map(|(floor, rounding)| rounding.hypot(self.louder * floor))
+        (self.noise(floors).zip(&self.rounding))
+            .map(|(floor, rounding)| rounding.hypot(floor))
             .collect()
     }
 

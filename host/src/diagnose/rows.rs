@@ -19,8 +19,11 @@ use crate::robot::{JointKind, Robot};
 /// indicator that is 1 on such samples. Where a joint sticks before it turns back its friction may be anything between both
 /// directions', so that twice this share of the dry friction is what a kept row may be off by.
 const SPOILT: f64 = 0.03;
-/// … and before its torque says nothing of a link behind a gear, whose touches are many times that.
-const ILLEGIBLE: f64 = 0.1;
+/// … and where such rows hold more than that.
+pub(super) const ILLEGIBLE: f64 = 0.1;
+
+/// Rows about rests by which what is left there is judged.
+const FEWEST_ABOUT_RESTS: usize = 20;
 
 /// Periods of the position filter's cut-off by which it may move a reversal: it rounds the corner where friction changes its
 /// sign, or stops the joint for a moment.
@@ -165,7 +168,8 @@ pub(super) struct Rows {
     pub(super) torque: Vec<Vec<f64>>,
     /// Whether the row is used, joint by joint.
     pub(super) keep: Vec<Vec<bool>>,
-    /// Whether its torque tells of a link behind a gear, joint by joint; empty where none is followed.
+    /// Whether it is used or could be: its torque tells something, but what a rest nearby may be off by. Joint by joint; empty
+    /// where no row is near a rest.
     pub(super) legible: Vec<Vec<bool>>,
     /// Nominal columns, one a base parameter.
     pub(super) nominal: Vec<Column>,
@@ -433,7 +437,7 @@ impl Rows {
         self.torque.len()
     }
 
-    /// Of each of a run's `samples`, whether the row nearest to it tells of a link behind a gear; before the first row and behind
+    /// Of each of a run's `samples`, whether the row nearest to it is legible, as it is for a link behind a gear; before the first row and behind
     /// the last none does.
     pub(super) fn sure(&self, run: usize, joint: usize, samples: usize) -> Vec<bool> {
         let all = self.legible.get(joint).map_or(&[][..], Vec::as_slice);
@@ -447,6 +451,28 @@ impl Rows {
                 row.is_some_and(|row| legible.get(row).copied().unwrap_or(false))
             })
             .collect()
+    }
+
+    /// What is left of a joint on the rows about rests that are not used, mean of the squares, and on those that are; `residual` is of
+    /// all rows. None where too few are near a rest.
+    pub(super) fn about_rests(&self, joint: usize, residual: &[f64]) -> Option<[f64; 2]> {
+        let keep = &self.keep[joint];
+        let legible = self.legible.get(joint)?;
+        let mean = |near: bool| {
+            let own = |(keep, legible): (&bool, &bool)| *legible && (*keep != near);
+            let rows = || residual.iter().zip(keep.iter().zip(legible));
+            let own = || rows().filter(|(_, about)| own(*about)).map(|(r, _)| r * r);
+            let count = own().count();
+            (count >= FEWEST_ABOUT_RESTS).then(|| own().sum::<f64>() / count as f64)
+        };
+        Some([mean(true)?, mean(false)?])
+    }
+
+    /// Uses the rows about a joint's rests as well.
+    pub(super) fn use_rests(&mut self, joint: usize) {
+        if let Some(legible) = self.legible.get(joint) {
+            self.keep[joint].clone_from(legible);
+        }
     }
 
     /// Rows used of a joint.

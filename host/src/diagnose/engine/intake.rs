@@ -73,6 +73,11 @@ pub(super) fn intake<'a>(
         loaded = rows(loaded)?;
         sealed = sealed.map(rows).transpose()?;
     }
+    if bench.look_about_rests(&loaded)? {
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
     let left: Vec<Vec<f64>> = {
         let refit = Refit::of(&bench, &loaded.rows)?;
         (0..bench.robot.joints.len())

@@ -42,6 +42,9 @@ use crate::robot::{Drive, Robot};
 use record::{Manner, Nominal, record};
 use size::{Equation, Problem, beyond};
 
+/// Run of the hold-out's repeat, beside those of training (0, 1), hold-out (2) and experiments.
+const HELD_AGAIN: u64 = 6;
+
 /// Which rig is recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rig {
@@ -65,7 +68,7 @@ pub struct Scenario {
     pub excitation: Excitation,
     /// Length of the training and of the hold-out recording, s.
     pub seconds: [f64; 2],
-    /// Whether the training reference is run twice.
+    /// Whether both references are run twice.
     pub repeated: bool,
     /// Relative error of the parameters in the description.
     pub description_error: f64,
@@ -78,7 +81,7 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// 90 s of training run twice and 60 s of hold-out at the middle noise level.
+    /// 90 s of training and 60 s of hold-out, each run twice, at the middle noise level.
     pub fn new(hidden: Vec<Hidden>, seed: u64) -> Self {
         Self {
             rig: Rig::OneLink,
@@ -140,6 +143,11 @@ impl Scenario {
             drive_off: None,
             clamped: None,
             holdout: recording("holdout", &other, 2)?,
+            held_again: if self.repeated {
+                Some(recording("holdout-again", &other, HELD_AGAIN)?)
+            } else {
+                None
+            },
             truth: Truth {
                 hidden: self.hidden.clone(),
                 nominal: nominal_parameters(&healthy),
@@ -328,6 +336,8 @@ pub struct Made {
     pub clamped: Option<InMemory>,
     /// Another reference.
     pub holdout: InMemory,
+    /// The same other reference again, by which the noise of what is held back is known.
+    pub held_again: Option<InMemory>,
     /// What is true.
     pub truth: Truth,
 }
@@ -376,10 +386,14 @@ impl Made {
             .map(|recording| recording as &dyn Recording)
             .chain(free.iter().map(|recording| recording as &dyn Recording))
             .collect();
-        super::diagnose(robot, &training, &[&self.holdout], options, &mut |_| ())
+        let held: Vec<&dyn Recording> = core::iter::once(&self.holdout)
+            .chain(&self.held_again)
+            .map(|recording| recording as &dyn Recording)
+            .collect();
+        super::diagnose(robot, &training, &held, options, &mut |_| ())
     }
 
-    /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
+    /// Writes `robot.toml`, `train.csv`, `repeat.csv`, `holdout.csv` and `holdout-again.csv` into a folder that exists.
     ///
     /// # Errors
     /// What the system says.
@@ -391,6 +405,7 @@ impl Made {
             ("train.csv", Some(&self.train)),
             ("repeat.csv", self.repeat.as_ref()),
             ("holdout.csv", Some(&self.holdout)),
+            ("holdout-again.csv", self.held_again.as_ref()),
         ];
         for (name, recording) in recordings {
             if let Some(recording) = recording {

@@ -21,6 +21,9 @@ impl Made {
             randomise(repeat, seed, 7)?;
         }
         randomise(&mut self.holdout, seed, 8)?;
+        if let Some(again) = &mut self.held_again {
+            randomise(again, seed, 9)?;
+        }
         self.truth.hidden.clear();
         Ok(self)
     }
