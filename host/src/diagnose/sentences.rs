@@ -307,8 +307,12 @@ pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
         _ => String::new(),
     };
     let followed = if profile.followed.is_some() {
+        let by = match profile.candidate.kind {
+            Kind::Backlash => "what was recorded before and in the stretch itself say most likely",
+            _ => "the torque recorded before tells",
+        };
         format!(
-            " In these figures of its residual the torque of the gear is predicted over stretches of half a swing of the link, at least {} ms: twist and speed of the link at their beginning are read off the torque recorded before.",
+            " In these figures of its residual the torque of the gear is predicted over stretches of half a swing of the link, at least {} ms: twist and speed of the link at their beginning are what {by}.",
             1e3 * STRETCH
         )
     } else {

@@ -81,7 +81,7 @@ fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_mo
 }
 
 /// Where the rig creeps, its friction lags a little: a link with all friction on it behind a spring of five times critical damping
-/// would take a tenth off what that leaves.
+/// would take a tenth off what that leaves, and 6 % with rows about rests left out.
 #[test]
 fn a_gear_that_does_not_swing_is_none() {
     let made = Scenario::short([], 900).make().unwrap();
@@ -94,5 +94,9 @@ fn a_gear_that_does_not_swing_is_none() {
     );
     let gear = |t: &&Tried| t.effect.contains("elasticity");
     let tried = diagnosis.tried.iter().find(gear).unwrap();
-    assert!(tried.refused.contains("swing"), "{tried:?}");
+    let why = ["swing", "less than 10 %"];
+    assert!(
+        why.iter().any(|why| tried.refused.contains(why)),
+        "{tried:?}"
+    );
 }
