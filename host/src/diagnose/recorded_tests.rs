@@ -270,7 +270,7 @@ fn a_piece_cut_out_of_a_recording_is_a_copy() {
         (100, rows, 1, 0.0),
         (rows / 3, rows / 2, 1, 0.0),
         (0, rows - 500, 1, 7.5),
-        // Every so manieth sample, whichever is the first.
+        // Every n-th sample, whichever is the first.
         (0, rows, 5, 0.0),
         (rows / 3 + 1, rows, 4, 7.5),
     ] {

@@ -68,8 +68,10 @@ pub struct Scenario {
     pub excitation: Excitation,
     /// Length of the training and of the hold-out recording, s.
     pub seconds: [f64; 2],
-    /// Whether both references are run twice.
+    /// Whether the training reference is run twice.
     pub repeated: bool,
+    /// Whether the reference held back is run twice.
+    pub held_twice: bool,
     /// Relative error of the parameters in the description.
     pub description_error: f64,
     /// A torque from outside that comes in the first run only.
@@ -91,6 +93,7 @@ impl Scenario {
             excitation: Excitation::Full,
             seconds: [90.0, 60.0],
             repeated: true,
+            held_twice: true,
             description_error: 0.0,
             intrusion: None,
             substeps: None,
@@ -143,7 +146,7 @@ impl Scenario {
             drive_off: None,
             clamped: None,
             holdout: recording("holdout", &other, 2)?,
-            held_again: if self.repeated {
+            held_again: if self.held_twice {
                 Some(recording("holdout-again", &other, HELD_AGAIN)?)
             } else {
                 None
@@ -344,13 +347,14 @@ pub struct Made {
 
 #[cfg(test)]
 impl Scenario {
-    /// 30 s of training run twice and 20 s of hold-out, with these effects in joint 0.
+    /// 30 s of training run twice and 20 s of hold-out once, with these effects in joint 0.
     pub(super) fn short(effects: impl IntoIterator<Item = Effect>, seed: u64) -> Self {
         let hidden = effects
             .into_iter()
             .map(|effect| Hidden { joint: 0, effect });
         Self {
             seconds: [30.0, 20.0],
+            held_twice: false,
             ..Self::new(hidden.collect(), seed)
         }
     }
