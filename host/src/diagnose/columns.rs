@@ -1,5 +1,6 @@
 //! Columns of an effect from the measured motion.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -40,6 +41,8 @@ pub(super) struct Source<'a> {
     pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
+    /// Joints with a saturation in the model.
+    pub(super) saturated: Vec<bool>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// What the recorded torque tells of gears whose links are followed, by run and joint.
@@ -65,11 +68,17 @@ pub(super) const DELAY: f64 = 0.002;
 /// Effects whose torque acts on the link: a gear between motor and link transmits it.
 const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
 
-/// Effects whose laws ask for the torque that the current stands for, with all that is in the model. To a ripple, which
-/// repeats with an angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
-const OF_THE_CURRENT: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
-/// Rounds in which such a law meets the torque that it makes: what is missing falls by its share of the torque in each.
-const OWN_ROUNDS: usize = 4;
+/// Effects beside which the torque of the drive is asked for with all that is in the model. To a ripple, which repeats with an
+/// angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
+const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
+
+/// Effects whose torque is linear in the filtered motion, or as good as: it has passed the position's filter with it.
+const OF_THE_FILTERED_MOTION: [Kind; 4] = [
+    Kind::InertiaCoupling,
+    Kind::JointElasticity,
+    Kind::MeasurementDelay,
+    Kind::GravityTilt,
+];
 
 impl Source<'_> {
     /// The same with the gears' load and the drives' torque as effects make them that are in the model; `gains` are those of
@@ -88,9 +97,10 @@ impl Source<'_> {
             if kind == Kind::MeasurementDelay {
                 self.delays[joint] = gains[at].max(DELAY);
             }
+            self.saturated[joint] |= kind == Kind::TorqueSaturation;
             at += profile.columns.len();
         }
-        let asked = (chosen.iter()).any(|p| OF_THE_CURRENT.contains(&p.candidate.kind));
+        let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
         for r in 0..self.runs.len() {
             let load = self.sum(r, chosen, gains, &|kind| ON_THE_LINK.contains(&kind))?;
             add(&mut self.predicted[r].load, &load);
@@ -98,15 +108,8 @@ impl Source<'_> {
                 continue;
             }
             // A late reading is no torque.
-            let others = self.sum(r, chosen, gains, &|kind| !OF_THE_CURRENT.contains(&kind))?;
-            add(&mut self.predicted[r].torque, &others);
-            // A saturation is in the torque that its law asks for.
-            let rest = self.predicted[r].torque.clone();
-            for _ in 0..OWN_ROUNDS {
-                let own = self.sum(r, chosen, gains, &|kind| kind == Kind::TorqueSaturation)?;
-                self.predicted[r].torque.clone_from(&rest);
-                add(&mut self.predicted[r].torque, &own);
-            }
+            let torque = self.sum(r, chosen, gains, &|kind| kind != Kind::MeasurementDelay)?;
+            add(&mut self.predicted[r].torque, &torque);
         }
         Ok(self)
     }
@@ -204,7 +207,12 @@ impl Source<'_> {
                     }
                 }
             }
-            for ((s, g, j), thin) in places.into_iter().zip(self.thinning.thinned(&signals)) {
+            let thinned = if OF_THE_FILTERED_MOTION.contains(&candidate.kind) {
+                self.thinning.thinned(&signals)
+            } else {
+                self.thinning.thinned_raw(&signals)
+            };
+            for ((s, g, j), thin) in places.into_iter().zip(thinned) {
                 columns[s][g][j] = Some(thin);
             }
         }
@@ -323,10 +331,11 @@ impl Source<'_> {
         let joint = &run.joints[candidate.joint];
         let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
-        let (load, drive) = (
-            &predicted.load[candidate.joint],
-            &predicted.torque[candidate.joint],
-        );
+        let load = &predicted.load[candidate.joint];
+        let drive = match candidate.kind {
+            Kind::TorqueSaturation => self.of_the_current(run, predicted, candidate.joint),
+            _ => Cow::Borrowed(&predicted.torque[candidate.joint][..]),
+        };
         let first_temperature = joint
             .temperature
             .as_ref()
@@ -370,6 +379,22 @@ impl Source<'_> {
             }
         }
         out
+    }
+
+    /// Torque that a joint's current stands for, over a run: as predicted, and where a saturation is in the model as recorded. What is
+    /// lost goes with the current that flowed, and the loss of a third at a peak is more than a prediction can follow; but a
+    /// recorded torque holds all that no model explains, and its cube would be taken for any of it before there is a name.
+    fn of_the_current<'s>(
+        &self,
+        run: &'s Run,
+        predicted: &'s Predicted,
+        joint: usize,
+    ) -> Cow<'s, [f64]> {
+        if self.saturated[joint] {
+            Cow::Owned(self.thinning.calm(&run.joints[joint].recorded()))
+        } else {
+            Cow::Borrowed(&predicted.torque[joint])
+        }
     }
 
     pub(super) fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {

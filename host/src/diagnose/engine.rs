@@ -418,6 +418,7 @@ fn attempt(
         }
         (told, _) => told,
     };
+    diagnosis.words.extend(stated.lifted.iter().cloned());
     diagnosis.words.extend(zero);
     diagnosis.words.extend(remarks(
         &bench,

@@ -17,6 +17,7 @@ mod descent;
 mod described;
 mod drive_off;
 mod engine;
+mod exceeded;
 pub mod experiment;
 mod fault;
 mod finish;

@@ -232,7 +232,7 @@ fn stretch(found: &Found, joint: usize) -> Option<Curves> {
     let (_, r, from, to) = best?;
     let run = &drawn.runs[r];
     let (mut torque, mut time) = (Vec::new(), Vec::new());
-    rows.thinning.push(&run.joints[joint].tau, &mut torque);
+    rows.thinning.push_raw(&run.joints[joint].tau, &mut torque);
     rows.thinning.pick(&run.t, &mut time);
     let step = (to - from).div_ceil(MOST_POINTS);
     let picked: Vec<usize> = (from..to).step_by(step).collect();

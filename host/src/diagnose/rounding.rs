@@ -23,7 +23,7 @@ pub(super) fn rounding(
     filter: &LowPass,
 ) -> Result<Vec<f64>, DiagnoseError> {
     let joints = rows.joints();
-    let (Some(run), Some(before)) = (source.runs.first(), source.predicted.first()) else {
+    let Some(run) = source.runs.first() else {
         return Ok(vec![0.0; joints]);
     };
     let mut read = run.clone();
@@ -39,7 +39,10 @@ pub(super) fn rounding(
         own.qd = central_difference(&own.q, 1.0 / run.rate);
         own.qdd = second_difference(&own.q, 1.0 / run.rate);
     }
-    let after = predict(source.nominal, source.robot, &source.values, &read)?;
+    // The source's own prediction may hold effects.
+    let [before, after] =
+        [run, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
+    let (before, after) = (before?, after?);
     let keep = &rows.keep;
     Ok((after.torque.iter().zip(&before.torque).zip(keep))
         .map(|((after, before), keep)| {

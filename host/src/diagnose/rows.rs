@@ -33,6 +33,9 @@ const SMEAR: f64 = 0.2;
 /// most noise.
 const CLEAR: f64 = 0.02;
 
+/// Share of the power of a signal that the position's filter may take away at the upper end of the low-pass without being heard.
+const HEARD: f64 = 1e-4;
+
 /// Directions whose angle has a sine below this are one.
 const PARALLEL: f64 = 1e-6;
 
@@ -58,9 +61,16 @@ pub(super) fn combined<'a>(
 }
 
 /// Low-pass and thinning that torque and every regressor column pass alike.
+///
+/// The motion has passed the position's filter before. Torque has not, nor has what is formed from the motion by a law that is
+/// not linear in it, such as the sign of a velocity: they pass that filter here, or both sides of the equation would differ by
+/// what it takes away wherever its cut-off is near the band of the rows.
 #[derive(Clone, Debug)]
 pub(super) struct Thinning {
     low_pass: LowPass,
+    /// The position's filter, and whether it takes away anything that the low-pass passes.
+    position: LowPass,
+    heard: bool,
     step: usize,
     /// Samples at either end that the position's filter spoils. They are cut before the low-pass, which would carry them far in.
     spoilt: usize,
@@ -76,8 +86,18 @@ impl Thinning {
         let low_pass = treatment
             .parallel_low_pass()
             .ok_or_else(|| DiagnoseError::Model("its low-pass cannot be built.".into()))?;
+        let position = treatment.position_filter().ok_or_else(|| {
+            DiagnoseError::Model("the filter of its position cannot be built.".into())
+        })?;
+        // Of the power, as it goes forward and backward.
+        let taken = 1.0
+            - position
+                .gain(treatment.parallel_edge, treatment.sample_rate)
+                .powi(2);
         Ok(Self {
             low_pass,
+            position,
+            heard: taken > HEARD,
             step: treatment.decimation.max(1),
             spoilt: treatment.trimmed,
             smear: SMEAR / treatment.cutoff,
@@ -97,7 +117,7 @@ impl Thinning {
                 |(v, a): (&f64, &f64)| f64::from(u8::from(v.abs() < a.abs() * self.smear));
             let reversing: Vec<f64> = own.qd.iter().zip(&own.qdd).map(reverses).collect();
             let mut share = Vec::new();
-            self.push(&reversing, &mut share);
+            self.push_raw(&reversing, &mut share);
             clear.extend((share.iter()).map(|s| f64::from(u8::from(s.abs() < CLEAR))));
         }
         clear
@@ -118,11 +138,24 @@ impl Thinning {
         self.sound(samples).step_by(self.step)
     }
 
-    /// What is kept of a signal at the full rate, appended to `out`.
+    /// What is kept of a signal at the full rate that is linear in the filtered motion, appended to `out`.
     pub(super) fn push(&self, signal: &[f64], out: &mut Vec<f64>) {
         let sound = signal.get(self.sound(signal.len())).unwrap_or_default();
         let smooth = self.low_pass.zero_phase_even(sound);
         out.extend(smooth.into_iter().step_by(self.step));
+    }
+
+    /// The same of one that has not passed the position's filter.
+    pub(super) fn push_raw(&self, signal: &[f64], out: &mut Vec<f64>) {
+        match self.heard {
+            true => self.push(&self.position.zero_phase_even(signal), out),
+            false => self.push(signal, out),
+        }
+    }
+
+    /// A signal behind the position's filter, at its own rate.
+    pub(super) fn calm(&self, signal: &[f64]) -> Vec<f64> {
+        self.position.zero_phase(signal)
     }
 
     /// A signal behind the low-pass, at its own rate.
@@ -130,16 +163,37 @@ impl Thinning {
         self.low_pass.zero_phase(signal)
     }
 
-    /// What is kept of signals of one length.
+    /// What is kept of signals of one length that are linear in the filtered motion.
     pub(super) fn thinned(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.thinned_behind(None, signals)
+    }
+
+    /// The same of such that have not passed the position's filter.
+    pub(super) fn thinned_raw(&self, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.thinned_behind(self.heard.then_some(&self.position), signals)
+    }
+
+    fn thinned_behind(&self, before: Option<&LowPass>, signals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut thin = Vec::with_capacity(signals.len());
         for four in signals.chunks(ABREAST) {
             let samples = four[0].len();
             let lane = |k: usize, s: usize| four.get(s).map_or(0.0, |signal| signal[k]);
-            let abreast: Vec<Lanes<ABREAST>> = (self.sound(samples))
-                .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
-                .collect();
-            let smooth = self.low_pass.zero_phase_even(&abreast);
+            let abreast = |range: Range<usize>| -> Vec<Lanes<ABREAST>> {
+                range
+                    .map(|k| Lanes(std::array::from_fn(|s| lane(k, s))))
+                    .collect()
+            };
+            let sound = self.sound(samples);
+            let sound = match before {
+                Some(filter) => {
+                    let mut all = filter.zero_phase_even(&abreast(0..samples));
+                    all.truncate(sound.end);
+                    all.drain(..sound.start.min(all.len()));
+                    all
+                }
+                None => abreast(sound),
+            };
+            let smooth = self.low_pass.zero_phase_even(&sound);
             thin.extend((0..four.len()).map(|s| {
                 let kept = smooth.iter().step_by(self.step);
                 kept.map(|row| row.0[s]).collect::<Vec<f64>>()
@@ -394,7 +448,7 @@ impl Rows {
             let before = starts.last().copied().unwrap_or(0);
             let rows = thinning.kept(run.len()).count();
             for (j, joint) in run.joints.iter().enumerate() {
-                thinning.push(&joint.tau, &mut torque[j]);
+                thinning.push_raw(&joint.tau, &mut torque[j]);
                 let threshold = treatment.speed_threshold.get(j).copied().unwrap_or(0.0);
                 let [low, high] = treatment.saturation.get(j).copied().unwrap_or_default();
                 let mut spoilt: Vec<f64> = (joint.qd.iter().zip(joint.recorded().iter()))
@@ -408,7 +462,7 @@ impl Rows {
                     spoilt[part.clone()].fill(1.0);
                 }
                 let mut share = Vec::new();
-                thinning.push(&spoilt, &mut share);
+                thinning.push_raw(&spoilt, &mut share);
                 // The low-pass rings: a share below 0 is as spoilt as one above.
                 keep[j].extend(share.iter().map(|s| s.abs() < SPOILT));
                 legible[j].extend(share.iter().map(|s| *s < ILLEGIBLE));
@@ -416,7 +470,11 @@ impl Rows {
             let motion = motion_of(run);
             nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, values| {
                 let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
-                thinning.push(values, list);
+                if nominal.is_coulomb(k) {
+                    thinning.push_raw(values, list);
+                } else {
+                    thinning.push(values, list);
+                }
             })?;
             starts.push(before + rows);
         }
@@ -489,6 +547,8 @@ impl Rows {
         Self {
             thinning: Thinning {
                 low_pass: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
+                position: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
+                heard: false,
                 step: 1,
                 spoilt: 0,
                 smear: 0.0,

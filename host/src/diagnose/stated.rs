@@ -66,6 +66,8 @@ pub(super) struct Stated {
     pub(super) no_offsets: bool,
     /// Whether the recordings tell which part of a stated constant torque comes from outside.
     pub(super) pulls_told: bool,
+    /// What was said of limits that were left out, sentences.
+    pub(super) lifted: Vec<String>,
     effects: Vec<(RobotEffect, Placed, Way)>,
 }
 
@@ -95,6 +97,7 @@ impl Stated {
             robot: plain,
             no_offsets: false,
             pulls_told: false,
+            lifted: Vec::new(),
             effects,
         }
     }

@@ -17,7 +17,7 @@ pub(super) enum Intake<'a> {
     Fit(Box<Material<'a>>),
     /// They cannot.
     Faulty(Vec<DataFault>),
-    /// The same with more of the description's effects held.
+    /// The same with more of the description's effects held, or its limits left out.
     Hold(Stated),
 }
 
@@ -61,7 +61,8 @@ pub(super) fn intake<'a>(
         return Ok(Intake::Faulty(wrong));
     }
     let mut more = stated.clone();
-    if more.hold_delays(slack(&loaded.runs))
+    if more.lift_limits(&loaded.runs)
+        || more.hold_delays(slack(&loaded.runs))
         || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without))
     {
         return Ok(Intake::Hold(more));

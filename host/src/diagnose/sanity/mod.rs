@@ -17,6 +17,7 @@ mod gravity;
 mod link;
 mod model;
 mod names;
+mod rotor;
 mod rows;
 mod senses;
 mod swaps;

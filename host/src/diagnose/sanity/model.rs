@@ -117,6 +117,9 @@ impl<'a> Judge<'a> {
             if found.iter().all(|f: &DataFault| f.joint != self.name(j)) {
                 found.extend(self.alike(j, described)?);
             }
+            if found.iter().all(|f: &DataFault| f.joint != self.name(j)) {
+                found.extend(self.heavy_rotor(j)?);
+            }
         }
         if let (true, Some(turned)) = (found.is_empty(), mixed) {
             found.push(self.said(&turned));

@@ -97,9 +97,9 @@ impl Equation {
                 signal.iter().map(|x| drive.gear_ratio * x).collect()
             };
             let omega = scaled(&joint.qd);
-            thinning.push(u, &mut voltage);
-            thinning.push(&i, &mut columns[CURRENT]);
-            thinning.push(
+            thinning.push_raw(u, &mut voltage);
+            thinning.push_raw(&i, &mut columns[CURRENT]);
+            thinning.push_raw(
                 &central_difference(&i, 1.0 / run.rate),
                 &mut columns[CHANGE],
             );
@@ -111,17 +111,17 @@ impl Equation {
             let saturated: Vec<f64> = (smooth.iter().zip(&omega))
                 .map(|(i, omega)| i * i * omega)
                 .collect();
-            thinning.push(&saturated, &mut columns[SATURATION]);
+            thinning.push_raw(&saturated, &mut columns[SATURATION]);
             for (dead, fade) in dead.iter_mut().zip(FADES) {
                 let lost: Vec<f64> = smooth.iter().map(|i| lost(*i, fade)).collect();
-                thinning.push(&lost, dead);
+                thinning.push_raw(&lost, dead);
             }
             let mut coasts = vec![0.0; i.len()];
             for own in &run.coasting {
                 coasts[own.clone()].fill(1.0);
             }
             let mut share = Vec::new();
-            thinning.push(&coasts, &mut share);
+            thinning.push_raw(&coasts, &mut share);
             keep.extend(share.iter().map(|s| s.abs() < COASTS));
             thinning.pick(&smooth, &mut current);
             thinning.pick(&omega, &mut speed);

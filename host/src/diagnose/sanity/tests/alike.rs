@@ -52,6 +52,18 @@ fn a_ratio_is_told_from_a_payload_and_from_friction() {
     assert_eq!(faults(&robot, &pulled).unwrap(), []);
 }
 
+/// What links and friction are need not be described for it.
+#[test]
+fn a_rotor_that_outweighs_the_joint_is_a_wrong_ratio() {
+    let (mut robot, sound) = runs(Vec::new());
+    robot.joints[0].friction = None;
+    robot.joints[0].inertial = None;
+    assert_eq!(faults(&robot, &sound).unwrap(), []);
+    robot.joints[0].drive.as_mut().unwrap().gear_ratio *= 10.0;
+    let given = tau(&sound, 0, 10.0);
+    only(&robot, &given, "ratio", 0, "the rotor of joint");
+}
+
 #[test]
 fn a_start_and_then_rest_is_no_motion_to_learn_from() {
     let (_, sound) = runs(Vec::new());
