@@ -248,8 +248,8 @@ pub(super) fn explained() -> Diagnosis {
             NotTestable { effect: "viscous_warmup".into(), joint: "link".into(), why: "48 s of running time and no temperature".into(), experiment: "the same motion for ten minutes, the first and the last minute recorded".into() },
         ],
         detectable: vec![
-            Detectable { effect: "backlash".into(), joint: "link".into(), parameter: "width".into(), size: 2.1e-3, unit: "rad".into() },
-            Detectable { effect: "asymmetric_coulomb".into(), joint: "link".into(), parameter: "asymmetry".into(), size: 0.012, unit: "N*m".into() },
+            Detectable { effect: "backlash".into(), joint: "link".into(), parameter: "width".into(), size: 2.1e-3, size_at_worst: None, unit: "rad".into() },
+            Detectable { effect: "asymmetric_coulomb".into(), joint: "link".into(), parameter: "asymmetry".into(), size: 0.012, size_at_worst: Some(0.02), unit: "N*m".into() },
         ],
         next_experiment: Some(NextExperiment {
             kind: "slow turn at two loads".into(),

@@ -48,11 +48,11 @@ const REPORT: &str = "report.html";
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to learn from, CSV or MCAP; may be given several times
-    #[arg(long, required = true)]
+    /// Recording to learn from, CSV or MCAP; one or more
+    #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Recording to judge by, of another motion, not used in any fit; may be given several times
-    #[arg(long)]
+    /// Recording to judge by, of another motion, not used in any fit; one or more
+    #[arg(long, num_args = 1..)]
     holdout: Vec<PathBuf>,
     /// Recording made with the drive off, where torque is measured by the motor's current: what the sensor reads there is its own
     #[arg(long)]

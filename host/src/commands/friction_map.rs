@@ -21,7 +21,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
     /// Recording of an excitation, from which gravity and inertia are identified
-    #[arg(long, required = true)]
+    #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
     /// Recording of the friction sweep
     #[arg(long)]

@@ -146,11 +146,11 @@ fn lead(text: &str) -> Result<f64, String> {
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to learn from, CSV or MCAP; may be given several times
-    #[arg(long, required = true)]
+    /// Recording to learn from, CSV or MCAP; one or more
+    #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Recording to judge by, not used in the fit; may be given several times
-    #[arg(long)]
+    /// Recording to judge by, not used in the fit; one or more
+    #[arg(long, num_args = 1..)]
     holdout: Vec<PathBuf>,
     /// Which equations are fitted
     #[arg(long, value_enum, default_value = "differential")]

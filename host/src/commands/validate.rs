@@ -23,8 +23,8 @@ use crate::validate::{Motion, Options, Validation, validate};
 pub(crate) struct Args {
     #[command(flatten)]
     robot: RobotArg,
-    /// Recording to judge by, CSV or MCAP; may be given several times
-    #[arg(long, required = true)]
+    /// Recording to judge by, CSV or MCAP; one or more
+    #[arg(long, required = true, num_args = 1..)]
     data: Vec<PathBuf>,
     /// Folder for the results
     #[arg(long)]

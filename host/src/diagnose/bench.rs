@@ -271,6 +271,7 @@ impl<'a> Bench<'a> {
                 vanished: None,
                 followed: None,
                 otherwise: None,
+                heard: false,
             });
             all.extend(gains);
         }

@@ -256,8 +256,13 @@ fn attempt(
             .map(|p| (p.candidate.joint, held.whole(p.candidate.joint)))
             .collect();
         named.dedup_by_key(|(joint, _)| *joint);
-        judged.left = left_of_held(robot, &held.last(), &descent.noise_held(&judged.floors))
-            .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
+        judged.left = left_of_held(
+            robot,
+            &held.last(),
+            &descent.train.last(),
+            [&judged.floors, &descent.noise_held(&judged.floors)],
+        )
+        .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
     }
     // Where a motion was repeated, what is left has been held against the noise.
     if judged.left.is_none() && judge.pairs.is_empty() {

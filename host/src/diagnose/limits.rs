@@ -153,6 +153,7 @@ pub(super) fn detectable(
                 joint: joint.name.clone(),
                 parameter: gain.name.to_owned(),
                 size,
+                size_at_worst: (sizes.len() > 1).then(|| sizes[sizes.len() - 1].0),
                 unit: found.search.source.unit(candidate, gain),
             });
         }

@@ -31,6 +31,8 @@ mod misfit;
 mod model;
 mod motion;
 pub mod outcome;
+#[cfg(test)]
+mod pendulum_tests;
 mod pictures;
 mod predicted;
 mod profile;

@@ -232,8 +232,12 @@ pub struct Detectable {
     pub joint: String,
     /// Which parameter the size is of.
     pub parameter: String,
-    /// SI
+    /// SI; the median over the shapes of the effect's law that were looked at.
     pub size: f64,
+    /// The same at the shape that this motion shows least, such as a breakaway that is gone at a speed it hardly goes through; none
+    /// where the law has one shape.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_at_worst: Option<f64>,
     /// ASCII
     pub unit: String,
 }

@@ -41,6 +41,10 @@ const LEAST_SIGMAS_OF_MUCH: f64 = 1.0;
 const SIGNS: f64 = 3.0;
 /// Least gain of a gear's law, whose three or four shapes bend to much that is not a gear.
 const LEAST_GAIN_OF_GEARS: f64 = 0.1;
+/// … of a play whose link follows the recorded torque by far better, this …
+const LEAST_GAIN_OF_HEARD: f64 = 0.05;
+/// … which is tried where its gain is so many standard deviations.
+const CLEAR_SIGMAS: f64 = 4.0;
 /// A candidate that explains less than this share of the squares at every point of its grid cannot reach the least gain.
 const HOPELESS: f64 = 0.5 * LEAST_GAIN;
 /// … and a gear, from whose starting points the ridge is further away.
@@ -74,6 +78,8 @@ pub(super) struct Profile {
     /// A shape that has run to the least of what is searched, where a law is its limit of none; the swing of a link on a gear
     /// that hardly lets it; the stiffness of a spring that is a constant; a gain that has left what physics allows.
     pub(super) vanished: Option<&'static str>,
+    /// Whether it is a play whose link follows the recorded torque by far better.
+    pub(super) heard: bool,
     /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
     pub(super) followed: Option<Followed>,
     /// Of a gear, the shapes by the other of two ways, where it was seen both by the motor's motion alone and with its link
@@ -140,8 +146,20 @@ impl Profile {
         e.gain_sigmas < least && (gear || e.sign_sigmas() < SIGNS)
     }
 
+    /// Whether it is a play that only takes away too little, as the motor's motion alone drives its link.
+    pub(super) fn is_nearly_a_play(&self, tried: usize) -> bool {
+        let e = &self.evidence;
+        self.candidate.kind == Kind::Backlash
+            && self.vanished.is_none()
+            && self.corrected(tried) <= SIGNIFICANT
+            && (LEAST_GAIN_OF_HEARD..LEAST_GAIN_OF_GEARS).contains(&e.joint_gain)
+            && e.gain_sigmas >= CLEAR_SIGMAS
+    }
+
     fn least_gain(&self) -> f64 {
-        if is_gear(self.candidate.kind) {
+        if self.heard {
+            LEAST_GAIN_OF_HEARD
+        } else if is_gear(self.candidate.kind) {
             LEAST_GAIN_OF_GEARS
         } else {
             LEAST_GAIN
@@ -283,6 +301,7 @@ impl Search<'_> {
             columns: best.2,
             evidence,
             vanished,
+            heard: self.heard.contains(&self.library[c]),
             followed: None,
             otherwise: None,
         }))

@@ -56,6 +56,10 @@ pub(super) struct Search<'a> {
     spans: Vec<f64>,
     /// What the last search had to drop.
     dropped: Vec<Candidate>,
+    /// A play that it all but took.
+    pub(super) nearly: Option<Profile>,
+    /// Plays whose links followed the recorded torque by far better: less is asked of them as the motor's motion drives them.
+    pub(super) heard: Vec<Candidate>,
     cache: Mutex<HashMap<usize, Vec<Arc<Vec<Column>>>>>,
 }
 
@@ -83,6 +87,8 @@ impl<'a> Search<'a> {
             measured: Vec::new(),
             settled: Vec::new(),
             dropped: Vec::new(),
+            nearly: None,
+            heard: Vec::new(),
             threads,
             cache: Mutex::new(HashMap::new()),
         }
@@ -222,6 +228,7 @@ impl<'a> Search<'a> {
             let found = |p: &&Profile| !self.is_described(&p.candidate);
             told(chosen.iter().filter(found).count(), &profiles);
             let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
+                self.nearly = profiles.into_iter().find(|p| p.is_nearly_a_play(trials));
                 break;
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;

@@ -275,8 +275,11 @@ fn closest(d: &Diagnosis) -> Option<String> {
         .filter(|t| !t.refused.is_empty())
         .max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     Some(format!(
-        "Of {} effects and places that were tried, {} at joint {} came closest: {}.",
-        d.tried.len(),
+        "{}, {} at joint {} came closest: {}.",
+        match d.tried.len() {
+            1 => "Of all effects one had anything to it".to_owned(),
+            n => format!("Of {n} effects and places that were tried"),
+        },
         closest.effect,
         closest.joint,
         closest.refused

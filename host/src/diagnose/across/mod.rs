@@ -425,6 +425,7 @@ impl Between<'_, '_> {
                 joint: joint.name.clone(),
                 parameter: p.name.to_owned(),
                 size,
+                size_at_worst: None,
                 unit: unit_of(p, joint.kind),
             })
         };

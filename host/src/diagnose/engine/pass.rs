@@ -1,5 +1,6 @@
 //! A search for effects on the training data: from the refitted model on, and once more beside gears that it has found.
 
+use super::follow::Follower;
 use crate::diagnose::across::{Across, across, gears, refutes};
 use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::outcome::Tried;
@@ -62,6 +63,13 @@ impl<'a> Pass<'a> {
             searched(bench, loaded, refit, search, found, &mut heard, progress)
         };
         let mut found = further(&refit, &mut search, None)?;
+        if let Some(play) = search.nearly.take() {
+            let candidate = play.candidate;
+            if Follower::new(bench, loaded, &refit, &search).hears(&found, play)? {
+                search.heard.push(candidate);
+                found = further(&refit, &mut search, Some(found))?;
+            }
+        }
         let mut refit = refit;
         for _ in 0..BESIDE_GEARS {
             let loud = search.loud(&found);

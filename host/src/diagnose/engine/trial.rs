@@ -71,6 +71,14 @@ impl Trial<'_, '_> {
                 let why = "explains the training data, and leaves more of the recordings held back than there is without it";
                 left = self.without(left, k, why, tried)?;
             }
+            let held = Replay::of(self.fitting, sealed)?;
+            while let Some(k) = {
+                let chosen = &left.judged.chosen;
+                held.spoiling(chosen, search.count_given(chosen))?
+            } {
+                let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
+                left = self.without(left, k, why, tried)?;
+            }
         }
         Ok(left)
     }

@@ -30,6 +30,7 @@ fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
         vanished: None,
         followed: None,
         otherwise: None,
+        heard: false,
     }
 }
 

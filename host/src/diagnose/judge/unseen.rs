@@ -6,14 +6,18 @@ use crate::robot::{Joint, Robot, title_of};
 
 /// … of the data held back, whose motion is another.
 const BEYOND_FLOOR_HELD: f64 = 1.5;
+/// What is left of the training data counts as noise up to this many floors.
+const LIKE_THE_FLOOR: f64 = 1.15;
 
-/// What the last model leaves of data held back, where it leaves no more than noise of the training data: in the joint where
-/// it is most beyond the floor.
+/// What the last model leaves of data held back, where nothing that it leaves of the training data goes with the motion: in the
+/// joint where it is most beyond the floor. `floors` are those of the training data and of the data held back.
 pub(in crate::diagnose) fn left_of_held(
     robot: &Robot,
     held: &[f64],
-    floors: &[f64],
+    learnt: &[f64],
+    floors: [&[f64]; 2],
 ) -> Option<Remainder> {
+    let [own, floors] = floors;
     let ratio = |j: usize| held[j] / floors[j];
     let j = (0..held.len()).max_by(|a, b| ratio(*a).total_cmp(&ratio(*b)))?;
     let Joint { name, kind, .. } = &robot.joints[j];
@@ -22,10 +26,18 @@ pub(in crate::diagnose) fn left_of_held(
         unit: kind.units().1.to_owned(),
         rms: (held[j].powi(2) - floors[j].powi(2)).sqrt(),
         ratio: ratio(j),
-        text: format!(
-            "The data held back are left at {:.1} times the noise floor in joint {name}, the training data are not: they show something that the training data hardly do. Give a recording like them with --data.",
-            ratio(j)
-        ),
+        text: {
+            let here = learnt[j] / own[j];
+            let why = if here > LIKE_THE_FLOOR {
+                format!("the training data at {here:.1} times, where it goes with nothing: what the model is wrong in shows more in the motion held back")
+            } else {
+                "the training data are not: they show something that the training data hardly do".to_owned()
+            };
+            format!(
+                "The data held back are left at {:.1} times the noise floor in joint {name}, {why}. Give a recording like them with --data.",
+                ratio(j)
+            )
+        },
         places: Vec::new(),
         doubt: false,
     })

@@ -21,6 +21,7 @@ fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
         vanished: None,
         followed: None,
         otherwise: None,
+        heard: false,
     }
 }
 

@@ -102,6 +102,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
             vanished: None,
             followed: None,
             otherwise: None,
+            heard: false,
         }
     };
     let mut third = [0.0; SHAPES];

@@ -125,6 +125,7 @@ impl<'a> Search<'a> {
                 vanished: None,
                 followed: None,
                 otherwise: None,
+                heard: false,
             });
         }
         if chosen.is_empty() {

@@ -167,6 +167,7 @@ fn winding(
         vanished: None,
         followed: None,
         otherwise: None,
+        heard: false,
     });
     let left_out = options.without.contains(&Kind::DriveDeadzone);
     let refused = match &profile {
@@ -208,6 +209,7 @@ fn winding(
             joint: own.name.clone(),
             parameter: about.gains[0].name.to_owned(),
             size,
+            size_at_worst: None,
             unit: about.gains[0].unit.to_owned(),
         });
     let repeated = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0);

@@ -191,7 +191,7 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
     if found.residual != Residual::Torque || found.waterfall.is_empty() {
         return None;
     }
-    let texts: Vec<String> = texts(&found.places);
+    let texts: Vec<String> = texts(&found.places, found.waterfall.len() > 1);
     let mut section = Section::new(
         "where",
         "Where the gap sits",
@@ -212,12 +212,15 @@ pub(super) fn places(found: &Diagnosis) -> Option<Section> {
     )))
 }
 
-/// What goes with something, in words.
-pub(super) fn texts(places: &[Place]) -> Vec<String> {
+/// What goes with something, in words; of which joint, where there are several.
+pub(super) fn texts(places: &[Place], several: bool) -> Vec<String> {
     places
         .iter()
         .filter(|place| !place.text.is_empty() && place.share >= LEAST_SHARE)
-        .map(|place| place.text.clone())
+        .map(|place| match several {
+            true => format!("{}: {}", place.joint, place.text),
+            false => place.text.clone(),
+        })
         .collect()
 }
 

@@ -147,7 +147,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         },
         format_significant(remainder.ratio, 3)
     )));
-    let texts = gap::texts(&remainder.places);
+    let texts = gap::texts(&remainder.places, false);
     if !texts.is_empty() {
         section = section.with(Block::List(texts));
     }

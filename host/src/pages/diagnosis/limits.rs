@@ -112,6 +112,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
             Column::text("Joint"),
             Column::text("Size of"),
             Column::number("Smallest", ""),
+            Column::number("At its worst", ""),
             Column::text("Unit"),
         ],
         rows: found
@@ -123,11 +124,12 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
                     words::or_dash(&d.joint),
                     d.parameter.clone(),
                     format_significant(d.size, 2),
+                    d.size_at_worst.map_or_else(|| "–".to_owned(), |size| format_significant(size, 2)),
                     parts::unit(&d.unit),
                 ]
             })
             .collect(),
-        note: "A smaller one may be there and would have passed unseen.".into(),
+        note: "A smaller one may be there and would have passed unseen. Of a law with a speed, a period or a time of its own the size is the median over these, and the worst is where this motion shows it least.".into(),
     };
     Some(section.with(folded(
         "The smallest sizes that would have been found",

@@ -21,7 +21,7 @@ pub fn verdict(verdict: Verdict) -> &'static str {
 pub(super) fn meaning(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingMissing => {
-            "The model as it is explains these data down to the noise. No effect had to be added."
+            "These data show nothing that the model as it is lacks. No effect had to be added."
         }
         Verdict::Explained => {
             "The model lacked something, and the effects named here explain it: what is left shows nothing more that these data could tell."

@@ -114,6 +114,7 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
         vanished: None,
         followed: None,
         otherwise: None,
+        heard: false,
     };
     let rigid = refit.base.rms(0);
     let follower = Follower::new(&bench, &loaded, &refit, &search);

@@ -66,6 +66,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
         vanished: None,
         followed: None,
         otherwise: None,
+        heard: false,
     };
     let fallen = unbelieved(&refit, &search, &judge, &[gear]).unwrap();
     fallen.map(|(_, why)| why)

@@ -1,0 +1,203 @@
+//! A pendulum of a few lines, of another making than the emulated rig: what a user's own simulator hands over.
+
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::outcome::Verdict;
+use super::{Diagnosis, Options};
+use crate::data::{Block, JointColumns};
+use crate::prepare::{InMemory, Recording};
+use crate::robot::Robot;
+
+const MASS: f64 = 1.2;
+const LENGTH: f64 = 0.3;
+const INERTIA: f64 = 0.138;
+const VISCOUS: f64 = 0.15;
+const COULOMB: f64 = 0.4;
+
+/// Integration step, s, and steps a sample.
+const STEP: f64 = 1e-4;
+const SAMPLE: usize = 20;
+
+/// What is recorded of it.
+#[derive(Clone, Copy)]
+struct Pendulum {
+    /// Loss of the torque per square of what is commanded, 1/(N·m)².
+    saturation: f64,
+    /// Noise of position and torque, rad and N·m.
+    noise: [f64; 2],
+    /// Angles of the motion are so many times larger.
+    reach: f64,
+    /// Its fundamental, Hz.
+    slowest: f64,
+}
+
+impl Pendulum {
+    /// A motion by the seed `motion`, its noise by `seed`.
+    fn recorded(&self, label: &str, motion: u64, seed: u64) -> InMemory {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(motion);
+        let harmonics = [1.0, 2.0, 3.0, 5.0, 7.0].map(|k| {
+            let amplitude = rng.random_range(0.15..0.5) / (1.0 + 0.15 * k);
+            (
+                self.reach * amplitude,
+                TAU * self.slowest * k,
+                rng.random_range(0.0..TAU),
+            )
+        });
+        let reference = |t: f64| -> f64 {
+            let sines = harmonics.iter().map(|(a, w, p)| a * (w * t + p).sin());
+            t.min(1.0) * sines.sum::<f64>()
+        };
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+        let mut noise = |size: f64| -> f64 {
+            let x: f64 = StandardNormal.sample(&mut rng);
+            size * x
+        };
+        let (mut q, mut v, mut torque) = (0.0f64, 0.0f64, 0.0f64);
+        let mut block = Block {
+            joints: vec![JointColumns {
+                reference: Some(Vec::new()),
+                ..JointColumns::default()
+            }],
+            ..Block::default()
+        };
+        for k in 0..400_000 {
+            let t = k as f64 * STEP;
+            if k % SAMPLE == 0 {
+                let wanted = reference(t);
+                let read = q + noise(self.noise[0]);
+                let speed = (reference(t + STEP) - wanted) / STEP;
+                torque = 60.0 * (wanted - read) + 6.0 * (speed - v);
+                let joint = &mut block.joints[0];
+                block.t.push(t);
+                joint.q.push(read);
+                joint.tau.push(torque + noise(self.noise[1]));
+                joint.reference.iter_mut().for_each(|r| r.push(wanted));
+            }
+            let acts = torque * (1.0 - self.saturation * torque * torque);
+            let friction = COULOMB * (v / 0.004).tanh() + VISCOUS * v;
+            v += STEP * (acts - MASS * 9.81 * LENGTH * q.sin() - friction) / INERTIA;
+            q += STEP * v;
+        }
+        InMemory {
+            label: label.to_owned(),
+            blocks: vec![block],
+        }
+    }
+
+    /// What is found of it by two runs of a motion and one of another.
+    fn diagnosed(&self, robot: &Robot) -> (Diagnosis, Robot) {
+        let [train, again, held] = [("train", 1, 2), ("again", 1, 3), ("held", 4, 5)]
+            .map(|(label, motion, seed)| self.recorded(label, motion, seed));
+        let training: [&dyn Recording; 2] = [&train, &again];
+        let held: [&dyn Recording; 1] = [&held];
+        super::diagnose(robot, &training, &held, &Options::default(), &mut |_| ()).unwrap()
+    }
+}
+
+/// Hanging at zero; all true but the dry friction.
+fn described(torque: f64) -> Robot {
+    let text = format!(
+        r#"
+name = "pendulum"
+gravity = [0.0, 0.0, -9.81]
+[[joint]]
+name = "shoulder"
+kind = "revolute"
+alpha = 1.5707963267948966
+a = 0.0
+theta = -1.5707963267948966
+d = 0.0
+[joint.inertial]
+mass = {MASS}
+first_moment = [{}, 0.0, 0.0]
+inertia = [0.0, 0.0, 0.0, 0.0, 0.0, {INERTIA}]
+[joint.limits]
+position = [-3.1, 3.1]
+velocity = 20.0
+acceleration = 200.0
+torque = {torque}
+[joint.friction]
+coulomb = 0.3
+viscous = 0.1
+offset = 0.0
+"#,
+        MASS * LENGTH
+    );
+    Robot::from_toml(&text, Path::new("pendulum.toml")).unwrap()
+}
+
+/// The encoder is so noisy that its filter is near the band of the rows: what it takes from the motion alone would be left of the
+/// torque and of dry friction, 22 % above the noise.
+#[test]
+fn torque_and_friction_pass_the_filter_that_the_motion_has_passed() {
+    let plain = Pendulum {
+        saturation: 0.0,
+        noise: [2e-5, 0.03],
+        reach: 1.0,
+        slowest: 0.1,
+    };
+    let (found, _) = plain.diagnosed(&described(50.0));
+    let w = &found.waterfall[0];
+    println!("{:?} {:?} over {}", found.words, w.holdout, w.floor);
+    assert!(found.steps.is_empty(), "{:?}", found.words);
+    assert_eq!(
+        found.verdict,
+        Verdict::ParameterChange,
+        "{:?}",
+        found.remainder
+    );
+    assert!(w.holdout[1] < 1.05 * w.floor, "{w:?}");
+    let friction = found.absorbed.iter().find(|a| a.parameter == "fc1");
+    println!("{friction:?}");
+}
+
+/// A third of the torque is lost at the peaks: the law has to be met with the torque that flowed.
+#[test]
+fn a_saturation_that_takes_a_third_of_the_peaks_is_found_with_its_size() {
+    let lost = Pendulum {
+        saturation: 0.003,
+        noise: [5e-6, 0.03],
+        reach: 1.25,
+        slowest: 0.25,
+    };
+    let (found, model) = lost.diagnosed(&described(50.0));
+    let w = &found.waterfall[0];
+    println!("{:?} {:?} over {}", found.words, w.holdout, w.floor);
+    let names: Vec<&str> = found.steps.iter().map(|s| s.effect.as_str()).collect();
+    assert_eq!(names, ["torque_saturation"], "{:?}", found.words);
+    let coefficient = &found.steps[0].parameters["coefficient"];
+    println!("{coefficient:?}");
+    assert!(
+        (coefficient.value / lost.saturation - 1.0).abs() < 0.05,
+        "{coefficient:?}"
+    );
+    // The floor holds nothing of the saturation.
+    assert!(found.gap_closed.unwrap() > 0.9, "{:?}", found.gap_closed);
+    assert_eq!(model.effects.len(), 1);
+}
+
+#[test]
+fn a_limit_that_the_recorded_torque_goes_beyond_is_left_out_and_said() {
+    let plain = Pendulum {
+        saturation: 0.0,
+        noise: [5e-6, 0.03],
+        reach: 1.0,
+        slowest: 0.2,
+    };
+    let (whole, _) = plain.diagnosed(&described(50.0));
+    let (found, model) = plain.diagnosed(&described(2.5));
+    let said = |found: &Diagnosis| -> Vec<String> {
+        let about = |w: &&String| w.contains("beyond the 2.5");
+        found.words.iter().filter(about).cloned().collect()
+    };
+    assert_eq!(said(&whole), [""; 0]);
+    assert_eq!(said(&found).len(), 1, "{:?}", found.words);
+    assert_eq!(model.joints[0].limits.as_ref().unwrap().torque, None);
+    assert_eq!(found.waterfall, whole.waterfall);
+}
