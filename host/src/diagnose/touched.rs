@@ -35,9 +35,17 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
                 let mut rows = (out.iter()).filter(|(known, _)| *known == run);
                 rows.any(|(_, part)| part.contains(&row))
             };
+            // Where both come to rest a little earlier or later makes them differ, and is no touch.
+            let reach = (BESIDE / rows.period).ceil() as usize;
+            let rests = |start: usize, k: usize| {
+                let near = k.saturating_sub(reach)..(k + reach + 1).min(length);
+                near.into_iter().any(|k| !rows.keep[j][start + k])
+            };
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
-                keep[x] = rows.keep[j][x] && rows.keep[j][y] && !known(a, k) && !known(b, k);
+                let at_rest = starts.iter().all(|start| rests(*start, k));
+                let known = known(a, k) || known(b, k);
+                keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
                 apart[x] = residual[x] - residual[y];
             }
             let Some(burst) = burst(&apart, &keep, &rows.starts, rows.period, &loaded.runs) else {
