@@ -233,6 +233,7 @@ impl<'a> Replay<'a> {
 
     /// The first effect beyond the `described` first that makes the motion of its joint worse where it came in, and among all as far as
     /// these can be simulated.
+    /// That much worse, as a share, is worse whatever it differs by between stretches: `most`.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -240,13 +241,16 @@ impl<'a> Replay<'a> {
         &self,
         chosen: &[Profile],
         described: usize,
+        most: f64,
     ) -> Result<Option<usize>, DiagnoseError> {
         let mut before = self.errors(&chosen[..described])?;
         for k in described..chosen.len() {
             let after = self.errors(&chosen[..=k])?;
             let joint = chosen[k].candidate.joint;
             let worse = |[a, b]: [&Option<Errors>; 2]| match (a, b) {
-                (Some(a), Some(b)) => Some(a.worse_than(b, joint)),
+                (Some(a), Some(b)) => {
+                    Some(a.worse_than(b, joint) || a.rms(joint) > (1.0 + most) * b.rms(joint))
+                }
                 _ => None,
             };
             if worse([&after, &before]) == Some(true) {

@@ -12,6 +12,9 @@ use crate::diagnose::outcome::Tried;
 use crate::diagnose::profile::Profile;
 use crate::diagnose::refit::Refit;
 
+/// Share by which a name may not make the simulated motion held back worse: that is often too short to say how sure it is.
+const MUCH_WORSE: f64 = 0.1;
+
 /// What effects are held against.
 pub(super) struct Trial<'a, 'r> {
     /// The training data.
@@ -57,7 +60,7 @@ impl Trial<'_, '_> {
         // A name that makes the simulated motion worse stands in for something else.
         while let Some(k) = {
             let chosen = &left.judged.chosen;
-            (self.replay).spoiling(chosen, search.count_given(chosen))?
+            (self.replay).spoiling(chosen, search.count_given(chosen), f64::INFINITY)?
         } {
             let why = "explains torque, but the simulated motion gets worse with it";
             left = self.without(left, k, why, tried)?;
@@ -74,7 +77,7 @@ impl Trial<'_, '_> {
             let held = Replay::of(self.fitting, sealed)?;
             while let Some(k) = {
                 let chosen = &left.judged.chosen;
-                held.spoiling(chosen, search.count_given(chosen))?
+                held.spoiling(chosen, search.count_given(chosen), MUCH_WORSE)?
             } {
                 let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
                 left = self.without(left, k, why, tried)?;
