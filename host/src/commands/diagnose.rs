@@ -244,7 +244,7 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         lines.extend(step.parameters.iter().map(|(name, value)| {
             let unit = match value.unit.as_str() {
                 "1" => String::new(),
-                unit => format!(" {unit}"),
+                unit => format!(" {}", report::format_unit(unit)),
             };
             format!("    {name} = {}", value.said(&unit))
         }));

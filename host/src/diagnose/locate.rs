@@ -17,7 +17,7 @@ use super::profile::SIGNIFICANT;
 use super::rows::Rows;
 use super::runs::Run;
 use crate::prepare::central_difference;
-use crate::report::format_significant;
+use crate::report::{format_significant, format_unit};
 use crate::robot::{JointKind, Robot};
 
 /// Bins of equal numbers of rows.
@@ -397,7 +397,7 @@ fn sentence(
     count: &[f64; BINS],
 ) -> String {
     let digits = format_significant;
-    let unit = coordinate.unit;
+    let unit = format_unit(coordinate.unit);
     let whole = low == 0 && high == BINS - 1;
     let place = if whole {
         "over its whole range".to_owned()

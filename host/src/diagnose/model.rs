@@ -11,6 +11,7 @@ use super::profile::Profile;
 use super::rows::Nominal;
 use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
+use crate::report::{format_significant, format_unit};
 use crate::robot::{Robot, RobotEffect, sane};
 
 /// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
@@ -160,8 +161,13 @@ fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<Strin
         let kept = value.clamp(low, high);
         if kept != *value {
             remarks.push(format!(
-                "{} of {} at joint {} came out as {value} {}, which cannot be; {kept} stands in the description.",
-                p.name, about.name, name(joint), p.unit
+                "{} of {} at joint {} came out as {} {}, which cannot be; {} stands in the description.",
+                p.name,
+                about.name,
+                name(joint),
+                format_significant(*value, 3),
+                format_unit(p.unit),
+                format_significant(kept, 3),
             ));
             *value = kept;
         }

@@ -112,7 +112,7 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
             "Without {} the fit had bent its parameters: {} came out as {before} instead of {after} {}.",
             if d.steps.len() == 1 { "it" } else { "them" },
             a.parameter,
-            a.unit
+            format_unit(&a.unit)
         ));
     }
     words

@@ -221,7 +221,8 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
                     0.0
                 };
                 remarks.push(format!(
-                    "The drive's inertia of {prior_drive} kg*m^2 in the description does not fit the identified {} kg*m^2; {} kg*m^2 were left to it.",
+                    "The drive's inertia of {} kg·m² in the description does not fit the identified {} kg·m²; {} kg·m² were left to it.",
+                    format_significant(prior_drive, 4),
                     format_significant(total, 4),
                     format_significant(drive, 4)
                 ));
@@ -255,7 +256,10 @@ fn one_link(robot: &Robot, base: &Combinations, pi: &mut DVector<f64>, remarks: 
             }
             pi[column::DRIVE_INERTIA] = drive;
             if total <= 0.0 {
-                remarks.push(format!("The identified inertia of {total} kg*m^2 is not positive: no simulation can use it."));
+                remarks.push(format!(
+                    "The identified inertia of {} kg·m² is not positive: no simulation can use it.",
+                    format_significant(total, 4)
+                ));
             }
         }
     }

@@ -353,7 +353,7 @@ impl Judge<'_> {
                     About::Recording,
                     j,
                     format!(
-                        "Gravity fits the description, but the inertia seen in the motion is {:.4} times what it states: t looks like {}, {clock:.4} of them a second.",
+                        "Gravity fits the description, but the inertia seen in the motion is {:.4} times what it states: t looks like {}, {clock:.4} of them a second, unless the inertia described is wrong, the rotor's by the square of the gear ratio among it.",
                         i / g,
                         names::of_clock(clock)
                     ),

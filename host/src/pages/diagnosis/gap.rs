@@ -256,6 +256,11 @@ pub(super) fn table(caption: &str, places: &[Place]) -> Block {
     })
 }
 
+/// Middle of the distances of bins from zero, as a share of the farthest, up to which they are crowded.
+const CROWDED: f64 = 0.2;
+/// Fewest bins of a figure of them.
+const FEWEST: usize = 8;
+
 /// Least and largest mean residual in all figures of a joint: what goes into one is seen against what is left in the next.
 fn reach(found: &Diagnosis, map: &Map) -> Option<[f64; 2]> {
     let alike = |m: &&Map| m.joint == map.joint && m.residual_unit == map.residual_unit;
@@ -272,9 +277,54 @@ fn reach(found: &Diagnosis, map: &Map) -> Option<[f64; 2]> {
 }
 
 /// The mean residual over one coordinate, before and after, and the law that was fitted to it.
-pub(super) fn map(found: &Diagnosis, map: &Map) -> Plot {
-    let unit = parts::unit(&map.residual_unit);
+pub(super) fn maps(found: &Diagnosis, map: &Map) -> Vec<Plot> {
     let reach = reach(found, map);
+    let whole = drawn(map, reach);
+    let nearer = |m: &Map| closer(m).filter(|m| m.at.len() >= FEWEST);
+    let close = std::iter::successors(nearer(map), nearer).last();
+    let close = close.map(|close| {
+        let mut plot = drawn(&close, reach);
+        plot.title = format!("{}, its middle", plot.title);
+        plot.note = format!(
+            "The {} bins of the figure before that are crowded in its middle.",
+            close.at.len()
+        );
+        plot
+    });
+    [Some(whole), close].into_iter().flatten().collect()
+}
+
+/// The bins in the middle, where they are too close to be told apart: those of the way or the time since a reversal, most of which are
+/// short.
+fn closer(map: &Map) -> Option<Map> {
+    let mut far: Vec<f64> = map.at.iter().map(|x| x.abs()).collect();
+    far.sort_by(f64::total_cmp);
+    let (median, most) = (*far.get(far.len() / 2)?, *far.last()?);
+    let within = |x: f64| x.abs() <= 2.0 * median;
+    let signed = map.at.iter().any(|x| *x < 0.0) && map.at.iter().any(|x| *x > 0.0);
+    if !signed || median > CROWDED * most {
+        return None;
+    }
+    let close = |values: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        (map.at.iter().zip(values))
+            .filter(|(x, _)| within(**x))
+            .map(|(_, v)| *v)
+            .collect()
+    };
+    Some(Map {
+        at: map.at.iter().copied().filter(|x| within(*x)).collect(),
+        before: close(&map.before),
+        after: close(&map.after),
+        law: (map.at.iter().zip(&map.law))
+            .filter(|(x, _)| within(**x))
+            .map(|(_, v)| *v)
+            .collect(),
+        ..map.clone()
+    })
+}
+
+fn drawn(map: &Map, reach: Option<[f64; 2]>) -> Plot {
+    let unit = parts::unit(&map.residual_unit);
     let bars = |name: &str, role, values: &[[f64; 2]]| {
         Series::new(
             name,

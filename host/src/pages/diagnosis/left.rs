@@ -117,7 +117,8 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         .maps
         .iter()
         .filter(|m| m.step.is_none())
-        .map(|m| Block::Plot(gap::map(found, m)))
+        .flat_map(|m| gap::maps(found, m))
+        .map(Block::Plot)
         .collect();
     let Some(remainder) = &found.remainder else {
         return (!maps.is_empty()).then(|| Section {

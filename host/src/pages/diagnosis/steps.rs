@@ -36,9 +36,11 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
             about.law.map_or(String::new(), |law| format!(", law {law}"))
         )));
     }
-    section
-        .blocks
-        .extend(maps.iter().map(|m| Block::Plot(gap::map(found, m))));
+    section.blocks.extend(
+        maps.iter()
+            .flat_map(|m| gap::maps(found, m))
+            .map(Block::Plot),
+    );
     if !step.parameters.is_empty() {
         section = section.with(parameters(step));
     }

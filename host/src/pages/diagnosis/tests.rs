@@ -136,7 +136,9 @@ fn the_spread_of_an_absorbed_parameter_follows_from_its_sigmas() {
 #[test]
 fn figures_of_one_joint_share_their_ordinates() {
     let found = made_up::explained();
-    let plots: Vec<_> = found.maps.iter().map(|m| gap::map(&found, m)).collect();
+    let plots: Vec<_> = (found.maps.iter())
+        .map(|m| gap::maps(&found, m).remove(0))
+        .collect();
     let reaches: Vec<_> = plots.iter().filter_map(|p| p.reach).collect();
     assert!(plots.len() > 1 && reaches.len() == plots.len());
     assert!(reaches.windows(2).all(|w| w[0] == w[1]), "{reaches:?}");
