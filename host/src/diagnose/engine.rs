@@ -75,7 +75,7 @@ pub fn diagnose(
                 result.0.words.extend(uneven.told());
                 return Ok(*result);
             }
-            Ok(Attempt::Hold(more)) => stated = more,
+            Ok(Attempt::Hold(more)) => stated = *more,
             Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {}
             Err(DiagnoseError::Prepare(error)) => {
                 let Some(fault) = of_preparing(&error) else {
@@ -92,7 +92,7 @@ pub fn diagnose(
 enum Attempt {
     Done(Box<(Diagnosis, Robot)>),
     /// The same with more of them held.
-    Hold(Stated),
+    Hold(Box<Stated>),
 }
 
 fn attempt(
@@ -155,7 +155,7 @@ fn attempt(
             &refuted,
         )?
     {
-        return Ok(Attempt::Hold(more));
+        return Ok(Attempt::Hold(Box::new(more)));
     }
     let sealed = sealed
         .map(|sealed| moved(&bench, sealed, &lead))

@@ -18,7 +18,7 @@ pub(super) enum Intake<'a> {
     /// They cannot.
     Faulty(Vec<DataFault>),
     /// The same with more of the description's effects held, or its limits left out.
-    Hold(Stated),
+    Hold(Box<Stated>),
 }
 
 /// Recordings that can be learnt from.
@@ -65,7 +65,7 @@ pub(super) fn intake<'a>(
         || more.hold_delays(slack(&loaded.runs))
         || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without))
     {
-        return Ok(Intake::Hold(more));
+        return Ok(Intake::Hold(Box::new(more)));
     }
     let open = open(&bench, &loaded.rows);
     if !open.is_empty() {

@@ -56,3 +56,20 @@ fn many_blocks_that_agree_stand_in_for_a_gain_beyond_what_they_vary_by() {
     assert!(of(Kind::AsymmetricCoulomb, 50).is_some());
     assert!(of(Kind::Backlash, 75).is_some());
 }
+
+/// The link of a wide play is seldom where the motor's motion has it.
+#[test]
+fn a_play_that_takes_little_is_heard_where_that_is_clear() {
+    let play = |gain, sigmas| profile(Kind::Backlash, gain, sigmas);
+    assert!(play(0.08, 6.0).is_nearly_a_play(300));
+    for (gain, sigmas) in [(0.03, 6.0), (0.08, 3.0), (0.2, 6.0)] {
+        assert!(!play(gain, sigmas).is_nearly_a_play(300));
+    }
+    assert!(!profile(Kind::JointElasticity, 0.08, 6.0).is_nearly_a_play(300));
+    assert!(play(0.08, 6.0).refused(300).is_some());
+    let heard = Profile {
+        heard: true,
+        ..play(0.08, 6.0)
+    };
+    assert_eq!(heard.refused(300), None);
+}

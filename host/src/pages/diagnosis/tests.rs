@@ -154,6 +154,23 @@ fn figures_of_one_joint_share_their_ordinates() {
 }
 
 #[test]
+fn bins_that_crowd_about_zero_are_drawn_once_more() {
+    let found = made_up::explained();
+    let mut map = found.maps[0].clone();
+    let count = map.at.len();
+    let even = |k: usize| k as f64 - 0.5 * (count as f64 - 1.0);
+    map.at = (0..count).map(even).collect();
+    assert_eq!(gap::maps(&found, &map).len(), 1);
+    map.at = (0..count).map(|k| even(k).powi(7)).collect();
+    let plots = gap::maps(&found, &map);
+    assert_eq!(plots.len(), 2);
+    let [whole, close] = [&plots[0], &plots[1]].map(|p| p.series[0].x.len());
+    assert!(close >= 8 && close < whole, "{close} of {whole}");
+    assert_eq!(plots[0].reach, plots[1].reach);
+    assert!(plots[1].title.contains("its middle"));
+}
+
+#[test]
 fn values_against_the_description_are_no_lies_of_a_fit() {
     let mut found = made_up::explained();
     found.absorbed_before = outcome::Before::Described;
