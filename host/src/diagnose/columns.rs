@@ -1,6 +1,5 @@
 //! Columns of an effect from the measured motion.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -41,8 +40,8 @@ pub(super) struct Source<'a> {
     pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
-    /// Joints with a saturation in the model.
-    pub(super) saturated: Vec<bool>,
+    /// Coefficient of the saturation in the model, joint by joint; 0 where there is none.
+    pub(super) saturated: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// What the recorded torque tells of gears whose links are followed, by run and joint.
@@ -72,6 +71,11 @@ const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCo
 /// angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
 const OF_THE_DRIVE: [Kind; 2] = [Kind::TorqueSaturation, Kind::MeasurementDelay];
 
+/// Rounds in which a saturation meets the torque that it makes: in each what is missing falls by half or more.
+const OWN_ROUNDS: usize = 6;
+/// Share of what a little more current would give that may be lost where the torque is predicted.
+const MOST_LOST: f64 = 0.5;
+
 /// Effects whose torque is linear in the filtered motion, or as good as: it has passed the position's filter with it.
 const OF_THE_FILTERED_MOTION: [Kind; 4] = [
     Kind::InertiaCoupling,
@@ -97,7 +101,9 @@ impl Source<'_> {
             if kind == Kind::MeasurementDelay {
                 self.delays[joint] = gains[at].max(DELAY);
             }
-            self.saturated[joint] |= kind == Kind::TorqueSaturation;
+            if kind == Kind::TorqueSaturation {
+                self.saturated[joint] = gains[at];
+            }
             at += profile.columns.len();
         }
         let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
@@ -108,10 +114,43 @@ impl Source<'_> {
                 continue;
             }
             // A late reading is no torque.
-            let torque = self.sum(r, chosen, gains, &|kind| kind != Kind::MeasurementDelay)?;
-            add(&mut self.predicted[r].torque, &torque);
+            let others = self.sum(r, chosen, gains, &|kind| !OF_THE_DRIVE.contains(&kind))?;
+            add(&mut self.predicted[r].torque, &others);
+            self.saturate(r, chosen, gains)?;
         }
         Ok(self)
+    }
+
+    /// Saturation in the predicted torque that its own law asks for. Where more than half of what a little more current would give
+    /// is lost, a prediction is off by more than twice what the model is, and the recorded torque takes its place; elsewhere that
+    /// would hold noise that is in what it is to explain.
+    fn saturate(
+        &mut self,
+        r: usize,
+        chosen: &[Profile],
+        gains: &[f64],
+    ) -> Result<(), DiagnoseError> {
+        let rest = self.predicted[r].torque.clone();
+        for _ in 0..OWN_ROUNDS {
+            let own = self.sum(r, chosen, gains, &|kind| kind == Kind::TorqueSaturation)?;
+            self.predicted[r].torque.clone_from(&rest);
+            add(&mut self.predicted[r].torque, &own);
+        }
+        for (joint, run) in self.runs[r].joints.iter().enumerate() {
+            let coefficient = self.saturated[joint];
+            if coefficient <= 0.0 {
+                continue;
+            }
+            // d(τ − c·τ³)/dτ is a half there.
+            let most = (MOST_LOST / (3.0 * coefficient)).sqrt();
+            let recorded = self.thinning.calm(&run.recorded());
+            for (to, recorded) in self.predicted[r].torque[joint].iter_mut().zip(recorded) {
+                if recorded.abs() > most {
+                    *to = recorded;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Torque over a run, joint by joint, of the effects of some kinds.
@@ -332,10 +371,7 @@ impl Source<'_> {
         let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
         let load = &predicted.load[candidate.joint];
-        let drive = match candidate.kind {
-            Kind::TorqueSaturation => self.of_the_current(run, predicted, candidate.joint),
-            _ => Cow::Borrowed(&predicted.torque[candidate.joint][..]),
-        };
+        let drive = &predicted.torque[candidate.joint];
         let first_temperature = joint
             .temperature
             .as_ref()
@@ -379,22 +415,6 @@ impl Source<'_> {
             }
         }
         out
-    }
-
-    /// Torque that a joint's current stands for, over a run: as predicted, and where a saturation is in the model as recorded. What is
-    /// lost goes with the current that flowed, and the loss of a third at a peak is more than a prediction can follow; but a
-    /// recorded torque holds all that no model explains, and its cube would be taken for any of it before there is a name.
-    fn of_the_current<'s>(
-        &self,
-        run: &'s Run,
-        predicted: &'s Predicted,
-        joint: usize,
-    ) -> Cow<'s, [f64]> {
-        if self.saturated[joint] {
-            Cow::Owned(self.thinning.calm(&run.joints[joint].recorded()))
-        } else {
-            Cow::Borrowed(&predicted.torque[joint])
-        }
     }
 
     pub(super) fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {

@@ -7,8 +7,10 @@ use super::runs::Run;
 use super::stated::Stated;
 use crate::report::{format_significant, format_unit};
 
-/// How far beyond the limit a torque has to be, as a factor: readings of one that is at its limit spread about it.
+/// How far beyond the limit a torque has to be, as a factor …
 const BEYOND: f64 = 1.05;
+/// … and in standard deviations of its reading: readings of a torque that is at its limit spread about it.
+const SIGMAS: f64 = 4.0;
 /// Share of a recording's samples that have to be there.
 const LEAST: f64 = 0.005;
 
@@ -22,10 +24,14 @@ impl Stated {
             };
             let Some(limit) = limits.torque else { continue };
             let own = || runs.iter().filter_map(|run| run.joints.get(j));
+            let noise = own()
+                .map(|own| own.differences().of_a_sample())
+                .fold(0.0, f64::max);
+            let least = (BEYOND * limit).max(limit + SIGMAS * noise);
             let (mut count, mut beyond, mut most) = (0_usize, 0_usize, 0.0f64);
             for tau in own().flat_map(|own| own.recorded().into_owned()) {
                 count += 1;
-                beyond += usize::from(tau.abs() > BEYOND * limit);
+                beyond += usize::from(tau.abs() > least);
                 most = most.max(tau.abs());
             }
             if (beyond as f64) < LEAST * count as f64 || beyond == 0 {

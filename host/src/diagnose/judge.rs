@@ -7,6 +7,8 @@ mod unseen;
 pub(super) use self::rank::{equal, rank};
 pub(super) use self::unseen::{left_of_held, not_carried_over, taken_by_none};
 
+use rig_shared::effects::Kind;
+
 use super::DiagnoseError;
 use super::burst::{Burst, burst};
 use super::engine::Follower;
@@ -146,8 +148,13 @@ impl Judge<'_, '_> {
     /// What stands with these effects.
     pub(super) fn as_found(&self, chosen: Vec<Profile>) -> Judged {
         let fit = with(self.base, &chosen, None);
+        // Of a play touches are loud, and so is what its law leaves of them.
+        let plays = |j: usize| {
+            let gear = |p: &Profile| p.candidate.kind == Kind::Backlash && p.candidate.joint == j;
+            chosen.iter().any(gear)
+        };
         let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
-            .map(|j| self.burst(&fit, j))
+            .map(|j| (!plays(j)).then(|| self.burst(&fit, j)).flatten())
             .collect();
         // Of a joint without its bursts.
         let calm = |j: usize| {

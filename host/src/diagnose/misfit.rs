@@ -144,7 +144,7 @@ fn families(source: &Source, joint: usize) -> Vec<Family> {
         family("speed", true, speed),
     ];
     // Beside the recorded torque, cubed, as a saturation's law has it, the cube of a predicted one tells of the noise between both.
-    if !source.saturated[joint] {
+    if source.saturated[joint] == 0.0 {
         list.push(family("torque of the drive", false, torque));
     }
     if ratio.abs() > 1.0 {

@@ -67,6 +67,12 @@ impl Differences {
         }
         sums
     }
+
+    /// Standard deviation of what a sample's reading has by itself: a smooth signal leaves nothing in third differences, white noise 20
+    /// times its variance.
+    pub fn of_a_sample(&self) -> f64 {
+        (self.third / (20.0 * self.count.max(1) as f64)).sqrt()
+    }
 }
 
 /// A stretch of a recording without a gap.

@@ -17,6 +17,19 @@ use crate::robot::Robot;
 /// Left out on either side of a loud stretch, s: what a filter carries beyond it.
 const BESIDE: f64 = 0.25;
 
+/// Least time that a joint has to stand for to be at rest, s; in a reversal it stands for less.
+const LASTING: f64 = 0.3;
+
+/// Rows in which a joint stands, of those that are used or not.
+fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
+    keep.chunk_by(|a, b| a == b)
+        .flat_map(|part| {
+            let stands = !part[0] && part.len() as f64 * period >= LASTING;
+            std::iter::repeat_n(stands, part.len())
+        })
+        .collect()
+}
+
 /// Marks in runs of one motion what is to be left out of them; sentences on that, none where nothing is. `residuals` are what the
 /// refitted model leaves of each joint on their rows.
 pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded) -> Vec<String> {
@@ -36,14 +49,13 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
                 rows.any(|(_, part)| part.contains(&row))
             };
             // Where both come to rest a little earlier or later makes them differ, and is no touch.
+            let resting =
+                starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
             let reach = (BESIDE / rows.period).ceil() as usize;
-            let rests = |start: usize, k: usize| {
-                let near = k.saturating_sub(reach)..(k + reach + 1).min(length);
-                near.into_iter().any(|k| !rows.keep[j][start + k])
-            };
+            let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
-                let at_rest = starts.iter().all(|start| rests(*start, k));
+                let at_rest = resting.iter().all(|rests| rests[near(k)].contains(&true));
                 let known = known(a, k) || known(b, k);
                 keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
                 apart[x] = residual[x] - residual[y];
