@@ -15,7 +15,7 @@ use self::even::{Uneven, borrowed};
 pub(super) use self::follow::Follower;
 use self::intake::{Intake, Material, intake};
 use self::pass::Pass;
-use self::remarks::remarks;
+use self::remarks::{remarks, weight_of_a_spring};
 use self::steps::{change_step, reconcile, steps};
 use self::trial::{Survivors, Trial};
 use super::across::{across, names_something, refutes, tell as tell_across};
@@ -434,6 +434,7 @@ fn attempt(
         after,
     ));
     diagnosis.words.extend(change.map(|c| c.words));
+    (diagnosis.words).extend(weight_of_a_spring(&bench, chosen, after));
     progress(1.0);
     Ok(Attempt::Done(Box::new((diagnosis, model))))
 }

@@ -29,6 +29,8 @@ const SAMPLE: usize = 20;
 struct Pendulum {
     /// Loss of the torque per square of what is commanded, 1/(N·m)².
     saturation: f64,
+    /// Stiffness of a spring that grows with the square of the angle, N·m/rad³.
+    stiffening: f64,
     /// Noise of position and torque, rad and N·m.
     noise: [f64; 2],
     /// Angles of the motion are so many times larger.
@@ -81,7 +83,8 @@ impl Pendulum {
             }
             let acts = torque * (1.0 - self.saturation * torque * torque);
             let friction = COULOMB * (v / 0.004).tanh() + VISCOUS * v;
-            v += STEP * (acts - MASS * 9.81 * LENGTH * q.sin() - friction) / INERTIA;
+            let pulls = MASS * 9.81 * LENGTH * q.sin() + self.stiffening * q.powi(3);
+            v += STEP * (acts - pulls - friction) / INERTIA;
             q += STEP * v;
         }
         InMemory {
@@ -138,6 +141,7 @@ offset = 0.0
 fn torque_and_friction_pass_the_filter_that_the_motion_has_passed() {
     let plain = Pendulum {
         saturation: 0.0,
+        stiffening: 0.0,
         noise: [2e-5, 0.03],
         reach: 1.0,
         slowest: 0.1,
@@ -162,6 +166,7 @@ fn torque_and_friction_pass_the_filter_that_the_motion_has_passed() {
 fn a_saturation_that_takes_a_third_of_the_peaks_is_found_with_its_size() {
     let lost = Pendulum {
         saturation: 0.003,
+        stiffening: 0.0,
         noise: [5e-6, 0.03],
         reach: 1.25,
         slowest: 0.25,
@@ -186,6 +191,7 @@ fn a_saturation_that_takes_a_third_of_the_peaks_is_found_with_its_size() {
 fn a_limit_that_the_recorded_torque_goes_beyond_is_left_out_and_said() {
     let plain = Pendulum {
         saturation: 0.0,
+        stiffening: 0.0,
         noise: [5e-6, 0.03],
         reach: 1.0,
         slowest: 0.2,
@@ -200,4 +206,22 @@ fn a_limit_that_the_recorded_torque_goes_beyond_is_left_out_and_said() {
     assert_eq!(said(&found).len(), 1, "{:?}", found.words);
     assert_eq!(model.joints[0].limits.as_ref().unwrap().torque, None);
     assert_eq!(found.waterfall, whole.waterfall);
+}
+
+/// The cube of an angle is nearly a line less a sine.
+#[test]
+fn a_spring_that_takes_the_weight_of_the_link_is_not_to_be_believed() {
+    let stiff = Pendulum {
+        saturation: 0.0,
+        stiffening: 0.5,
+        noise: [5e-6, 0.03],
+        reach: 1.25,
+        slowest: 0.2,
+    };
+    let (found, _) = stiff.diagnosed(&described(50.0));
+    println!("{:?}", found.words);
+    let said = |w: &&String| w.contains("before you believe either");
+    let named = found.steps.iter().any(|s| s.effect == "spring");
+    assert_eq!(found.words.iter().filter(said).count(), usize::from(named));
+    assert!(named, "{:?}", found.words);
 }

@@ -1,11 +1,47 @@
 //! What is said besides the verdict: how recordings were treated, what stayed as described, what they are too much alike for.
 
+use rig_shared::effects::Kind;
+
 use crate::diagnose::bench::{Bench, Loaded};
 use crate::diagnose::floor;
+use crate::diagnose::profile::Profile;
 use crate::diagnose::sentences::offsets;
 use crate::diagnose::solve::Solution;
-use crate::report::{format_unit, format_value};
+use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::Robot;
+
+/// Share of the described first moment below which a link is light beside a spring …
+const LIGHT: f64 = 0.5;
+/// … and standard deviations that it is so by.
+const CLEAR: f64 = 5.0;
+
+/// That a spring has taken a link's weight: a spring that stiffens is nearly a straight one less a part of the weight.
+pub(super) fn weight_of_a_spring(
+    bench: &Bench,
+    chosen: &[Profile],
+    last: &Solution,
+) -> Option<String> {
+    let anchor = &bench.anchor;
+    if !anchor.stated || chosen.iter().all(|p| p.candidate.kind != Kind::Spring) {
+        return None;
+    }
+    let prior = anchor.prior_coefficients();
+    // Of a single link both first moments are one free direction, along which gravity is described.
+    let weight = anchor
+        .free
+        .iter()
+        .position(|direction| direction.len() > 1)?;
+    let [now, described] = [last.values[weight], prior[weight]];
+    let light =
+        now.abs() < LIGHT * described.abs() && (described - now).abs() > CLEAR * last.std(weight);
+    light.then(|| {
+        format!(
+            "Beside the spring the first moment (gravity) comes out as {}, where {} is described: a spring that stiffens looks like a straight one and a lighter link. Weigh the link, or record without the spring, before you believe either.",
+            format_value(now, last.std(weight)),
+            format_significant(described, 3)
+        )
+    })
+}
 
 /// Sentences on recordings learnt from and held back, the base parameters `open` to doubt, what the sensors read with the drive off,
 /// and the constants of the last model.
