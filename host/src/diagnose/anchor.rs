@@ -32,6 +32,17 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
+    /// Place among the free directions of a single link's first moment, where the direction of gravity is held.
+    pub(super) fn first_moment(&self, nominal: &Nominal) -> Option<usize> {
+        let along = |d: &Direction| {
+            let mut columns = d.iter().map(|(b, _)| nominal.base.columns[*b]);
+            columns.all(|c| (1..=2).contains(&c))
+        };
+        (self.gravity_held)
+            .then(|| self.free.iter().position(along))
+            .flatten()
+    }
+
     /// For a robot whose description states what `stated` has.
     pub(super) fn of(robot: &Robot, nominal: &Nominal, stated: &Stated) -> Self {
         let n = robot.joints.len();

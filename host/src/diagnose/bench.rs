@@ -217,7 +217,6 @@ impl<'a> Bench<'a> {
                 .map(|j| self.lets_constant_free(j))
                 .collect(),
             delays: vec![DELAY; self.robot.joints.len()],
-            saturated: vec![0.0; self.robot.joints.len()],
             driven: Mutex::default(),
             seen: HashMap::new(),
             slopes: Mutex::default(),

@@ -190,16 +190,13 @@ fn payload(
     let [joint] = bench.robot.joints.as_slice() else {
         return None;
     };
-    if joint.kind != JointKind::Revolute || !anchor.gravity_held {
+    if joint.kind != JointKind::Revolute {
         return None;
     }
     let inertia = anchor.free.iter().position(
         |d| matches!(d.as_slice(), [(b, _)] if nominal.base.columns[*b] == column::INERTIA + 5),
     )?;
-    let moment = anchor.free.iter().position(|d| {
-        d.iter()
-            .all(|(b, _)| (1..=2).contains(&nominal.base.columns[*b]))
-    })?;
+    let moment = anchor.first_moment(nominal)?;
     // First moment and inertia of a point mass m at distance l: m·l and m·l².
     let (dm, dj) = (
         after.values[moment] - prior[moment],

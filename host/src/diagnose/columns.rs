@@ -40,8 +40,6 @@ pub(super) struct Source<'a> {
     pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
-    /// Coefficient of the saturation in the model, joint by joint; 0 where there is none.
-    pub(super) saturated: Vec<f64>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// What the recorded torque tells of gears whose links are followed, by run and joint.
@@ -101,9 +99,6 @@ impl Source<'_> {
             if kind == Kind::MeasurementDelay {
                 self.delays[joint] = gains[at].max(DELAY);
             }
-            if kind == Kind::TorqueSaturation {
-                self.saturated[joint] = gains[at];
-            }
             at += profile.columns.len();
         }
         let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
@@ -130,20 +125,27 @@ impl Source<'_> {
         chosen: &[Profile],
         gains: &[f64],
     ) -> Result<(), DiagnoseError> {
+        let mut at = 0;
+        let mut saturated: Vec<(usize, f64)> = Vec::new();
+        for profile in chosen {
+            if profile.candidate.kind == Kind::TorqueSaturation && gains[at] > 0.0 {
+                saturated.push((profile.candidate.joint, gains[at]));
+            }
+            at += profile.columns.len();
+        }
+        if saturated.is_empty() {
+            return Ok(());
+        }
         let rest = self.predicted[r].torque.clone();
         for _ in 0..OWN_ROUNDS {
             let own = self.sum(r, chosen, gains, &|kind| kind == Kind::TorqueSaturation)?;
             self.predicted[r].torque.clone_from(&rest);
             add(&mut self.predicted[r].torque, &own);
         }
-        for (joint, run) in self.runs[r].joints.iter().enumerate() {
-            let coefficient = self.saturated[joint];
-            if coefficient <= 0.0 {
-                continue;
-            }
+        for (joint, coefficient) in saturated {
             // d(τ − c·τ³)/dτ is a half there.
             let most = (MOST_LOST / (3.0 * coefficient)).sqrt();
-            let recorded = self.thinning.calm(&run.recorded());
+            let recorded = (self.thinning).calm(&self.runs[r].joints[joint].recorded());
             for (to, recorded) in self.predicted[r].torque[joint].iter_mut().zip(recorded) {
                 if recorded.abs() > most {
                     *to = recorded;

@@ -67,7 +67,7 @@ pub fn diagnose(
     stated.no_offsets = options.no_offsets && !told;
     let mut uneven = Uneven::default();
     loop {
-        // Each time around more of the description's effects are held, or another recording is brought to an even step.
+        // Each time around more of the description's effects are held or its limits left out, or another recording is brought to an even step.
         let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
         let [training, holdout] = [&training, &holdout].map(|recordings| borrowed(recordings));
         match attempt(robot, &stated, &training, &holdout, options, progress) {
@@ -91,7 +91,7 @@ pub fn diagnose(
 /// What came of one way to treat the description's effects.
 enum Attempt {
     Done(Box<(Diagnosis, Robot)>),
-    /// The same with more of them held.
+    /// The same with more of them held, or limits left out.
     Hold(Box<Stated>),
 }
 

@@ -11,7 +11,7 @@ use crate::report::{format_significant, format_unit};
 const BEYOND: f64 = 1.05;
 /// … and in standard deviations of its reading: readings of a torque that is at its limit spread about it.
 const SIGMAS: f64 = 4.0;
-/// Share of a recording's samples that have to be there.
+/// Share of all samples that have to be there.
 const LEAST: f64 = 0.005;
 
 impl Stated {
@@ -24,15 +24,16 @@ impl Stated {
             };
             let Some(limit) = limits.torque else { continue };
             let own = || runs.iter().filter_map(|run| run.joints.get(j));
-            let noise = own()
-                .map(|own| own.differences().of_a_sample())
-                .fold(0.0, f64::max);
+            let variances = own().map(|own| own.differences().variance());
+            let noise = variances.fold(0.0, f64::max).sqrt();
             let least = (BEYOND * limit).max(limit + SIGMAS * noise);
             let (mut count, mut beyond, mut most) = (0_usize, 0_usize, 0.0f64);
-            for tau in own().flat_map(|own| own.recorded().into_owned()) {
-                count += 1;
-                beyond += usize::from(tau.abs() > least);
-                most = most.max(tau.abs());
+            for own in own() {
+                for tau in own.recorded().iter() {
+                    count += 1;
+                    beyond += usize::from(tau.abs() > least);
+                    most = most.max(tau.abs());
+                }
             }
             if (beyond as f64) < LEAST * count as f64 || beyond == 0 {
                 continue;

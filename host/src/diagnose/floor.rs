@@ -1,7 +1,7 @@
 //! The noise floor: what no model of the motion can explain.
 
 use super::rows::Rows;
-use super::runs::Run;
+use super::runs::{Differences, Run};
 
 /// Share of the band of thinned rows that the low-pass before the thinning passes.
 const PASSED: f64 = 0.8;
@@ -147,17 +147,17 @@ pub(super) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
 /// By third differences, in which a smooth torque leaves nothing: of white noise they have 20 times its variance, and second
 /// ones 6 times.
 pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
-    let (mut second, mut third, mut count) = (0.0, 0.0, 0);
+    let mut all = Differences::default();
     for run in runs {
         let own = run.joints[joint].differences();
-        second += own.second;
-        third += own.third;
-        count += own.count;
+        all.second += own.second;
+        all.third += own.third;
+        all.count += own.count;
     }
     let rate = runs.first()?.rate;
     let passed = (PASSED / (period * rate)).min(1.0);
-    let white = third > STILL_WHITE * second && count > 0;
-    white.then(|| (third / 20.0 / count as f64 * passed).sqrt())
+    let white = all.third > STILL_WHITE * all.second && all.count > 0;
+    white.then(|| (all.variance() * passed).sqrt())
 }
 
 /// Standard deviation of a sample of white noise whose RMS on rows so many `samples` apart is `noise`.

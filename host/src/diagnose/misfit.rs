@@ -5,7 +5,7 @@
 //! tilted base explains a constant but for the difference of cos q and 1. What is left then is small against the noise of
 //! a sample, and repeats with the coordinate.
 //!
-//! Leaves out: functions of two coordinates; what the motion does not tell from the name; of the torque of a drive that saturates.
+//! Leaves out: functions of two coordinates; what the motion does not tell from the name.
 
 use super::columns::Source;
 use super::fit::Fit;
@@ -139,14 +139,11 @@ fn families(source: &Source, joint: usize) -> Vec<Family> {
     let speed = of(&|_, run| run.qd.iter().map(|v| v.abs()).collect());
     let mut list = vec![
         family("position", false, position()),
+        family("torque of the drive", false, torque),
         family("position", true, position()),
         family("torque on the gear", true, load),
         family("speed", true, speed),
     ];
-    // Beside the recorded torque, cubed, as a saturation's law has it, the cube of a predicted one tells of the noise between both.
-    if source.saturated[joint] == 0.0 {
-        list.push(family("torque of the drive", false, torque));
-    }
     if ratio.abs() > 1.0 {
         list.push(Family {
             periodic: true,

@@ -232,8 +232,7 @@ impl<'a> Replay<'a> {
     }
 
     /// The first effect beyond the `described` first that makes the motion of its joint worse where it came in, and among all as far as
-    /// these can be simulated.
-    /// That much worse, as a share, is worse whatever it differs by between stretches: `most`.
+    /// these can be simulated. Worse by more than a share of `most` counts whatever it differs by between stretches.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].

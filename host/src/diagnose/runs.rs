@@ -68,10 +68,10 @@ impl Differences {
         sums
     }
 
-    /// Standard deviation of what a sample's reading has by itself: a smooth signal leaves nothing in third differences, white noise 20
-    /// times its variance.
-    pub fn of_a_sample(&self) -> f64 {
-        (self.third / (20.0 * self.count.max(1) as f64)).sqrt()
+    /// Variance of what a sample's reading has by itself, of the signal's unit squared: a smooth signal leaves nothing in third
+    /// differences, white noise 20 times its variance. 0 of none.
+    pub fn variance(&self) -> f64 {
+        self.third / 20.0 / self.count.max(1) as f64
     }
 }
 

@@ -26,11 +26,7 @@ pub(super) fn weight_of_a_spring(
         return None;
     }
     let prior = anchor.prior_coefficients();
-    // Of a single link both first moments are one free direction, along which gravity is described.
-    let weight = anchor
-        .free
-        .iter()
-        .position(|direction| direction.len() > 1)?;
+    let weight = anchor.first_moment(&bench.nominal)?;
     let [now, described] = [last.values[weight], prior[weight]];
     let light =
         now.abs() < LIGHT * described.abs() && (described - now).abs() > CLEAR * last.std(weight);

@@ -58,13 +58,8 @@ impl Trial<'_, '_> {
             fallen: Vec::new(),
         };
         // A name that makes the simulated motion worse stands in for something else.
-        while let Some(k) = {
-            let chosen = &left.judged.chosen;
-            (self.replay).spoiling(chosen, search.count_given(chosen), f64::INFINITY)?
-        } {
-            let why = "explains torque, but the simulated motion gets worse with it";
-            left = self.without(left, k, why, tried)?;
-        }
+        let why = "explains torque, but the simulated motion gets worse with it";
+        left = self.unspoilt(left, (self.replay, f64::INFINITY), why, tried)?;
         while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
             left = self.without(left, k, why, tried)?;
         }
@@ -75,13 +70,26 @@ impl Trial<'_, '_> {
                 left = self.without(left, k, why, tried)?;
             }
             let held = Replay::of(self.fitting, sealed)?;
-            while let Some(k) = {
-                let chosen = &left.judged.chosen;
-                held.spoiling(chosen, search.count_given(chosen), MUCH_WORSE)?
-            } {
-                let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
-                left = self.without(left, k, why, tried)?;
-            }
+            let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
+            left = self.unspoilt(left, (&held, MUCH_WORSE), why, tried)?;
+        }
+        Ok(left)
+    }
+
+    /// Without what makes a simulated motion worse, by a share that is too much however sure it is.
+    fn unspoilt(
+        &self,
+        mut left: Survivors,
+        (replay, most): (&Replay, f64),
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let given = |chosen: &[Profile]| self.judge.search.count_given(chosen);
+        while let Some(k) = {
+            let chosen = &left.judged.chosen;
+            replay.spoiling(chosen, given(chosen), most)?
+        } {
+            left = self.without(left, k, why, tried)?;
         }
         Ok(left)
     }

@@ -276,7 +276,8 @@ fn reach(found: &Diagnosis, map: &Map) -> Option<[f64; 2]> {
     })
 }
 
-/// The mean residual over one coordinate, before and after, and the law that was fitted to it.
+/// The mean residual over one coordinate, before and after, and the law that was fitted to it; its middle once more where bins crowd
+/// there.
 pub(super) fn maps(found: &Diagnosis, map: &Map) -> Vec<Plot> {
     let reach = reach(found, map);
     let whole = drawn(map, reach);
