@@ -53,6 +53,12 @@ fn left(robot: &Robot, made: &Made) -> f64 {
     (0.5 * squares).sqrt()
 }
 
+/// RMS that a diagnosis leaves of a description as it stands, on the rows that it uses.
+fn frozen(robot: &Robot, made: &Made) -> f64 {
+    let (found, _) = made.diagnosed(robot, &Options::default());
+    found.waterfall[0].train[0]
+}
+
 #[test]
 fn the_description_predicts_what_the_fit_does_with_weakening_friction() {
     let effect = Effect::Stribeck {
@@ -93,7 +99,10 @@ fn a_tilted_base_is_gravity_turned() {
     assert!((pull.after / truth - 1.0).abs() < 0.03, "{pull:?} {truth}");
     let [_, after] = diagnosis.steps[0].train_rms;
     let own = left(&model, &made);
-    // The diagnosis leaves rows about rests out, which are in this.
+    // The diagnosis leaves rows about rests out, which are in this …
     assert!((own / after - 1.0).abs() < 0.08, "{own} {after}");
+    // … and not in what it leaves of the description that came out.
+    let again = frozen(&model, &made);
+    assert!((again / after - 1.0).abs() < 1e-3, "{again} {after}");
     assert!(left(&made.robot, &made) > 1.3 * own);
 }

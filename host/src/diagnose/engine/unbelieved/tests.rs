@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::diagnose::Options;
-use crate::diagnose::bench::{Bench, library};
+use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::engine::Follower;
 use crate::diagnose::fit::Evidence;
@@ -16,13 +16,23 @@ use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
 use rig_shared::effects::{Kind, SHAPES};
 
-/// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
-fn said(stiffness: f64, times: f64) -> Option<&'static str> {
-    let effect = Effect::JointElasticity {
-        stiffness: 700.0,
-        damping: 0.3,
-    };
-    let made = Scenario::short([effect], 5).make().unwrap();
+const SPRING: Effect = Effect::JointElasticity {
+    stiffness: 700.0,
+    damping: 0.3,
+};
+const GEAR: Candidate = Candidate {
+    kind: Kind::JointElasticity,
+    joint: 0,
+    other: None,
+};
+
+/// What `ask` makes of the library on a rig with that hidden.
+fn on<T>(
+    effect: Option<Effect>,
+    seed: u64,
+    ask: impl FnOnce(&Bench, &Loaded, &Refit, &Search) -> T,
+) -> T {
+    let made = Scenario::short(effect, seed).make().unwrap();
     let stated = Stated::of(&made.robot);
     let training: [&dyn Recording; 1] = [&made.train];
     let bench = Bench::of(&stated, &training).unwrap();
@@ -35,41 +45,49 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
         Vec::new(),
         2,
     );
-    let follower = Follower::new(&bench, &loaded, &refit, &search);
-    let judge = Judge {
-        robot: &made.robot,
-        search: &search,
-        follower: &follower,
-        rows: &loaded.rows,
-        coordinates: &[Vec::new()],
-        pairs: Vec::new(),
-        rounding: vec![0.0],
-        base: &refit.base,
-        seed: 1,
-    };
-    let candidate = Candidate {
-        kind: Kind::JointElasticity,
-        joint: 0,
-        other: None,
-    };
+    ask(&bench, &loaded, &refit, &search)
+}
+
+/// Stiffness, damping and share of the friction as shapes.
+fn shapes(of: [f64; 3]) -> [f64; SHAPES] {
     let mut shapes = [0.0; SHAPES];
-    shapes[..3].copy_from_slice(&[stiffness, 0.3, 0.25]);
-    let mut columns = search.source.columns(&candidate, &shapes).unwrap();
-    for value in columns.iter_mut().flatten().flatten().flatten() {
-        *value *= times;
-    }
-    let gear = Profile {
-        candidate,
-        shapes,
-        columns: Arc::new(columns),
-        evidence: Evidence::default(),
-        vanished: None,
-        followed: None,
-        otherwise: None,
-        heard: false,
-    };
-    let fallen = unbelieved(&refit, &search, &judge, &[gear]).unwrap();
-    fallen.map(|(_, why)| why)
+    shapes[..3].copy_from_slice(&of);
+    shapes
+}
+
+/// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
+fn said(stiffness: f64, times: f64) -> Option<&'static str> {
+    on(Some(SPRING), 5, |bench, loaded, refit, search| {
+        let shapes = shapes([stiffness, 0.3, 0.25]);
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            rounding: vec![0.0],
+            base: &refit.base,
+            seed: 1,
+        };
+        let mut columns = search.source.columns(&GEAR, &shapes).unwrap();
+        for value in columns.iter_mut().flatten().flatten().flatten() {
+            *value *= times;
+        }
+        let gear = Profile {
+            candidate: GEAR,
+            shapes,
+            columns: Arc::new(columns),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
+        fallen.map(|(_, why)| why)
+    })
 }
 
 #[test]
@@ -100,4 +118,22 @@ fn a_gear_that_does_not_swing_is_none() {
         why.iter().any(|why| tried.refused.contains(why)),
         "{tried:?}"
     );
+}
+
+/// What comes of an elastic gear where the search begins with one like that.
+fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
+    on(effect, seed, |_, _, refit, search| {
+        let place = search.library.iter().position(|c| *c == GEAR).unwrap();
+        let profile = search.profile(&refit.base, place, Some(shapes(begun)));
+        profile.unwrap().unwrap()
+    })
+}
+
+/// On the creeping rig the best gear beyond critical damping stays there; a true one swings.
+#[test]
+fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
+    let lag = profiled(None, 900, [3000.0, 190.0, 0.25]);
+    assert!(lag.refused(300).unwrap().contains("swing"), "{lag:?}");
+    let gear = profiled(Some(SPRING), 5, [700.0, 0.3, 0.25]);
+    assert_eq!(gear.refused(300), None);
 }
