@@ -205,6 +205,32 @@ fn a_recording_may_begin_in_motion_and_a_hold_out_is_another_motion() {
     let angle = steps[0]["parameters"]["angle"]["value"].as_f64().unwrap();
     assert!((angle - 0.06).abs() < 1e-3, "{angle}");
 
+    // The figures as pictures, those of another result gone; an effect that is left out of the library is not named, and that is said.
+    let picture = |name: &str| folder.path().join("out").join(name);
+    let drawn = fs::read_to_string(picture("gap-1.svg")).unwrap();
+    assert!(drawn.contains("gravity tilt") && picture("effect-1.svg").is_file());
+    fs::write(picture("effect-7.svg"), "of another result").unwrap();
+    let said = succeed(command(&[&train], &other).args(["--without", "gravity_tilt"]));
+    assert!(
+        said.contains("Left out of the library, as asked: gravity_tilt."),
+        "{said}"
+    );
+    assert!(!picture("effect-7.svg").exists());
+    let text = fs::read_to_string(folder.path().join("out/diagnosis.json")).unwrap();
+    let found: Value = serde_json::from_str(&text).unwrap();
+    for step in found["steps"].as_array().unwrap() {
+        assert_ne!(step["effect"], "gravity_tilt", "{said}");
+    }
+    let wrong = (command(&[&train], &other).args(["--without", "tilt"]))
+        .output()
+        .unwrap();
+    let sentence = String::from_utf8(wrong.stderr).unwrap();
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(
+        sentence.contains("tilt") && sentence.contains("gravity_tilt"),
+        "{sentence}"
+    );
+
     let said = succeed(&mut command(&[&train], &again));
     assert!(said.contains(repeats), "{said}");
 

@@ -7,6 +7,7 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::input::command_line;
+use super::pictures;
 use super::ui::Ui;
 use crate::demo;
 use crate::files::write_whole;
@@ -52,6 +53,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     })?;
     write_whole(&args.out.join("diagnosis.json"), (json + "\n").as_bytes())?;
     report::write_svg(&args.out.join("tracking.svg"), &demo.picture())?;
+    pictures::write(&args.out, &demo.diagnosis)?;
     for line in demo.summary()? {
         ui.say(&line);
     }

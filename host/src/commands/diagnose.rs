@@ -1,13 +1,16 @@
 //! `rig diagnose`: what the model lacks.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
+use rig_shared::effects::Kind;
 
 use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, command_line, recordings, refuse_as_rest, refuse_shared, refuse_twice,
 };
+use super::pictures::{self, forget};
 use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::experiment::FILE;
@@ -43,7 +46,8 @@ const REPORT: &str = "report.html";
 /// were.
 ///
 /// Writes model.toml (the description with the effects found and the parameters fitted again, for --robot), diagnosis.json
-/// and report.html into the folder given with --out, and next_experiment.toml where a motion would tell more.
+/// and report.html into the folder given with --out, the figures of what was found as pictures of their own (gap-1.svg,
+/// effect-1.svg), and next_experiment.toml where a motion would tell more.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -65,6 +69,10 @@ pub(crate) struct Args {
     /// and back-EMF; may be given several times
     #[arg(long)]
     clamped: Vec<PathBuf>,
+    /// Effect to leave out of the library, as one that the rig cannot have; may be given several times. What it explained is then
+    /// left, or another name stands in for it
+    #[arg(long, value_parser = known)]
+    without: Vec<String>,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -114,6 +122,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         sensor_zeros: zeros(&robot, args, ui)?,
         clamped: clamps(&robot, args, ui)?,
         no_offsets: description.urdf.is_some(),
+        without: (Kind::ALL.iter().copied())
+            .filter(|kind| args.without.iter().any(|name| name == kind.about().name))
+            .collect(),
         ..Options::default()
     };
     let mut progress = ui.progress("diagnosing", 1000);
@@ -121,7 +132,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let free: Vec<Unburdened> = free.iter().map(|recording| Unburdened(recording)).collect();
     let mut learnt = recordings(&listened);
     learnt.extend(free.iter().map(|recording| recording as &dyn Recording));
-    let (found, model) = workflow(
+    let (mut found, model) = workflow(
         &robot,
         &learnt,
         &recordings(&holdout.listened()),
@@ -132,6 +143,10 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let heard: Vec<String> = all.iter().flat_map(|inputs| inputs.heard()).collect();
     for warning in &heard {
         ui.remark(warning);
+    }
+    if !args.without.is_empty() {
+        let names = args.without.join(", ");
+        (found.words).push(format!("Left out of the library, as asked: {names}."));
     }
     let text = model.to_toml()?;
     let context = Context {
@@ -153,18 +168,22 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     write_whole(&args.out.join(MODEL), text.as_bytes())?;
     write_whole(&args.out.join(DIAGNOSIS), (json + "\n").as_bytes())?;
     write_whole(&args.out.join(REPORT), page.as_bytes())?;
+    pictures::write(&args.out, &found)?;
     print(ui, &found, &args.out);
     Ok(())
 }
 
-/// Takes the motion of an earlier result away, which nobody is to take for one of this.
-fn forget(path: &Path) -> Result<(), CommandError> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(CommandError::Sentence(
-            format!("{} cannot be removed: {error}.", path.display()),
-        )),
-        _ => Ok(()),
+/// The name of an effect.
+fn known(name: &str) -> Result<String, String> {
+    let names: BTreeSet<&str> = Kind::ALL.iter().map(|kind| kind.about().name).collect();
+    if names.contains(name) {
+        return Ok(name.to_owned());
     }
+    let names: Vec<&str> = names.into_iter().collect();
+    Err(format!(
+        "no effect has that name; there are {}",
+        names.join(", ")
+    ))
 }
 
 /// One of the two ways from recordings to a verdict.
@@ -236,9 +255,11 @@ fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
     ui.say(&format!("report: {}", out.join(REPORT).display()));
 }
 
+/// First what was asked for, then everything else that the diagnosis has to say.
 fn summary(found: &Diagnosis) -> Vec<String> {
     let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
-    lines.extend(found.words.iter().cloned());
+    let (first, besides) = found.words.split_at(found.words.len().min(1));
+    lines.extend(first.iter().cloned());
     for (k, step) in found.steps.iter().enumerate() {
         lines.push(effect(k + 1, step));
         lines.extend(step.parameters.iter().map(|(name, value)| {
@@ -271,6 +292,10 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     }
     if let Some(next) = &found.next_experiment {
         lines.push(format!("next: {}", next.text));
+    }
+    if !besides.is_empty() {
+        lines.push("besides:".into());
+        lines.extend(besides.iter().map(|sentence| format!("  - {sentence}")));
     }
     lines
 }

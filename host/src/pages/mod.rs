@@ -16,7 +16,7 @@ mod validation;
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
 };
-pub use diagnosis::{diagnosis, verdict};
+pub use diagnosis::{PICTURE_NAMES, diagnosis, pictures, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
 pub use validation::validation;

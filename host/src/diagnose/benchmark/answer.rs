@@ -151,6 +151,15 @@ pub fn exact_class(name: &str) -> BTreeSet<&str> {
     class
 }
 
+/// Whether two effects together are one of them with other parameters, as far as a recording of torque, motor position and voltage
+/// goes: partners of one function, or a spring and a constant torque, which another rest of the spring holds as well.
+pub(super) fn one_holds_both(a: &str, b: &str) -> bool {
+    let springs = [Kind::Spring.about().name, Kind::TorqueOffset.about().name];
+    let [spring, constants] = [springs[0], springs[1]].map(same_by_voltage);
+    let held = |one: &str, other: &str| spring.contains(one) && constants.contains(other);
+    exact_class(a).contains(b) || held(a, b) || held(b, a)
+}
+
 /// Whether `named` is `truth` but for exact partners.
 pub fn is_right(named: &str, truth: &str) -> bool {
     exact_class(truth).contains(named)

@@ -3,7 +3,7 @@
 use rig_shared::effects::Kind;
 use serde::Serialize;
 
-use super::answer::exact_class;
+use super::answer::{exact_class, one_holds_both};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::scenario::{
     Effect, Excitation, Hidden, Intrusion, Made, Noise, Scenario, Size, Truth,
@@ -171,8 +171,8 @@ impl Plan {
         Ok(cases)
     }
 
-    /// Different effects that do not describe the same function, turning through the list with the seed; none where
-    /// the list is too short.
+    /// Different effects that do not describe the same function, nor one that another of them holds already, turning through the list
+    /// with the seed; none where the list is too short.
     fn combination(&self, count: usize, seed: u64) -> Result<Option<Scenario>, DiagnoseError> {
         let n = self.effects.len();
         let mut chosen: Vec<&String> = Vec::new();
@@ -180,7 +180,7 @@ impl Plan {
         let (start, stride) = (seed as usize % n.max(1), 1 + seed as usize / n.max(1));
         for k in 0..n * 2 {
             let name = &self.effects[(start + k * stride + k / n.max(1)) % n];
-            let known = |other: &&String| exact_class(name).contains(other.as_str());
+            let known = |other: &&String| one_holds_both(name, other);
             if chosen.len() < count && !chosen.iter().any(known) {
                 chosen.push(name);
             }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::answer::{Answer, exact_class, is_right, same_by_voltage};
+use super::answer::{Answer, Named, exact_class, is_right, same_by_voltage};
 use super::cases::Group;
 use super::follow::Followed;
 use super::parameters::Compared;
@@ -39,6 +39,17 @@ pub struct Outcome {
 
 /// The one hidden effect that is a change of the description's values.
 const PAYLOAD: &str = "payload";
+
+/// Whether every one of `truth` is in a set of its own, and no set is left over.
+pub(super) fn one_each(truth: &[&str], sets: &[BTreeSet<String>]) -> bool {
+    match truth {
+        [] => sets.is_empty(),
+        [first, rest @ ..] => (0..sets.len()).any(|k| {
+            let others = || [&sets[..k], &sets[k + 1..]].concat();
+            sets[k].iter().any(|name| is_right(name, first)) && one_each(rest, &others())
+        }),
+    }
+}
 
 impl Outcome {
     fn truth(&self) -> Vec<&'static str> {
@@ -87,6 +98,16 @@ impl Outcome {
         };
         // A method that failed has named nothing, and is wrong where something was to be named.
         classes(&self.names()) == classes(&self.truth())
+    }
+
+    /// Whether each hidden effect is one of the names that the data leave to a name of its own, and no name is over.
+    pub fn exact_as_sets(&self) -> bool {
+        let named = |answer: &Answer| -> Vec<BTreeSet<String>> {
+            let set = |n: &Named| n.set.iter().cloned().chain([n.effect.clone()]).collect();
+            answer.named.iter().map(set).collect()
+        };
+        let sets = self.answer.as_ref().map_or(Vec::new(), named);
+        self.exact() || one_each(&self.truth(), &sets)
     }
 
     /// Whether it names anything, or finds values changed that have not.
@@ -163,6 +184,8 @@ pub struct Score {
     pub exact_single: Proportion,
     /// The same of two or more, each above the floor.
     pub exact_combination: Proportion,
+    /// The same where an open name counts as right whose set holds the hidden effect.
+    pub exact_combination_as_sets: Proportion,
     /// Median share of the hold-out's gap that is closed under a right first name, by class of effect.
     pub gap_closed: BTreeMap<&'static str, f64>,
     /// Says that something is left although nothing is hidden or exactly what is hidden, one effect, is named.
@@ -281,6 +304,11 @@ impl Score {
                 group(Group::Combination)
                     .filter(|o| o.above())
                     .map(Outcome::exact),
+            ),
+            exact_combination_as_sets: Proportion::of(
+                group(Group::Combination)
+                    .filter(|o| o.above())
+                    .map(Outcome::exact_as_sets),
             ),
             gap_closed: classes
                 .into_iter()

@@ -1,11 +1,12 @@
 //! That answers are counted as they should.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rig_shared::effects::Kind;
 
-use super::answer::same_by_voltage;
+use super::answer::{one_holds_both, same_by_voltage};
+use super::score::one_each;
 use super::*;
 use crate::diagnose::scenario::{Effect, Hidden, Made, Noise, Scenario};
 
@@ -95,6 +96,39 @@ fn exact_partners_count_as_one_name() {
         ["asymmetric_coulomb", "torque_offset"]
     );
     assert!(!is_right("stribeck", "presliding"));
+    // k·(q − rest) + c has one rest; a current that is read wrong shows beside the voltage.
+    assert!(one_holds_both("spring", "asymmetric_coulomb"));
+    assert!(one_holds_both("torque_offset", "spring"));
+    assert!(!one_holds_both("spring", "current_offset"));
+    assert!(!one_holds_both("spring", "gravity_tilt"));
+}
+
+#[test]
+fn an_open_name_is_right_once_where_its_set_holds_the_hidden_effect() {
+    let sets = |sets: &[&[&str]]| -> Vec<BTreeSet<String>> {
+        (sets.iter())
+            .map(|set| set.iter().map(|name| (*name).to_owned()).collect())
+            .collect()
+    };
+    let hidden = ["spring", "payload"];
+    assert!(one_each(
+        &hidden,
+        &sets(&[&["payload"], &["torque_offset", "spring"]])
+    ));
+    // The first set could be either, and only one way leaves each a set of its own.
+    assert!(one_each(
+        &hidden,
+        &sets(&[&["spring", "payload"], &["spring"]])
+    ));
+    assert!(!one_each(&hidden, &sets(&[&["spring", "payload"]])));
+    assert!(!one_each(
+        &hidden,
+        &sets(&[&["payload"], &["spring"], &["cogging"]])
+    ));
+    assert!(!one_each(
+        &hidden,
+        &sets(&[&["payload"], &["torque_offset"]])
+    ));
 }
 
 #[test]
@@ -109,13 +143,16 @@ fn combinations_hold_different_effects_and_repeat_with_the_seed() {
     };
     let cases = plan.cases().unwrap();
     assert_eq!(cases.len(), 120);
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     for case in &cases {
         let names: Vec<&str> = (case.scenario.hidden.iter())
             .map(|h| h.effect.name())
             .collect();
         for (k, a) in names.iter().enumerate() {
-            assert!(names[..k].iter().all(|b| !is_right(a, b)), "{names:?}");
+            assert!(
+                names[..k].iter().all(|b| !one_holds_both(a, b)),
+                "{names:?}"
+            );
         }
         seen.insert(names);
     }

@@ -44,20 +44,24 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
         });
     section
         .blocks
-        .extend(moved.iter().map(|w| Block::Plot(bars(found, w))));
+        .extend(moved.iter().map(|w| Block::Plot(bars(found, w, ROOM))));
     if !still.is_empty() {
         section.blocks.push(Block::Details {
             summary: format!(
                 "Joints in which nothing was found: {}",
                 words::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
             ),
-            blocks: still.iter().map(|w| Block::Plot(bars(found, w))).collect(),
+            blocks: still
+                .iter()
+                .map(|w| Block::Plot(bars(found, w, ROOM)))
+                .collect(),
         });
     }
     Some(section.with(figures(found)))
 }
 
-fn bars(found: &Diagnosis, w: &Waterfall) -> Plot {
+/// The residual of a joint from model to model; models whose names need more than `room` letters are numbered.
+pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     let n = w.models.len();
     let short: Vec<String> = w
         .models
@@ -68,7 +72,7 @@ fn bars(found: &Diagnosis, w: &Waterfall) -> Plot {
         })
         .collect();
     let longest = short.iter().map(|m| m.chars().count()).max();
-    let numbered = longest.unwrap_or(0) * n > ROOM;
+    let numbered = longest.unwrap_or(0) * n > room;
     let names = if numbered {
         (1..=n).map(|k| k.to_string()).collect()
     } else {
@@ -292,7 +296,7 @@ pub(super) fn maps(found: &Diagnosis, map: &Map) -> Vec<Plot> {
         );
         plot
     });
-    [Some(whole), close].into_iter().flatten().collect()
+    std::iter::once(whole).chain(close).collect()
 }
 
 /// The bins in the middle, where they are too close to be told apart: those of the way or the time since a reversal, most of which are

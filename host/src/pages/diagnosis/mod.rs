@@ -4,12 +4,14 @@ mod curves;
 mod gap;
 mod left;
 mod limits;
+mod pictures;
 mod steps;
 #[cfg(test)]
 mod tests;
 mod words;
 
 use super::{Context, parts};
+pub use pictures::{NAMES as PICTURE_NAMES, pictures};
 pub use words::verdict;
 
 use crate::diagnose::outcome::{Diagnosis, Verdict};
