@@ -291,7 +291,13 @@ fn summary(found: &Diagnosis) -> Vec<String> {
         lines.push(format!("left: {}", remainder.text));
     }
     if let Some(next) = &found.next_experiment {
-        lines.push(format!("next: {}", next.text));
+        lines.push(match (next.separates.as_slice(), &next.file) {
+            // Nothing is open for it: whoever wants to know has the report.
+            ([one], Some(file)) => {
+                format!("next: {file} would make {one} testable; the report says how")
+            }
+            _ => format!("next: {}", next.text),
+        });
     }
     if !besides.is_empty() {
         lines.push("besides:".into());
@@ -317,7 +323,7 @@ fn effect(number: usize, step: &Step) -> String {
         format!("; these data support as well: {}", rivals.join(", "))
     };
     format!(
-        "{number}. {}{law} at joint {}, {} % of the gap{open}",
+        "{number}. {}{law} at joint {}, {} % of the gap before it{open}",
         step.effect,
         step.joint,
         format_significant(100.0 * step.gap_closed, 3)

@@ -18,6 +18,11 @@ use crate::robot::JointKind;
 /// Share of the whole change's gain that a part of the parameters must reach to speak for it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
 
+/// … and inertia and gravity for a payload, where the joint's friction has effects: what their laws are not quite, its parameters make up for.
+const SPEAKS_BESIDE_FRICTION: f64 = 0.5;
+/// Shares by which inertia and gravity have grown that are apart by less are one factor.
+const ONE_RATIO: f64 = 0.05;
+
 /// Least relative change of one nominal parameter at least: a refit beside effects that are not quite the library's moves all
 /// by a per cent.
 const LEAST_CHANGE: f64 = 0.04;
@@ -46,12 +51,13 @@ pub(super) struct Change {
     pub(super) p_value: f64,
 }
 
-/// Compares the refit with the description. `known` is the torque that the effects found explain, `left` whether they leave
-/// something, `without` is not named.
+/// Compares the refit with the description. `known` is the torque that the effects found explain, `beside_friction` whether friction is
+/// among them, `left` whether they leave something, `without` is not named.
 pub(super) fn change(
     bench: &Bench,
     refit: &Refit,
     known: &Column,
+    beside_friction: bool,
     left: bool,
     after: &Solution,
     without: &[Kind],
@@ -87,6 +93,11 @@ pub(super) fn change(
         return None;
     }
     let speaks = |e: &Evidence| e.gain >= SPEAKS_FOR_ALL * whole.gain;
+    // Not by one factor: that is a torque constant.
+    let carries = |e: &Evidence, [inertia, moment]: &[usize; 2]| {
+        let [inertia, moment] = [inertia, moment].map(|k| after.values[*k] / prior[*k]);
+        e.gain >= SPEAKS_BESIDE_FRICTION * whole.gain && (inertia / moment - 1.0).abs() > ONE_RATIO
+    };
     let least = if left {
         LEAST_OF_BOTH_BESIDE
     } else {
@@ -95,7 +106,7 @@ pub(super) fn change(
     if !without.contains(&Kind::Payload)
         && let Some(load) = payload(bench, after, &prior, least)
         && let Some(e) = evidence(&load.1)
-        && speaks(&e)
+        && (speaks(&e) || beside_friction && carries(&e, &load.1))
     {
         return Some(Change {
             words: "Inertia and gravity have grown in the ratio of a mass at one place: a payload."
@@ -185,7 +196,7 @@ fn payload(
     after: &Solution,
     prior: &[f64],
     least: f64,
-) -> Option<(BTreeMap<String, Value>, Vec<usize>)> {
+) -> Option<(BTreeMap<String, Value>, [usize; 2])> {
     let (nominal, anchor) = (&bench.nominal, &bench.anchor);
     let [joint] = bench.robot.joints.as_slice() else {
         return None;
@@ -237,5 +248,5 @@ fn payload(
     // A mass on a link lies within some metres of its axis.
     (0.01..3.0)
         .contains(&distance)
-        .then_some((parameters, vec![inertia, moment]))
+        .then_some((parameters, [inertia, moment]))
 }

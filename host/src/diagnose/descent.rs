@@ -115,7 +115,8 @@ impl Descent {
             let left = bench.remaining(sealed, stands.fitted(), chosen)?;
             let pairs = floor::repeats(&sealed.runs);
             for (j, own) in repeated.iter_mut().enumerate() {
-                *own = floor::from_repeats(&sealed.rows, &pairs, &left[j], None, j);
+                *own = floor::from_repeats(&sealed.rows, &pairs, &left[j], None, j)
+                    .map(|repeated| repeated.noise);
             }
         }
         let slower = sealed.map_or(1.0, |sealed| bench.rate() / sealed.treatment.sample_rate);

@@ -15,6 +15,10 @@ use super::search::with;
 /// Share of what a name leaves beyond the floor, the description's values as they are, that another one leaves at most.
 const MUCH_LESS: f64 = 0.5;
 
+/// Times the floor that a name may leave, the description's values as they are: beside one that leaves more these have changed, and
+/// are no witness.
+const STANDS: f64 = 2.0;
+
 /// Puts names in the place of equal ones where the description's values, as they are, then leave much less.
 ///
 /// # Errors
@@ -58,6 +62,7 @@ pub(super) fn by_description(
             })
             .min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((less, list)) = best
+            && less < STANDS * floor
             && less - floor < MUCH_LESS * (own - floor)
         {
             chosen = list;

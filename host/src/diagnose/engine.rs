@@ -34,7 +34,7 @@ use super::outcome::{Before, Diagnosis, Residual, Verdict};
 use super::profile::Profile;
 use super::refit::Refit;
 use super::rounding::rounding;
-use super::search::with;
+use super::search::{is_friction, with};
 use super::stated::{Now, Stated};
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
@@ -303,7 +303,9 @@ fn attempt(
         word.applied(step);
     }
     let explained = refit.explained(chosen, after);
-    let change = change(&bench, &refit, &explained, left, after, &options.without);
+    let without = &options.without;
+    let friction = chosen.iter().any(|p| is_friction(p.candidate.kind));
+    let change = change(&bench, &refit, &explained, friction, left, after, without);
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
     {
         let given = replay.errors_of(&stated.moving());

@@ -75,16 +75,26 @@ fn alike(a: &Run, b: &Run) -> bool {
     })
 }
 
-/// RMS of a joint's noise from residuals of repeated runs: what differs between them over √2, where rows count so much (all
-/// alike where nothing is given). None without a repeat.
+/// What residuals of repeated runs of one motion say of a joint.
+pub(super) struct Repeated {
+    /// What differs between them, over √2: noise, RMS.
+    pub(super) noise: f64,
+    /// All that is left in these very rows, RMS.
+    pub(super) left: f64,
+    /// Pairs of rows.
+    pub(super) rows: f64,
+}
+
+/// Noise and what is left of a joint in repeated runs, where rows count so much (all alike where nothing is given). None without a
+/// repeat.
 pub(super) fn from_repeats(
     rows: &Rows,
     pairs: &[(usize, usize)],
     residual: &[f64],
     counts: Option<&[f64]>,
     joint: usize,
-) -> Option<f64> {
-    let (mut squares, mut used) = (0.0, 0.0);
+) -> Option<Repeated> {
+    let (mut apart, mut squares, mut used) = (0.0, 0.0, 0.0);
     for &(a, b) in pairs {
         let (start_a, start_b) = (rows.starts[a], rows.starts[b]);
         let length = (rows.starts[a + 1] - start_a).min(rows.starts[b + 1] - start_b);
@@ -92,12 +102,17 @@ pub(super) fn from_repeats(
             let (i, j) = (start_a + k, start_b + k);
             if rows.keep[joint][i] && rows.keep[joint][j] {
                 let counted = counts.map_or(1.0, |counts| counts[i] * counts[j]);
-                squares += 0.5 * counted * (residual[i] - residual[j]).powi(2);
+                apart += 0.5 * counted * (residual[i] - residual[j]).powi(2);
+                squares += 0.5 * counted * (residual[i].powi(2) + residual[j].powi(2));
                 used += counted;
             }
         }
     }
-    (used > 0.0).then(|| (squares / used).sqrt())
+    (used > 0.0).then(|| Repeated {
+        noise: (apart / used).sqrt(),
+        left: (squares / used).sqrt(),
+        rows: used,
+    })
 }
 
 /// How much more is left of a joint on average in the second of two runs of one motion than in the first, and its standard deviation

@@ -53,13 +53,16 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
             if taken || across || known(&list) {
                 continue;
             }
+            let own = (found.search.library.iter().enumerate())
+                .filter(|(_, c)| c.kind == kind && c.joint == j);
             let lacking = testable::not_testable(kind, found.robot, j, runs);
-            if let Some(lacking) = lacking {
+            if let Some(mut lacking) = lacking {
+                if own.count() > 0 {
+                    lacking.why += " It was tried all the same: a large one would show.";
+                }
                 list.push(lacking);
                 continue;
             }
-            let own = (found.search.library.iter().enumerate())
-                .filter(|(_, c)| c.kind == kind && c.joint == j);
             let mut tried = false;
             let mut distinct = false;
             for (c, candidate) in own {

@@ -69,7 +69,7 @@ pub use outcome::Diagnosis;
 pub use pull::Unburdened;
 pub(crate) use runs::runs_of_blocks;
 pub use runs::{JointRun, Run};
-pub(crate) use sentences::WHAT_FALLS;
+pub(crate) use sentences::what_falls;
 
 use rig_shared::effects::Kind;
 
@@ -135,7 +135,7 @@ pub enum DiagnoseError {
     },
     /// A recording without a voltage.
     #[error(
-        "{0} has no motor voltage; record u1, or duty1 with supply, or give recordings with torque or current."
+        "{0} has neither torque nor current (a column tau1 or i1), and no motor voltage to go by instead (u1, or duty1 with supply); record one of them, or give its column that name."
     )]
     NoVoltage(String),
     /// A scenario that cannot be made.

@@ -8,6 +8,7 @@ use rig_shared::multibody::{COLUMNS, column};
 
 use super::columns::Candidate;
 use super::profile::Profile;
+use super::refit::turn;
 use super::rows::Nominal;
 use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
@@ -138,15 +139,11 @@ fn turned(
         };
         sum += Vector3::from(*axis) * slope;
     }
-    let slope = sum.norm();
-    if slope == 0.0 {
-        return gravity;
-    }
     for k in moments {
-        values[k] *= slope.hypot(1.0);
+        values[k] *= sum.norm().hypot(1.0);
     }
-    let turn = Rotation3::from_scaled_axis(sum * (slope.atan() / slope));
-    (turn.inverse() * Vector3::from(gravity)).into()
+    let turned = Rotation3::from_scaled_axis(sum * turn(sum.as_slice()));
+    (turned.inverse() * Vector3::from(gravity)).into()
 }
 
 /// The effect as a table of the description, its values within what a description may hold.

@@ -482,12 +482,14 @@ impl Joint {
         let at = place(chosen, free, k);
         let fitted = (source.gains(&profile.candidate).into_iter().enumerate())
             .filter(|_| profile.followed.is_none());
+        let whole = profile.columns.len();
+        let turn = match kind {
+            Kind::GravityTilt => turn(&self.solution.values.as_slice()[at..at + whole]),
+            _ => 1.0,
+        };
         let gains = fitted.map(|(g, gain)| {
-            (
-                gain,
-                self.solution.values[at + g],
-                self.solution.std(at + g),
-            )
+            let (value, std) = (self.solution.values[at + g], self.solution.std(at + g));
+            (gain, turn * value, turn * std)
         });
         let shapes = (kind.about().shapes.iter().enumerate())
             .map(|(s, shape)| (*shape, profile.shapes[s], self.stds[k][s]));
@@ -502,6 +504,16 @@ impl Joint {
                 (parameter.name.to_owned(), value)
             })
             .collect()
+    }
+}
+
+/// Angle over slope of a tilted base: what is fitted is gravity across, of which the angle's tangent is a share.
+pub(super) fn turn(slopes: &[f64]) -> f64 {
+    let slope = slopes.iter().fold(0.0, |norm: f64, s| norm.hypot(*s));
+    if slope == 0.0 {
+        1.0
+    } else {
+        slope.atan() / slope
     }
 }
 

@@ -23,7 +23,7 @@ mod shadow;
 mod simplest;
 
 use kinds::depends_on_model;
-pub(super) use kinds::{is_first_law, is_gear, rivals};
+pub(super) use kinds::{is_first_law, is_friction, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
 

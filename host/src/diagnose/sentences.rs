@@ -20,8 +20,18 @@ const MOVED: f64 = 3.0;
 /// Times the RMS that the description leaves, from which on fitting again has made it worse.
 const WORSE: f64 = 1.1;
 
-/// What the residuals of the description and of the refitted description say.
-pub(crate) const WHAT_FALLS: &str = "What fitting the parameters again takes off a residual had come from wrong values; what it leaves above the noise floor comes from physics that the model does not have.";
+/// What the residuals of the description and of the refitted description say under a verdict.
+pub(crate) fn what_falls(verdict: Verdict) -> Option<&'static str> {
+    match verdict {
+        Verdict::Explained | Verdict::Remainder => Some(
+            "What fitting the parameters again takes off a residual had come from wrong values; what it leaves above the noise floor comes from physics that the model does not have.",
+        ),
+        Verdict::ParameterChange => Some(
+            "What fitting the parameters again takes off a residual had come from wrong values.",
+        ),
+        Verdict::NothingMissing | Verdict::DataFault => None,
+    }
+}
 
 fn number(x: f64) -> String {
     format_significant(x, 3)
@@ -79,19 +89,21 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     }
     words.extend(constant(d));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
-    if d.residual == Residual::Torque && !d.waterfall.is_empty() {
-        words.push(WHAT_FALLS.to_owned());
+    let worse = worse_refitted(d);
+    if d.residual == Residual::Torque && worse.is_none() && !d.waterfall.is_empty() {
+        words.extend(what_falls(d.verdict).map(str::to_owned));
     }
-    words.extend(worse_refitted(d));
+    words.extend(worse);
     words.extend(motion(d));
     if let Some(doubted) = d.remainder.as_ref().filter(|r| r.doubt) {
         words.push(doubted.text.clone());
     } else if let Some(remainder) = &d.remainder {
         words.push(format!(
-            "At joint {} an RMS of {} beyond the noise floor stays without a name, {} times the floor.",
+            "At joint {} {} {} RMS stay without a name; with noise, what is left is {} times the floor.",
             remainder.joint,
             number(remainder.rms),
-            format_significant(remainder.ratio, 2)
+            format_unit(&remainder.unit),
+            format_significant(remainder.ratio, 3)
         ));
     }
     for (lead, w) in d.torque_lead.iter().zip(&d.waterfall) {

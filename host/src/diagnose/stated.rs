@@ -20,8 +20,8 @@ use super::profile::Profile;
 use super::pull;
 use super::search::{is_gear, with};
 use crate::effects::{Effects, is_torque};
-use crate::report::format_significant;
-use crate::robot::{Placed, Robot, RobotEffect, title_of, unit_of};
+use crate::report::{format_significant, format_unit};
+use crate::robot::{JointKind, Placed, Robot, RobotEffect, title_of, unit_of};
 
 /// Standard deviations within which the recordings do not contradict a described gain.
 const AGREES: f64 = 3.0;
@@ -306,9 +306,12 @@ impl Stated {
                             if *taken_off { ", and was taken off the recordings" } else { "" }
                         ),
                     ),
-                    (Way::Free, Some(_)) => (
+                    (Way::Free, Some(now)) => (
                         Fate::FittedAgain,
-                        format!("The description's {what} stays, fitted again together with everything else."),
+                        format!(
+                            "The description's {what} stays, fitted again together with everything else.{}",
+                            changed(effect, now, joint.kind)
+                        ),
                     ),
                     (Way::Free | Way::GivenUp, _) => {
                         let values = effect.values().map(|(p, value)| {
@@ -393,6 +396,25 @@ pub(super) struct Now {
     pub(super) kind: Kind,
     /// As fitted.
     pub(super) parameters: BTreeMap<String, Value>,
+}
+
+/// What of a stated effect's values has changed, a sentence; empty where nothing has.
+fn changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
+    let changed: Vec<String> = (effect.values())
+        .filter_map(|(p, stated)| {
+            let value = now.parameters.get(p.name)?;
+            let unit = match unit_of(p, kind) {
+                unit if unit == "1" => String::new(),
+                unit => format!(" {}", format_unit(&unit)),
+            };
+            let [from, to] = [stated, value.value].map(|x| format_significant(x, 4));
+            (value.is_apart_from(stated)).then(|| format!("{} from {from} to {to}{unit}", p.name))
+        })
+        .collect();
+    match changed.as_slice() {
+        [] => String::new(),
+        list => format!(" Changed: {}.", list.join(", ")),
+    }
 }
 
 /// The place of a described effect in a library.

@@ -274,8 +274,6 @@ pub struct Plot {
     pub series: Vec<Series>,
     /// Labelled lines.
     pub markers: Vec<Marker>,
-    /// Ordinates that the figure reaches at least, whatever is drawn; figures that are compared share them.
-    pub reach: Option<[f64; 2]>,
     /// One unit of x as long as one unit of y, for ellipses and paths. Linear axes only.
     pub equal_aspect: bool,
     /// Number of samples, RMS, the command that made it. May be empty.
@@ -296,7 +294,6 @@ impl Plot {
             y,
             series: Vec::new(),
             markers: Vec::new(),
-            reach: None,
             equal_aspect: false,
             note: String::new(),
             height: Self::HEIGHT,

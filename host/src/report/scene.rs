@@ -337,7 +337,6 @@ fn ranges(plot: &Plot, series: &[Drawn<'_>]) -> Option<(Range, Range)> {
         };
         [value(&s.y), value(&s.low), value(&s.high), base]
     });
-    let y_values = y_values.chain(plot.reach.into_iter().flatten());
     let y = extent(y_values.chain(at(Direction::Horizontal)), plot.y.log)?;
     let named = |range: Range, names: &[String]| {
         if names.is_empty() {

@@ -287,15 +287,6 @@ fn equal_scales_draw_a_circle_round() {
 }
 
 #[test]
-fn a_figure_reaches_what_it_shares_with_others() {
-    let line = || Series::line("small", Role::Model, vec![0.0, 1.0], vec![-1.0, 1.0]);
-    let mut plot = Plot::new("small", Axis::default(), Axis::default()).with(line());
-    plot.reach = Some([-50.0, 70.0]);
-    let picture = svg(&plot).unwrap();
-    assert!(picture.contains("from \u{2212}57.2 to 77.2"), "{picture}");
-}
-
-#[test]
 fn what_does_not_fit_is_refused_with_its_place() {
     let ragged = Plot::new("torque", Axis::default(), Axis::default()).with(Series::line(
         "tau",

@@ -32,7 +32,7 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
     };
     assert_eq!(
         effect(1, &step),
-        "1. cogging at joint link, 50.0 % of the gap"
+        "1. cogging at joint link, 50.0 % of the gap before it"
     );
     step.set.push("torque_ripple".into());
     assert!(effect(2, &step).ends_with("; these data support as well: torque_ripple"));

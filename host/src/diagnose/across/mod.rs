@@ -197,6 +197,7 @@ impl Between<'_, '_> {
             let last = beside(equation, &base, &laws.found, None);
             let residual = last.residual(0);
             let floor = floor::from_repeats(rows, &equation.pairs, &residual, None, 0)
+                .map(|repeated| repeated.noise)
                 .unwrap_or_else(|| equation.short_time(&residual));
             let memory = floor::memory(rows, &[residual]);
             let solved = self.solved(&plain.clustered(memory, &equation.pairs), &base, &laws)?;

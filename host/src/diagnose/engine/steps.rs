@@ -1,5 +1,7 @@
 //! The steps of a result: what each effect is worth, which other names it may have.
 
+use rig_shared::effects::Kind;
+
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::change::Change;
 use crate::diagnose::descent::Descent;
@@ -70,9 +72,37 @@ pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
     }
 }
 
+/// A law that came in for another of its name, in whose round it was taken.
+fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile) {
+    let (kind, joint) = (
+        profile.candidate.kind,
+        &robot.joints[profile.candidate.joint].name,
+    );
+    let of_name: Vec<String> = (Kind::ALL.iter())
+        .filter(|other| other.about().name == kind.about().name)
+        .map(|other| title_of(*other))
+        .collect();
+    let first = (tried.iter().enumerate())
+        .filter(|(_, t)| t.joint == *joint && of_name.contains(&t.effect))
+        .max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
+    let Some((at, first)) = first else { return };
+    let (step, p_value) = (first.step, first.p_value);
+    tried[at].refused = "another law of that name does better".into();
+    let taken = Tried {
+        effect: title_of(kind),
+        joint: joint.clone(),
+        step,
+        gain: profile.evidence.gain,
+        gain_sigmas: profile.evidence.gain_sigmas,
+        p_value: profile.evidence.p_value.max(p_value),
+        refused: String::new(),
+    };
+    tried.insert(at, taken);
+}
+
 /// Brings what was said of each try in line with what stands in the end: what came in without a round of its own was taken, what
 /// is not there has fallen.
-pub(super) fn reconcile(robot: &Robot, tried: &mut [Tried], found: &[Profile]) {
+pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile]) {
     let is = |t: &Tried, p: &Profile| {
         t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
     };
@@ -82,7 +112,14 @@ pub(super) fn reconcile(robot: &Robot, tried: &mut [Tried], found: &[Profile]) {
         let best = own
             .max_by(|a, b| a.gain.total_cmp(&b.gain))
             .filter(|_| !stands);
-        best.into_iter().for_each(|t| t.refused.clear());
+        let mut other_law = false;
+        match best {
+            Some(best) => best.refused.clear(),
+            None => other_law = !stands,
+        }
+        if other_law {
+            took_over(robot, tried, profile);
+        }
     }
     for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {
         if !found.iter().any(|profile| is(fallen, profile)) {

@@ -19,6 +19,9 @@ const OF_INERTIA: usize = 2;
 /// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
 /// true gears of the emulated rig come out from 0.7 to 1.1.
 const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
+/// Amplitude of what an encoder on the joint may read wrongly, rad: half more than the catalogue has of any, 0.6 mm off centre on a ring
+/// of 20 mm radius. A larger one is a wave of something else, friction under load for one.
+const MOST_OF_AN_ENCODER: f64 = 0.03;
 /// What a name may leave more on recordings held back than the model without it: half of what the least of names takes away.
 const WORSE: f64 = 1.01;
 
@@ -53,6 +56,17 @@ pub(super) fn unbelieved(
     for k in found.clone().filter(couples) {
         if joint.of_nothing(chosen, free, k, OF_INERTIA) > SIGNIFICANT {
             let why = "what it takes away goes with the other joint's speed alone, and no inertia is shown";
+            return Ok(Some((k, why)));
+        }
+    }
+    let reads = |k: &usize| chosen[*k].candidate.kind == Kind::EncoderEccentricityJoint;
+    for k in found.clone().filter(reads) {
+        let amplitude = joint
+            .gains(chosen, free, k)
+            .iter()
+            .fold(0.0, |a: f64, g| a.hypot(*g));
+        if amplitude > MOST_OF_AN_ENCODER {
+            let why = "its encoder would have to be farther off its centre than any is";
             return Ok(Some((k, why)));
         }
     }

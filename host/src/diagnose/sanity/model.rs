@@ -106,6 +106,9 @@ impl<'a> Judge<'a> {
         if let Some(unit) = self.thousandfold(described) {
             return Ok(vec![unit]);
         }
+        if let Some(turned) = self.single_zero()? {
+            return Ok(vec![turned]);
+        }
         let mut found = Vec::new();
         for j in (0..n).filter(|j| self.stirs(*j)) {
             found.extend(self.against_description(j, described)?);

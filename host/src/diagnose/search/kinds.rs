@@ -1,12 +1,17 @@
 //! What a search asks of kinds and candidates.
 
-use rig_shared::effects::{Channel, Kind};
+use rig_shared::effects::{Channel, Direction, Kind};
 
 use crate::diagnose::columns::Candidate;
 
 /// Whether it acts between motor and link.
 pub(in crate::diagnose) fn is_gear(kind: Kind) -> bool {
     kind.about().channel == Channel::Transmission
+}
+
+/// Whether it is friction of a shape that the standard model's has not: a constant by direction is none.
+pub(in crate::diagnose) fn is_friction(kind: Kind) -> bool {
+    kind.about().direction == Direction::Dry && kind != Kind::AsymmetricCoulomb
 }
 
 /// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.

@@ -212,7 +212,8 @@ fn winding(
             size_at_worst: None,
             unit: about.gains[0].unit.to_owned(),
         });
-    let repeated = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0);
+    let repeated = floor::from_repeats(rows, &pairs, &last.residual(0), None, 0)
+        .map(|repeated| repeated.noise);
     let coordinates = training.coordinates();
     let places_of = |fit: &Fit, floor: f64| {
         let blocks = fit.block_of_rows();

@@ -1,8 +1,8 @@
 //! How large the gap is and where it sits.
 
 use super::{parts, words};
-use crate::diagnose::WHAT_FALLS;
 use crate::diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
+use crate::diagnose::what_falls;
 use crate::report::{
     Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
     format_significant,
@@ -68,7 +68,8 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
         .iter()
         .map(|model| match model.as_str() {
             "frozen description" => "as given".into(),
-            other => words::name(other),
+            "refitted" => "fitted again".into(),
+            effect => format!("+ {}", words::name(effect)),
         })
         .collect();
     let longest = short.iter().map(|m| m.chars().count()).max();
@@ -181,9 +182,9 @@ fn figures(found: &Diagnosis) -> Block {
             } else {
                 "RMS"
             },
-            match found.residual {
-                Residual::Torque => format!(" {WHAT_FALLS}"),
-                Residual::Position => String::new(),
+            match (found.residual, what_falls(found.verdict)) {
+                (Residual::Torque, Some(meaning)) => format!(" {meaning}"),
+                _ => String::new(),
             }
         ),
     })
@@ -265,30 +266,14 @@ const CROWDED: f64 = 0.2;
 /// Fewest bins of a figure of them.
 const FEWEST: usize = 8;
 
-/// Least and largest mean residual in all figures of a joint: what goes into one is seen against what is left in the next.
-fn reach(found: &Diagnosis, map: &Map) -> Option<[f64; 2]> {
-    let alike = |m: &&Map| m.joint == map.joint && m.residual_unit == map.residual_unit;
-    let ends = |m: &Map| -> Vec<f64> {
-        let bars = m.before.iter().chain(&m.after);
-        let bars = bars.flat_map(|[mean, half]| [mean - half, mean + half]);
-        bars.chain(m.law.iter().copied()).collect()
-    };
-    let all = (found.maps.iter().filter(alike).flat_map(ends)).filter(|v| v.is_finite());
-    all.fold(None, |reach, v| match reach {
-        None => Some([v; 2]),
-        Some([low, high]) => Some([low.min(v), high.max(v)]),
-    })
-}
-
 /// The mean residual over one coordinate, before and after, and the law that was fitted to it; its middle once more where bins crowd
 /// there.
-pub(super) fn maps(found: &Diagnosis, map: &Map) -> Vec<Plot> {
-    let reach = reach(found, map);
-    let whole = drawn(map, reach);
+pub(super) fn maps(map: &Map) -> Vec<Plot> {
+    let whole = drawn(map);
     let nearer = |m: &Map| closer(m).filter(|m| m.at.len() >= FEWEST);
     let close = std::iter::successors(nearer(map), nearer).last();
     let close = close.map(|close| {
-        let mut plot = drawn(&close, reach);
+        let mut plot = drawn(&close);
         plot.title = format!("{}, its middle", plot.title);
         plot.note = format!(
             "The {} bins of the figure before that are crowded in its middle.",
@@ -328,7 +313,7 @@ fn closer(map: &Map) -> Option<Map> {
     })
 }
 
-fn drawn(map: &Map, reach: Option<[f64; 2]>) -> Plot {
+fn drawn(map: &Map) -> Plot {
     let unit = parts::unit(&map.residual_unit);
     let bars = |name: &str, role, values: &[[f64; 2]]| {
         Series::new(
@@ -370,7 +355,6 @@ fn drawn(map: &Map, reach: Option<[f64; 2]>) -> Plot {
             map.law.clone(),
         ));
     }
-    plot.reach = reach;
     plot.mark(Marker::horizontal(0.0, "")).note(format!(
         "n = {} bins; bars are 95 % intervals of the mean.{}",
         map.at.len(),

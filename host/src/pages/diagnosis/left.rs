@@ -117,7 +117,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         .maps
         .iter()
         .filter(|m| m.step.is_none())
-        .flat_map(|m| gap::maps(found, m))
+        .flat_map(gap::maps)
         .map(Block::Plot)
         .collect();
     let Some(remainder) = &found.remainder else {
@@ -138,7 +138,7 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::warning(remainder.text.clone()))
     .with(Block::Text(format!(
-        "Joint {}: {} RMS beyond the noise; {} is {} times the noise floor.",
+        "Joint {}: {} RMS without a name; with noise, {} is {} times the noise floor.",
         remainder.joint,
         shown.value(remainder.rms),
         if remainder.of_a_voltage() {

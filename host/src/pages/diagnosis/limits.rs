@@ -77,7 +77,7 @@ pub(super) fn limits(found: &Diagnosis) -> Option<Section> {
     let mut section = Section::new(
         "limits",
         "What these data cannot show",
-        "Not found is not the same as not there. Some effects these data cannot show at all; others would have shown from some size on.",
+        "Not found is not the same as not there. Some effects these data cannot show, or only where they are large; others would have shown from some size on.",
     );
     if !found.not_testable.is_empty() {
         section = section.with(Block::Table(Table {

@@ -14,7 +14,7 @@ use super::{Context, parts};
 pub use pictures::{NAMES as PICTURE_NAMES, pictures};
 pub use words::verdict;
 
-use crate::diagnose::outcome::{Diagnosis, Verdict};
+use crate::diagnose::outcome::{Diagnosis, Remainder, Verdict};
 use crate::report::{
     Block, Column, Document, Fact, Section, Table, Tone, format_p_value, format_significant,
 };
@@ -128,7 +128,7 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
                 "Not testable",
                 words::several(limits::grouped(&found.not_testable).len(), "effect"),
             )
-            .note("these data cannot show them, if they are there"),
+            .note("these data cannot exclude them"),
         );
     }
     facts
@@ -168,6 +168,7 @@ fn opening(found: &Diagnosis) -> Section {
                     parts::percent(step.gap_closed),
                     format_p_value(step.p_value),
                     match words::rivals(step).len() {
+                        0 if doubted(found, &step.joint) => "see what is left".into(),
                         0 => "yes".into(),
                         n => format!("no: {} as good", words::several(n, "other name")),
                     },
@@ -176,6 +177,12 @@ fn opening(found: &Diagnosis) -> Section {
             .collect(),
         note: "Gap: what the residual's RMS lies above the noise floor. p: how often chance alone would look like this, corrected for all that was tried.".into(),
     }))
+}
+
+/// Whether what is left of a joint leaves it open that one of its names stands in for something else.
+fn doubted(found: &Diagnosis, joint: &str) -> bool {
+    let speaks = |left: &Remainder| left.joint == joint && left.doubt && !left.of_a_voltage();
+    found.remainder.as_ref().is_some_and(speaks)
 }
 
 fn faults(found: &Diagnosis) -> Option<Section> {

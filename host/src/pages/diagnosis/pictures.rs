@@ -5,25 +5,31 @@ use crate::diagnose::outcome::Diagnosis;
 use crate::report::Plot;
 
 /// What the names of the files begin with, in the order in which [`pictures`] gives them; a number from 1 and `.svg` follow.
-pub const NAMES: [&str; 2] = ["gap", "effect"];
+pub const NAMES: [&str; 3] = ["gap", "effect", "left"];
 
 /// Letters for which there is room below the axis of a picture of its own.
 const ROOM: usize = 92;
 
-/// The fall of the gap at each joint in which something was found, and the residual map of each effect that has one, its middle where
-/// the bins crowd there.
+/// The fall of the gap at each joint in which something was found or left (at all where nothing was), the residual map of each effect
+/// that has one, and that of what is left, each map's middle where its bins crowd there.
 pub fn pictures(found: &Diagnosis) -> Vec<(String, Plot)> {
-    let [gap, effect] = NAMES;
+    let [gap, effect, left] = NAMES;
+    let named = |kind: &str, k: usize| format!("{kind}-{}.svg", k + 1);
+    let remains = |joint: &str| found.remainder.as_ref().is_some_and(|r| r.joint == joint);
+    let speaks = |joint: &str| remains(joint) || found.steps.iter().any(|s| s.joint == joint);
+    let none = !found.waterfall.iter().any(|w| speaks(&w.joint));
     let joints = (found.waterfall.iter())
-        .filter(|w| found.steps.iter().any(|step| step.joint == w.joint))
+        .filter(|w| none || speaks(&w.joint))
         .enumerate()
-        .map(|(k, w)| (format!("{gap}-{}.svg", k + 1), gap::bars(found, w, ROOM)));
+        .map(|(k, w)| (named(gap, k), gap::bars(found, w, ROOM)));
     let effects = (0..found.steps.len()).filter_map(|k| {
         let map = found.maps.iter().find(|m| m.step == Some(k))?;
-        let mut plot = gap::maps(found, map).pop()?;
-        // Nothing stands beside it to share a scale with.
-        plot.reach = None;
-        Some((format!("{effect}-{}.svg", k + 1), plot))
+        Some((named(effect, k), gap::maps(map).pop()?))
     });
-    joints.chain(effects).collect()
+    let rest = (found.maps.iter())
+        .filter(|m| m.step.is_none() && remains(&m.joint))
+        .filter_map(|m| gap::maps(m).pop())
+        .enumerate()
+        .map(|(k, plot)| (named(left, k), plot));
+    joints.chain(effects).chain(rest).collect()
 }

@@ -36,18 +36,19 @@ pub(super) fn section(found: &Diagnosis, k: usize) -> Section {
             about.law.map_or(String::new(), |law| format!(", law {law}"))
         )));
     }
-    section.blocks.extend(
-        maps.iter()
-            .flat_map(|m| gap::maps(found, m))
-            .map(Block::Plot),
-    );
+    section
+        .blocks
+        .extend(maps.iter().flat_map(|m| gap::maps(m)).map(Block::Plot));
     if !step.parameters.is_empty() {
         section = section.with(parameters(step));
     }
     section
         .with(worth(found, step))
         .with(Block::Note {
-            kind: NoteKind::Good,
+            kind: match super::doubted(found, &step.joint) {
+                true => NoteKind::Info,
+                false => NoteKind::Good,
+            },
             text: format!(
                 "Why to believe it. {} The probability that chance alone looks like this, corrected for all that was tried: {}.",
                 step.why,
