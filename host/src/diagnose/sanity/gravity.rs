@@ -102,7 +102,7 @@ impl Judge<'_> {
         } else {
             let theta = joint.theta + off;
             format!(
-                "Gravity on joint {name} is strongest at q1 = {} rad, where the description has {} rad: the joint's zero, or the base, is turned by about {:.0} degrees against the description. With theta near {} it fits (in a URDF turn the joint's origin by its `rpy`).",
+                "Gravity on joint {name} is strongest at q1 = {} rad, where the description has {} rad: the joint's zero in this recording (`--home`), or the base, is turned by about {:.0} degrees against the description. With theta near {} it fits (in a URDF turn the joint's origin by its `rpy`).",
                 hundredths(strongest[0]),
                 hundredths(strongest[1]),
                 off.to_degrees(),
