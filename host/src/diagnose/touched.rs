@@ -10,6 +10,7 @@ use std::ops::Range;
 use super::bench::Loaded;
 use super::burst::burst;
 use super::floor;
+use super::rows::Rows;
 use super::runs::Run;
 use crate::report::format_significant;
 use crate::robot::Robot;
@@ -26,6 +27,22 @@ fn lasting(keep: &[bool], period: f64) -> Vec<bool> {
         .flat_map(|part| {
             let stands = !part[0] && part.len() as f64 * period >= LASTING;
             std::iter::repeat_n(stands, part.len())
+        })
+        .collect()
+}
+
+/// Rows of a run's first `length` at which its reference moves; all where it has none.
+fn asked(run: &Run, joint: usize, rows: &Rows, length: usize) -> Vec<bool> {
+    let period = rows.period;
+    let own = run.joints[joint].reference.as_ref();
+    (0..length)
+        .map(|k| {
+            let at = (rows.thinning.trimmed(run) + k as f64 * period) * run.rate;
+            let sample = |row: f64| (at + row * period * run.rate).max(0.0).round() as usize;
+            own.is_none_or(|r| match (r.get(sample(-0.5)), r.get(sample(0.5))) {
+                (Some(before), Some(after)) => before != after,
+                _ => false,
+            })
         })
         .collect()
 }
@@ -51,11 +68,16 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             // Where both come to rest a little earlier or later makes them differ, and is no touch.
             let resting =
                 starts.map(|start| lasting(&rows.keep[j][start..start + length], rows.period));
+            let asked = asked(&loaded.runs[a], j, rows, length);
+            let commanded = lasting(&asked, rows.period);
             let reach = (BESIDE / rows.period).ceil() as usize;
             let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
-                let at_rest = resting.iter().all(|rests| rests[near(k)].contains(&true));
+                let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
+                // Where a rest that is asked for begins or ends, each comes to stand on another side of its friction.
+                let stands = &commanded[near(k)];
+                let at_rest = rests || stands.contains(&true) && stands.contains(&false);
                 let known = known(a, k) || known(b, k);
                 keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
                 apart[x] = residual[x] - residual[y];
