@@ -58,7 +58,7 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
             let lacking = testable::not_testable(kind, found.robot, j, runs);
             if let Some(mut lacking) = lacking {
                 if own.count() > 0 {
-                    lacking.why += " It was tried all the same: a large one would show.";
+                    lacking.why += "; it was tried all the same, as a large one would show";
                 }
                 list.push(lacking);
                 continue;
