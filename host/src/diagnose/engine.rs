@@ -324,7 +324,7 @@ fn attempt(
             })
             .collect(),
     );
-    reconcile(robot, &mut tried, &chosen[described..]);
+    reconcile(robot, &mut tried, &chosen[described..], search.trials());
     let absorbed = |before: &[f64]| refit.absorbed(&bench, before, after);
     let (absorbed_before, absorbed) = if chosen.len() > described {
         let without = before.coefficients(&bench.anchor);

@@ -76,6 +76,7 @@ fn alike(a: &Run, b: &Run) -> bool {
 }
 
 /// What residuals of repeated runs of one motion say of a joint.
+#[derive(Clone, Copy)]
 pub(super) struct Repeated {
     /// What differs between them, over √2: noise, RMS.
     pub(super) noise: f64,

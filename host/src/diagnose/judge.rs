@@ -154,7 +154,10 @@ impl Judge<'_, '_> {
     pub(super) fn as_found(&self, chosen: Vec<Profile>) -> Judged {
         let fit = with(self.base, &chosen, None);
         // Of a play touches are loud, and so is what its law leaves of them.
-        let plays = |j: usize| chosen.iter().any(|p| is_play_of(p, j));
+        let plays = |j: usize| {
+            let gear = |p: &Profile| p.candidate.kind == Kind::Backlash && p.candidate.joint == j;
+            chosen.iter().any(gear)
+        };
         let bursts: Vec<Option<Burst>> = (0..self.rows.joints())
             .map(|j| (!plays(j)).then(|| self.burst(&fit, j)).flatten())
             .collect();
@@ -163,20 +166,26 @@ impl Judge<'_, '_> {
             let loud = bursts[j].as_ref().map_or(0.0, |burst| burst.share);
             (1.0 - loud).max(0.0).sqrt()
         };
-        let of_repeats = |counts, j: usize| {
-            let repeated = self.repeated(&fit.residual(j), counts, j);
-            repeated.map(|repeated| repeated.noise.max(self.rounding[j]))
-        };
+        let own: Vec<[Option<Repeated>; 2]> = (0..bursts.len())
+            .map(|j| {
+                let residual = fit.residual(j);
+                [None, fit.counts(j)].map(|counts| self.repeated(&residual, counts, j))
+            })
+            .collect();
+        let noise = |k: usize, j: usize| own[j][k].map(|own| own.noise.max(self.rounding[j]));
         let (floors, quiet): (Vec<f64>, Vec<f64>) = (0..bursts.len())
             .map(|j| {
                 (
-                    of_repeats(None, j).unwrap_or_else(|| fit.even_rms(j) * calm(j)),
-                    of_repeats(fit.counts(j), j).unwrap_or_else(|| fit.rms(j) * calm(j)),
+                    noise(0, j).unwrap_or_else(|| fit.even_rms(j) * calm(j)),
+                    noise(1, j).unwrap_or_else(|| fit.rms(j) * calm(j)),
                 )
             })
             .unzip();
         let left = (0..quiet.len())
-            .filter_map(|j| self.remainder_of(&fit, &chosen, j, quiet[j], bursts[j].as_ref()))
+            .filter_map(|j| {
+                let own = own[j][1].filter(|_| !plays(j));
+                self.remainder_of(&fit, &chosen, j, (quiet[j], own), bursts[j].as_ref())
+            })
             .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let much_left = (left.as_ref())
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
@@ -249,13 +258,13 @@ impl Judge<'_, '_> {
             .flatten()
     }
 
-    /// What is left of a joint beyond the floor and goes with the motion, or came and went.
+    /// What is left of a joint beyond the floor and goes with the motion, or came and went; `own` is what repeated runs say of it.
     fn remainder_of(
         &self,
         fit: &Fit,
         chosen: &[Profile],
         joint: usize,
-        floor: f64,
+        (floor, own): (f64, Option<Repeated>),
         burst: Option<&Burst>,
     ) -> Option<Remainder> {
         let repeated = !self.pairs.is_empty();
@@ -269,14 +278,10 @@ impl Judge<'_, '_> {
         }
         let [rms, noise] = if repeated {
             let explained = (self.base.rms(joint).powi(2) - rms * rms).max(0.0);
-            let own = chosen.iter().filter(|p| p.candidate.joint == joint);
-            let shadow = own.map(shadow).fold(0.0, f64::max) * explained;
+            let names = chosen.iter().filter(|p| p.candidate.joint == joint);
+            let shadow = names.map(shadow).fold(0.0, f64::max) * explained;
             let torque = floor::rms(&self.rows.torque[joint], &self.rows.keep[joint]);
             let besides = (TREATED * torque).powi(2) + shadow;
-            let residual = fit.residual(joint);
-            let plays = chosen.iter().any(|p| is_play_of(p, joint));
-            let own = self.repeated(&residual, fit.counts(joint), joint);
-            let own = own.filter(|_| !plays);
             let more = self.beyond_noise([rms, floor], own, besides, joint)?;
             (shown.is_some() || self.away_from_reversals(fit, chosen, joint)).then_some(more)?
         } else {
@@ -355,11 +360,6 @@ impl Judge<'_, '_> {
             beyond([left, noise.max(rounding)], BEYOND_OWN_FLOOR.max(chance))
         })
     }
-}
-
-/// Whether an effect is play of a joint's gear.
-fn is_play_of(profile: &Profile, joint: usize) -> bool {
-    profile.candidate.kind == Kind::Backlash && profile.candidate.joint == joint
 }
 
 /// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.

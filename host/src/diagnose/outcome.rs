@@ -67,13 +67,6 @@ pub struct Value {
 }
 
 impl Value {
-    /// Whether it is another value than a description states, by more than three standard deviations and one part in fifty, a whole
-    /// number by any.
-    pub(crate) fn is_apart_from(&self, stated: f64) -> bool {
-        let apart = (self.value - stated).abs();
-        apart > 3.0 * self.std && apart > 0.02 * stated.abs()
-    }
-
     /// With its standard deviation and `unit` behind it, or said not to be determined.
     pub(crate) fn said(&self, unit: &str) -> String {
         if self.std.is_infinite() {

@@ -20,9 +20,13 @@ const MOVED: f64 = 3.0;
 /// Times the RMS that the description leaves, from which on fitting again has made it worse.
 const WORSE: f64 = 1.1;
 
-/// What the residuals of the description and of the refitted description say under a verdict.
-pub(crate) fn what_falls(verdict: Verdict) -> Option<&'static str> {
-    match verdict {
+/// What the residuals of the description and of the refitted description say; none where fitting again has made the hold-out worse, or
+/// there is nothing to it.
+pub(crate) fn what_falls(d: &Diagnosis) -> Option<&'static str> {
+    if d.residual != Residual::Torque || d.waterfall.is_empty() || worse_refitted(d).is_some() {
+        return None;
+    }
+    match d.verdict {
         Verdict::Explained | Verdict::Remainder => Some(
             "What fitting the parameters again takes off a residual had come from wrong values; what it leaves above the noise floor comes from physics that the model does not have.",
         ),
@@ -89,11 +93,8 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
     }
     words.extend(constant(d));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
-    let worse = worse_refitted(d);
-    if d.residual == Residual::Torque && worse.is_none() && !d.waterfall.is_empty() {
-        words.extend(what_falls(d.verdict).map(str::to_owned));
-    }
-    words.extend(worse);
+    words.extend(what_falls(d).map(str::to_owned));
+    words.extend(worse_refitted(d));
     words.extend(motion(d));
     if let Some(doubted) = d.remainder.as_ref().filter(|r| r.doubt) {
         words.push(doubted.text.clone());

@@ -217,10 +217,7 @@ impl Stated {
         (self.effects.iter().zip(told)).any(|((effect, ..), now)| match now.fate {
             Fate::Dropped => true,
             Fate::FittedAgain => effect.values().any(|(p, stated)| {
-                now.parameters.get(p.name).is_some_and(|value| {
-                    let off = (value.value - stated).abs();
-                    off > CHANGED * stated.abs() && off > SURE * value.std
-                })
+                (now.parameters.get(p.name)).is_some_and(|value| is_another(value, stated))
             }),
             Fate::Held | Fate::InTheLink => false,
         })
@@ -310,7 +307,7 @@ impl Stated {
                         Fate::FittedAgain,
                         format!(
                             "The description's {what} stays, fitted again together with everything else.{}",
-                            changed(effect, now, joint.kind)
+                            what_changed(effect, now, joint.kind)
                         ),
                     ),
                     (Way::Free | Way::GivenUp, _) => {
@@ -398,8 +395,14 @@ pub(super) struct Now {
     pub(super) parameters: BTreeMap<String, Value>,
 }
 
+/// Whether a fitted value is another than the one stated, by more than noise and rounding.
+fn is_another(value: &Value, stated: f64) -> bool {
+    let off = (value.value - stated).abs();
+    off > CHANGED * stated.abs() && off > SURE * value.std
+}
+
 /// What of a stated effect's values has changed, a sentence; empty where nothing has.
-fn changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
+fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
     let changed: Vec<String> = (effect.values())
         .filter_map(|(p, stated)| {
             let value = now.parameters.get(p.name)?;
@@ -408,7 +411,7 @@ fn changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
                 unit => format!(" {}", format_unit(&unit)),
             };
             let [from, to] = [stated, value.value].map(|x| format_significant(x, 4));
-            (value.is_apart_from(stated)).then(|| format!("{} from {from} to {to}{unit}", p.name))
+            is_another(value, stated).then(|| format!("{} from {from} to {to}{unit}", p.name))
         })
         .collect();
     match changed.as_slice() {

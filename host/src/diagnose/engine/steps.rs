@@ -73,7 +73,7 @@ pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: 
 }
 
 /// A law that came in for another of its name, in whose round it was taken.
-fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile) {
+fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile, trials: usize) {
     let (kind, joint) = (
         profile.candidate.kind,
         &robot.joints[profile.candidate.joint].name,
@@ -86,7 +86,7 @@ fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile) {
         .filter(|(_, t)| t.joint == *joint && of_name.contains(&t.effect))
         .max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
     let Some((at, first)) = first else { return };
-    let (step, p_value) = (first.step, first.p_value);
+    let step = first.step;
     tried[at].refused = "another law of that name does better".into();
     let taken = Tried {
         effect: title_of(kind),
@@ -94,7 +94,7 @@ fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile) {
         step,
         gain: profile.evidence.gain,
         gain_sigmas: profile.evidence.gain_sigmas,
-        p_value: profile.evidence.p_value.max(p_value),
+        p_value: profile.evidence.corrected(trials),
         refused: String::new(),
     };
     tried.insert(at, taken);
@@ -102,23 +102,18 @@ fn took_over(robot: &Robot, tried: &mut Vec<Tried>, profile: &Profile) {
 
 /// Brings what was said of each try in line with what stands in the end: what came in without a round of its own was taken, what
 /// is not there has fallen.
-pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile]) {
+pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile], trials: usize) {
     let is = |t: &Tried, p: &Profile| {
         t.effect == title_of(p.candidate.kind) && t.joint == robot.joints[p.candidate.joint].name
     };
     for profile in found {
-        let stands = tried.iter().any(|t| t.refused.is_empty() && is(t, profile));
-        let own = tried.iter_mut().filter(|t| is(t, profile));
-        let best = own
-            .max_by(|a, b| a.gain.total_cmp(&b.gain))
-            .filter(|_| !stands);
-        let mut other_law = false;
-        match best {
-            Some(best) => best.refused.clear(),
-            None => other_law = !stands,
+        if tried.iter().any(|t| t.refused.is_empty() && is(t, profile)) {
+            continue;
         }
-        if other_law {
-            took_over(robot, tried, profile);
+        let own = tried.iter_mut().filter(|t| is(t, profile));
+        match own.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            Some(best) => best.refused.clear(),
+            None => took_over(robot, tried, profile, trials),
         }
     }
     for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {

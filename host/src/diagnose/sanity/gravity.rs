@@ -62,17 +62,14 @@ impl Judge<'_> {
         let Some(fit) = Fit::of(&matrix, &rows.tau[0], &order) else {
             return Ok(None);
         };
-        let at = [first + 2, first + 3];
-        let along = |direction: [f64; 2]| {
-            let mut weights = DVector::zeros(first + 4);
-            for (c, weight) in at.into_iter().zip(direction) {
-                weights[c] = weight;
-            }
-            fit.functional(&weights)
+        let [Some(a), Some(b)] = [first + 2, first + 3].map(|wave| fit.parameter(wave)) else {
+            return Ok(None);
         };
-        let [a, b] = [[1.0, 0.0], [0.0, 1.0]].map(|direction| along(direction).value);
+        let (a, b) = (a.value, b.value);
         let strength = a.hypot(b);
-        let across = along([-b / strength, a / strength]).std;
+        let mut sideways = DVector::zeros(first + 4);
+        (sideways[first + 2], sideways[first + 3]) = (-b / strength, a / strength);
+        let across = fit.functional(&sideways).std;
         // One wave: what it is anywhere follows from two places.
         let places = Rows {
             q: vec![vec![0.0, FRAC_PI_2]],

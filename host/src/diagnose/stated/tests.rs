@@ -62,6 +62,30 @@ fn described(robot: &Robot, effect: RobotEffect) -> Robot {
 }
 
 #[test]
+fn what_changed_of_an_effect_is_said_with_both_values() {
+    let value = |value: f64, std: f64, unit: &str| Value {
+        value,
+        std,
+        unit: unit.into(),
+    };
+    let now = |order: f64, cosine: f64| Now {
+        kind: Kind::Cogging,
+        parameters: [
+            ("order", value(order, 0.0, "1")),
+            ("cosine", value(cosine, 0.01, "N*m")),
+        ]
+        .map(|(name, value)| (name.to_owned(), value))
+        .into(),
+    };
+    let said = |now: &Now| what_changed(&wave(0.2), now, JointKind::Revolute);
+    assert_eq!(said(&now(9.0, 0.21)), "");
+    assert_eq!(
+        said(&now(12.0, 0.3)),
+        " Changed: cosine from 0.2000 to 0.3000 N·m, order from 9.000 to 12.00."
+    );
+}
+
+#[test]
 fn an_effect_that_was_found_is_begun_with_and_written_once() {
     let first = recorded(&[WAVE], 3, 40.0);
     let (before, model) = diagnosed(&first.robot, &first, without_gears());

@@ -182,10 +182,7 @@ fn figures(found: &Diagnosis) -> Block {
             } else {
                 "RMS"
             },
-            match (found.residual, what_falls(found.verdict)) {
-                (Residual::Torque, Some(meaning)) => format!(" {meaning}"),
-                _ => String::new(),
-            }
+            what_falls(found).map_or(String::new(), |meaning| format!(" {meaning}"))
         ),
     })
 }
