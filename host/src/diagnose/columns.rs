@@ -260,6 +260,12 @@ impl Source<'_> {
         Ok(all)
     }
 
+    /// The longest time that the joints have been running at the end of a recording, s.
+    pub(super) fn running(&self) -> f64 {
+        let ran = |run: &Run| run.t.last().map_or(0.0, |t| t - run.began);
+        self.runs.iter().map(ran).fold(0.0, f64::max)
+    }
+
     /// Coulomb friction of a joint, as identified; 0 where it came out below that.
     pub(super) fn coulomb(&self, joint: usize) -> f64 {
         self.friction(joint)[1].max(0.0)

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
-pub(super) use self::shapes::{grid, grid_on};
+pub(super) use self::shapes::{goes_straight, grid, grid_on, is_straight};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
@@ -425,8 +425,12 @@ impl Search<'_> {
         let [step, fine] = spacing(shape, scales.len());
         let middle = coordinate(shape, best.1[place]);
         let told = self.least_told(self.library[c].kind, self.library[c].joint);
-        let [least, most] = searched(shape, told).map(|bound| coordinate(shape, bound));
-        let (mut low, mut high) = ((middle - step).max(least), (middle + step).min(most));
+        let running = self.source.running();
+        let [least, most] =
+            searched(shape, told, running).map(|bound| coordinate(shape, bound));
+        // What is stated may lie beyond what these recordings tell.
+        let mut high = (middle + step).min(most);
+        let mut low = (middle - step).max(least).min(high);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let at = |x: f64, best: &mut Best| -> Result<f64, DiagnoseError> {
             let mut shapes = best.1;

@@ -18,7 +18,7 @@ use super::lead::slack;
 use super::locate::Coordinate;
 use super::model::weights;
 use super::outcome::{Absorbed, Value};
-use super::profile::Profile;
+use super::profile::{Profile, is_straight};
 use super::quiet::counts;
 use super::rows::{Column, Rows, combined};
 use super::search::{is_gear, with};
@@ -205,7 +205,8 @@ impl<'r> Refit<'r> {
                 let slope = slope(source, profile, place, shape, gains)?;
                 // A shape that changes nothing, or what others change as well, is not known.
                 stds[k][place] = f64::INFINITY;
-                if beside.push(&slope) {
+                let straight = is_straight(shape, profile.shapes[place], source.running());
+                if !straight && beside.push(&slope) {
                     slopes.push(slope);
                     places.push((k, place));
                 }

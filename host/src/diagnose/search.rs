@@ -9,7 +9,7 @@ use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::judge::equal;
-use super::profile::{LEAST_GAIN, Profile, grid, grid_on};
+use super::profile::{LEAST_GAIN, Profile, goes_straight, grid, grid_on};
 use super::rows::Column;
 use super::runs::{blurred, resolution};
 use super::waves;
@@ -122,10 +122,14 @@ impl<'a> Search<'a> {
     pub(super) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
         let joints = &self.source.robot.joints;
         // Of one joint such waves stand in for what the laws of others leave: of load friction, on the emulated rig.
-        if joints.len() == 1 {
-            return grid(candidate.kind);
-        }
-        grid_on(candidate.kind, &joints[candidate.joint])
+        let mut points = if joints.len() == 1 {
+            grid(candidate.kind)
+        } else {
+            grid_on(candidate.kind, &joints[candidate.joint])
+        };
+        let running = self.source.running();
+        points.retain(|point| !goes_straight(candidate.kind, point, running));
+        points
     }
 
     /// Columns of the points of a candidate's grid.

@@ -115,8 +115,8 @@ pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
 }
 
 /// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
-/// least that is `told`.
-pub(super) fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
+/// least that is `told`, nor a time constant beyond the time that the joints have been `running`.
+pub(super) fn searched(shape: &Parameter, told: f64, running: f64) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
         Scale::Logarithmic => {
@@ -125,7 +125,12 @@ pub(super) fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
             } else {
                 0.0
             };
-            [low.max(0.1 * least).max(told), high.min(10.0 * most)]
+            let most = if is_duration(shape) {
+                running.max(least)
+            } else {
+                10.0 * most
+            };
+            [low.max(0.1 * least).max(told), high.min(most)]
         }
         Scale::Linear | Scale::Whole => [low, high],
     }
@@ -135,7 +140,7 @@ pub(super) fn searched(shape: &Parameter, told: f64) -> [f64; 2] {
 /// gear only play is one.
 pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
     let shape = kind.about().shapes.first()?;
-    let least = (1.0 + AT_THE_END) * searched(shape, told)[0];
+    let least = (1.0 + AT_THE_END) * searched(shape, told, f64::INFINITY)[0];
     let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
     (counts && shapes[0] < least).then_some(shape.name)
 }
@@ -143,6 +148,27 @@ pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<
 /// Whether a shape is a way that the position shows.
 pub(super) fn is_distance(shape: &Parameter) -> bool {
     shape.unit == "rad"
+}
+
+/// Whether a shape is a time that goes by.
+fn is_duration(shape: &Parameter) -> bool {
+    shape.unit == "s"
+}
+
+/// Whether a shape is a time constant that has run to the time that the joints have been `running`: what happens by a longer one
+/// is a straight line, of which gain and time constant are one number.
+pub(in crate::diagnose) fn is_straight(shape: &Parameter, value: f64, running: f64) -> bool {
+    is_duration(shape) && value * (1.0 + AT_THE_END) > running
+}
+
+/// Whether one of a law's shapes is such a one.
+pub(in crate::diagnose) fn goes_straight(
+    kind: Kind,
+    shapes: &[f64; SHAPES],
+    running: f64,
+) -> bool {
+    let scales = kind.about().shapes.iter();
+    (scales.zip(shapes)).any(|(shape, value)| is_straight(shape, *value, running))
 }
 
 /// The value there, within what physics allows.
