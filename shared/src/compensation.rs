@@ -13,7 +13,7 @@
 //!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
 //!   is given for where the link will be when the torque acts ([`Now::lead`]).
 //! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
-//!   fed by the measured way it would close a loop of positive sign.
+//!   fed by the measured way it would close a loop of positive sign. Other dry friction goes the way that it does.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
 //! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a
@@ -83,6 +83,8 @@ pub struct State<T: Real> {
     /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
     /// each round, so that no rounding piles up.
     sums: [T; 3],
+    /// Of those that stand, what acts on the link, so that a gear transmits it: kept as the sums are.
+    on_link: T,
     turn: u8,
     given: Given<T>,
 }
@@ -123,6 +125,7 @@ impl<T: Real> State<T> {
         self.planned = [T::ZERO; EFFECTS];
         self.sliding = [T::ZERO; EFFECTS];
         self.sums = [T::ZERO; 3];
+        self.on_link = T::ZERO;
         self.memories = [[Memory::default(); 2]; EFFECTS];
         self.turn = 0;
         self.given = Given::default();
@@ -161,6 +164,8 @@ pub struct Compensation<T> {
     waves: Waves<T>,
     /// Some effect depends on the transmitted torque.
     needs_load: bool,
+    /// The effect of presliding, through whose contact other dry friction acts.
+    contact: Option<u8>,
 }
 
 impl<T: Scalar> Compensation<T> {
@@ -175,6 +180,9 @@ impl<T: Scalar> Compensation<T> {
             let checked = Compensated::new(*effect)?;
             all.effects[k] = Some(checked);
             all.needs_load |= effect.kind == Kind::LoadFriction;
+            if effect.kind.is_presliding() {
+                all.contact = Some(k as u8);
+            }
             match checked.role {
                 Role::Dry => {
                     all.add(k, all.dry, false);
@@ -328,6 +336,25 @@ impl<T: Scalar> Compensation<T> {
             sum(&mut state.planned.iter().rev().take(standing)),
             sum(&mut state.sliding.iter().take(dry)),
         ];
+        let value = |job: &Job| {
+            let one = self.effects.get(usize::from(job.effect))?.as_ref()?;
+            let counts = one.role == Role::Standing && one.effect.kind.on_the_link();
+            counts.then(|| state.planned.get(usize::from(job.place)).copied())?
+        };
+        let jobs = self.jobs.iter().take(usize::from(self.count));
+        state.on_link = (jobs.filter_map(value)).fold(T::ZERO, |sum, one| sum + one);
+    }
+
+    /// How far the contact is bent through which a law acts; none where nothing bends it.
+    #[inline(always)]
+    fn bent(&self, state: &State<T>, job: &Job) -> Option<T> {
+        let contact = usize::from(self.contact?);
+        let effect = |k: usize| self.effects.get(k)?.as_ref().map(|one| &one.effect);
+        if !effect(usize::from(job.effect))?.kind.acts_through_contact() {
+            return None;
+        }
+        let [planned, sliding] = state.memories.get(contact)?;
+        Some(effect(contact)?.bent(if job.sliding { sliding } else { planned }))
     }
 
     #[inline(always)]
@@ -349,6 +376,7 @@ impl<T: Scalar> Compensation<T> {
             0
         };
         let k = usize::from(job.effect);
+        let bent = self.bent(state, job);
         let (Some(Some(one)), Some([planned, sliding])) =
             (self.effects.get(k), state.memories.get_mut(k))
         else {
@@ -383,9 +411,14 @@ impl<T: Scalar> Compensation<T> {
             };
             (&mut state.planned, planned)
         };
-        let nowhere = one.role == Role::Standing && !now.placed;
         // Of dry friction nothing is given where nothing moves or is to, whatever a law remembers.
         let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
+        if let Some(bent) = bent {
+            instant.direction = bent;
+        }
+        instant.friction = now.friction(instant.velocity, instant.direction);
+        instant.load += state.on_link;
+        let nowhere = one.role == Role::Standing && !now.placed;
         let torque = if nowhere {
             T::ZERO
         } else {
@@ -398,7 +431,11 @@ impl<T: Scalar> Compensation<T> {
             _ => 0,
         };
         if let Some(place) = place.get_mut(usize::from(job.place)) {
-            state.sums[sum] += torque - *place;
+            let change = torque - *place;
+            state.sums[sum] += change;
+            if one.role == Role::Standing && one.effect.kind.on_the_link() {
+                state.on_link += change;
+            }
             *place = torque;
         }
         if state.turn == 0 {

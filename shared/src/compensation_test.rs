@@ -217,6 +217,8 @@ fn every_kind_is_either_refused_by_name_or_finite_whatever_comes() {
                         angle_in_turn: value,
                         drive_torque: value,
                         load: value,
+                        coulomb: value,
+                        viscous: value,
                         time: value,
                         warming: value,
                         reference: Reference {

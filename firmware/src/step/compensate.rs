@@ -36,6 +36,8 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
         turns: state.tick & 1 != 0,
         drive_torque: state.drive_torque,
         load: 0.0,
+        coulomb: state.settings.friction.coulomb,
+        viscous: state.settings.friction.viscous,
         // To a tenth of a second, without the conversion of a 64-bit number.
         time: (state.tick >> 10) as u32 as f32 * (1024.0 * state.derived.period),
         warming: state.warming,

@@ -216,6 +216,7 @@ impl<'a> Bench<'a> {
             free_constants: (0..self.robot.joints.len())
                 .map(|j| self.lets_constant_free(j))
                 .collect(),
+            bent: HashMap::new(),
             delays: vec![DELAY; self.robot.joints.len()],
             driven: Mutex::default(),
             seen: HashMap::new(),
@@ -271,6 +272,7 @@ impl<'a> Bench<'a> {
                 followed: None,
                 otherwise: None,
                 heard: false,
+                doubled: false,
             });
             all.extend(gains);
         }

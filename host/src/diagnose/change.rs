@@ -8,7 +8,7 @@ use rig_shared::multibody::column;
 use super::bench::Bench;
 use super::fit::Evidence;
 use super::outcome::Value;
-use super::profile::{LEAST_GAIN, SIGNIFICANT};
+use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
 use super::refit::Refit;
 use super::rows::{Column, combined};
 use super::solve::Solution;
@@ -187,6 +187,13 @@ pub(super) fn change(
         parameters: BTreeMap::new(),
         p_value: corrected(&whole),
     })
+}
+
+/// Whether inertia and gravity beside these effects have grown as a payload on a single link makes them.
+pub(super) fn is_loaded(bench: &Bench, refit: &Refit, chosen: &[Profile]) -> bool {
+    let prior = bench.anchor.prior_coefficients();
+    let grown = |after| payload(bench, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
+    refit.solution(chosen).is_ok_and(grown)
 }
 
 /// Mass and distance of a payload on a single link that changes gravity and inertia by a share of `least` at least, and the free

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
-use rig_shared::effects::{Channel, GAINS, Instant, Kind, MEMORY, Parameter, SHAPES, Scale};
+use rig_shared::effects::{
+    Channel, Effect, GAINS, Instant, Kind, MEMORY, Memory, Parameter, SHAPES, Scale,
+};
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 
 use super::DiagnoseError;
@@ -40,6 +42,9 @@ pub(super) struct Source<'a> {
     pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
+    /// How far the contacts of joints with presliding are bent, from −1 to 1, by run and joint: what all of their dry friction has in
+    /// the place of the direction.
+    pub(super) bent: HashMap<(usize, usize), Vec<f64>>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// What the recorded torque tells of gears whose links are followed, by run and joint.
@@ -61,9 +66,6 @@ pub(super) struct Candidate {
 
 /// Delay at which the column of a delay is taken until one is known, s: first order would be 2 % off at 3 Hz and 10 ms.
 pub(super) const DELAY: f64 = 0.002;
-
-/// Effects whose torque acts on the link: a gear between motor and link transmits it.
-const ON_THE_LINK: [Kind; 3] = [Kind::GravityTilt, Kind::Spring, Kind::InertiaCoupling];
 
 /// Effects beside which the torque of the drive is asked for with all that is in the model. To a ripple, which repeats with an
 /// angle, the nominal torque says enough; products of its wave with those of other effects bend to anything.
@@ -101,9 +103,20 @@ impl Source<'_> {
             }
             at += profile.columns.len();
         }
+        let mut at = 0;
+        for profile in chosen {
+            let own = &gains[at..at + profile.columns.len()];
+            at += own.len();
+            if profile.candidate.kind.is_presliding() {
+                for r in 0..self.runs.len() {
+                    let bent = self.bent(profile, own, r);
+                    self.bent.insert((r, profile.candidate.joint), bent);
+                }
+            }
+        }
         let asked = (chosen.iter()).any(|p| OF_THE_DRIVE.contains(&p.candidate.kind));
         for r in 0..self.runs.len() {
-            let load = self.sum(r, chosen, gains, &|kind| ON_THE_LINK.contains(&kind))?;
+            let load = self.sum(r, chosen, gains, &Kind::on_the_link)?;
             add(&mut self.predicted[r].load, &load);
             if !asked {
                 continue;
@@ -114,6 +127,24 @@ impl Source<'_> {
             self.saturate(r, chosen, gains)?;
         }
         Ok(self)
+    }
+
+    /// How far the contact of a joint with presliding is bent over a run.
+    fn bent(&self, profile: &Profile, gains: &[f64], r: usize) -> Vec<f64> {
+        let candidate = &profile.candidate;
+        let run = &self.runs[r];
+        let effect = Effect::new(candidate.kind, gains, &profile.shapes);
+        let mut memory = Memory::default();
+        let along = |velocity: &f64| {
+            let at = Instant {
+                velocity: *velocity,
+                period: 1.0 / run.rate,
+                ..Instant::default()
+            };
+            effect.torque(&mut memory, &at);
+            effect.bent(&memory)
+        };
+        (run.joints[candidate.joint].qd.iter()).map(along).collect()
     }
 
     /// Saturation in the predicted torque that its own law asks for. Where more than half of what a little more current would give
@@ -354,13 +385,15 @@ impl Source<'_> {
             (Kind::GravityTilt, _) => self.tilted(run),
             (_, Channel::Position) => {
                 let slopes = self.slopes(candidate.joint, r)?;
-                let errors = self.terms(candidate, shapes, run, predicted);
+                let errors = self.terms(candidate, shapes, run, predicted, None);
                 Ok((errors.iter().take(gains))
                     .map(|error| slopes.misread(error, 1.0 / run.rate))
                     .collect())
             }
             _ => {
-                let terms = self.terms(candidate, shapes, run, predicted);
+                let bent = (self.bent.get(&(r, candidate.joint)))
+                    .filter(|_| candidate.kind.acts_through_contact());
+                let terms = self.terms(candidate, shapes, run, predicted, bent);
                 Ok(terms.into_iter().take(gains).map(own).collect())
             }
         };
@@ -374,12 +407,14 @@ impl Source<'_> {
         shapes: &[f64; SHAPES],
         run: &Run,
         predicted: &Predicted,
+        bent: Option<&Vec<f64>>,
     ) -> Vec<Vec<f64>> {
         let joint = &run.joints[candidate.joint];
         let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
         let load = &predicted.load[candidate.joint];
         let drive = &predicted.torque[candidate.joint];
+        let [viscous, coulomb] = self.friction(candidate.joint);
         let first_temperature = joint
             .temperature
             .as_ref()
@@ -389,18 +424,20 @@ impl Source<'_> {
         let mut out = vec![Vec::with_capacity(run.len()); gains];
         let mut memory = [0.0; MEMORY];
         for k in 0..run.len() {
+            let direction = match bent {
+                Some(bent) => bent[k],
+                None if joint.qd[k] == 0.0 => 0.0,
+                None => joint.qd[k].signum(),
+            };
             let at = Instant {
                 position: joint.q[k],
                 velocity: joint.qd[k],
                 acceleration: joint.qdd[k],
-                direction: if joint.qd[k] == 0.0 {
-                    0.0
-                } else {
-                    joint.qd[k].signum()
-                },
+                direction,
                 motor_angle: ratio * joint.q[k],
                 drive_torque: drive[k],
                 load: load[k],
+                friction: coulomb * direction + viscous * joint.qd[k],
                 time: run.t[k] - run.began,
                 warming: joint
                     .temperature

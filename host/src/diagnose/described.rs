@@ -6,7 +6,8 @@
 use rig_shared::effects::Kind;
 
 use super::DiagnoseError;
-use super::anchor::Anchor;
+use super::bench::Bench;
+use super::change::is_loaded;
 use super::judge::{BEYOND_FLOOR, Judge, Judged, equal};
 use super::profile::{Profile, stiff};
 use super::refit::Refit;
@@ -26,13 +27,14 @@ const STANDS: f64 = 2.0;
 pub(super) fn by_description(
     judge: &Judge,
     refit: &Refit,
-    anchor: &Anchor,
+    bench: &Bench,
     judged: Judged,
 ) -> Result<Judged, DiagnoseError> {
-    if !anchor.stated {
+    // A load on the link is in its inertia as well, where no other name has a say: the description is no witness then.
+    if !bench.anchor.stated || is_loaded(bench, refit, &judged.chosen) {
         return Ok(judged);
     }
-    let frozen = refit.frozen(anchor);
+    let frozen = refit.frozen(&bench.anchor);
     let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
     // Where gravity is as described, a spring that it could hide behind shows.
     let stands = |rival: &Profile, list: &[Profile], k: usize| {

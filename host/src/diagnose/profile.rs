@@ -30,6 +30,10 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 pub(super) const LEAST_GAIN: f64 = 0.02;
 /// … and that many standard deviations of it.
 const LEAST_SIGMAS: f64 = 2.0;
+/// … beside its double, which takes nearly all of it away: what no model without it would leave, for neither has another form …
+const LEAST_GAIN_BESIDE_ITS_DOUBLE: f64 = 0.0075;
+/// … and in standard deviations of so little.
+const LEAST_SIGMAS_BESIDE_ITS_DOUBLE: f64 = 3.0;
 /// What takes away this share of the RMS is no chance, whatever it is called: a link that is driven by the noise of a motion with
 /// rests took a fifth where nothing was missing.
 const MUCH: f64 = 0.3;
@@ -80,6 +84,8 @@ pub(super) struct Profile {
     pub(super) vanished: Option<&'static str>,
     /// Whether it is a play whose link follows the recorded torque by far better.
     pub(super) heard: bool,
+    /// Whether its double is in the model: what is nearly the same function of the motion, and of one form alone.
+    pub(super) doubled: bool,
     /// Of a gear whose link is followed from the recorded torque. Its columns are then a known torque, whose gains are 1.
     pub(super) followed: Option<Followed>,
     /// Of a gear, the shapes by the other of two ways, where it was seen both by the motor's motion alone and with its link
@@ -140,6 +146,8 @@ impl Profile {
         };
         let least = if much {
             LEAST_SIGMAS_OF_MUCH
+        } else if self.doubled && e.joint_gain < LEAST_GAIN {
+            LEAST_SIGMAS_BESIDE_ITS_DOUBLE
         } else {
             LEAST_SIGMAS
         };
@@ -156,9 +164,11 @@ impl Profile {
             && e.gain_sigmas >= CLEAR_SIGMAS
     }
 
-    fn least_gain(&self) -> f64 {
+    pub(super) fn least_gain(&self) -> f64 {
         if self.heard {
             LEAST_GAIN_OF_HEARD
+        } else if self.doubled {
+            LEAST_GAIN_BESIDE_ITS_DOUBLE
         } else if is_gear(self.candidate.kind) {
             LEAST_GAIN_OF_GEARS
         } else {
@@ -302,6 +312,7 @@ impl Search<'_> {
             evidence,
             vanished,
             heard: self.heard.contains(&self.library[c]),
+            doubled: false,
             followed: None,
             otherwise: None,
         }))
@@ -426,8 +437,7 @@ impl Search<'_> {
         let middle = coordinate(shape, best.1[place]);
         let told = self.least_told(self.library[c].kind, self.library[c].joint);
         let running = self.source.running();
-        let [least, most] =
-            searched(shape, told, running).map(|bound| coordinate(shape, bound));
+        let [least, most] = searched(shape, told, running).map(|bound| coordinate(shape, bound));
         // What is stated may lie beyond what these recordings tell.
         let mut high = (middle + step).min(most);
         let mut low = (middle - step).max(least).min(high);

@@ -5,7 +5,7 @@
 use rand::{RngExt, SeedableRng};
 
 use super::locate::SINCE_START;
-use super::outcome::{Before, Verdict};
+use super::outcome::{Before, Step, Verdict};
 use super::scenario::{Effect, Intrusion, Made, Noise, Scenario};
 use super::{Diagnosis, Options};
 use crate::data::Block;
@@ -218,6 +218,106 @@ fn a_constant_that_changes_between_two_runs_is_said_and_is_no_noise() {
         left.text
             .contains("more are left on average in repeat than in train")
     );
+}
+
+/// A quarter of the emulated rig's friction is the link's, and its gear carries that as well. Without it a twelfth of the noise and
+/// more stayed, beside the right name.
+#[test]
+fn a_gear_carries_the_links_friction_beside_its_load() {
+    let made = Scenario::short([Effect::LoadFriction { ratio: 0.14 }], 42)
+        .make()
+        .unwrap();
+    let (found, _) = diagnosed(&made);
+    assert_eq!(names(&found), ["load_friction"], "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
+    let parameters = &found.steps[0].parameters;
+    let [coefficient, share] = ["coefficient", "link_friction"].map(|name| parameters[name].value);
+    assert!((coefficient / 0.14 - 1.0).abs() < 0.03, "{coefficient}");
+    assert!((share - 0.25).abs() < 0.05, "{share}");
+}
+
+/// All dry friction of the emulated rig acts through one contact: with friction that turns round at once under load its coefficient
+/// came out a sixth too small (seed 3911).
+#[test]
+fn friction_under_load_builds_up_with_presliding() {
+    let hidden = [
+        Effect::Presliding { stroke: 0.015 },
+        Effect::LoadFriction { ratio: 0.1 },
+    ];
+    let made = Scenario::short(hidden, 46).make().unwrap();
+    let (found, _) = diagnosed(&made);
+    let mut named = names(&found);
+    named.sort_unstable();
+    assert_eq!(named, ["load_friction", "presliding"], "{:?}", found.words);
+    let load = found.steps.iter().find(|s| s.effect == "load_friction");
+    let coefficient = load.unwrap().parameters["coefficient"].value;
+    assert!((coefficient / 0.1 - 1.0).abs() < 0.06, "{coefficient}");
+}
+
+/// Over a motion both are one constant; friction under load is carried by the one and not by the other.
+#[test]
+fn friction_under_load_tells_a_constant_on_the_link_from_one_of_the_sensor() {
+    let load = Effect::LoadFriction { ratio: 0.14 };
+    let sides = [
+        (Effect::TorqueOffset { torque: 0.3 }, true),
+        (Effect::CurrentOffset { current: 0.12 }, false),
+    ];
+    for (constant, on_the_link) in sides {
+        let made = Scenario::short([constant, load], 43).make().unwrap();
+        let (found, _) = diagnosed(&made);
+        assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
+        let mut steps = found.steps.iter();
+        let constant = steps.find(|s| s.effect != "load_friction").unwrap();
+        let side = |name: &str| match name {
+            "torque_offset" => Some(true),
+            "current_offset" | "asymmetric_coulomb" => Some(false),
+            _ => None,
+        };
+        assert_eq!(
+            side(&constant.effect),
+            Some(on_the_link),
+            "{:?}",
+            found.words
+        );
+        let mut sides = constant.set.iter().filter_map(|name| side(name));
+        assert!(sides.all(|side| side == on_the_link), "{:?}", constant.set);
+        assert_eq!(found.steps.len(), 2, "{:?}", found.words);
+    }
+}
+
+/// Over most motions a constant and a tilt are nearly one function: what the second takes off beside the first is little, and no model
+/// without it would leave that.
+#[test]
+fn a_constant_and_a_tilt_together_are_both_named() {
+    let hidden = [
+        Effect::AsymmetricCoulomb { difference: -0.12 },
+        Effect::GravityTilt { angle: 0.04 },
+    ];
+    let made = Scenario::short(hidden, 44).make().unwrap();
+    let (found, _) = diagnosed(&made);
+    assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
+    assert_eq!(names(&found).len(), 2, "{:?}", found.words);
+    for hidden in hidden {
+        let named = |step: &Step| step.set.iter().any(|name| name == hidden.name());
+        assert!(found.steps.iter().any(named), "{:?}", found.words);
+    }
+}
+
+/// A payload changes gravity as a spring would; inertia says which of them it is.
+#[test]
+fn a_constant_beside_a_payload_is_no_spring() {
+    let hidden = [
+        Effect::TorqueOffset { torque: -0.11 },
+        Effect::Payload {
+            mass: 0.2,
+            distance: 0.33,
+        },
+    ];
+    let made = Scenario::short(hidden, 45).make().unwrap();
+    let (found, _) = diagnosed(&made);
+    let named = names(&found);
+    assert!(named.contains(&"payload"), "{named:?}");
+    assert!(!named.contains(&"spring") && named.len() == 2, "{named:?}");
 }
 
 /// Friction that falls has no mean of its own over both directions: by direction it is most of what is left.

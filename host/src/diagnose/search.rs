@@ -20,10 +20,11 @@ mod begin;
 mod kinds;
 mod pairs;
 mod shadow;
+mod side;
 mod simplest;
 
-use kinds::depends_on_model;
-pub(super) use kinds::{is_first_law, is_friction, is_gear, rivals};
+use kinds::{depends_on_model, doubles};
+pub(super) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
 
@@ -54,6 +55,8 @@ pub(super) struct Search<'a> {
     blurred: Vec<f64>,
     /// Lowest to highest position, joint by joint, rad or m.
     spans: Vec<f64>,
+    /// Constants of which a gear has told on which side of it they act.
+    sided: Vec<Candidate>,
     /// What the last search had to drop.
     dropped: Vec<Candidate>,
     /// A play that it all but took.
@@ -86,6 +89,7 @@ impl<'a> Search<'a> {
             described,
             measured: Vec::new(),
             settled: Vec::new(),
+            sided: Vec::new(),
             dropped: Vec::new(),
             nearly: None,
             heard: Vec::new(),
@@ -107,9 +111,14 @@ impl<'a> Search<'a> {
 
     /// Takes a source with another model's predictions; columns that depend on them are forgotten.
     fn renewed(&mut self, source: Source<'a>) {
+        // Where presliding has come in, or has gone, all other dry friction goes with it.
+        let slid = !(self.source.bent.is_empty() && source.bent.is_empty());
         self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.retain(|c, _| !depends_on_model(self.library[*c].kind));
+        cache.retain(|c, _| {
+            let kind = self.library[*c].kind;
+            !(depends_on_model(kind) || slid && kind.acts_through_contact())
+        });
     }
 
     /// Whether the motion spans a candidate with these shapes where it is a wave.
@@ -179,6 +188,9 @@ impl<'a> Search<'a> {
         .into_iter()
         .filter_map(Result::transpose)
         .collect::<Result<Vec<_>, _>>()?;
+        for profile in &mut profiles {
+            profile.doubled = present.iter().any(|p| doubles(p, &profile.candidate));
+        }
         profiles.sort_by(|a, b| {
             b.evidence
                 .gain
@@ -254,6 +266,7 @@ impl<'a> Search<'a> {
                 self.refine_all(base, &mut chosen)?;
             }
             chosen.retain(|profile| profile.vanished.is_none());
+            self.sides(base, &mut chosen, renew)?;
             let place = chosen.iter().position(|p| p.candidate == newcomer);
             if let Some(i) = place
                 && let Some(smaller) = self.smaller(base, &chosen, i, &profiles, trials)?
@@ -273,6 +286,7 @@ impl<'a> Search<'a> {
             }
         }
         self.other_laws(base, &mut chosen)?;
+        self.springs(base, &mut chosen, trials)?;
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
         self.dropped = impossible;
         Ok(chosen)
@@ -410,7 +424,8 @@ impl<'a> Search<'a> {
             let fit = with(base, chosen, Some(i));
             let c = (self.library.iter()).position(|l| *l == chosen[i].candidate);
             let Some(c) = c else { continue };
-            if let Some(better) = self.profile(&fit, c, Some(chosen[i].shapes))? {
+            if let Some(mut better) = self.profile(&fit, c, Some(chosen[i].shapes))? {
+                better.doubled = (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
                 chosen[i] = better;
             } else {
                 // No column of its own any more, or only with signs that cannot be.

@@ -4,7 +4,7 @@ use rig_shared::effects::{Kind, Memory};
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
 use rig_shared::scalar::Real as _;
 
-use super::{Effects, State, at_the_link, is_torque, outruns, shifted};
+use super::{Effects, State, Turn, is_torque, outruns, shifted};
 use crate::data::{Block, JointColumns};
 use crate::prepare::{
     LowPass, Piece, PrepareError, Recording, Treatment, central_difference, each_piece, later,
@@ -238,31 +238,49 @@ impl Compensated<'_> {
                     - p[column::OFFSET]
             })
             .collect();
-        for (k, p) in placed.iter().enumerate() {
-            let kind = p.effect.kind;
-            if !is_torque(kind) || kind == Kind::LoadFriction {
-                continue;
-            }
-            if outruns(kind, &p.effect.shapes, motor_velocity[p.joint], at.period) {
-                continue;
-            }
-            let mut instant = self.effects.instant(k, at);
-            instant.direction = at.qd[p.joint].sgn();
-            let torque = p.effect.torque(&mut memory[k], &instant);
-            sum[p.joint] += torque;
-            if !at_the_link(kind) {
-                behind[p.joint] -= torque;
+        // How far the contact is bent where there is presliding, elsewhere the direction.
+        let mut slid: Vec<f64> = at.qd.iter().map(|speed| speed.sgn()).collect();
+        for turn in [Turn::Presliding, Turn::Others] {
+            for (k, p) in placed.iter().enumerate() {
+                let kind = p.effect.kind;
+                if !is_torque(kind) || Turn::of(kind) != turn {
+                    continue;
+                }
+                if outruns(kind, &p.effect.shapes, motor_velocity[p.joint], at.period) {
+                    continue;
+                }
+                let mut instant = self.effects.instant(k, at);
+                instant.direction = if kind.acts_through_contact() {
+                    slid[p.joint]
+                } else {
+                    at.qd[p.joint].sgn()
+                };
+                let torque = p.effect.torque(&mut memory[k], &instant);
+                if kind.is_presliding() {
+                    slid[p.joint] = p.effect.bent(&memory[k]);
+                }
+                sum[p.joint] += torque;
+                if !kind.on_the_link() {
+                    behind[p.joint] -= torque;
+                }
             }
         }
         for (j, behind) in behind.iter().enumerate() {
-            // What is left is load + c·|load|·direction.
-            let of = placed.iter();
-            let coefficient: f64 = of
-                .filter(|p| p.joint == j && p.effect.kind == Kind::LoadFriction)
-                .map(|p| p.effect.gains[0])
-                .sum();
-            let load = behind / (1.0 + coefficient * at.qd[j].sgn() * behind.sgn());
-            sum[j] += coefficient * load.abs() * at.qd[j].sgn();
+            // What is left is load + c·|carried|·direction, where carried is load + link_friction·friction. Of several such
+            // effects, which carry in one sense but about zero, the shares are weighed.
+            let of = placed.iter().map(|p| (p.joint, &p.effect));
+            let [coefficient, weighed] = of
+                .filter(|(joint, effect)| *joint == j && effect.kind == Kind::LoadFriction)
+                .map(|(_, effect)| [effect.gains[0], effect.gains[0] * effect.shapes[0]])
+                .fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+            if coefficient == 0.0 {
+                continue;
+            }
+            let direction = slid[j];
+            let friction = weighed / coefficient * self.effects.friction(j, at.qd[j], direction);
+            let both = behind + friction;
+            let carried = both / (1.0 + coefficient * direction * both.sgn());
+            sum[j] += coefficient * carried.abs() * direction;
         }
     }
 

@@ -28,7 +28,7 @@ pub struct Effects {
     /// For sentences.
     titles: Vec<String>,
     transmission: Transmission<f64>,
-    /// The description's own parameters, without payloads.
+    /// Parameters of the links and drives that they stand beside, without payloads: the description's own, or a model's.
     standard: Vec<[f64; COLUMNS]>,
     /// Payloads, one row a joint.
     loads: Vec<[f64; COLUMNS]>,
@@ -52,12 +52,27 @@ pub(crate) struct State<'a> {
     pub period: f64,
 }
 
-/// Whether the effect acts on the link, behind whatever the gear does.
-pub(crate) fn at_the_link(kind: Kind) -> bool {
-    matches!(
-        kind,
-        Kind::Spring | Kind::GravityTilt | Kind::InertiaCoupling
-    )
+/// Which of a joint's effects are worked out before which.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// How far its contact is bent is what other dry friction goes by.
+    Presliding,
+    /// What acts on the link is part of the load.
+    Others,
+    /// Goes by the load.
+    LoadFriction,
+}
+
+impl Turn {
+    pub(crate) const ALL: [Self; 3] = [Self::Presliding, Self::Others, Self::LoadFriction];
+
+    pub(crate) fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::LoadFriction => Self::LoadFriction,
+            _ if kind.is_presliding() => Self::Presliding,
+            _ => Self::Others,
+        }
+    }
 }
 
 /// Whether the effect is a torque of the joint that its law gives along a motion.
@@ -118,6 +133,12 @@ impl Effects {
         })
     }
 
+    /// The same beside other parameters than the description's, one row a joint.
+    pub(crate) fn beside(mut self, parameters: &[[f64; COLUMNS]]) -> Self {
+        self.standard = parameters.to_vec();
+        self
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
@@ -142,7 +163,13 @@ impl Effects {
         self.transmission.motor_position(q, out)
     }
 
-    /// What the law of effect `k` sees, load and direction left to the caller.
+    /// Dry and viscous friction of a joint at a velocity and in a direction, N·m.
+    pub(crate) fn friction(&self, joint: usize, velocity: f64, direction: f64) -> f64 {
+        let row = &self.standard[joint];
+        row[column::COULOMB] * direction + row[column::VISCOUS] * velocity
+    }
+
+    /// What the law of effect `k` sees; load, direction and friction are left to the caller.
     pub(crate) fn instant(&self, k: usize, at: &State<'_>) -> Instant<f64> {
         let Placed { joint, other, .. } = self.placed[k];
         Instant {

@@ -39,7 +39,7 @@ const TORQUES: [(Kind, &[f64], &[f64]); 18] = [
     (Kind::StribeckExponential, &[0.3], &[0.2]),
     (Kind::AsymmetricCoulomb, &[0.15], &[]),
     (Kind::QuadraticDrag, &[0.1], &[]),
-    (Kind::LoadFriction, &[0.15], &[]),
+    (Kind::LoadFriction, &[0.15], &[0.4]),
     (Kind::PositionFriction, &[0.15, 0.1], &[2.0]),
     (Kind::PreslidingDahl, &[0.35], &[0.02]),
     (Kind::PreslidingLugre, &[0.35, 0.4], &[0.02, 0.3, 0.1]),
@@ -112,6 +112,7 @@ fn books(robot: &Robot, dt: f64, seconds: f64) -> ([f64; 2], f64, f64) {
             motor_angle: 50.0 * middle,
             drive_torque: torque,
             load: load[0],
+            friction: fv * mean + fc * mean.sgn(),
             time: (k as f64 + 0.5) * dt,
             period: 0.5 * dt,
             ..Instant::default()
@@ -227,6 +228,40 @@ fn a_recording_with_each_effect_is_explained_by_it_and_by_nothing_less() {
         };
         let share = joints[0].position_rms_error / joints[0].tracking_rms;
         assert!(share < 0.02, "{kind:?}: {share}");
+    }
+}
+
+/// Simulation and what is taken off a recording are written apart; both bend the contact before other dry friction turns round.
+#[test]
+fn dry_friction_beside_presliding_turns_round_as_that_does() {
+    let contacts: [(Kind, &[f64], &[f64]); 2] = [
+        (Kind::PreslidingDahl, &[0.4], &[0.05]),
+        (Kind::PreslidingMaxwell, &[0.1, 0.1, 0.1, 0.1], &[0.08]),
+    ];
+    let others: [(Kind, &[f64], &[f64]); 3] = [
+        (Kind::LoadFriction, &[0.15], &[0.4]),
+        (Kind::PositionFriction, &[0.15, 0.1], &[2.0]),
+        (Kind::Stribeck, &[0.3], &[0.2]),
+    ];
+    for (contact, gains, shapes) in contacts {
+        let bent = with(rig(), contact, gains, shapes);
+        for (kind, gains, shapes) in others {
+            let robot = with(bent.clone(), kind, gains, shapes);
+            let recording = recorded(&robot);
+            let right = rms(&checked(&robot, &recording));
+            assert!(right < 0.02, "{contact:?} {kind:?}: {right}");
+            // The same friction at once, as it is where the contact is stiff: what the two differ by is seen.
+            let mut stiff = robot.clone();
+            stiff.effects[0].effect.shapes[0] = 1e-4;
+            let wrong = rms(&checked(&stiff, &recording));
+            let mut plain = bent.clone();
+            plain.effects[0].effect.shapes[0] = 1e-4;
+            let alone = rms(&checked(&plain, &recorded(&bent)));
+            assert!(
+                wrong > alone && right < 0.2 * wrong,
+                "{contact:?} {kind:?}: {right} {wrong} {alone}"
+            );
+        }
     }
 }
 

@@ -157,7 +157,10 @@ fn allowed(parameter: &Parameter) -> String {
         (false, true) => format!("at most {high}"),
         (true, true) => format!("{} and at most {high}", number(low)),
     };
-    format!("it must be {range}, in {}", parameter.unit)
+    match parameter.unit {
+        "1" => format!("it must be {range}"),
+        unit => format!("it must be {range}, in {unit}"),
+    }
 }
 
 impl RobotEffect {
@@ -225,6 +228,7 @@ impl RobotEffect {
         }
         let value = |p: &Parameter| {
             let number = match table.get(p.name) {
+                None if kind.optional().contains(&p.name) => Some(0.0),
                 Some(toml::Value::Float(x)) => Some(*x),
                 Some(toml::Value::Integer(x)) => Some(*x as f64),
                 _ => None,

@@ -124,6 +124,11 @@ fn faults_name_line_value_and_mend() {
             &["stiffness", "-900", "above 0"],
         ),
         (
+            "kind = 'load_friction'\ncoefficient = 0.1\nlink_friction = 1.5",
+            2,
+            &["link_friction", "1.5", "at least 0 and at most 1"],
+        ),
+        (
             "kind = 'load_friction'\ncoefficient = 1.5",
             1,
             &["1.5", "at least 0 and at most 1"],
@@ -176,6 +181,19 @@ fn faults_name_line_value_and_mend() {
 }
 
 #[test]
+fn the_share_that_a_gear_carries_may_be_left_out() {
+    let robot = with("kind = 'load_friction'\ncoefficient = 0.1").unwrap();
+    let effect = robot.effects[0].effect;
+    assert_eq!(effect, Effect::new(Kind::LoadFriction, &[0.1], &[0.0]));
+    for kind in Kind::ALL {
+        let shapes = kind.about().shapes;
+        for name in kind.optional() {
+            assert!(shapes.iter().any(|s| s.name == *name), "{kind:?} {name}");
+        }
+    }
+}
+
+#[test]
 fn what_is_refused_is_far_from_what_rigs_have() {
     for p in Kind::ALL.iter().flat_map(|kind| parameters(*kind)) {
         let [low, high] = sane(p);
@@ -213,7 +231,11 @@ fn table() -> String {
         let about = kind.about();
         let law = about.law.map_or(String::new(), |l| format!(" (`{l}`)"));
         let list: Vec<String> = parameters(*kind)
-            .map(|p| format!("`{}` {}: {}", p.name, p.unit, p.meaning))
+            .map(|p| {
+                let optional = kind.optional().contains(&p.name);
+                let missing = if optional { " (0 where missing)" } else { "" };
+                format!("`{}` {}: {}{missing}", p.name, p.unit, p.meaning)
+            })
             .collect();
         let cells = [about.title, about.equation, &list.join("; ")]
             .map(|cell| cell.replace('|', "\\|").replace('*', "\\*"));

@@ -3,7 +3,7 @@
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
 
 use super::SimulateError;
-use crate::effects::{Effects, State, at_the_link, is_torque};
+use crate::effects::{Effects, State, Turn, is_torque};
 
 /// Friction may be beyond zero by this share of itself: rounding.
 const SLACK: f64 = 1e-9;
@@ -22,6 +22,8 @@ pub(super) struct Acting<'a> {
     dry: Vec<[f64; 2]>,
     /// The part of that whose hidden state stands for the direction.
     remembered: Vec<[f64; 2]>,
+    /// How far the contact of each joint with presliding is bent.
+    bent: Vec<Option<f64>>,
 }
 
 impl<'a> Acting<'a> {
@@ -35,6 +37,7 @@ impl<'a> Acting<'a> {
             torque: vec![0.0; joints + usize::from(link.is_some())],
             dry: vec![[0.0; 2]; joints],
             remembered: vec![[0.0; 2]; joints],
+            bent: vec![None; joints],
         }
     }
 
@@ -75,7 +78,7 @@ impl<'a> Acting<'a> {
         );
         instant.other[2] = 0.0;
         if let Some(link) = self.link
-            && at_the_link(place.effect.kind)
+            && place.effect.kind.on_the_link()
         {
             (instant.position, instant.velocity) = (q[link], v[link]);
         }
@@ -97,32 +100,39 @@ impl<'a> Acting<'a> {
         self.effects
             .motor_angles(&motion[0][..joints], &mut self.motor)?;
         let mut load = links.to_vec();
-        // Friction under load last: what acts on the link is part of the load.
-        for last in [false, true] {
+        self.bent.fill(None);
+        for turn in Turn::ALL {
             for (k, p) in self.effects.placed().iter().enumerate() {
                 let kind = p.effect.kind;
-                if !is_torque(kind) || (kind == Kind::LoadFriction) != last {
+                if !is_torque(kind) || Turn::of(kind) != turn {
                     continue;
                 }
                 let mut instant = self.instant(k, motion, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
+                    let contact = self.bent[p.joint].filter(|_| kind.acts_through_contact());
                     for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
-                        instant.direction = direction;
-                        let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
+                        instant.direction = contact.unwrap_or(direction);
+                        instant.friction =
+                            (self.effects).friction(p.joint, instant.velocity, instant.direction);
+                        let mut memory = self.memory[k];
+                        let torque = p.effect.torque(&mut memory, &instant);
                         self.dry[p.joint][side] += torque;
-                        if kind.about().name == "presliding" {
+                        if kind.is_presliding() {
+                            self.bent[p.joint] = Some(p.effect.bent(&memory));
+                        }
+                        if kind.is_presliding() || contact.is_some() {
                             self.remembered[p.joint][side] += torque;
                         }
                     }
                     continue;
                 }
                 let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
-                match self.link.filter(|_| at_the_link(kind)) {
+                match self.link.filter(|_| kind.on_the_link()) {
                     Some(link) => self.torque[link] += torque,
                     None => self.torque[p.joint] += torque,
                 }
-                if at_the_link(kind) && self.link.is_none() {
+                if kind.on_the_link() && self.link.is_none() {
                     load[p.joint] += torque;
                 }
             }

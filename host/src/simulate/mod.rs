@@ -153,7 +153,7 @@ impl Model {
         mut parameters: Vec<[f64; COLUMNS]>,
         motors: Option<Motors>,
     ) -> Result<Self, SimulateError> {
-        let effects = Effects::of(robot)?;
+        let effects = Effects::of(robot)?.beside(&parameters);
         effects.add_loads(&mut parameters);
         Ok(Self {
             chain,

@@ -28,8 +28,12 @@ pub struct Now<T> {
     pub turns: bool,
     /// Torque that the drive gives, N·m.
     pub drive_torque: T,
-    /// Torque that the gear transmits, N·m.
+    /// Torque that the gear transmits, without that of effects, N·m.
     pub load: T,
+    /// Coulomb friction of the joint, N·m.
+    pub coulomb: T,
+    /// Viscous friction of the joint, N·m·s/rad.
+    pub viscous: T,
     /// Running time, s.
     pub time: T,
     /// Temperature above that at the start, K.
@@ -55,6 +59,12 @@ impl<T: Real> Now<T> {
         }
     }
 
+    /// Friction of the joint at a velocity and in a direction, N·m.
+    #[inline(always)]
+    pub(super) fn friction(&self, velocity: T, direction: T) -> T {
+        self.coulomb * direction + self.viscous * velocity
+    }
+
     /// At the reference's acceleration, at rest.
     #[inline(always)]
     pub(super) fn instant(&self, whole: bool) -> Instant<T> {
@@ -69,6 +79,7 @@ impl<T: Real> Now<T> {
             drive_rate: T::ZERO,
             gravity: T::ZERO,
             load: self.load,
+            friction: T::ZERO,
             time: self.time,
             warming: self.warming,
             other: [T::ZERO; 3],

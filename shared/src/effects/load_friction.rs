@@ -9,11 +9,12 @@ use crate::scalar::Real;
 pub(super) struct LoadFriction;
 
 impl Law for LoadFriction {
+    const OPTIONAL: &'static [&'static str] = &["link_friction"];
     const ABOUT: About = About {
         name: "load_friction",
         law: None,
         title: "friction that grows with the load",
-        equation: "coefficient · |load| · sgn q̇",
+        equation: "coefficient · |load + link_friction · friction| · sgn q̇",
         source: "Hamon, Gautier, Garrec 2010; Bittencourt and Gunnarsson 2012",
         channel: Channel::Torque,
         direction: Direction::Dry,
@@ -25,8 +26,15 @@ impl Law for LoadFriction {
             scale: Scale::Logarithmic,
             meaning: "friction per transmitted torque",
         }],
-        shapes: &[],
-        signature: "odd in velocity and proportional to the transmitted torque, whatever its sign",
+        shapes: &[Parameter {
+            name: "link_friction",
+            unit: "1",
+            bounds: [0.0, 1.0],
+            range: [0.0, 1.0],
+            scale: Scale::Linear,
+            meaning: "share of the joint's friction that acts on the link's side of the gear, which carries it as well",
+        }],
+        signature: "odd in velocity and proportional to the transmitted torque, whatever its sign; with friction on the link also more where the motor drives the load than where the load drives the motor",
         confused: &[
             Confusion {
                 with: "position_friction",
@@ -46,11 +54,12 @@ impl Law for LoadFriction {
         ],
         needs: &[Need::LoadRange(1.0), Need::Reversals(4)],
         compensable: true,
-        leaves_out: "different efficiencies for driving and being driven, a term with the square of the load",
+        leaves_out: "a term with the square of the load; what other effects add to the friction on the link's side",
     };
 
     #[inline(always)]
-    fn terms<T: Real>(_: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
-        [at.load.abs() * at.direction, T::ZERO, T::ZERO, T::ZERO]
+    fn terms<T: Real>(shapes: &[T; SHAPES], _: &mut [T; MEMORY], at: &Instant<T>) -> [T; GAINS] {
+        let carried = at.load + shapes[0] * at.friction;
+        [carried.abs() * at.direction, T::ZERO, T::ZERO, T::ZERO]
     }
 }

@@ -11,6 +11,7 @@ mod about;
 mod asymmetric_coulomb;
 mod backlash;
 mod cogging;
+mod contact;
 mod current_offset;
 mod drive_deadzone;
 mod encoder_eccentricity_joint;
@@ -73,6 +74,8 @@ pub struct Instant<T> {
     pub drive_rate: T,
     /// Torque that the gear transmits to the link, friction and the drive's own inertia taken off, N·m.
     pub load: T,
+    /// Dry and viscous friction of the joint as its model has them without effects, against positive motion, N·m.
+    pub friction: T,
     /// Torque of gravity per kg·m of first moment along x of the link's frame, m/s².
     pub gravity: T,
     /// Running time, s.
@@ -98,6 +101,8 @@ trait Law {
     const ABOUT: About;
     /// Of what it is a sinusoid, where it is one.
     const PERIODIC: Option<Periodic> = None;
+    /// Names of the shapes that a description may leave out; they are 0 then.
+    const OPTIONAL: &'static [&'static str] = &[];
 
     /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
     fn terms<T: Real>(
@@ -133,6 +138,13 @@ macro_rules! registry {
             pub const fn periodic(self) -> Option<Periodic> {
                 match self {
                     $(Self::$kind => <$module::$kind as Law>::PERIODIC),+
+                }
+            }
+
+            /// Names of the shapes that a description may leave out; they are 0 then.
+            pub const fn optional(self) -> &'static [&'static str] {
+                match self {
+                    $(Self::$kind => <$module::$kind as Law>::OPTIONAL),+
                 }
             }
 
@@ -256,6 +268,14 @@ impl Kind {
             Self::JointElasticity => Some(shapes[2]),
             _ => None,
         }
+    }
+
+    /// Whether its torque acts on the link: a gear transmits it, friction under load grows with it, and a shaft is twisted by it.
+    pub const fn on_the_link(self) -> bool {
+        matches!(
+            self,
+            Self::Spring | Self::GravityTilt | Self::InertiaCoupling | Self::TorqueOffset
+        )
     }
 
     /// The kind with this name and law, as a description writes them.

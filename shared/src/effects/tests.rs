@@ -32,6 +32,7 @@ fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
                 motor_angle: 25.0 * (pair[0] + pair[1]),
                 drive_torque: 2.0,
                 load: -3.0,
+                friction: 0.5 * velocity.sgn(),
                 time: k as f64 * period,
                 warming: 5.0,
                 period,
@@ -156,6 +157,7 @@ fn terms_beyond_the_gains_are_zero_and_no_gain_is_without_a_term() {
         drive_torque: 3.0,
         drive_rate: 7.0,
         load: 2.5,
+        friction: -0.4,
         gravity: 6.0,
         time: 40.0,
         warming: 8.0,
@@ -275,13 +277,13 @@ proptest! {
     ) {
         let at = Instant {
             position, velocity, acceleration: 3.0 * velocity, direction: velocity.sgn(), motor_angle: 50.0 * position,
-            drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, gravity: 9.0, time: 60.0,
+            drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, friction: 0.3 * velocity.sgn(), gravity: 9.0, time: 60.0,
             warming: 4.0, other: [0.1, velocity, -velocity], period: 1e-3,
         };
         let near = Instant {
             position: at.position as f32, velocity: at.velocity as f32, acceleration: at.acceleration as f32,
             direction: at.direction as f32, motor_angle: at.motor_angle as f32,
-            drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32,
+            drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32, friction: at.friction as f32,
             gravity: at.gravity as f32, time: at.time as f32, warming: at.warming as f32,
             other: at.other.map(|x| x as f32), period: at.period as f32,
         };
@@ -396,4 +398,67 @@ fn a_saturated_motor_is_the_textbook_torque_constant() {
     let lacking = effect.torque(&mut Memory::default(), &at);
     let got = constant * (1.0 - b * current * current) * current * ratio;
     assert!((at.drive_torque - lacking - got).abs() < 1e-12);
+}
+
+/// A gear carries the link's friction as well: where the motor drives the load that adds to it, where the load drives the motor it
+/// takes off.
+#[test]
+fn a_gear_that_carries_friction_loses_more_driving_than_driven() {
+    let (coefficient, share, dry, load) = (0.1, 0.25, 0.8, 3.0);
+    let lost = |direction: f64, share: f64| {
+        let at = Instant {
+            direction,
+            load,
+            friction: dry * direction,
+            ..Instant::default()
+        };
+        let law = Effect::new(Kind::LoadFriction, &[coefficient], &[share]);
+        law.torque(&mut Memory::default(), &at)
+    };
+    let [up, down] = [1.0, -1.0].map(|direction| lost(direction, share));
+    assert!((up - coefficient * (load + share * dry)).abs() < 1e-12);
+    assert!((down + coefficient * (load - share * dry)).abs() < 1e-12);
+    // With all friction before the gear both are alike.
+    assert!((lost(1.0, 0.0) + lost(-1.0, 0.0)).abs() < 1e-12);
+}
+
+/// From one direction to the other, evenly where all elements are alike, and no farther.
+#[test]
+fn a_contact_is_bent_from_one_direction_to_the_other() {
+    for kind in [
+        Kind::PreslidingDahl,
+        Kind::PreslidingLugre,
+        Kind::PreslidingMaxwell,
+    ] {
+        assert!(kind.is_presliding() && !kind.acts_through_contact());
+        let effect = example(kind);
+        let mut memory = Memory::default();
+        assert_eq!(effect.bent(&memory), 0.0);
+        let mut along = |velocity: f64, count: usize| -> Vec<f64> {
+            let at = Instant {
+                velocity,
+                direction: velocity.sgn(),
+                period: 1e-3,
+                ..Instant::default()
+            };
+            let mut step = || {
+                effect.torque(&mut memory, &at);
+                effect.bent(&memory)
+            };
+            (0..count).map(|_| step()).collect()
+        };
+        let forth = along(0.5, 4000);
+        let back = along(-0.5, 4000);
+        assert!((forth[3999] - 1.0).abs() < 1e-6 && (back[3999] + 1.0).abs() < 1e-6);
+        assert!(forth.windows(2).all(|pair| pair[0] <= pair[1]), "{kind:?}");
+        assert!(back.windows(2).all(|pair| pair[0] >= pair[1]), "{kind:?}");
+    }
+    let through = |kind: &&Kind| kind.acts_through_contact();
+    let names: Vec<&str> = (Kind::ALL.iter().filter(through))
+        .map(|kind| kind.about().name)
+        .collect();
+    assert_eq!(
+        names,
+        ["stribeck", "stribeck", "load_friction", "position_friction"]
+    );
 }

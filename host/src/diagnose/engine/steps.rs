@@ -55,7 +55,8 @@ pub(super) fn steps(
             step.set.push(step.effect.clone());
         } else {
             let rivals = search.alternatives(&refit.base, chosen, k)?;
-            rank(&mut step, profile, &rivals, source.runs);
+            let is_not = |kind| search.is_not(&profile.candidate, kind);
+            rank(&mut step, profile, &rivals, source.runs, &is_not);
         }
         steps.push(step);
     }

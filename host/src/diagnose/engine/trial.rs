@@ -1,7 +1,7 @@
 //! Which of the effects that a search has found stand before the simulated motion, all the others and the recordings held back.
 
 use super::steps::{refuse, refuse_guesses};
-use super::unbelieved::{contradicted, unbelieved};
+use super::unbelieved::{contradicted, ordered, unbelieved};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::bodies::Fitting;
@@ -51,7 +51,7 @@ impl Trial<'_, '_> {
         let (robot, search) = (judge.robot, judge.search);
         let judged = judge.judged(found)?;
         refuse_guesses(robot, tried, &judged);
-        let judged = by_description(judge, refit, &self.fitting.bench.anchor, judged)?;
+        let judged = by_description(judge, refit, self.fitting.bench, judged)?;
         refuse_guesses(robot, tried, &judged);
         let mut left = Survivors {
             judged,
@@ -69,6 +69,7 @@ impl Trial<'_, '_> {
                 let why = "explains the training data, and leaves more of the recordings held back than there is without it";
                 left = self.without(left, k, why, tried)?;
             }
+            left.judged.chosen = ordered(self.fitting, search, &left.judged.chosen, sealed)?;
             let held = Replay::of(self.fitting, sealed)?;
             let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
             left = self.unspoilt(left, (&held, MUCH_WORSE), why, tried)?;

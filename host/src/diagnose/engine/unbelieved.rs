@@ -84,8 +84,9 @@ pub(super) fn unbelieved(
     Ok(None)
 }
 
-/// The effect found with which the recordings held back are explained worst, if worse than without it; none where all of them
-/// carry over. Beside a gear that is not to be told: its link is followed only once its name stands.
+/// The effect found with which the recordings held back are explained worst: worse than without it by what came before it, and no
+/// better beside all the others. None where all of them carry over. Beside a gear that is not to be told: its link is followed only
+/// once its name stands.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
@@ -95,10 +96,64 @@ pub(super) fn contradicted(
     chosen: &[Profile],
     sealed: &Loaded,
 ) -> Result<Option<usize>, DiagnoseError> {
+    let mut rising = rising(fitting, search, chosen, sealed)?;
+    rising.sort_by(|a, b| b.1.total_cmp(&a.1));
+    for (k, _) in rising {
+        let joint = chosen[k].candidate.joint;
+        let [with, without] = [chosen, &but(chosen, k)]
+            .map(|list| fitting.unseen(list, sealed).map(|left| left[joint]));
+        if WORSE * with? > without? {
+            return Ok(Some(k));
+        }
+    }
+    Ok(None)
+}
+
+/// The effects in an order in which those found explain the recordings held back better one by one, where they do not as they were
+/// found: friction that depends on the position may show there only once its warming is known. Last is always what is missed least.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn ordered(
+    fitting: &Fitting,
+    search: &Search,
+    chosen: &[Profile],
+    sealed: &Loaded,
+) -> Result<Vec<Profile>, DiagnoseError> {
+    let mut front = chosen.to_vec();
+    if rising(fitting, search, chosen, sealed)?.is_empty() {
+        return Ok(front);
+    }
+    let given = search.count_given(chosen);
+    let mut behind = Vec::new();
+    while front.len() > given + 1 {
+        let whole = fitting.unseen(&front, sealed)?;
+        let mut least: Option<(usize, f64)> = None;
+        for k in given..front.len() {
+            let joint = front[k].candidate.joint;
+            let missed = fitting.unseen(&but(&front, k), sealed)?[joint] / whole[joint];
+            if least.is_none_or(|(_, least)| missed < least) {
+                least = Some((k, missed));
+            }
+        }
+        let Some((k, _)) = least else { break };
+        behind.push(front.remove(k));
+    }
+    front.extend(behind.into_iter().rev());
+    Ok(front)
+}
+
+/// The effects found after which more is left of the recordings held back than by what came before them, and by how many times.
+fn rising(
+    fitting: &Fitting,
+    search: &Search,
+    chosen: &[Profile],
+    sealed: &Loaded,
+) -> Result<Vec<(usize, f64)>, DiagnoseError> {
     let geared = |joint: usize| {
         (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
     };
-    let mut worst: Option<(usize, f64)> = None;
+    let mut rising = Vec::new();
     let mut last: Option<(usize, Vec<f64>)> = None;
     for k in search.count_given(chosen)..chosen.len() {
         let joint = chosen[k].candidate.joint;
@@ -113,11 +168,17 @@ pub(super) fn contradicted(
         let after = left(k + 1)?;
         let rise = after[joint] / before[joint];
         last = Some((k + 1, after));
-        if rise > worst.map_or(WORSE, |(_, rise)| rise) {
-            worst = Some((k, rise));
+        if rise > WORSE {
+            rising.push((k, rise));
         }
     }
-    Ok(worst.map(|(k, _)| k))
+    Ok(rising)
+}
+
+/// All but the `k`-th.
+fn but(chosen: &[Profile], k: usize) -> Vec<Profile> {
+    let others = (chosen.iter().enumerate()).filter(|(i, _)| *i != k);
+    others.map(|(_, profile)| profile.clone()).collect()
 }
 
 /// Frequency at which the link swings on its gear while the motor stands, Hz.

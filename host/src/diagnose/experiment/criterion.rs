@@ -81,6 +81,7 @@ impl Course {
                         drive_torque,
                         drive_rate,
                         load,
+                        friction: viscous * at.velocity + coulomb * direction,
                         gravity: gravity * place.pull_at(position),
                         time,
                         warming: 0.0,

@@ -17,18 +17,28 @@ const SPANS_TO_REST: f64 = 2.0;
 const NO_DIFFERENCE: f64 = 2.5;
 
 /// Fills the set and the runner-up of a step. `rivals` are what would stand in its place, best first; one on another joint
-/// takes away something else.
-pub(in crate::diagnose) fn rank(step: &mut Step, own: &Profile, rivals: &[Profile], runs: &[Run]) {
+/// takes away something else, and of some kinds it `is_not`.
+pub(in crate::diagnose) fn rank(
+    step: &mut Step,
+    own: &Profile,
+    rivals: &[Profile],
+    runs: &[Run],
+    is_not: &dyn Fn(Kind) -> bool,
+) {
     let mut names = vec![step.effect.clone()];
     let mut exact = |kind: Kind| {
         for confusion in testable::confounded(kind, own.candidate.joint, runs) {
+            if Kind::named(confusion.with, None).is_some_and(is_not) {
+                continue;
+            }
             if !names.iter().any(|n| n == confusion.with) {
                 names.push(confusion.with.to_owned());
             }
         }
     };
     exact(own.candidate.kind);
-    for rival in rivals.iter().filter(|rival| may_stand(rival, runs)) {
+    let possible = |rival: &&Profile| may_stand(rival, runs) && !is_not(rival.candidate.kind);
+    for rival in rivals.iter().filter(possible) {
         let name = rival.candidate.kind.about().name;
         if names.iter().any(|n| n == name) {
             continue;

@@ -31,6 +31,7 @@ fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
         followed: None,
         otherwise: None,
         heard: false,
+        doubled: false,
     }
 }
 
@@ -57,7 +58,7 @@ fn the_runner_up_is_of_the_same_joint() {
         gap_closed: 0.9,
         why: String::new(),
     };
-    rank(&mut step, &own, &rivals, &[]);
+    rank(&mut step, &own, &rivals, &[], &|_| false);
     assert_eq!(step.runner_up.as_deref(), Some("quadratic_drag"));
     assert!(
         step.runner_up_gap_closed
@@ -68,7 +69,7 @@ fn the_runner_up_is_of_the_same_joint() {
         runner_up_gap_closed: None,
         ..step
     };
-    rank(&mut alone, &own, &rivals[..1], &[]);
+    rank(&mut alone, &own, &rivals[..1], &[], &|_| false);
     assert_eq!(alone.runner_up, None);
 }
 

@@ -162,11 +162,7 @@ pub(in crate::diagnose) fn is_straight(shape: &Parameter, value: f64, running: f
 }
 
 /// Whether one of a law's shapes is such a one.
-pub(in crate::diagnose) fn goes_straight(
-    kind: Kind,
-    shapes: &[f64; SHAPES],
-    running: f64,
-) -> bool {
+pub(in crate::diagnose) fn goes_straight(kind: Kind, shapes: &[f64; SHAPES], running: f64) -> bool {
     let scales = kind.about().shapes.iter();
     (scales.zip(shapes)).any(|(shape, value)| is_straight(shape, *value, running))
 }

@@ -22,6 +22,7 @@ fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
         followed: None,
         otherwise: None,
         heard: false,
+        doubled: false,
     }
 }
 

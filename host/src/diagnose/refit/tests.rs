@@ -103,6 +103,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
             followed: None,
             otherwise: None,
             heard: false,
+            doubled: false,
         }
     };
     let mut third = [0.0; SHAPES];

@@ -126,6 +126,7 @@ impl<'a> Search<'a> {
                 followed: None,
                 otherwise: None,
                 heard: false,
+                doubled: false,
             });
         }
         if chosen.is_empty() {
@@ -157,7 +158,7 @@ impl<'a> Search<'a> {
             } else {
                 chosen.len() > 1
                     && (unsure
-                        || e.joint_gain < LEAST_GAIN
+                        || e.joint_gain < LEAST_GAIN.min(chosen[i].least_gain())
                         || in_the_shadow(self.source.robot, chosen, i))
             };
             if weak || chosen[i].vanished.is_some() {

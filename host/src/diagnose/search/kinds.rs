@@ -20,6 +20,20 @@ pub(in crate::diagnose) fn rivals(a: &Candidate, b: &Candidate) -> bool {
     one && a.joint == b.joint && a.other == b.other
 }
 
+/// Whether it is one constant in the torque of a joint that moves.
+pub(in crate::diagnose) fn is_constant(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::AsymmetricCoulomb | Kind::TorqueOffset | Kind::CurrentOffset
+    )
+}
+
+/// Whether two candidates are nearly one function of the motion, each of one form alone: a constant and the direction of gravity.
+pub(super) fn doubles(a: &Candidate, b: &Candidate) -> bool {
+    let of = |a: &Candidate, b: &Candidate| is_constant(a.kind) && b.kind == Kind::GravityTilt;
+    a.joint == b.joint && (of(a, b) || of(b, a))
+}
+
 /// Whether a kind is the law that its name is searched by; others take its place only where they do better.
 pub(in crate::diagnose) fn is_first_law(kind: Kind) -> bool {
     Kind::named(kind.about().name, None) == Some(kind)

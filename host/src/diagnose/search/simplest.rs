@@ -93,6 +93,30 @@ impl Search<'_> {
         Ok(best)
     }
 
+    /// Springs that were taken for what an effect found later explains give way to the constant that they hold.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn springs(
+        &self,
+        base: &Fit,
+        chosen: &mut [Profile],
+        trials: usize,
+    ) -> Result<(), DiagnoseError> {
+        for i in 0..chosen.len() {
+            let own = chosen[i].candidate;
+            if own.kind != Kind::Spring || self.is_described(&own) {
+                continue;
+            }
+            let rivals = self.alternatives(base, chosen, i)?;
+            if let Some(smaller) = self.smaller(base, chosen, i, &rivals, trials)? {
+                chosen[i] = smaller;
+                self.refine_all(base, chosen)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Whether the data support a smaller candidate as well as `best`. What acts between motor and link only bends to what
     /// has no gear; the search weighs them elsewhere.
     fn as_good_and_smaller(

@@ -7,7 +7,7 @@
 //!
 //! Leaves out: inductance, sag of the supply between rows, heating, play and elasticity of the gear.
 
-use rig_shared::effects::{Channel, Direction, GAINS, Instant, Kind, MEMORY, SHAPES};
+use rig_shared::effects::{Channel, Direction, Effect, Instant, Kind, Memory};
 
 use super::log::{Log, Segment};
 use crate::robot::Robot;
@@ -47,43 +47,39 @@ fn wave(c: &[f64; 3], q: f64) -> f64 {
 
 /// Effects with their parameters, after the nominal ones in the list of a fit.
 struct Part {
-    kind: Kind,
-    gains: [f64; GAINS],
-    shapes: [f64; SHAPES],
-    memory: [f64; MEMORY],
+    effect: Effect<f64>,
+    memory: Memory<f64>,
 }
 
 fn parts(effects: &[Kind], theta: &[f64]) -> Vec<Part> {
     let mut at = NOMINAL;
-    let mut take = |count: usize| {
+    let mut take = move |count: usize| {
         at += count;
         &theta[at - count..at]
     };
     effects
         .iter()
         .map(|kind| {
-            let mut part = Part {
-                kind: *kind,
-                gains: [0.0; GAINS],
-                shapes: [0.0; SHAPES],
-                memory: [0.0; MEMORY],
-            };
             let about = kind.about();
-            part.gains[..about.gains.len()].copy_from_slice(take(about.gains.len()));
-            part.shapes[..about.shapes.len()].copy_from_slice(take(about.shapes.len()));
-            part
+            let (gains, shapes) = (take(about.gains.len()), take(about.shapes.len()));
+            Part {
+                effect: Effect::new(*kind, gains, shapes),
+                memory: Memory::default(),
+            }
         })
         .collect()
 }
 
 impl Part {
-    fn torque(&mut self, at: &Instant<f64>, keep: bool) -> f64 {
+    fn torque(&self, at: &Instant<f64>) -> f64 {
+        self.effect.torque(&mut self.memory.clone(), at)
+    }
+
+    /// How far the contact is bent by then, of presliding.
+    fn bent(&self, at: &Instant<f64>) -> f64 {
         let mut memory = self.memory;
-        let terms = self.kind.terms(&self.shapes, &mut memory, at);
-        if keep {
-            self.memory = memory;
-        }
-        self.gains.iter().zip(terms).map(|(g, t)| g * t).sum()
+        self.effect.torque(&mut memory, at);
+        self.effect.bent(&memory)
     }
 }
 
@@ -125,10 +121,10 @@ impl Plant {
         let inertia = self.inertia + armature;
         let mut parts = parts(effects, theta);
         let late: f64 = (parts.iter())
-            .filter(|p| p.kind == Kind::MeasurementDelay)
-            .map(|p| p.gains[0])
+            .filter(|p| p.effect.kind == Kind::MeasurementDelay)
+            .map(|p| p.effect.gains[0])
             .sum();
-        parts.retain(|p| p.kind != Kind::MeasurementDelay);
+        parts.retain(|p| p.effect.kind != Kind::MeasurementDelay);
         let mut between = Between {
             log,
             row: segment.from,
@@ -169,9 +165,9 @@ impl Plant {
                 if on {
                     let net = effective - emf * v;
                     at.drive_torque = gain * net;
-                    let lost: f64 = (parts.iter_mut())
-                        .filter(|p| p.kind.about().channel == Channel::Voltage)
-                        .map(|p| p.torque(&at, false))
+                    let lost: f64 = (parts.iter())
+                        .filter(|p| p.effect.kind.about().channel == Channel::Voltage)
+                        .map(|p| p.torque(&at))
                         .sum();
                     // What is lost stops the current; it does not turn it round.
                     effective -= lost.abs().min(net.abs()) * net.signum();
@@ -182,19 +178,24 @@ impl Plant {
                 at.load = self.inertia * acceleration + weight;
                 let mut torque = if on { gain * effective } else { 0.0 } - weight - offset;
                 let (mut low, mut high) = (-coulomb, coulomb);
-                for part in &mut parts {
-                    let about = part.kind.about();
+                let contact = parts.iter().find(|p| p.effect.kind.is_presliding());
+                let bent = contact.map(|part| part.bent(&at));
+                for part in &parts {
+                    let kind = part.effect.kind;
+                    let about = kind.about();
                     if about.channel == Channel::Voltage {
                         continue;
                     }
                     if about.direction == Direction::Indifferent {
-                        torque -= part.torque(&at, false);
+                        torque -= part.torque(&at);
                         continue;
                     }
-                    at.direction = 1.0;
-                    high += part.torque(&at, false);
-                    at.direction = -1.0;
-                    low += part.torque(&at, false);
+                    let bent = bent.filter(|_| kind.acts_through_contact());
+                    for (side, direction) in [(&mut high, 1.0), (&mut low, -1.0)] {
+                        at.direction = bent.unwrap_or(direction);
+                        at.friction = viscous * v + coulomb * at.direction;
+                        *side += part.torque(&at);
+                    }
                 }
                 if low > high {
                     return false;
@@ -209,7 +210,7 @@ impl Plant {
                 at.velocity = v;
                 at.direction = if v == 0.0 { 0.0 } else { v.signum() };
                 for part in &mut parts {
-                    part.torque(&at, true);
+                    part.effect.torque(&mut part.memory, &at);
                 }
             }
             if !(q.abs() < 1.0e6 && v.abs() < 1.0e6) {

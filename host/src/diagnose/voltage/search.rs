@@ -184,22 +184,21 @@ impl Search<'_> {
         let mut model = nominal;
         for (effect, fitted) in parts {
             let about = effect.kind.about();
-            let from = model.theta.len();
             model.effects.push(effect.kind);
             for (gain, value) in about.gains.iter().zip(effect.gains) {
+                model.free.extend(fitted.then_some(model.theta.len()));
                 model.theta.push(value);
                 model.bounds.push(gain.bounds);
             }
             for (shape, value) in about.shapes.iter().zip(effect.shapes) {
                 let [low, high] = shape.range;
+                let held = !fitted || effect.kind.optional().contains(&shape.name);
+                model.free.extend((!held).then_some(model.theta.len()));
                 model.theta.push(value);
                 // What is described stands, however far from what rigs have.
                 model
                     .bounds
                     .push([value.min(0.1 * low), value.max(10.0 * high)]);
-            }
-            if *fitted {
-                model.free.extend(from..model.theta.len());
             }
         }
         // The nominal values may have been bent by what was not in the model: those of the description are tried as well.
@@ -263,8 +262,18 @@ impl Search<'_> {
                 more.theta.push(self.first_gain(gain, model));
                 more.bounds.push(gain.bounds);
             }
+            let mut shaped = false;
+            more.free.extend(model.theta.len()..more.theta.len());
             for shape in about.shapes {
                 let [low, high] = shape.range;
+                // How friction parts between the sides of a gear is more than such a motion tells.
+                if kind.optional().contains(&shape.name) {
+                    more.theta.push(0.0);
+                    more.bounds.push(shape.bounds);
+                    continue;
+                }
+                shaped = true;
+                more.free.push(more.theta.len());
                 more.theta.push(match shape.scale {
                     Scale::Linear | Scale::Whole => low + share * (high - low),
                     Scale::Logarithmic => low * (high / low).powf(share),
@@ -272,7 +281,6 @@ impl Search<'_> {
                 // What is far outside of what rigs have is another effect.
                 more.bounds.push([0.1 * low, 10.0 * high]);
             }
-            more.free.extend(model.theta.len()..more.theta.len());
             // Whole recordings alone end in the nearest of many valleys; windows alone weigh what windows show.
             let near = self.fitted(&more, segments(self.logs, |_| true, WINDOW));
             let fitted = self.better(
@@ -285,7 +293,7 @@ impl Search<'_> {
                     None => fitted,
                 });
             }
-            if about.shapes.is_empty() {
+            if !shaped {
                 break;
             }
         }

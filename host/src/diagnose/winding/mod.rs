@@ -168,6 +168,7 @@ fn winding(
         followed: None,
         otherwise: None,
         heard: false,
+        doubled: false,
     });
     let left_out = options.without.contains(&Kind::DriveDeadzone);
     let refused = match &profile {

@@ -9,15 +9,9 @@ use crate::diagnose::fit::Fit;
 use crate::diagnose::judge::equal;
 use crate::diagnose::outcome::Step;
 use crate::diagnose::profile::Profile;
-use crate::diagnose::search::{Search, with};
+use crate::diagnose::search::{Search, is_constant, with};
 
-/// Effects that are one constant in the torque.
-const CONSTANTS: [Kind; 3] = [
-    Kind::AsymmetricCoulomb,
-    Kind::TorqueOffset,
-    Kind::CurrentOffset,
-];
-/// Those that are a torque. They are one function, too, unless a recording is without all that pulls on the joint.
+/// Constants that are a torque. They are one function, too, unless a recording is without all that pulls on the joint.
 const TORQUES: [Kind; 2] = [Kind::TorqueOffset, Kind::AsymmetricCoulomb];
 /// What the sensor reads without a current counts as the torque's constant, or as nothing, within so many standard deviations …
 const WITHIN: f64 = 3.0;
@@ -85,7 +79,7 @@ pub(in crate::diagnose) fn settled(
             }
         };
         let sensor = Kind::CurrentOffset;
-        if CONSTANTS.contains(&candidate.kind) {
+        if is_constant(candidate.kind) {
             let Some([constant, std]) = constant(&chosen[k]) else {
                 continue;
             };
@@ -120,7 +114,7 @@ pub(in crate::diagnose) fn settled(
     Ok(words)
 }
 
-/// The constant torque of one of [`CONSTANTS`], on average, and its standard deviation.
+/// The constant torque of an effect that is one, on average, and its standard deviation.
 fn constant(profile: &Profile) -> Option<[f64; 2]> {
     let column = profile.columns.first()?[profile.candidate.joint].as_ref()?;
     let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;

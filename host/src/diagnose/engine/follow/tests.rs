@@ -115,6 +115,7 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
         followed: None,
         otherwise: None,
         heard: false,
+        doubled: false,
     };
     let rigid = refit.base.rms(0);
     let follower = Follower::new(&bench, &loaded, &refit, &search);

@@ -84,6 +84,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
             followed: None,
             otherwise: None,
             heard: false,
+            doubled: false,
         };
         let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
         fallen.map(|(_, why)| why)

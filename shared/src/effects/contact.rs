@@ -1,0 +1,47 @@
+//! The sliding contact of a joint, through which all of its dry friction acts: where a law with memory of distance stands, the others
+//! build up as that one does and not at once.
+//!
+//! Source: Lampaert, Al-Bender, Swevers 2003, eqs. 8 to 10, whose elements slip at their share of all the friction there is. Leaves
+//! out: that more friction bends the contact farther before it slides, at the stiffness that the contact has; friction that differs
+//! with the direction, which is a constant beside one that does not.
+
+use super::{Direction, Effect, Kind, Memory};
+use crate::scalar::Real;
+
+impl Kind {
+    /// Whether it is a law of friction that builds up over a distance.
+    pub const fn is_presliding(self) -> bool {
+        matches!(
+            self,
+            Self::PreslidingDahl | Self::PreslidingLugre | Self::PreslidingMaxwell
+        )
+    }
+
+    /// Whether it is dry friction that acts through the same contact as presliding of the joint.
+    pub const fn acts_through_contact(self) -> bool {
+        let dry = matches!(self.about().direction, Direction::Dry);
+        dry && !self.is_presliding() && !matches!(self, Self::AsymmetricCoulomb)
+    }
+}
+
+impl<T: Real> Effect<T> {
+    /// How far the contact is bent that an effect of presliding remembers, from −1 to 1: what other dry friction has in the place of
+    /// its direction.
+    #[inline(always)]
+    pub fn bent(&self, memory: &Memory<T>) -> T {
+        let [first, ..] = memory.0;
+        if self.kind != Kind::PreslidingMaxwell {
+            // A bristle that is bent farther holds the breakaway of its own law.
+            return first.clamp_to(-T::ONE, T::ONE);
+        }
+        let elements = || self.gains.iter().zip(memory.0);
+        let sum = elements().fold(T::ZERO, |sum, (gain, state)| sum + *gain * state);
+        let whole = elements().fold(T::ZERO, |sum, (gain, _)| sum + *gain);
+        let alike = elements().fold(T::ZERO, |sum, (_, state)| sum + state) * T::from_f64(0.25);
+        T::select(
+            T::ZERO.lt(whole),
+            sum / whole.max(T::from_f64(1e-30)),
+            alike,
+        )
+    }
+}
