@@ -104,7 +104,7 @@ fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Co
             "way since the last reversal, by direction"
         }
         Kind::JointElasticity => "acceleration",
-        Kind::ViscousWarmupTime => SINCE_START,
+        Kind::ViscousWarmupTime | Kind::ViscousWarmupHeat => SINCE_START,
         Kind::ViscousWarmupTemperature => "temperature",
         Kind::LoadFriction => "torque on the gear along the motion",
         Kind::TorqueSaturation => "torque of the drive",

@@ -320,6 +320,29 @@ fn a_constant_beside_a_payload_is_no_spring() {
     assert!(!named.contains(&"spring") && named.len() == 2, "{named:?}");
 }
 
+/// The heat of friction warms the emulated rig, so that another motion warms it otherwise: by the time alone the data held back are
+/// explained worse than without any warming.
+#[test]
+fn friction_that_its_own_heat_warms_goes_by_that_and_not_by_the_time() {
+    let warming = Effect::ViscousWarmup {
+        fall: 0.56,
+        time_constant: 15.8,
+    };
+    let made = Scenario {
+        seconds: [90.0, 60.0],
+        ..Scenario::short([warming], 4000)
+    }
+    .make()
+    .unwrap();
+    let (found, _) = diagnosed(&made);
+    assert_eq!(names(&found), ["viscous_warmup"], "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::Explained, "{:?}", found.words);
+    let step = &found.steps[0];
+    assert_eq!(step.law.as_deref(), Some("heat"));
+    let time_constant = step.parameters["time_constant"].value;
+    assert!((time_constant / 15.8 - 1.0).abs() < 0.3, "{time_constant}");
+}
+
 /// Friction that falls has no mean of its own over both directions: by direction it is most of what is left.
 #[test]
 fn friction_that_drifts_is_said_to_go_with_time_before_all_else() {
@@ -337,6 +360,7 @@ fn friction_that_drifts_is_said_to_go_with_time_before_all_else() {
         without: vec![
             Kind::ViscousWarmupTime,
             Kind::ViscousWarmupTemperature,
+            Kind::ViscousWarmupHeat,
             Kind::Backlash,
             Kind::JointElasticity,
         ],

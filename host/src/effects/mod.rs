@@ -15,6 +15,7 @@ use std::f64::consts::PI;
 use rig_shared::dual::Dual;
 use rig_shared::effects::{Channel, Instant, Kind, Memory, Periodic, SHAPES};
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::scalar::Real as _;
 use rig_shared::transmission::{Transmission, TransmissionError};
 
 pub use compensated::Compensated;
@@ -169,7 +170,7 @@ impl Effects {
         row[column::COULOMB] * direction + row[column::VISCOUS] * velocity
     }
 
-    /// What the law of effect `k` sees; load, direction and friction are left to the caller.
+    /// What the law of effect `k` sees; load and direction are left to the caller, friction is that of the velocity's direction.
     pub(crate) fn instant(&self, k: usize, at: &State<'_>) -> Instant<f64> {
         let Placed { joint, other, .. } = self.placed[k];
         Instant {
@@ -179,6 +180,7 @@ impl Effects {
             direction: 0.0,
             motor_angle: at.motor[joint],
             drive_torque: at.drive[joint],
+            friction: self.friction(joint, at.qd[joint], at.qd[joint].sgn()),
             time: at.time,
             warming: at.warming.get(joint).copied().unwrap_or(0.0),
             other: other.map_or([0.0; 3], |o| [at.q[o], at.qd[o], at.qdd[o]]),

@@ -34,7 +34,7 @@ fn with(mut robot: Robot, kind: Kind, gains: &[f64], shapes: &[f64]) -> Robot {
 }
 
 /// Torques of one joint, each of a size that a rig may have.
-const TORQUES: [(Kind, &[f64], &[f64]); 18] = [
+const TORQUES: [(Kind, &[f64], &[f64]); 19] = [
     (Kind::Stribeck, &[0.3], &[0.2]),
     (Kind::StribeckExponential, &[0.3], &[0.2]),
     (Kind::AsymmetricCoulomb, &[0.15], &[]),
@@ -45,6 +45,7 @@ const TORQUES: [(Kind, &[f64], &[f64]); 18] = [
     (Kind::PreslidingLugre, &[0.35, 0.4], &[0.02, 0.3, 0.1]),
     (Kind::PreslidingMaxwell, &[0.1, 0.1, 0.1, 0.05], &[0.04]),
     (Kind::ViscousWarmupTime, &[0.2], &[3.0]),
+    (Kind::ViscousWarmupHeat, &[0.1], &[3.0]),
     (Kind::Cogging, &[0.2, 0.1], &[4.0]),
     (Kind::TorqueRipple, &[0.06, 0.04], &[2.0]),
     (Kind::GearEccentricity, &[0.2, 0.1], &[1.0]),

@@ -36,6 +36,7 @@ mod tests;
 mod torque_offset;
 mod torque_ripple;
 mod torque_saturation;
+mod viscous_warmup_heat;
 mod viscous_warmup_temperature;
 mod viscous_warmup_time;
 
@@ -242,6 +243,8 @@ registry! {
     InertiaCoupling in inertia_coupling,
     /// A constant torque.
     TorqueOffset in torque_offset,
+    /// Viscous friction that falls as friction heats the joint.
+    ViscousWarmupHeat in viscous_warmup_heat,
 }
 
 impl Kind {

@@ -462,3 +462,28 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
         ["stribeck", "stribeck", "load_friction", "position_friction"]
     );
 }
+
+/// Ten thousand times a second for ten minutes, in numbers of 24 bits: what a tick adds is less than their last digit.
+#[test]
+fn heat_is_stored_on_a_chip_as_it_is_on_a_desktop() {
+    let (period, time_constant, velocity, friction) = (1e-4, 600.0, 0.5, 0.8);
+    let at = Instant {
+        velocity: velocity as f32,
+        friction: friction as f32,
+        period: period as f32,
+        ..Instant::default()
+    };
+    let law = Effect::new(Kind::ViscousWarmupHeat, &[1.0_f32], &[time_constant as f32]);
+    let mut memory = Memory::default();
+    let mut torque = 0.0;
+    let ticks = (time_constant / period) as usize;
+    for _ in 0..ticks {
+        torque = law.torque(&mut memory, &at);
+    }
+    let warm = friction * velocity * (1.0 - (-1.0_f64).exp());
+    let expected = -velocity * warm;
+    assert!(
+        (f64::from(torque) / expected - 1.0).abs() < 1e-3,
+        "{torque} {expected}"
+    );
+}

@@ -51,5 +51,5 @@ pub(super) fn depends_on_model(kind: Kind) -> bool {
     ) || matches!(
         about.name,
         "load_friction" | "torque_ripple" | "torque_saturation" | "gravity_tilt"
-    )
+    ) || kind == Kind::ViscousWarmupHeat
 }

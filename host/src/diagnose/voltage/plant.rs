@@ -8,6 +8,7 @@
 //! Leaves out: inductance, sag of the supply between rows, heating, play and elasticity of the gear.
 
 use rig_shared::effects::{Channel, Direction, Effect, Instant, Kind, Memory};
+use rig_shared::scalar::Real as _;
 
 use super::log::{Log, Segment};
 use crate::robot::Robot;
@@ -119,6 +120,7 @@ impl Plant {
             return false;
         };
         let inertia = self.inertia + armature;
+        let sliding = |v: f64| viscous * v + coulomb * v.sgn();
         let mut parts = parts(effects, theta);
         let late: f64 = (parts.iter())
             .filter(|p| p.effect.kind == Kind::MeasurementDelay)
@@ -176,6 +178,7 @@ impl Plant {
                 at.drive_rate = (at.drive_torque - drive_before) / dt;
                 drive_before = at.drive_torque;
                 at.load = self.inertia * acceleration + weight;
+                at.friction = sliding(v);
                 let mut torque = if on { gain * effective } else { 0.0 } - weight - offset;
                 let (mut low, mut high) = (-coulomb, coulomb);
                 let contact = parts.iter().find(|p| p.effect.kind.is_presliding());
@@ -208,7 +211,8 @@ impl Plant {
                 q += 0.5 * dt * (v + next);
                 v = next;
                 at.velocity = v;
-                at.direction = if v == 0.0 { 0.0 } else { v.signum() };
+                at.direction = v.sgn();
+                at.friction = sliding(v);
                 for part in &mut parts {
                     part.effect.torque(&mut part.memory, &at);
                 }

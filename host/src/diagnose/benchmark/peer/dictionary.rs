@@ -133,7 +133,10 @@ impl Dictionary {
                     let bend = second_difference(&load, 1.0 / RATE);
                     push(&bend.iter().map(|b| rotor * b).collect::<Vec<_>>());
                 }
-                Kind::InertiaCoupling | Kind::Payload | Kind::ViscousWarmupTemperature => {}
+                Kind::InertiaCoupling
+                | Kind::Payload
+                | Kind::ViscousWarmupTemperature
+                | Kind::ViscousWarmupHeat => {}
                 _ if about.shapes.len() > 1 => {}
                 _ if matches!(about.channel, Channel::Transmission | Channel::Voltage) => {}
                 _ => {

@@ -1,0 +1,68 @@
+//! Viscous friction that falls as friction heats the joint.
+
+use super::{
+    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
+    Scale,
+};
+use crate::scalar::Real;
+
+pub(super) struct ViscousWarmupHeat;
+
+impl Law for ViscousWarmupHeat {
+    const ABOUT: About = About {
+        name: "viscous_warmup",
+        law: Some("heat"),
+        title: "viscous friction that falls as its own heat warms the joint",
+        equation: "−drop · w · q̇, time_constant · dw/dt = friction · q̇ − w",
+        source: "Bittencourt and Gunnarsson 2012; one thermal mass, heated by the joint's friction",
+        channel: Channel::Torque,
+        direction: Direction::Indifferent,
+        gains: &[Parameter {
+            name: "drop",
+            unit: "N*m*s/(rad*W)",
+            bounds: [0.0, f64::INFINITY],
+            range: [0.005, 1.0],
+            scale: Scale::Logarithmic,
+            meaning: "viscous friction cold less warm, per watt of friction that is kept up",
+        }],
+        shapes: &[Parameter {
+            name: "time_constant",
+            unit: "s",
+            bounds: [f64::MIN_POSITIVE, f64::INFINITY],
+            range: [10.0, 3600.0],
+            scale: Scale::Logarithmic,
+            meaning: "time after which 63 % of the fall has happened at an even speed",
+        }],
+        signature: "odd in velocity, growing with it, fading over minutes, faster where the joint moves faster",
+        confused: &[
+            Confusion {
+                with: "quadratic_drag",
+                exact: false,
+                separated_by: "the same speeds in random order",
+            },
+            Confusion {
+                with: "torque_saturation",
+                exact: false,
+                separated_by: "the same motion cold and warm",
+            },
+        ],
+        needs: &[Need::Duration(60.0)],
+        compensable: true,
+        leaves_out: "heat of the motor and of other effects' friction, Coulomb friction that falls with temperature too, viscous friction that falls less the warmer it is, what happened before the recording",
+    };
+
+    #[inline(always)]
+    fn terms<T: Real>(
+        shapes: &[T; SHAPES],
+        memory: &mut [T; MEMORY],
+        at: &Instant<T>,
+    ) -> [T; GAINS] {
+        // Implicit Euler, so that any step is stable; what a step is too small to add to a number of 24 bits is kept for later ones.
+        let share = at.period / (shapes[0] + at.period);
+        let [warm, rest, ..] = *memory;
+        let more = (at.friction * at.velocity - warm) * share + rest;
+        let next = warm + more;
+        (memory[0], memory[1]) = (next, more - (next - warm));
+        [-(at.velocity * next), T::ZERO, T::ZERO, T::ZERO]
+    }
+}
