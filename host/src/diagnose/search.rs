@@ -32,6 +32,8 @@ pub(super) use shadow::shadow;
 const STEPS_OF_A_DISTANCE: f64 = 2.0;
 /// An effect in the model stays while its own probability is below this.
 const STAYS: f64 = 1e-3;
+/// How often laws are weighed against others of their names, each time beside those that have changed.
+const LAWS_ANEW: usize = 2;
 /// Most effects beside those of the description.
 const MOST_EFFECTS: usize = 6;
 
@@ -285,7 +287,17 @@ impl<'a> Search<'a> {
                 impossible.push(newcomer);
             }
         }
-        self.other_laws(base, &mut chosen)?;
+        for _ in 0..LAWS_ANEW {
+            if !self.other_laws(base, &mut chosen)? {
+                break;
+            }
+            for _ in 0..2 {
+                // Another law of presliding bends the contact otherwise, through which other friction acts.
+                self.renewed(renew(&chosen)?);
+                self.refine_all(base, &mut chosen)?;
+            }
+            chosen.retain(|profile| profile.vanished.is_none());
+        }
         self.springs(base, &mut chosen, trials)?;
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
         self.dropped = impossible;
@@ -344,8 +356,9 @@ impl<'a> Search<'a> {
         (self.library.iter().enumerate()).filter(move |(_, c)| another(c))
     }
 
-    /// Another law under the same name where it does clearly better: it has more parameters to bend.
-    fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
+    /// Another law under the same name where it does clearly better: it has more parameters to bend. Says whether there was one.
+    fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<bool, DiagnoseError> {
+        let mut changed = false;
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
             let present = chosen[i].candidate;
@@ -355,10 +368,11 @@ impl<'a> Search<'a> {
                     && rival.evidence.beyond(&chosen[i].evidence) > LEAST_GAIN
                 {
                     chosen[i] = rival;
+                    changed = true;
                 }
             }
         }
-        Ok(())
+        Ok(changed)
     }
 
     /// Refines all shapes together, drops what no longer stands by itself, exchanges what something else does better. Gives

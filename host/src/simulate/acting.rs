@@ -1,6 +1,7 @@
 //! The effects of a model within a step.
 
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
+use rig_shared::scalar::Real as _;
 
 use super::SimulateError;
 use crate::effects::{Effects, State, Turn, is_torque};
@@ -24,6 +25,8 @@ pub(super) struct Acting<'a> {
     remembered: Vec<[f64; 2]>,
     /// How far the contact of each joint with presliding is bent.
     bent: Vec<Option<f64>>,
+    /// What other dry friction adds through such a contact, whatever the direction is, one a joint.
+    through: Vec<f64>,
 }
 
 impl<'a> Acting<'a> {
@@ -38,6 +41,7 @@ impl<'a> Acting<'a> {
             dry: vec![[0.0; 2]; joints],
             remembered: vec![[0.0; 2]; joints],
             bent: vec![None; joints],
+            through: vec![0.0; joints],
         }
     }
 
@@ -101,6 +105,7 @@ impl<'a> Acting<'a> {
             .motor_angles(&motion[0][..joints], &mut self.motor)?;
         let mut load = links.to_vec();
         self.bent.fill(None);
+        self.through.fill(0.0);
         for turn in Turn::ALL {
             for (k, p) in self.effects.placed().iter().enumerate() {
                 let kind = p.effect.kind;
@@ -110,19 +115,24 @@ impl<'a> Acting<'a> {
                 let mut instant = self.instant(k, motion, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
-                    let contact = self.bent[p.joint].filter(|_| kind.acts_through_contact());
-                    for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
-                        instant.direction = contact.unwrap_or(direction);
+                    let mut towards = |direction: f64| {
+                        instant.direction = direction;
                         instant.friction =
-                            (self.effects).friction(p.joint, instant.velocity, instant.direction);
+                            (self.effects).friction(p.joint, instant.velocity, direction);
                         let mut memory = self.memory[k];
-                        let torque = p.effect.torque(&mut memory, &instant);
+                        (p.effect.torque(&mut memory, &instant), memory)
+                    };
+                    let bent = self.bent[p.joint].filter(|_| kind.acts_through_contact());
+                    if let Some(bent) = bent {
+                        self.through[p.joint] += towards(bent).0;
+                        continue;
+                    }
+                    for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
+                        let (torque, memory) = towards(direction);
                         self.dry[p.joint][side] += torque;
                         if kind.is_presliding() {
-                            self.bent[p.joint] = Some(p.effect.bent(&memory));
-                        }
-                        if kind.is_presliding() || contact.is_some() {
                             self.remembered[p.joint][side] += torque;
+                            self.bent[p.joint] = Some(p.effect.bent(&memory));
                         }
                     }
                     continue;
@@ -153,12 +163,15 @@ impl<'a> Acting<'a> {
         let [back, forth] = self.remembered[joint];
         let slack = SLACK * (coulomb + low.abs() + high.abs());
         // Slid far enough, what is remembered is the direction: the rest must be friction on its own.
-        let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack;
+        let through = self.through[joint];
+        // What a bent contact holds goes against what has bent it.
+        let held = self.bent[joint].map_or(0.0, |bent| (coulomb * bent + through) * bent.sgn());
+        let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack && held >= -slack;
         if passive && bounds[0] <= bounds[1] {
-            return Ok(bounds);
+            return Ok(bounds.map(|bound| bound + through));
         }
         if passive {
-            return Ok([winding(bounds, [back, forth]); 2]);
+            return Ok([winding(bounds, [back, forth]) + through; 2]);
         }
         Err(SimulateError::DrivingEffects {
             joint: joint + 1,
