@@ -13,7 +13,7 @@
 //!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
 //!   is given for where the link will be when the torque acts ([`Now::lead`]).
 //! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
-//!   fed by the measured way it would close a loop of positive sign. Other dry friction goes the way that it does.
+//!   fed by the measured way it would close a loop of positive sign. Friction of load and position goes the way that it does.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
 //! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a

@@ -236,24 +236,6 @@ fn a_gear_carries_the_links_friction_beside_its_load() {
     assert!((share - 0.25).abs() < 0.05, "{share}");
 }
 
-/// All dry friction of the emulated rig acts through one contact: with friction that turns round at once under load its coefficient
-/// came out a sixth too small (seed 3911).
-#[test]
-fn friction_under_load_builds_up_with_presliding() {
-    let hidden = [
-        Effect::Presliding { stroke: 0.015 },
-        Effect::LoadFriction { ratio: 0.1 },
-    ];
-    let made = Scenario::short(hidden, 46).make().unwrap();
-    let (found, _) = diagnosed(&made);
-    let mut named = names(&found);
-    named.sort_unstable();
-    assert_eq!(named, ["load_friction", "presliding"], "{:?}", found.words);
-    let load = found.steps.iter().find(|s| s.effect == "load_friction");
-    let coefficient = load.unwrap().parameters["coefficient"].value;
-    assert!((coefficient / 0.1 - 1.0).abs() < 0.06, "{coefficient}");
-}
-
 /// Over a motion both are one constant; friction under load is carried by the one and not by the other.
 #[test]
 fn friction_under_load_tells_a_constant_on_the_link_from_one_of_the_sensor() {

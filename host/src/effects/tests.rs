@@ -232,17 +232,16 @@ fn a_recording_with_each_effect_is_explained_by_it_and_by_nothing_less() {
     }
 }
 
-/// Simulation and what is taken off a recording are written apart; both bend the contact before other dry friction turns round.
+/// Simulation and what is taken off a recording are written apart; both bend the contact before such friction turns round.
 #[test]
-fn dry_friction_beside_presliding_turns_round_as_that_does() {
+fn friction_of_load_and_position_beside_presliding_turns_round_as_that_does() {
     let contacts: [(Kind, &[f64], &[f64]); 2] = [
         (Kind::PreslidingDahl, &[0.4], &[0.05]),
         (Kind::PreslidingMaxwell, &[0.1, 0.1, 0.1, 0.1], &[0.08]),
     ];
-    let others: [(Kind, &[f64], &[f64]); 3] = [
+    let others: [(Kind, &[f64], &[f64]); 2] = [
         (Kind::LoadFriction, &[0.15], &[0.4]),
         (Kind::PositionFriction, &[0.15, 0.1], &[2.0]),
-        (Kind::Stribeck, &[0.3], &[0.2]),
     ];
     for (contact, gains, shapes) in contacts {
         let bent = with(rig(), contact, gains, shapes);

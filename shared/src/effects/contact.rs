@@ -1,11 +1,12 @@
-//! The sliding contact of a joint, through which all of its dry friction acts: where a law with memory of distance stands, the others
-//! build up as that one does and not at once.
+//! The sliding contact of a joint, through which its dry friction acts: where a law with memory of distance stands, what grows with
+//! the load or varies with the position builds up as that does and not at once.
 //!
 //! Source: Lampaert, Al-Bender, Swevers 2003, eqs. 8 to 10, whose elements slip at their share of all the friction there is. Leaves
-//! out: that more friction bends the contact farther before it slides, at the stiffness that the contact has; friction that differs
-//! with the direction, which is a constant beside one that does not.
+//! out: that more friction bends the contact farther before it slides, at the stiffness that the contact has; friction that falls with
+//! speed, whose short reach and that of the contact hardly part in a recording (the law after Canudas de Wit has both); friction that
+//! differs with the direction, which is a constant beside one that does not.
 
-use super::{Direction, Effect, Kind, Memory};
+use super::{Effect, Kind, Memory};
 use crate::scalar::Real;
 
 impl Kind {
@@ -19,8 +20,7 @@ impl Kind {
 
     /// Whether it is dry friction that acts through the same contact as presliding of the joint.
     pub const fn acts_through_contact(self) -> bool {
-        let dry = matches!(self.about().direction, Direction::Dry);
-        dry && !self.is_presliding() && !matches!(self, Self::AsymmetricCoulomb)
+        matches!(self, Self::LoadFriction | Self::PositionFriction)
     }
 }
 

@@ -453,14 +453,6 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
         assert!(forth.windows(2).all(|pair| pair[0] <= pair[1]), "{kind:?}");
         assert!(back.windows(2).all(|pair| pair[0] >= pair[1]), "{kind:?}");
     }
-    let through = |kind: &&Kind| kind.acts_through_contact();
-    let names: Vec<&str> = (Kind::ALL.iter().filter(through))
-        .map(|kind| kind.about().name)
-        .collect();
-    assert_eq!(
-        names,
-        ["stribeck", "stribeck", "load_friction", "position_friction"]
-    );
 }
 
 /// Ten thousand times a second for ten minutes, in numbers of 24 bits: what a tick adds is less than their last digit.
