@@ -211,6 +211,8 @@ registry! {
     ViscousWarmupTime in viscous_warmup_time,
     /// Viscous friction that falls with a measured temperature.
     ViscousWarmupTemperature in viscous_warmup_temperature,
+    /// Viscous friction that falls as friction heats the joint.
+    ViscousWarmupHeat in viscous_warmup_heat,
     /// Detent torque of the motor's magnets.
     Cogging in cogging,
     /// A torque constant that varies with the motor's angle.
@@ -243,8 +245,6 @@ registry! {
     InertiaCoupling in inertia_coupling,
     /// A constant torque.
     TorqueOffset in torque_offset,
-    /// Viscous friction that falls as friction heats the joint.
-    ViscousWarmupHeat in viscous_warmup_heat,
 }
 
 impl Kind {
