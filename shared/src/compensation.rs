@@ -83,8 +83,6 @@ pub struct State<T: Real> {
     /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
     /// each round, so that no rounding piles up.
     sums: [T; 3],
-    /// Of those that stand, what acts on the link, so that a gear transmits it: kept as the sums are.
-    on_link: T,
     turn: u8,
     given: Given<T>,
 }
@@ -125,7 +123,6 @@ impl<T: Real> State<T> {
         self.planned = [T::ZERO; EFFECTS];
         self.sliding = [T::ZERO; EFFECTS];
         self.sums = [T::ZERO; 3];
-        self.on_link = T::ZERO;
         self.memories = [[Memory::default(); 2]; EFFECTS];
         self.turn = 0;
         self.given = Given::default();
@@ -147,6 +144,8 @@ struct Job {
     place: u8,
     /// At the measured motion, instead of where the torque to give is taken from.
     sliding: bool,
+    /// The effect of presliding through whose contact it acts.
+    contact: Option<u8>,
 }
 
 /// The effects of a rig, checked.
@@ -159,13 +158,13 @@ pub struct Compensation<T> {
     /// Dry effects, and standing ones.
     dry: u8,
     standing: u8,
+    /// How many of the standing ones, the first, act on the link, where an effect depends on what the gear transmits.
+    on_link: u8,
     /// Ticks until a law's turn comes again.
     round: T,
     waves: Waves<T>,
     /// Some effect depends on the transmitted torque.
     needs_load: bool,
-    /// The effect of presliding, through whose contact other dry friction acts.
-    contact: Option<u8>,
 }
 
 impl<T: Scalar> Compensation<T> {
@@ -175,38 +174,57 @@ impl<T: Scalar> Compensation<T> {
     /// What is wrong with the first that cannot be used.
     pub fn new(effects: &Effects<T>) -> Result<Self, EffectFault> {
         let mut all = Self::default();
+        let mut contact = None;
         for (k, effect) in effects.iter().enumerate() {
             let Some(effect) = effect else { continue };
-            let checked = Compensated::new(*effect)?;
-            all.effects[k] = Some(checked);
+            all.effects[k] = Some(Compensated::new(*effect)?);
             all.needs_load |= effect.kind == Kind::LoadFriction;
             if effect.kind.is_presliding() {
-                all.contact = Some(k as u8);
+                contact = Some(k as u8);
             }
-            match checked.role {
-                Role::Dry => {
-                    all.add(k, all.dry, false);
-                    all.add(k, all.dry, true);
-                    all.dry += 1;
+        }
+        // What a gear carries comes first, so that its values lie side by side.
+        for on_link in [true, false] {
+            for (k, one) in all.effects.into_iter().enumerate() {
+                let Some(one) = one else { continue };
+                if one.effect.kind.on_the_link() == on_link {
+                    all.place(k, &one, contact);
                 }
-                Role::Standing if effect.kind.periodic().is_none() => {
-                    all.standing += 1;
-                    all.add(k, EFFECTS as u8 - all.standing, false);
-                }
-                Role::Standing | Role::Position | Role::Current | Role::Voltage => {}
+            }
+            if on_link && all.needs_load {
+                all.on_link = all.standing;
             }
         }
         all.waves = Waves::new(&all.effects);
         Ok(all)
     }
 
-    fn add(&mut self, effect: usize, place: u8, sliding: bool) {
-        if let Some(job) = self.jobs.get_mut(usize::from(self.count)) {
-            *job = Job {
-                effect: effect as u8,
-                place,
-                sliding,
-            };
+    /// Gives an effect its turn and its place among the values.
+    fn place(&mut self, effect: usize, one: &Compensated<T>, contact: Option<u8>) {
+        let kind = one.effect.kind;
+        let job = |place: u8, sliding: bool| Job {
+            effect: effect as u8,
+            place,
+            sliding,
+            contact: contact.filter(|_| kind.acts_through_contact()),
+        };
+        match one.role {
+            Role::Dry => {
+                self.add(job(self.dry, false));
+                self.add(job(self.dry, true));
+                self.dry += 1;
+            }
+            Role::Standing if kind.periodic().is_none() => {
+                self.standing += 1;
+                self.add(job(EFFECTS as u8 - self.standing, false));
+            }
+            Role::Standing | Role::Position | Role::Current | Role::Voltage => {}
+        }
+    }
+
+    fn add(&mut self, job: Job) {
+        if let Some(place) = self.jobs.get_mut(usize::from(self.count)) {
+            *place = job;
             self.count += 1;
             self.round += T::ONE;
         }
@@ -336,25 +354,15 @@ impl<T: Scalar> Compensation<T> {
             sum(&mut state.planned.iter().rev().take(standing)),
             sum(&mut state.sliding.iter().take(dry)),
         ];
-        let value = |job: &Job| {
-            let one = self.effects.get(usize::from(job.effect))?.as_ref()?;
-            let counts = one.role == Role::Standing && one.effect.kind.on_the_link();
-            counts.then(|| state.planned.get(usize::from(job.place)).copied())?
-        };
-        let jobs = self.jobs.iter().take(usize::from(self.count));
-        state.on_link = (jobs.filter_map(value)).fold(T::ZERO, |sum, one| sum + one);
     }
 
     /// How far the contact is bent through which a law acts; none where nothing bends it.
     #[inline(always)]
     fn bent(&self, state: &State<T>, job: &Job) -> Option<T> {
-        let contact = usize::from(self.contact?);
-        let effect = |k: usize| self.effects.get(k)?.as_ref().map(|one| &one.effect);
-        if !effect(usize::from(job.effect))?.kind.acts_through_contact() {
-            return None;
-        }
+        let contact = usize::from(job.contact?);
         let [planned, sliding] = state.memories.get(contact)?;
-        Some(effect(contact)?.bent(if job.sliding { sliding } else { planned }))
+        let one = self.effects.get(contact)?.as_ref()?;
+        Some(one.effect.bent(if job.sliding { sliding } else { planned }))
     }
 
     #[inline(always)]
@@ -384,6 +392,8 @@ impl<T: Scalar> Compensation<T> {
         };
         let (wanted, measured) = (finite(now.reference.velocity), finite(now.velocity));
         let mut instant = now.instant(one.whole);
+        let linked = state.planned.iter().rev().take(usize::from(self.on_link));
+        instant.load += linked.fold(T::ZERO, |sum, one| sum + *one);
         instant.period = now.period * self.round;
         // Until half of the time that it stands for has passed.
         let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
@@ -417,7 +427,6 @@ impl<T: Scalar> Compensation<T> {
             instant.direction = bent;
         }
         instant.friction = now.friction(instant.velocity, instant.direction);
-        instant.load += state.on_link;
         let nowhere = one.role == Role::Standing && !now.placed;
         let torque = if nowhere {
             T::ZERO
@@ -431,11 +440,7 @@ impl<T: Scalar> Compensation<T> {
             _ => 0,
         };
         if let Some(place) = place.get_mut(usize::from(job.place)) {
-            let change = torque - *place;
-            state.sums[sum] += change;
-            if one.role == Role::Standing && one.effect.kind.on_the_link() {
-                state.on_link += change;
-            }
+            state.sums[sum] += torque - *place;
             *place = torque;
         }
         if state.turn == 0 {

@@ -134,11 +134,21 @@ pub(crate) fn mixed_effects() -> [Effect<f32>; EFFECTS] {
 }
 
 /// Effects of each sort at their dearest, as many as there can be: what runs beside every motion and law below.
-fn effects() -> [(&'static str, std::vec::Vec<Effect<f32>>); 4] {
+fn effects() -> [(&'static str, std::vec::Vec<Effect<f32>>); 5] {
     let fill = |kinds: &[Effect<f32>]| kinds.iter().cycle().take(EFFECTS).copied().collect();
     let mixed = mixed_effects();
+    let maxwell = Effect::new(Kind::PreslidingMaxwell, &[0.05, 0.05, 0.05, 0.05], &[0.1]);
+    let carried = [
+        maxwell,
+        Effect::new(Kind::LoadFriction, &[0.1], &[0.5]),
+        Effect::new(Kind::PositionFriction, &[0.02, 0.02], &[12.0]),
+        Effect::new(Kind::ViscousWarmupHeat, &[0.02], &[600.0]),
+        Effect::new(Kind::Spring, &[0.1, 0.2], &[]),
+        Effect::new(Kind::TorqueOffset, &[0.01], &[]),
+    ];
     [
         ("none", vec![]),
+        ("carried by a gear and a contact", carried.to_vec()),
         ("dry with memory", fill(&[LUGRE])),
         ("encoder and ripple", fill(&[mixed[4], mixed[2]])),
         ("one of each sort", mixed.to_vec()),
