@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use rig_shared::effects::{
-    Channel, Effect, GAINS, Instant, Kind, MEMORY, Memory, Parameter, SHAPES, Scale,
+    Channel, Effect, GAINS, Instant, Kind, Memory, Parameter, SHAPES, Scale,
 };
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
 
@@ -42,8 +42,8 @@ pub(super) struct Source<'a> {
     pub(super) free_constants: Vec<bool>,
     /// Delay at which the column of each joint's delay is taken, s.
     pub(super) delays: Vec<f64>,
-    /// How far the contacts of joints with presliding are bent, from −1 to 1, by run and joint: what all of their dry friction has in
-    /// the place of the direction.
+    /// How far the contacts of joints with presliding are bent, from −1 to 1, by run and joint: what acts through them has that in the
+    /// place of the direction.
     pub(super) bent: HashMap<(usize, usize), Vec<f64>>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
@@ -84,6 +84,21 @@ const OF_THE_FILTERED_MOTION: [Kind; 4] = [
     Kind::GravityTilt,
 ];
 
+/// How far an effect of presliding is bent along the velocities of a run.
+fn bent(effect: &Effect<f64>, velocities: &[f64], period: f64) -> Vec<f64> {
+    let mut memory = Memory::default();
+    let along = |&velocity: &f64| {
+        let at = Instant {
+            velocity,
+            period,
+            ..Instant::default()
+        };
+        effect.torque(&mut memory, &at);
+        effect.bent(&memory)
+    };
+    velocities.iter().map(along).collect()
+}
+
 impl Source<'_> {
     /// The same with the gears' load and the drives' torque as effects make them that are in the model; `gains` are those of
     /// their columns, one effect after the other.
@@ -98,19 +113,16 @@ impl Source<'_> {
         let mut at = 0;
         for profile in chosen {
             let Candidate { kind, joint, .. } = profile.candidate;
-            if kind == Kind::MeasurementDelay {
-                self.delays[joint] = gains[at].max(DELAY);
-            }
-            at += profile.columns.len();
-        }
-        let mut at = 0;
-        for profile in chosen {
             let own = &gains[at..at + profile.columns.len()];
             at += own.len();
-            if profile.candidate.kind.is_presliding() {
-                for r in 0..self.runs.len() {
-                    let bent = self.bent(profile, own, r);
-                    self.bent.insert((r, profile.candidate.joint), bent);
+            if kind == Kind::MeasurementDelay {
+                self.delays[joint] = own[0].max(DELAY);
+            }
+            if kind.is_presliding() {
+                let effect = Effect::new(kind, own, &profile.shapes);
+                for (r, run) in self.runs.iter().enumerate() {
+                    let bent = bent(&effect, &run.joints[joint].qd, 1.0 / run.rate);
+                    self.bent.insert((r, joint), bent);
                 }
             }
         }
@@ -127,24 +139,6 @@ impl Source<'_> {
             self.saturate(r, chosen, gains)?;
         }
         Ok(self)
-    }
-
-    /// How far the contact of a joint with presliding is bent over a run.
-    fn bent(&self, profile: &Profile, gains: &[f64], r: usize) -> Vec<f64> {
-        let candidate = &profile.candidate;
-        let run = &self.runs[r];
-        let effect = Effect::new(candidate.kind, gains, &profile.shapes);
-        let mut memory = Memory::default();
-        let along = |velocity: &f64| {
-            let at = Instant {
-                velocity: *velocity,
-                period: 1.0 / run.rate,
-                ..Instant::default()
-            };
-            effect.torque(&mut memory, &at);
-            effect.bent(&memory)
-        };
-        (run.joints[candidate.joint].qd.iter()).map(along).collect()
     }
 
     /// Saturation in the predicted torque that its own law asks for. Where more than half of what a little more current would give
@@ -385,15 +379,13 @@ impl Source<'_> {
             (Kind::GravityTilt, _) => self.tilted(run),
             (_, Channel::Position) => {
                 let slopes = self.slopes(candidate.joint, r)?;
-                let errors = self.terms(candidate, shapes, run, predicted, None);
+                let errors = self.terms(candidate, shapes, r);
                 Ok((errors.iter().take(gains))
                     .map(|error| slopes.misread(error, 1.0 / run.rate))
                     .collect())
             }
             _ => {
-                let bent = (self.bent.get(&(r, candidate.joint)))
-                    .filter(|_| candidate.kind.acts_through_contact());
-                let terms = self.terms(candidate, shapes, run, predicted, bent);
+                let terms = self.terms(candidate, shapes, r);
                 Ok(terms.into_iter().take(gains).map(own).collect())
             }
         };
@@ -401,14 +393,38 @@ impl Source<'_> {
     }
 
     /// The effect's terms sample by sample.
-    fn terms(
+    fn terms(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Vec<Vec<f64>> {
+        self.along(candidate, shapes, r).0
+    }
+
+    /// What an effect remembers where a run begins: nothing, or where it goes on from another what that one has left.
+    fn begun(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Memory<f64> {
+        let end = |run: &Run| run.t.last().copied();
+        let first = self.runs[r].t.first().copied().unwrap_or(0.0);
+        let before = (self.runs.iter().enumerate())
+            .filter(|(_, run)| run.began == self.runs[r].began)
+            .filter_map(|(p, run)| Some((p, end(run)?)))
+            .filter(|(p, end)| *p != r && *end < first)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        match before {
+            Some((p, end)) if candidate.kind == Kind::ViscousWarmupHeat => {
+                let (_, memory) = self.along(candidate, shapes, p);
+                Effect::new(candidate.kind, &[], shapes).rested(memory, first - end)
+            }
+            _ => Memory::default(),
+        }
+    }
+
+    /// The effect's terms sample by sample, and what it remembers at the end.
+    fn along(
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
-        run: &Run,
-        predicted: &Predicted,
-        bent: Option<&Vec<f64>>,
-    ) -> Vec<Vec<f64>> {
+        r: usize,
+    ) -> (Vec<Vec<f64>>, Memory<f64>) {
+        let (run, predicted) = (&self.runs[r], &self.predicted[r]);
+        let bent = (self.bent.get(&(r, candidate.joint)))
+            .filter(|_| candidate.kind.acts_through_contact());
         let joint = &run.joints[candidate.joint];
         let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
@@ -422,7 +438,7 @@ impl Source<'_> {
             .unwrap_or(0.0);
         let gains = candidate.kind.about().gains.len();
         let mut out = vec![Vec::with_capacity(run.len()); gains];
-        let mut memory = [0.0; MEMORY];
+        let mut memory = self.begun(candidate, shapes, r);
         for k in 0..run.len() {
             let direction = match bent {
                 Some(bent) => bent[k],
@@ -453,13 +469,13 @@ impl Source<'_> {
                 if outruns(candidate.kind, shapes, ratio * joint.qd[k], at.period) {
                     [0.0; GAINS]
                 } else {
-                    candidate.kind.terms(shapes, &mut memory, &at)
+                    candidate.kind.terms(shapes, &mut memory.0, &at)
                 };
             for (list, term) in out.iter_mut().zip(terms) {
                 list.push(term);
             }
         }
-        out
+        (out, memory)
     }
 
     pub(super) fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {

@@ -113,7 +113,7 @@ impl<'a> Search<'a> {
 
     /// Takes a source with another model's predictions; columns that depend on them are forgotten.
     fn renewed(&mut self, source: Source<'a>) {
-        // Where presliding has come in, or has gone, all other dry friction goes with it.
+        // Where presliding has come in, or has gone, what acts through its contact goes with it.
         let slid = !(self.source.bent.is_empty() && source.bent.is_empty());
         self.source = source;
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
@@ -262,12 +262,7 @@ impl<'a> Search<'a> {
                 chosen = before;
                 continue;
             }
-            for _ in 0..2 {
-                // Load and inertia as they are with the effects in; the columns that rest on them follow.
-                self.renewed(renew(&chosen)?);
-                self.refine_all(base, &mut chosen)?;
-            }
-            chosen.retain(|profile| profile.vanished.is_none());
+            self.anew(base, &mut chosen, renew)?;
             self.sides(base, &mut chosen, renew)?;
             let place = chosen.iter().position(|p| p.candidate == newcomer);
             if let Some(i) = place
@@ -288,20 +283,40 @@ impl<'a> Search<'a> {
             }
         }
         for _ in 0..LAWS_ANEW {
-            if !self.other_laws(base, &mut chosen)? {
+            let other = self.other_laws(base, &mut chosen)?;
+            if !self.springs(base, &mut chosen, trials)? && !other {
                 break;
             }
-            for _ in 0..2 {
-                // Another law of presliding bends the contact otherwise, through which other friction acts.
-                self.renewed(renew(&chosen)?);
-                self.refine_all(base, &mut chosen)?;
-            }
-            chosen.retain(|profile| profile.vanished.is_none());
+            self.anew(base, &mut chosen, renew)?;
+            self.sides(base, &mut chosen, renew)?;
         }
-        self.springs(base, &mut chosen, trials)?;
         chosen.sort_by_key(|profile| self.rank_of(&profile.candidate));
         self.dropped = impossible;
         Ok(chosen)
+    }
+
+    /// The effects once more by what the model predicts with them in: load and inertia, how far contacts are bent, and the columns
+    /// that rest on them. What vanishes by that goes, and its part in them with it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    fn anew(
+        &mut self,
+        base: &Fit,
+        chosen: &mut Vec<Profile>,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+    ) -> Result<(), DiagnoseError> {
+        let before = chosen.len();
+        for _ in 0..2 {
+            self.renewed(renew(chosen)?);
+            self.refine_all(base, chosen)?;
+        }
+        chosen.retain(|profile| profile.vanished.is_none());
+        if chosen.len() < before {
+            self.renewed(renew(chosen)?);
+            self.refine_all(base, chosen)?;
+        }
+        Ok(())
     }
 
     /// What would stand in the place of the `i`-th effect beside all others, best first; gears only where a gear or what is

@@ -71,6 +71,8 @@ fn stopped(e: impl std::fmt::Display) -> PrepareError {
 struct Running {
     memory: Vec<Memory<f64>>,
     segment: usize,
+    /// Of the last row worked on, s.
+    last_time: f64,
     first_time: f64,
     first_temperature: Vec<Option<f64>>,
 }
@@ -110,17 +112,23 @@ impl Recording for Compensated<'_> {
         let mut running: Option<Running> = None;
         each_piece(self.inner, CORE.max(margin), margin, &mut |mut piece| {
             if running.is_none() {
+                let first_time = piece.rows.t.first().copied().unwrap_or(0.0);
                 running = Some(Running {
-                    memory: Vec::new(),
-                    segment: usize::MAX,
-                    first_time: piece.rows.t.first().copied().unwrap_or(0.0),
+                    memory: vec![Memory::default(); self.effects.placed.len()],
+                    segment: piece.segment,
+                    last_time: first_time,
+                    first_time,
                     first_temperature: temperatures(&piece, piece.core_start),
                 });
             }
             if let Some(running) = &mut running {
                 if running.segment != piece.segment {
                     running.segment = piece.segment;
-                    running.memory = vec![Memory::default(); self.effects.placed.len()];
+                    let first = piece.rows.t.get(piece.core_start).copied();
+                    let gap = first.unwrap_or(running.last_time) - running.last_time;
+                    for (memory, placed) in running.memory.iter_mut().zip(&self.effects.placed) {
+                        *memory = placed.effect.rested(*memory, gap);
+                    }
                 }
                 self.work(&mut piece, running)?;
             }
@@ -132,6 +140,27 @@ impl Recording for Compensated<'_> {
             }
             Ok(())
         })
+    }
+}
+
+/// What is worked out for a row, joint by joint, N·m or N.
+struct Scratch {
+    /// What effects ask for.
+    sum: Vec<f64>,
+    /// What is left for the gear to transmit.
+    behind: Vec<f64>,
+    /// How far the contact is bent where there is presliding, elsewhere the direction.
+    slid: Vec<f64>,
+}
+
+impl Scratch {
+    fn of(joints: usize) -> Self {
+        let zeros = || vec![0.0; joints];
+        Self {
+            sum: zeros(),
+            behind: zeros(),
+            slid: zeros(),
+        }
     }
 }
 
@@ -166,7 +195,8 @@ impl Compensated<'_> {
         let mut row = [vec![0.0; joints], vec![0.0; joints], vec![0.0; joints]];
         let (mut motor, mut drive) = (vec![0.0; joints], vec![0.0; joints]);
         let mut motor_velocity = vec![0.0; joints];
-        let (mut warming, mut sum) = (vec![0.0; joints], vec![0.0; joints]);
+        let mut warming = vec![0.0; joints];
+        let mut scratch = Scratch::of(joints);
         for r in piece.core_start..piece.core_end {
             for (j, s) in seen.iter().enumerate() {
                 (row[0][j], row[1][j], row[2][j]) = (s.q[r], s.qd[r], s.qdd[r]);
@@ -195,7 +225,9 @@ impl Compensated<'_> {
                 warming: &warming,
                 period: self.period,
             };
-            self.torques(&state, &motor_velocity, &mut running.memory, &mut sum);
+            running.last_time = piece.rows.t[r];
+            self.torques(&state, &motor_velocity, &mut running.memory, &mut scratch);
+            let sum = &mut scratch.sum;
             if self.loads && self.effects.loads.iter().flatten().any(|x| *x != 0.0) {
                 let mut load = vec![0.0; joints];
                 let loads = &self.effects.loads;
@@ -205,8 +237,8 @@ impl Compensated<'_> {
                     *to += from;
                 }
             }
-            for (to, torque) in known.iter_mut().zip(&sum) {
-                to[r] += torque;
+            for (to, torque) in known.iter_mut().zip(sum) {
+                to[r] += *torque;
             }
         }
         for (column, known) in piece.rows.joints.iter_mut().zip(known) {
@@ -221,25 +253,17 @@ impl Compensated<'_> {
         at: &State<'_>,
         motor_velocity: &[f64],
         memory: &mut [Memory<f64>],
-        sum: &mut [f64],
+        Scratch { sum, behind, slid }: &mut Scratch,
     ) {
-        sum.fill(0.0);
         let placed = &self.effects.placed;
-        let mut behind: Vec<f64> = self
-            .effects
-            .standard
-            .iter()
-            .enumerate()
-            .map(|(j, p)| {
-                at.drive[j]
-                    - p[column::DRIVE_INERTIA] * at.qdd[j]
-                    - p[column::VISCOUS] * at.qd[j]
-                    - p[column::COULOMB] * at.qd[j].sgn()
-                    - p[column::OFFSET]
-            })
-            .collect();
-        // How far the contact is bent where there is presliding, elsewhere the direction.
-        let mut slid: Vec<f64> = at.qd.iter().map(|speed| speed.sgn()).collect();
+        for (j, p) in self.effects.standard.iter().enumerate() {
+            sum[j] = 0.0;
+            slid[j] = at.qd[j].sgn();
+            behind[j] = at.drive[j]
+                - p[column::DRIVE_INERTIA] * at.qdd[j]
+                - self.effects.friction(j, at.qd[j], slid[j])
+                - p[column::OFFSET];
+        }
         for turn in [Turn::Presliding, Turn::Others] {
             for (k, p) in placed.iter().enumerate() {
                 let kind = p.effect.kind;

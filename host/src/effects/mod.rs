@@ -56,7 +56,7 @@ pub(crate) struct State<'a> {
 /// Which of a joint's effects are worked out before which.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Turn {
-    /// How far its contact is bent is what other dry friction goes by.
+    /// How far its contact is bent is what friction of load and position goes by.
     Presliding,
     /// What acts on the link is part of the load.
     Others,

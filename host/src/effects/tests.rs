@@ -8,7 +8,7 @@ use rig_shared::scalar::Real as _;
 
 use super::*;
 use crate::identify::identify;
-use crate::prepare::InMemory;
+use crate::prepare::{InMemory, stretch};
 use crate::robot::{Controller, ONE_LINK_TEMPLATE, RobotEffect};
 use crate::simulate::{Inputs, Model, Stepper, closed_loop};
 use crate::validate::{Motion, Options, Validation, validate};
@@ -308,6 +308,70 @@ fn what_is_identified_is_the_robot_without_its_effects() {
     }
 }
 
+/// The friction that effects go by is that of the joint, not what its description took it for.
+#[test]
+fn effects_go_by_the_friction_that_is_identified() {
+    for (kind, gains, shapes) in [
+        (Kind::LoadFriction, &[0.15][..], &[0.4][..]),
+        (Kind::ViscousWarmupHeat, &[0.1], &[3.0]),
+    ] {
+        let truth = with(rig(), kind, gains, shapes);
+        let recording = recorded(&truth);
+        let mut described = truth.clone();
+        let friction = described.joints[0].friction.as_mut().unwrap();
+        friction.viscous *= 0.7;
+        friction.coulomb *= 0.7;
+        let options = crate::identify::Options::default();
+        let [right, wrong] = [&truth, &described]
+            .map(|robot| identify(robot, &[&recording], &[], &options).unwrap());
+        for (a, b) in wrong.base_parameters.iter().zip(&right.base_parameters) {
+            assert!(
+                (a.value - b.value).abs() < 2e-3 * (1.0 + b.value.abs()),
+                "{kind:?} {}: {} {}",
+                a.expression,
+                a.value,
+                b.value
+            );
+        }
+        let own = truth.joints[0].friction.as_ref().unwrap();
+        let found = crate::identify::identified_robot(&described, &wrong).0;
+        let found = found.joints[0].friction.as_ref().unwrap();
+        assert!(
+            (found.viscous - own.viscous).abs() < 0.02
+                && (found.coulomb - own.coulomb).abs() < 0.02,
+            "{kind:?}: {found:?} {own:?}"
+        );
+    }
+}
+
+/// Fifty milliseconds that a log has lost leave a joint as warm as it was, but for what it cools in that time.
+#[test]
+fn heat_goes_on_over_a_gap() {
+    let robot = with(rig(), Kind::ViscousWarmupHeat, &[0.1], &[3.0]);
+    let whole = recorded(&robot);
+    let [block] = whole.blocks.as_slice() else {
+        panic!("more than one block");
+    };
+    let [before, mut after] = [(0, 5000), (5050, 10_000)].map(|(a, b)| stretch(block, a, b));
+    after.continues = false;
+    let cut = InMemory {
+        label: "cut".into(),
+        blocks: vec![before, after],
+    };
+    let options = crate::identify::Options::default();
+    let [whole, cut] =
+        [&whole, &cut].map(|recording| identify(&robot, &[recording], &[], &options).unwrap());
+    for (a, b) in cut.base_parameters.iter().zip(&whole.base_parameters) {
+        assert!(
+            (a.value - b.value).abs() < 5e-3,
+            "{}: {} {}",
+            a.expression,
+            a.value,
+            b.value
+        );
+    }
+}
+
 #[test]
 fn gears_are_simulated_and_said_to_be_beyond_the_torque_check() {
     for (kind, gains, shapes) in GEARS {
@@ -463,6 +527,12 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             "{kind:?}: {said}"
         );
     }
+    let warm = with(rig(), Kind::ViscousWarmupTime, &[0.5], &[0.05]);
+    let said = refused(&warm);
+    assert!(
+        said.contains("joint 1") && said.contains("smaller drop"),
+        "{said}"
+    );
     let mut two = coupled(0.0);
     two.effects.clear();
     let mut elastic = with(two, Kind::JointElasticity, &[], &[2000.0, 3.0]);
@@ -479,6 +549,31 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         said.contains("backlash of joint link") && said.contains("rotor_inertia"),
         "{said}"
     );
+}
+
+/// Whether a stiff gear has its share of the joint's friction on the link's side or all of it on the motor's, teeth are loaded by the
+/// share that friction under load states, once.
+#[test]
+fn a_stiff_gear_is_loaded_as_none_is() {
+    let swung = |robot: &Robot| {
+        let model = Model::from_robot(robot).unwrap();
+        let mut stepper = Stepper::new(&model).unwrap();
+        let (mut q, mut v) = (vec![0.3], vec![2.0]);
+        for _ in 0..400 {
+            stepper.step(&mut q, &mut v, &[0.5], 1e-3).unwrap();
+        }
+        q[0]
+    };
+    let loaded = |share: f64| with(rig(), Kind::LoadFriction, &[0.15], &[share]);
+    let [none, plain] = [0.0, 0.4].map(|share| swung(&loaded(share)));
+    for side in [0.0, 0.4, 1.0] {
+        let stiff = with(loaded(0.4), Kind::JointElasticity, &[], &[2e5, 50.0, side]);
+        let off = (swung(&stiff) - plain).abs();
+        assert!(
+            off < 0.1 * (none - plain).abs(),
+            "{side}: {off} {none} {plain}"
+        );
+    }
 }
 
 /// A fit finds a little more memory than dry friction as easily as a little less: what is beyond it cannot be, and the rig slides,

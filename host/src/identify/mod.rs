@@ -53,6 +53,7 @@ mod repeat;
 mod residual;
 mod ridge;
 mod robust;
+mod settled;
 mod slow;
 mod solve;
 mod speed;
@@ -91,7 +92,7 @@ pub use position::PositionTorque;
 pub(crate) use prior::described;
 pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};
 pub use residual::{Dependence, ResidualReport, Series};
-pub use solve::identify;
+pub use settled::identify;
 pub use standard::{StandardParameter, StandardSet};
 pub use tilt::BaseTilt;
 

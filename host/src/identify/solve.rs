@@ -48,20 +48,21 @@ const SETTLED: f64 = 1e-3;
 /// … or after this many passes; then a warning says so.
 const MOST_PASSES: usize = 30;
 
-/// Identifies `robot` from `training` and checks the result on `holdout`.
+/// Identifies `robot` from `training` and checks the result on `holdout`; its effects stand beside these parameters, one row a joint.
 ///
 /// # Errors
 /// [`IdentifyError`]: recordings that cannot be used, a motion that excites nothing, a singular problem.
-pub fn identify(
+pub(super) fn identify_beside(
     robot: &Robot,
     training: &[&dyn Recording],
     holdout: &[&dyn Recording],
     options: &Options,
+    beside: &[[f64; COLUMNS]],
 ) -> Result<Identification, IdentifyError> {
     further::check(robot, options)?;
     let mut known = None;
     for _ in 0..=MOST_LOOKS {
-        match solve(robot, training, holdout, options, known.as_ref())? {
+        match solve(robot, training, holdout, options, beside, known.as_ref())? {
             Solved::Whole(found) => return Ok(*found),
             Solved::Anew(more) => known = Some(more),
         }
@@ -100,6 +101,7 @@ fn solve(
     training: &[&dyn Recording],
     holdout: &[&dyn Recording],
     options: &Options,
+    beside: &[[f64; COLUMNS]],
     added: Option<&Beyond>,
 ) -> Result<Solved, IdentifyError> {
     let nothing = Beyond::default();
@@ -142,7 +144,9 @@ fn solve(
         let of = |survey| treatment.at_rate_of(survey);
         holdout_surveys.iter().map(of).collect()
     };
-    let effects = Effects::of(robot).map_err(|e| IdentifyError::Model(e.to_string()))?;
+    let effects = Effects::of(robot)
+        .map_err(|e| IdentifyError::Model(e.to_string()))?
+        .beside(beside);
     let rid = if effects.is_empty() {
         [const { Vec::new() }; 3]
     } else {

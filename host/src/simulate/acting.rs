@@ -25,8 +25,10 @@ pub(super) struct Acting<'a> {
     remembered: Vec<[f64; 2]>,
     /// How far the contact of each joint with presliding is bent.
     bent: Vec<Option<f64>>,
-    /// What other dry friction adds through such a contact, whatever the direction is, one a joint.
+    /// What other friction adds through such a contact, whatever the direction is, one a joint.
     through: Vec<f64>,
+    /// What warming takes off viscous friction, one a joint.
+    warmed: Vec<f64>,
 }
 
 impl<'a> Acting<'a> {
@@ -42,6 +44,7 @@ impl<'a> Acting<'a> {
             remembered: vec![[0.0; 2]; joints],
             bent: vec![None; joints],
             through: vec![0.0; joints],
+            warmed: vec![0.0; joints],
         }
     }
 
@@ -106,6 +109,7 @@ impl<'a> Acting<'a> {
         let mut load = links.to_vec();
         self.bent.fill(None);
         self.through.fill(0.0);
+        self.warmed.fill(0.0);
         for turn in Turn::ALL {
             for (k, p) in self.effects.placed().iter().enumerate() {
                 let kind = p.effect.kind;
@@ -138,6 +142,10 @@ impl<'a> Acting<'a> {
                     continue;
                 }
                 let torque = p.effect.torque(&mut self.memory[k].clone(), &instant);
+                if kind.is_warming() && instant.velocity != 0.0 {
+                    self.warmed[p.joint] += torque / instant.velocity;
+                    self.refuse_driving(p.joint)?;
+                }
                 match self.link.filter(|_| kind.on_the_link()) {
                     Some(link) => self.torque[link] += torque,
                     None => self.torque[p.joint] += torque,
@@ -146,6 +154,21 @@ impl<'a> Acting<'a> {
                     load[p.joint] += torque;
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses viscous friction of a joint of which warming has left less than none.
+    fn refuse_driving(&self, joint: usize) -> Result<(), SimulateError> {
+        let viscous = self.effects.friction(joint, 1.0, 0.0);
+        let left = viscous + self.warmed[joint];
+        if left < -SLACK * viscous {
+            return Err(SimulateError::WarmedAway {
+                joint: joint + 1,
+                time: self.time,
+                viscous,
+                left,
+            });
         }
         Ok(())
     }
@@ -163,22 +186,26 @@ impl<'a> Acting<'a> {
         let [back, forth] = self.remembered[joint];
         let slack = SLACK * (coulomb + low.abs() + high.abs());
         // Slid far enough, what is remembered is the direction: the rest must be friction on its own.
+        let driving = |[low, high]: [f64; 2]| SimulateError::DrivingEffects {
+            joint: joint + 1,
+            velocity,
+            low,
+            high,
+        };
         let through = self.through[joint];
         // What a bent contact holds goes against what has bent it.
         let held = self.bent[joint].map_or(0.0, |bent| (coulomb * bent + through) * bent.sgn());
-        let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack && held >= -slack;
+        if held < -slack {
+            return Err(driving([-held, held]));
+        }
+        let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack;
         if passive && bounds[0] <= bounds[1] {
             return Ok(bounds.map(|bound| bound + through));
         }
         if passive {
             return Ok([winding(bounds, [back, forth]) + through; 2]);
         }
-        Err(SimulateError::DrivingEffects {
-            joint: joint + 1,
-            velocity,
-            low: bounds[0],
-            high: bounds[1],
-        })
+        Err(driving(bounds))
     }
 
     /// Hidden states and time at the end of the step.

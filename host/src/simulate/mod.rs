@@ -88,6 +88,20 @@ pub enum SimulateError {
         /// Friction against motion forwards.
         high: f64,
     },
+    /// Viscous friction that has warmed away.
+    #[error(
+        "after {time:.3} s of motion joint {joint} has warmed so far that its viscous friction is {left} N·m·s/rad (N·s/m), and would drive it: the description gives it {viscous} cold; give viscous_warmup a smaller drop, or [joint.friction] viscous more."
+    )]
+    WarmedAway {
+        /// From 1 at the base.
+        joint: usize,
+        /// When, s.
+        time: f64,
+        /// Viscous friction cold, N·m·s/rad or N·s/m.
+        viscous: f64,
+        /// Viscous friction then, N·m·s/rad or N·s/m.
+        left: f64,
+    },
     /// Play or elasticity where it is not simulated.
     #[error(
         "{effect} is simulated for a robot of one joint with a drive of its own only; leave it out, or describe the joint alone."

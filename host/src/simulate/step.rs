@@ -16,6 +16,7 @@
 //! Leaves out: end stops, temperatures, the electrical side.
 
 use rig_shared::multibody::{COLUMNS, bias_torque, column, inertia_matrix};
+use rig_shared::scalar::Real as _;
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::acting::Acting;
@@ -244,7 +245,12 @@ impl<'a> Stepper<'a> {
             let inertia: f64 = row.zip(&self.acceleration).map(|(m, a)| m * a).sum();
             let rotor = self.smooth[j][column::DRIVE_INERTIA] * self.acceleration[j];
             *load = match self.elastic {
-                Some(_) => self.bias[0],
+                // What the shaft transmits, without the friction on the link's side: a law adds what it takes to be carried.
+                Some(elastic) => {
+                    let speed = self.mean_velocity[1];
+                    let friction = self.model.effects.friction(j, speed, speed.sgn());
+                    self.bias[0] - elastic.link_friction * friction
+                }
                 None => self.bias[j] + inertia - rotor,
             };
         }

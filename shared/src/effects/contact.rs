@@ -25,8 +25,8 @@ impl Kind {
 }
 
 impl<T: Real> Effect<T> {
-    /// How far the contact is bent that an effect of presliding remembers, from −1 to 1: what other dry friction has in the place of
-    /// its direction.
+    /// How far the contact is bent that an effect of presliding remembers, from −1 to 1: what [`Kind::acts_through_contact`] has in the
+    /// place of its direction.
     #[inline(always)]
     pub fn bent(&self, memory: &Memory<T>) -> T {
         let [first, ..] = memory.0;

@@ -111,6 +111,11 @@ trait Law {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS];
+
+    /// The hidden state after so many seconds of which nothing is known, s: it begins anew.
+    fn rested<T: Real>(_shapes: &[T; SHAPES], memory: &mut [T; MEMORY], _seconds: T) {
+        *memory = [T::ZERO; MEMORY];
+    }
 }
 
 macro_rules! registry {
@@ -162,7 +167,13 @@ macro_rules! registry {
                 }
             }
 
-            /// The same without the laws that nothing compensates, and without the periodic ones, which are turned with the
+            fn rested<T: Real>(self, shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
+                match self {
+                    $(Self::$kind => $module::$kind::rested(shapes, memory, seconds)),+
+                }
+            }
+
+            /// [`Self::terms`] without the laws that nothing compensates, and without the periodic ones, which are turned with the
             /// angle instead: a chip need not hold their code. 0 for them.
             #[inline(always)]
             pub(crate) fn compensated_terms<T: Real>(
@@ -273,6 +284,19 @@ impl Kind {
         }
     }
 
+    /// Whether it takes viscous friction off as the joint warms.
+    pub const fn is_warming(self) -> bool {
+        matches!(
+            self,
+            Self::ViscousWarmupTime | Self::ViscousWarmupTemperature | Self::ViscousWarmupHeat
+        )
+    }
+
+    /// Whether its law goes by the joint's own friction: heat of it, or what of the drive's torque is left for a gear to transmit.
+    pub const fn heeds_friction(self) -> bool {
+        matches!(self, Self::LoadFriction | Self::ViscousWarmupHeat)
+    }
+
     /// Whether its torque acts on the link: a gear transmits it, friction under load grows with it, and a shaft is twisted by it.
     pub const fn on_the_link(self) -> bool {
         matches!(
@@ -331,5 +355,12 @@ impl<T: Real> Effect<T> {
             .iter()
             .zip(terms)
             .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term)
+    }
+
+    /// The hidden state after `seconds` of which nothing is known, as in a gap of a recording: heat goes its way as in a joint at
+    /// rest, and what remembers a distance begins anew.
+    pub fn rested(&self, mut memory: Memory<T>, seconds: T) -> Memory<T> {
+        self.kind.rested(&self.shapes, &mut memory.0, seconds);
+        memory
     }
 }

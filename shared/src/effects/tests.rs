@@ -479,3 +479,34 @@ fn heat_is_stored_on_a_chip_as_it_is_on_a_desktop() {
         "{torque} {expected}"
     );
 }
+
+/// What is left after a pause is what was there, cooled as the law cools a joint at rest; a distance is forgotten.
+#[test]
+fn heat_outlasts_a_pause_and_nothing_else_does() {
+    for &kind in Kind::ALL {
+        let law = example(kind);
+        let at = |velocity: f64| Instant {
+            velocity,
+            direction: velocity.sgn(),
+            friction: 0.5 * velocity.sgn(),
+            time: 30.0,
+            period: 1e-3,
+            ..Instant::default()
+        };
+        let mut memory = Memory::default();
+        for _ in 0..20_000 {
+            law.torque(&mut memory, &at(0.7));
+        }
+        let paused = law.rested(memory, 3.0);
+        if kind != Kind::ViscousWarmupHeat {
+            assert_eq!(paused, Memory::default(), "{kind:?}");
+            continue;
+        }
+        let warm = memory.0[0];
+        for _ in 0..3000 {
+            law.torque(&mut memory, &at(0.0));
+        }
+        assert!(warm > 0.0 && paused.0[0] < warm);
+        assert!((paused.0[0] / memory.0[0] - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,9 +1,7 @@
 //! Viscous friction that falls as friction heats the joint.
 
-use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
-};
+use super::viscous_warmup_time::ViscousWarmupTime;
+use super::{About, Channel, Direction, GAINS, Instant, Law, MEMORY, Parameter, SHAPES, Scale};
 use crate::scalar::Real;
 
 pub(super) struct ViscousWarmupHeat;
@@ -34,21 +32,10 @@ impl Law for ViscousWarmupHeat {
             meaning: "time after which 63 % of the fall has happened at an even speed",
         }],
         signature: "odd in velocity, growing with it, fading over minutes, faster where the joint moves faster",
-        confused: &[
-            Confusion {
-                with: "quadratic_drag",
-                exact: false,
-                separated_by: "the same speeds in random order",
-            },
-            Confusion {
-                with: "torque_saturation",
-                exact: false,
-                separated_by: "the same motion cold and warm",
-            },
-        ],
-        needs: &[Need::Duration(60.0)],
+        confused: ViscousWarmupTime::ABOUT.confused,
+        needs: ViscousWarmupTime::ABOUT.needs,
         compensable: true,
-        leaves_out: "heat of the motor and of other effects' friction, Coulomb friction that falls with temperature too, viscous friction that falls less the warmer it is, what happened before the recording",
+        leaves_out: "heat of the motor and of other effects' friction, Coulomb friction that falls with temperature too, viscous friction that falls less the warmer it is, what the joint did before the recording and in its gaps, where it counts as cold and as at rest; that `friction` falls as well",
     };
 
     #[inline(always)]
@@ -64,5 +51,11 @@ impl Law for ViscousWarmupHeat {
         let next = warm + more;
         (memory[0], memory[1]) = (next, more - (next - warm));
         [-(at.velocity * next), T::ZERO, T::ZERO, T::ZERO]
+    }
+
+    fn rested<T: Real>(shapes: &[T; SHAPES], memory: &mut [T; MEMORY], seconds: T) {
+        let [warm, rest, ..] = *memory;
+        *memory = [T::ZERO; MEMORY];
+        memory[0] = (warm + rest) * (-(seconds / shapes[0])).exp();
     }
 }

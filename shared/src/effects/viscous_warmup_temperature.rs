@@ -1,8 +1,8 @@
 //! Viscous friction that falls with a measured temperature.
 
+use super::viscous_warmup_time::ViscousWarmupTime;
 use super::{
-    About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
-    Scale,
+    About, Channel, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES, Scale,
 };
 use crate::scalar::Real;
 
@@ -27,18 +27,7 @@ impl Law for ViscousWarmupTemperature {
         }],
         shapes: &[],
         signature: "odd in velocity, growing with it, fading as the temperature rises",
-        confused: &[
-            Confusion {
-                with: "quadratic_drag",
-                exact: false,
-                separated_by: "the same speeds in random order",
-            },
-            Confusion {
-                with: "torque_saturation",
-                exact: false,
-                separated_by: "the same motion cold and warm",
-            },
-        ],
+        confused: ViscousWarmupTime::ABOUT.confused,
         needs: &[Need::Temperature],
         compensable: true,
         leaves_out: "the curve of viscosity over more than some 20 K, Coulomb friction that falls with temperature too",

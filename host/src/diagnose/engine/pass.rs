@@ -125,6 +125,7 @@ fn searched<'a>(
     let mut told = |step: usize, profiles: &[Profile]| {
         heard.sweeps += 1;
         progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(heard.sweeps)));
+        let first = profiles.iter().position(|p| p.refused(trials).is_none());
         for (k, p) in profiles.iter().enumerate() {
             heard.tried.push(Tried {
                 effect: title_of(p.candidate.kind),
@@ -135,7 +136,7 @@ fn searched<'a>(
                 p_value: p.evidence.corrected(trials),
                 refused: match p.refused(trials) {
                     Some(why) => why,
-                    None if k == 0 => String::new(),
+                    None if Some(k) == first => String::new(),
                     None => "another takes away more".into(),
                 },
             });

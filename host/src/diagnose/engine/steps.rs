@@ -67,11 +67,8 @@ pub(super) fn steps(
 pub(super) fn refuse(robot: &Robot, tried: &mut [Tried], fallen: &Profile, why: &str) {
     let title = title_of(fallen.candidate.kind);
     let joint = &robot.joints[fallen.candidate.joint].name;
-    // Marked as taken, or taken although another, which could not stand, took away more.
-    let own = |t: &&mut Tried| t.effect == title && t.joint == *joint;
-    if let Some(taken) = (tried.iter_mut().filter(own))
-        .max_by_key(|t| (t.refused.is_empty(), std::cmp::Reverse(t.step)))
-    {
+    let own = |t: &&mut Tried| t.refused.is_empty() && t.effect == title && t.joint == *joint;
+    if let Some(taken) = tried.iter_mut().find(own) {
         taken.refused = why.into();
     }
 }

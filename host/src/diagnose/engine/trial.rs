@@ -1,7 +1,7 @@
 //! Which of the effects that a search has found stand before the simulated motion, all the others and the recordings held back.
 
 use super::steps::{refuse, refuse_guesses};
-use super::unbelieved::{contradicted, ordered, unbelieved};
+use super::unbelieved::{CarriedOver, carried_over, ordered, unbelieved};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::bodies::Fitting;
@@ -65,11 +65,18 @@ impl Trial<'_, '_> {
         }
         // The hold-out finds no name; one that it contradicts does not stand.
         if let Some(sealed) = self.sealed {
-            while let Some(k) = contradicted(self.fitting, search, &left.judged.chosen, sealed)? {
-                let why = "explains the training data, and leaves more of the recordings held back than there is without it";
-                left = self.without(left, k, why, tried)?;
+            let why = "explains the training data, and leaves more of the recordings held back than there is without it";
+            loop {
+                match carried_over(self.fitting, search, &left.judged.chosen, sealed)? {
+                    CarriedOver::Yes => break,
+                    CarriedOver::InAnotherOrder => {
+                        let found = std::mem::take(&mut left.judged.chosen);
+                        left.judged.chosen = ordered(self.fitting, search, found, sealed)?;
+                        break;
+                    }
+                    CarriedOver::Not(k) => left = self.without(left, k, why, tried)?,
+                }
             }
-            left.judged.chosen = ordered(self.fitting, search, &left.judged.chosen, sealed)?;
             let held = Replay::of(self.fitting, sealed)?;
             let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
             left = self.unspoilt(left, (&held, MUCH_WORSE), why, tried)?;

@@ -84,47 +84,56 @@ pub(super) fn unbelieved(
     Ok(None)
 }
 
-/// The effect found with which the recordings held back are explained worst: worse than without it by what came before it, and no
-/// better beside all the others. None where all of them carry over. Beside a gear that is not to be told: its link is followed only
-/// once its name stands.
+/// What recordings held back say of the effects found.
+pub(super) enum CarriedOver {
+    /// One by one they explain them better.
+    Yes,
+    /// All together they do, though not one by one in the order that they were found in.
+    InAnotherOrder,
+    /// This one does not.
+    Not(usize),
+}
+
+/// Whether the effects found explain the recordings held back. One does not with which they are explained worse than without it by
+/// what came before it, and no better beside all the others. Beside a gear that is not to be told: its link is followed only once
+/// its name stands.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
-pub(super) fn contradicted(
+pub(super) fn carried_over(
     fitting: &Fitting,
     search: &Search,
     chosen: &[Profile],
     sealed: &Loaded,
-) -> Result<Option<usize>, DiagnoseError> {
+) -> Result<CarriedOver, DiagnoseError> {
     let mut rising = rising(fitting, search, chosen, sealed)?;
+    if rising.is_empty() {
+        return Ok(CarriedOver::Yes);
+    }
     rising.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let whole = fitting.unseen(chosen, sealed)?;
     for (k, _) in rising {
         let joint = chosen[k].candidate.joint;
-        let [with, without] = [chosen, &but(chosen, k)]
-            .map(|list| fitting.unseen(list, sealed).map(|left| left[joint]));
-        if WORSE * with? > without? {
-            return Ok(Some(k));
+        let without = fitting.unseen(&but(chosen, k), sealed)?;
+        if WORSE * whole[joint] > without[joint] {
+            return Ok(CarriedOver::Not(k));
         }
     }
-    Ok(None)
+    Ok(CarriedOver::InAnotherOrder)
 }
 
-/// The effects in an order in which those found explain the recordings held back better one by one, where they do not as they were
-/// found: friction that depends on the position may show there only once its warming is known. Last is always what is missed least.
+/// The effects with those found in another order, last always what is missed least of the recordings held back: friction that depends
+/// on the position may show there only once its warming is known.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
 pub(super) fn ordered(
     fitting: &Fitting,
     search: &Search,
-    chosen: &[Profile],
+    mut front: Vec<Profile>,
     sealed: &Loaded,
 ) -> Result<Vec<Profile>, DiagnoseError> {
-    let mut front = chosen.to_vec();
-    if rising(fitting, search, chosen, sealed)?.is_empty() {
-        return Ok(front);
-    }
-    let given = search.count_given(chosen);
+    let given = search.count_given(&front);
     let mut behind = Vec::new();
     while front.len() > given + 1 {
         let whole = fitting.unseen(&front, sealed)?;

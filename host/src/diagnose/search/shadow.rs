@@ -2,7 +2,7 @@
 
 use rig_shared::effects::Kind;
 
-use super::is_gear;
+use super::{is_constant, is_gear};
 use crate::diagnose::fit::sigmas;
 use crate::diagnose::profile::Profile;
 use crate::robot::Robot;
@@ -79,9 +79,7 @@ fn clear(own: &[f64], casting: &[f64], share: f64) -> bool {
 pub(in crate::diagnose) fn shadow(of: &Profile) -> f64 {
     match of.candidate.kind {
         kind if is_gear(kind) => SHADOW_OF_A_GEAR,
-        Kind::TorqueOffset | Kind::CurrentOffset | Kind::AsymmetricCoulomb | Kind::GravityTilt => {
-            SHADOW_OF_A_CONSTANT
-        }
+        kind if is_constant(kind) || kind == Kind::GravityTilt => SHADOW_OF_A_CONSTANT,
         Kind::Stribeck | Kind::StribeckExponential => SHADOW_OF_A_CURVE,
         _ => SHADOW,
     }

@@ -93,7 +93,8 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Springs that were taken for what an effect found later explains give way to the constant that they hold.
+    /// Springs that were taken for what an effect found later explains give way to the constant that they hold. Says whether there
+    /// was one.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -102,7 +103,8 @@ impl Search<'_> {
         base: &Fit,
         chosen: &mut [Profile],
         trials: usize,
-    ) -> Result<(), DiagnoseError> {
+    ) -> Result<bool, DiagnoseError> {
+        let mut changed = false;
         for i in 0..chosen.len() {
             let own = chosen[i].candidate;
             if own.kind != Kind::Spring || self.is_described(&own) {
@@ -111,10 +113,10 @@ impl Search<'_> {
             let rivals = self.alternatives(base, chosen, i)?;
             if let Some(smaller) = self.smaller(base, chosen, i, &rivals, trials)? {
                 chosen[i] = smaller;
-                self.refine_all(base, chosen)?;
+                changed = true;
             }
         }
-        Ok(())
+        Ok(changed)
     }
 
     /// Whether the data support a smaller candidate as well as `best`. What acts between motor and link only bends to what

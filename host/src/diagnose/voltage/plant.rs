@@ -195,9 +195,13 @@ impl Plant {
                     }
                     let bent = bent.filter(|_| kind.acts_through_contact());
                     for (side, direction) in [(&mut high, 1.0), (&mut low, -1.0)] {
-                        at.direction = bent.unwrap_or(direction);
-                        at.friction = viscous * v + coulomb * at.direction;
-                        *side += part.torque(&at);
+                        let direction = bent.unwrap_or(direction);
+                        let friction = viscous * v + coulomb * direction;
+                        *side += part.torque(&Instant {
+                            direction,
+                            friction,
+                            ..at
+                        });
                     }
                 }
                 if low > high {
