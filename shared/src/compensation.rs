@@ -13,7 +13,7 @@
 //!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
 //!   is given for where the link will be when the torque acts ([`Now::lead`]).
 //! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
-//!   fed by the measured way it would close a loop of positive sign. Friction of load and position goes the way that it does.
+//!   fed by the measured way it would close a loop of positive sign. What acts through its contact goes the way that it does.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
 //! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a
@@ -83,6 +83,9 @@ pub struct State<T: Real> {
     /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
     /// each round, so that no rounding piles up.
     sums: [T; 3],
+    /// Friction that goes through a contact when that is bent as far as it can be, of each law where the torque to give is taken from,
+    /// and at the measured motion.
+    through: [[T; EFFECTS]; 2],
     turn: u8,
     given: Given<T>,
 }
@@ -124,6 +127,7 @@ impl<T: Real> State<T> {
         self.sliding = [T::ZERO; EFFECTS];
         self.sums = [T::ZERO; 3];
         self.memories = [[Memory::default(); 2]; EFFECTS];
+        self.through = [[T::ZERO; EFFECTS]; 2];
         self.turn = 0;
         self.given = Given::default();
     }
@@ -423,15 +427,27 @@ impl<T: Scalar> Compensation<T> {
         };
         // Of dry friction nothing is given where nothing moves or is to, whatever a law remembers.
         let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
-        if let Some(bent) = bent {
-            instant.direction = bent;
+        instant.friction = now.friction(instant.velocity, bent.unwrap_or(instant.direction));
+        if bent.is_some() {
+            instant.direction = T::ONE;
         }
-        instant.friction = now.friction(instant.velocity, instant.direction);
+        let through = &mut state.through[usize::from(job.sliding)];
+        if one.effect.kind.is_presliding() && T::ZERO.lt(now.coulomb) {
+            let friction = through.iter().fold(T::ZERO, |sum, one| sum + *one);
+            instant.beside = friction / now.coulomb;
+        }
         let nowhere = one.role == Role::Standing && !now.placed;
         let torque = if nowhere {
             T::ZERO
         } else {
             evaluate(&one.effect, memory, &instant)
+        };
+        let torque = match (bent, through.get_mut(k)) {
+            (Some(bent), Some(through)) => {
+                *through = torque;
+                torque * bent
+            }
+            _ => torque,
         };
         let torque = if rests { T::ZERO } else { torque };
         let sum = match (one.role, job.sliding) {

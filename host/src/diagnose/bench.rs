@@ -217,6 +217,7 @@ impl<'a> Bench<'a> {
                 .map(|j| self.lets_constant_free(j))
                 .collect(),
             bent: HashMap::new(),
+            beside: HashMap::new(),
             delays: vec![DELAY; self.robot.joints.len()],
             driven: Mutex::default(),
             seen: HashMap::new(),

@@ -8,6 +8,7 @@ use rig_shared::effects::{
     Channel, Effect, GAINS, Instant, Kind, Memory, Parameter, SHAPES, Scale,
 };
 use rig_shared::multibody::{COLUMNS, Chain, bias_torque, column};
+use rig_shared::scalar::Real as _;
 
 use super::DiagnoseError;
 use super::predicted::Predicted;
@@ -19,7 +20,7 @@ use super::search::is_gear;
 use super::slopes::Slopes;
 use super::transmission::{ABREAST, Driven, Seen};
 use crate::batch::each_by;
-use crate::effects::outruns;
+use crate::effects::{outruns, over_coulomb};
 use crate::robot::{Robot, unit_of};
 
 mod gears;
@@ -45,6 +46,8 @@ pub(super) struct Source<'a> {
     /// How far the contacts of joints with presliding are bent, from −1 to 1, by run and joint: what acts through them has that in the
     /// place of the direction.
     pub(super) bent: HashMap<(usize, usize), Vec<f64>>,
+    /// Friction that acts through those contacts over that of the model, by run and joint.
+    pub(super) beside: HashMap<(usize, usize), Vec<f64>>,
     /// What twists obey, by run and joint, once it has been asked for.
     pub(super) driven: Mutex<HashMap<(usize, usize), Arc<Driven>>>,
     /// What the recorded torque tells of gears whose links are followed, by run and joint.
@@ -84,19 +87,20 @@ const OF_THE_FILTERED_MOTION: [Kind; 4] = [
     Kind::GravityTilt,
 ];
 
-/// How far an effect of presliding is bent along the velocities of a run.
-fn bent(effect: &Effect<f64>, velocities: &[f64], period: f64) -> Vec<f64> {
+/// How far an effect of presliding is bent along the velocities of a run, `beside` so much other friction.
+fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {
     let mut memory = Memory::default();
-    let along = |&velocity: &f64| {
+    let along = |(&velocity, &beside): (&f64, &f64)| {
         let at = Instant {
             velocity,
             period,
+            beside,
             ..Instant::default()
         };
         effect.torque(&mut memory, &at);
         effect.bent(&memory)
     };
-    velocities.iter().map(along).collect()
+    velocities.iter().zip(beside).map(along).collect()
 }
 
 impl Source<'_> {
@@ -121,8 +125,10 @@ impl Source<'_> {
             if kind.is_presliding() {
                 let effect = Effect::new(kind, own, &profile.shapes);
                 for (r, run) in self.runs.iter().enumerate() {
-                    let bent = bent(&effect, &run.joints[joint].qd, 1.0 / run.rate);
+                    let beside = self.beside(joint, r, chosen, gains);
+                    let bent = bent(&effect, &run.joints[joint].qd, &beside, 1.0 / run.rate);
                     self.bent.insert((r, joint), bent);
+                    self.beside.insert((r, joint), beside);
                 }
             }
         }
@@ -392,9 +398,34 @@ impl Source<'_> {
         shapes.iter().map(of_one).collect()
     }
 
+    /// Friction of a joint's effects that acts through its contact over that of the model, sample by sample.
+    fn beside(&self, joint: usize, r: usize, chosen: &[Profile], gains: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.runs[r].len()];
+        let [_, coulomb] = self.friction(joint);
+        let mut at = 0;
+        for profile in chosen {
+            let own = &gains[at..at + profile.columns.len()];
+            at += own.len();
+            let candidate = &profile.candidate;
+            if candidate.joint != joint || !candidate.kind.acts_through_contact() {
+                continue;
+            }
+            let (terms, _) = self.along(candidate, &profile.shapes, r, true);
+            for (term, gain) in terms.iter().zip(own) {
+                for (to, term) in sum.iter_mut().zip(term) {
+                    *to += gain * term;
+                }
+            }
+        }
+        for value in &mut sum {
+            *value = over_coulomb(*value, coulomb);
+        }
+        sum
+    }
+
     /// The effect's terms sample by sample.
     fn terms(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Vec<Vec<f64>> {
-        self.along(candidate, shapes, r).0
+        self.along(candidate, shapes, r, false).0
     }
 
     /// What an effect remembers where a run begins: nothing, or where it goes on from another what that one has left.
@@ -408,23 +439,26 @@ impl Source<'_> {
             .max_by(|a, b| a.1.total_cmp(&b.1));
         match before {
             Some((p, end)) if candidate.kind == Kind::ViscousWarmupHeat => {
-                let (_, memory) = self.along(candidate, shapes, p);
+                let (_, memory) = self.along(candidate, shapes, p, false);
                 Effect::new(candidate.kind, &[], shapes).rested(memory, first - end)
             }
             _ => Memory::default(),
         }
     }
 
-    /// The effect's terms sample by sample, and what it remembers at the end.
+    /// The effect's terms sample by sample, `whole` as if each went in the positive direction, and what it remembers at the end.
     fn along(
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
         r: usize,
+        whole: bool,
     ) -> (Vec<Vec<f64>>, Memory<f64>) {
         let (run, predicted) = (&self.runs[r], &self.predicted[r]);
         let bent = (self.bent.get(&(r, candidate.joint)))
             .filter(|_| candidate.kind.acts_through_contact());
+        let beside =
+            (self.beside.get(&(r, candidate.joint))).filter(|_| candidate.kind.is_presliding());
         let joint = &run.joints[candidate.joint];
         let ratio = self.robot.joints[candidate.joint].gear_ratio();
         let other = candidate.other.and_then(|k| run.joints.get(k));
@@ -440,20 +474,19 @@ impl Source<'_> {
         let mut out = vec![Vec::with_capacity(run.len()); gains];
         let mut memory = self.begun(candidate, shapes, r);
         for k in 0..run.len() {
-            let direction = match bent {
+            let slid = match bent {
                 Some(bent) => bent[k],
-                None if joint.qd[k] == 0.0 => 0.0,
-                None => joint.qd[k].signum(),
+                None => joint.qd[k].sgn(),
             };
             let at = Instant {
                 position: joint.q[k],
                 velocity: joint.qd[k],
                 acceleration: joint.qdd[k],
-                direction,
+                direction: if whole { 1.0 } else { slid },
                 motor_angle: ratio * joint.q[k],
                 drive_torque: drive[k],
                 load: load[k],
-                friction: coulomb * direction + viscous * joint.qd[k],
+                friction: coulomb * slid + viscous * joint.qd[k],
                 time: run.t[k] - run.began,
                 warming: joint
                     .temperature
@@ -461,6 +494,7 @@ impl Source<'_> {
                     .map_or(0.0, |t| t[k] - first_temperature),
                 other: other.map_or([0.0; 3], |o| [o.q[k], o.qd[k], o.qdd[k]]),
                 period: 1.0 / run.rate,
+                beside: beside.map_or(0.0, |beside| beside[k]),
                 // Delays and payloads have columns of their own.
                 drive_rate: 0.0,
                 gravity: 0.0,

@@ -119,7 +119,8 @@ impl<'a> Search<'a> {
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         cache.retain(|c, _| {
             let kind = self.library[*c].kind;
-            !(depends_on_model(kind) || slid && kind.acts_through_contact())
+            !(depends_on_model(kind)
+                || slid && (kind.acts_through_contact() || kind.is_presliding()))
         });
     }
 
@@ -453,7 +454,12 @@ impl<'a> Search<'a> {
             let fit = with(base, chosen, Some(i));
             let c = (self.library.iter()).position(|l| *l == chosen[i].candidate);
             let Some(c) = c else { continue };
-            if let Some(mut better) = self.profile(&fit, c, Some(chosen[i].shapes))? {
+            let mut better = self.profile(&fit, c, Some(chosen[i].shapes))?;
+            if better.is_none() && chosen[i].candidate.kind.is_presliding() {
+                // Beside other friction than its shapes were found with, one of its elements may be below zero there.
+                better = self.profile(&fit, c, None)?;
+            }
+            if let Some(mut better) = better {
                 better.doubled = (chosen.iter()).any(|p| doubles(&p.candidate, &better.candidate));
                 chosen[i] = better;
             } else {

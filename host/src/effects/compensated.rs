@@ -75,6 +75,7 @@ struct Running {
     last_time: f64,
     first_time: f64,
     first_temperature: Vec<Option<f64>>,
+    scratch: Scratch,
 }
 
 /// One joint over a piece, as the effects see it.
@@ -119,6 +120,7 @@ impl Recording for Compensated<'_> {
                     last_time: first_time,
                     first_time,
                     first_temperature: temperatures(&piece, piece.core_start),
+                    scratch: Scratch::of(self.effects.loads.len()),
                 });
             }
             if let Some(running) = &mut running {
@@ -151,6 +153,8 @@ struct Scratch {
     behind: Vec<f64>,
     /// How far the contact is bent where there is presliding, elsewhere the direction.
     slid: Vec<f64>,
+    /// Of the row before, friction of effects that act through it over the joint's own, 1.
+    beside: Vec<f64>,
 }
 
 impl Scratch {
@@ -160,6 +164,7 @@ impl Scratch {
             sum: zeros(),
             behind: zeros(),
             slid: zeros(),
+            beside: zeros(),
         }
     }
 }
@@ -196,7 +201,6 @@ impl Compensated<'_> {
         let (mut motor, mut drive) = (vec![0.0; joints], vec![0.0; joints]);
         let mut motor_velocity = vec![0.0; joints];
         let mut warming = vec![0.0; joints];
-        let mut scratch = Scratch::of(joints);
         for r in piece.core_start..piece.core_end {
             for (j, s) in seen.iter().enumerate() {
                 (row[0][j], row[1][j], row[2][j]) = (s.q[r], s.qd[r], s.qdd[r]);
@@ -226,8 +230,8 @@ impl Compensated<'_> {
                 period: self.period,
             };
             running.last_time = piece.rows.t[r];
-            self.torques(&state, &motor_velocity, &mut running.memory, &mut scratch);
-            let sum = &mut scratch.sum;
+            self.torques(&state, &motor_velocity, running);
+            let sum = &mut running.scratch.sum;
             if self.loads && self.effects.loads.iter().flatten().any(|x| *x != 0.0) {
                 let mut load = vec![0.0; joints];
                 let loads = &self.effects.loads;
@@ -252,9 +256,16 @@ impl Compensated<'_> {
         &self,
         at: &State<'_>,
         motor_velocity: &[f64],
-        memory: &mut [Memory<f64>],
-        Scratch { sum, behind, slid }: &mut Scratch,
+        Running {
+            memory, scratch, ..
+        }: &mut Running,
     ) {
+        let Scratch {
+            sum,
+            behind,
+            slid,
+            beside,
+        } = scratch;
         let placed = &self.effects.placed;
         for (j, p) in self.effects.standard.iter().enumerate() {
             sum[j] = 0.0;
@@ -274,14 +285,18 @@ impl Compensated<'_> {
                     continue;
                 }
                 let mut instant = self.effects.instant(k, at);
-                instant.direction = if kind.acts_through_contact() {
-                    slid[p.joint]
-                } else {
-                    at.qd[p.joint].sgn()
-                };
-                let torque = p.effect.torque(&mut memory[k], &instant);
+                let through = kind.acts_through_contact();
+                instant.direction = if through { 1.0 } else { at.qd[p.joint].sgn() };
+                if kind.is_presliding() {
+                    instant.beside = std::mem::take(&mut beside[p.joint]);
+                }
+                let mut torque = p.effect.torque(&mut memory[k], &instant);
                 if kind.is_presliding() {
                     slid[p.joint] = p.effect.bent(&memory[k]);
+                }
+                if through {
+                    beside[p.joint] += self.effects.over_coulomb(p.joint, torque);
+                    torque *= slid[p.joint];
                 }
                 sum[p.joint] += torque;
                 if !kind.on_the_link() {
@@ -305,6 +320,7 @@ impl Compensated<'_> {
             let both = behind + friction;
             let carried = both / (1.0 + coefficient * direction * both.sgn());
             sum[j] += coefficient * carried.abs() * direction;
+            beside[j] += self.effects.over_coulomb(j, coefficient * carried.abs());
         }
     }
 

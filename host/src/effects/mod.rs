@@ -56,7 +56,7 @@ pub(crate) struct State<'a> {
 /// Which of a joint's effects are worked out before which.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Turn {
-    /// How far its contact is bent is what friction of load and position goes by.
+    /// How far its contact is bent is what other friction goes by.
     Presliding,
     /// What acts on the link is part of the load.
     Others,
@@ -73,6 +73,15 @@ impl Turn {
             _ if kind.is_presliding() => Self::Presliding,
             _ => Self::Others,
         }
+    }
+}
+
+/// Friction of effects over the joint's own, 1.
+pub(crate) fn over_coulomb(friction: f64, coulomb: f64) -> f64 {
+    if coulomb > 0.0 {
+        friction / coulomb
+    } else {
+        0.0
     }
 }
 
@@ -168,6 +177,11 @@ impl Effects {
     pub(crate) fn friction(&self, joint: usize, velocity: f64, direction: f64) -> f64 {
         let row = &self.standard[joint];
         row[column::COULOMB] * direction + row[column::VISCOUS] * velocity
+    }
+
+    /// Friction of effects over the joint's own, 1: by so much farther a contact is bent that all of it acts through.
+    pub(crate) fn over_coulomb(&self, joint: usize, friction: f64) -> f64 {
+        over_coulomb(friction, self.friction(joint, 0.0, 1.0))
     }
 
     /// What the law of effect `k` sees; load and direction are left to the caller, friction is that of the velocity's direction.

@@ -27,6 +27,8 @@ pub(super) struct Acting<'a> {
     bent: Vec<Option<f64>>,
     /// What other friction adds through such a contact, whatever the direction is, one a joint.
     through: Vec<f64>,
+    /// Friction of those over the joint's own, 1, one a joint: of the pass before.
+    beside: Vec<f64>,
     /// What warming takes off viscous friction, one a joint.
     warmed: Vec<f64>,
 }
@@ -44,6 +46,7 @@ impl<'a> Acting<'a> {
             remembered: vec![[0.0; 2]; joints],
             bent: vec![None; joints],
             through: vec![0.0; joints],
+            beside: vec![0.0; joints],
             warmed: vec![0.0; joints],
         }
     }
@@ -84,6 +87,9 @@ impl<'a> Acting<'a> {
             },
         );
         instant.other[2] = 0.0;
+        if place.effect.kind.is_presliding() {
+            instant.beside = self.beside[place.joint];
+        }
         if let Some(link) = self.link
             && place.effect.kind.on_the_link()
         {
@@ -110,6 +116,7 @@ impl<'a> Acting<'a> {
         self.bent.fill(None);
         self.through.fill(0.0);
         self.warmed.fill(0.0);
+        let mut through = vec![0.0; joints];
         for turn in Turn::ALL {
             for (k, p) in self.effects.placed().iter().enumerate() {
                 let kind = p.effect.kind;
@@ -119,20 +126,21 @@ impl<'a> Acting<'a> {
                 let mut instant = self.instant(k, motion, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
-                    let mut towards = |direction: f64| {
+                    let mut towards = |direction: f64, bent: f64| {
                         instant.direction = direction;
-                        instant.friction =
-                            (self.effects).friction(p.joint, instant.velocity, direction);
+                        instant.friction = (self.effects).friction(p.joint, instant.velocity, bent);
                         let mut memory = self.memory[k];
                         (p.effect.torque(&mut memory, &instant), memory)
                     };
                     let bent = self.bent[p.joint].filter(|_| kind.acts_through_contact());
                     if let Some(bent) = bent {
-                        self.through[p.joint] += towards(bent).0;
+                        let (whole, _) = towards(1.0, bent);
+                        self.through[p.joint] += whole * bent;
+                        through[p.joint] += whole;
                         continue;
                     }
                     for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
-                        let (torque, memory) = towards(direction);
+                        let (torque, memory) = towards(direction, direction);
                         self.dry[p.joint][side] += torque;
                         if kind.is_presliding() {
                             self.remembered[p.joint][side] += torque;
@@ -154,6 +162,9 @@ impl<'a> Acting<'a> {
                     load[p.joint] += torque;
                 }
             }
+        }
+        for (j, whole) in through.into_iter().enumerate() {
+            self.beside[j] = self.effects.over_coulomb(j, whole);
         }
         Ok(())
     }

@@ -84,6 +84,7 @@ impl<T: Real> Now<T> {
             warming: self.warming,
             other: [T::ZERO; 3],
             period: self.period,
+            beside: T::ZERO,
         }
     }
 }

@@ -1,11 +1,13 @@
 //! The sliding contact of a joint, through which its dry friction acts: where a law with memory of distance stands, what grows with
-//! the load or varies with the position builds up as that does and not at once.
+//! the load, varies with the position or falls with the speed builds up as that does and not at once, and bends the contact farther
+//! before it slides ([`Instant::beside`]): what bends is as stiff as it was.
 //!
 //! Source: Lampaert, Al-Bender, Swevers 2003, eqs. 8 to 10, whose elements slip at their share of all the friction there is. Leaves
-//! out: that more friction bends the contact farther before it slides, at the stiffness that the contact has; friction that falls with
-//! speed, whose short reach and that of the contact hardly part in a recording (the law after Canudas de Wit has both); friction that
-//! differs with the direction, which is a constant beside one that does not.
+//! out: that a contact that sticks while its friction changes keeps its torque, not its share; friction that differs with the
+//! direction, which is a constant beside one that does not.
 
+#[cfg(doc)]
+use super::Instant;
 use super::{Effect, Kind, Memory};
 use crate::scalar::Real;
 
@@ -20,7 +22,13 @@ impl Kind {
 
     /// Whether it is dry friction that acts through the same contact as presliding of the joint.
     pub const fn acts_through_contact(self) -> bool {
-        matches!(self, Self::LoadFriction | Self::PositionFriction)
+        matches!(
+            self,
+            Self::LoadFriction
+                | Self::PositionFriction
+                | Self::Stribeck
+                | Self::StribeckExponential
+        )
     }
 }
 

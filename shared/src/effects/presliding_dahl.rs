@@ -58,7 +58,7 @@ impl Law for PreslidingDahl {
         at: &Instant<T>,
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
-        let way = at.velocity * at.period;
+        let way = at.way();
         let sign = way.sgn();
         let kept = (-(way.abs() / shapes[0])).exp();
         memory[0] = sign.squared() * (sign + (memory[0] - sign) * kept)

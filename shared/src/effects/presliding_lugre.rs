@@ -91,7 +91,7 @@ impl Law for PreslidingLugre {
         at: &Instant<T>,
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
-        let way = at.velocity * at.period;
+        let way = at.way();
         let sign = way.sgn();
         let level = T::ONE + shapes[1] * (-(at.velocity / shapes[2]).squared()).exp();
         let kept = (-(way.abs() / (shapes[0] * level))).exp();

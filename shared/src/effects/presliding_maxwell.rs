@@ -81,7 +81,7 @@ impl Law for PreslidingMaxwell {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        let way = at.velocity * at.period;
+        let way = at.way();
         let mut yield_at = shapes[0];
         let mut terms = [T::ZERO; GAINS];
         for (state, term) in memory.iter_mut().zip(&mut terms).rev() {

@@ -162,6 +162,7 @@ fn terms_beyond_the_gains_are_zero_and_no_gain_is_without_a_term() {
         time: 40.0,
         warming: 8.0,
         other: [0.3, 0.6, -1.5],
+        beside: 0.2,
         period: 1e-3,
     };
     for &kind in Kind::ALL {
@@ -278,14 +279,14 @@ proptest! {
         let at = Instant {
             position, velocity, acceleration: 3.0 * velocity, direction: velocity.sgn(), motor_angle: 50.0 * position,
             drive_torque: torque, drive_rate: 30.0 * velocity, load: 0.8 * torque, friction: 0.3 * velocity.sgn(), gravity: 9.0, time: 60.0,
-            warming: 4.0, other: [0.1, velocity, -velocity], period: 1e-3,
+            warming: 4.0, other: [0.1, velocity, -velocity], beside: 0.2, period: 1e-3,
         };
         let near = Instant {
             position: at.position as f32, velocity: at.velocity as f32, acceleration: at.acceleration as f32,
             direction: at.direction as f32, motor_angle: at.motor_angle as f32,
             drive_torque: at.drive_torque as f32, drive_rate: at.drive_rate as f32, load: at.load as f32, friction: at.friction as f32,
             gravity: at.gravity as f32, time: at.time as f32, warming: at.warming as f32,
-            other: at.other.map(|x| x as f32), period: at.period as f32,
+            other: at.other.map(|x| x as f32), beside: 0.2, period: at.period as f32,
         };
         for &kind in Kind::ALL {
             let shapes = example(kind).shapes;
@@ -509,4 +510,54 @@ fn heat_outlasts_a_pause_and_nothing_else_does() {
         assert!(warm > 0.0 && paused.0[0] < warm);
         assert!((paused.0[0] / memory.0[0] - 1.0).abs() < 1e-3);
     }
+}
+
+/// Against elements that are springs of their own stiffness, each of which slips at its share of all the friction that there is: friction
+/// that falls with the speed then bends them farther than it would bend a contact of its own.
+#[test]
+fn other_friction_bends_the_contact_farther() {
+    let (gains, stroke, dry) = ([0.2, 0.1, 0.15, 0.05], 0.01, 0.5);
+    let (falling, speed) = (0.3, 0.2);
+    let law = Effect::new(Kind::PreslidingMaxwell, &gains, &[stroke]);
+    let stribeck = Effect::new(Kind::Stribeck, &[falling], &[speed]);
+    let period = 1e-4;
+    let off = |widened: bool| {
+        let (mut memory, mut force) = (Memory::default(), [0.0; 4]);
+        let (mut squares, mut beside) = (0.0, 0.0);
+        for k in 0..40_000 {
+            let t = f64::from(k) * period;
+            // Slow loops within a fast one.
+            let velocity = 0.5 * (2.0 * t).sin() + 0.3 * (9.0 * t).cos();
+            let at = Instant {
+                velocity,
+                direction: velocity.sgn(),
+                period,
+                beside: if widened { beside } else { 0.0 },
+                ..Instant::default()
+            };
+            let presliding = law.torque(&mut memory, &at);
+            let whole = stribeck.torque(
+                &mut Memory::default(),
+                &Instant {
+                    direction: 1.0,
+                    ..at
+                },
+            );
+            beside = whole / dry;
+            let found = dry * velocity.sgn() + presliding + whole * law.bent(&memory);
+            let limit = 1.0 + whole / dry;
+            for (k, force) in force.iter_mut().enumerate() {
+                let yields = stroke * 2.0_f64.powi(k as i32 - 3);
+                let held = *force + gains[k] / yields * velocity * period;
+                *force = held.clamp(-gains[k] * limit, gains[k] * limit);
+            }
+            squares += (found - force.iter().sum::<f64>()).powi(2);
+        }
+        (squares / 40_000.0).sqrt()
+    };
+    let [widened, plain] = [true, false].map(off);
+    assert!(
+        widened < 0.03 * dry && widened < 0.5 * plain,
+        "{widened} {plain}"
+    );
 }

@@ -87,6 +87,7 @@ impl Course {
                         warming: 0.0,
                         other: [0.0; 3],
                         period,
+                        beside: 0.0,
                     }
                 })
                 .collect()

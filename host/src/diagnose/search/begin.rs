@@ -132,8 +132,16 @@ impl<'a> Search<'a> {
         if chosen.is_empty() {
             return Ok(chosen);
         }
+        // Load, inertia and bent contacts as they are with the effects in, and as described: shapes that are refined beside columns
+        // without them run away.
         for _ in 0..2 {
-            // Load and inertia as they are with the effects in.
+            self.renewed(renew(&chosen)?);
+            for profile in &mut chosen {
+                let columns = self.source.columns(&profile.candidate, &profile.shapes)?;
+                profile.columns = Arc::new(columns);
+            }
+        }
+        for _ in 0..2 {
             self.renewed(renew(&chosen)?);
             self.refine_all(base, &mut chosen)?;
         }

@@ -11,6 +11,7 @@ use rig_shared::effects::{Channel, Direction, Effect, Instant, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
 use super::log::{Log, Segment};
+use crate::effects::over_coulomb;
 use crate::robot::Robot;
 
 /// Longest step, s.
@@ -183,6 +184,7 @@ impl Plant {
                 let (mut low, mut high) = (-coulomb, coulomb);
                 let contact = parts.iter().find(|p| p.effect.kind.is_presliding());
                 let bent = contact.map(|part| part.bent(&at));
+                let mut through = 0.0;
                 for part in &parts {
                     let kind = part.effect.kind;
                     let about = kind.about();
@@ -194,19 +196,25 @@ impl Plant {
                         continue;
                     }
                     let bent = bent.filter(|_| kind.acts_through_contact());
-                    for (side, direction) in [(&mut high, 1.0), (&mut low, -1.0)] {
-                        let direction = bent.unwrap_or(direction);
-                        let friction = viscous * v + coulomb * direction;
-                        *side += part.torque(&Instant {
+                    let towards = |direction: f64, bent: f64| {
+                        part.torque(&Instant {
                             direction,
-                            friction,
+                            friction: viscous * v + coulomb * bent,
                             ..at
-                        });
+                        })
+                    };
+                    if let Some(bent) = bent {
+                        let whole = towards(1.0, bent);
+                        (low, high) = (low + whole * bent, high + whole * bent);
+                        through += whole;
+                        continue;
                     }
+                    (low, high) = (low + towards(-1.0, -1.0), high + towards(1.0, 1.0));
                 }
                 if low > high {
                     return false;
                 }
+                at.beside = over_coulomb(through, coulomb);
                 let braking = viscous + if on { gain * emf } else { 0.0 };
                 let mass = inertia + dt * braking;
                 let stop = inertia * v / dt + torque;
