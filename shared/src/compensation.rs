@@ -13,7 +13,8 @@
 //!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
 //!   is given for where the link will be when the torque acts ([`Now::lead`]).
 //! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
-//!   fed by the measured way it would close a loop of positive sign. What acts through its contact goes the way that it does.
+//!   fed by the measured way it would close a loop of positive sign. What acts through its contact goes the way that it does;
+//!   that it bends the contact farther ([`Instant::beside`](crate::effects::Instant::beside)) is left out, for want of time in a tick.
 //! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
 //!   of the current** is taken off the reading.
 //! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a
@@ -83,9 +84,6 @@ pub struct State<T: Real> {
     /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
     /// each round, so that no rounding piles up.
     sums: [T; 3],
-    /// Friction that goes through a contact when that is bent as far as it can be, of each law where the torque to give is taken from,
-    /// and at the measured motion.
-    through: [[T; EFFECTS]; 2],
     turn: u8,
     given: Given<T>,
 }
@@ -127,7 +125,6 @@ impl<T: Real> State<T> {
         self.sliding = [T::ZERO; EFFECTS];
         self.sums = [T::ZERO; 3];
         self.memories = [[Memory::default(); 2]; EFFECTS];
-        self.through = [[T::ZERO; EFFECTS]; 2];
         self.turn = 0;
         self.given = Given::default();
     }
@@ -138,6 +135,19 @@ impl<T: Real> State<T> {
     fn forget(&mut self) {
         self.stand = Stand::default();
     }
+}
+
+/// Sum of values. Not inlined: a chip's fast memory is small.
+#[inline(never)]
+fn total<T: Real>(values: &[T]) -> T {
+    values.iter().fold(T::ZERO, |sum, value| sum + *value)
+}
+
+/// The last so many values.
+#[inline(always)]
+fn last<T>(values: &[T; EFFECTS], count: u8) -> &[T] {
+    let first = EFFECTS.saturating_sub(usize::from(count));
+    values.get(first..).unwrap_or_default()
 }
 
 /// One law to be evaluated.
@@ -350,13 +360,11 @@ impl<T: Scalar> Compensation<T> {
     /// The sums anew.
     #[inline(never)]
     fn add_up(&self, state: &mut State<T>) {
-        let sum =
-            |values: &mut dyn Iterator<Item = &T>| values.fold(T::ZERO, |sum, value| sum + *value);
-        let (dry, standing) = (usize::from(self.dry), usize::from(self.standing));
+        let dry = usize::from(self.dry);
         state.sums = [
-            sum(&mut state.planned.iter().take(dry)),
-            sum(&mut state.planned.iter().rev().take(standing)),
-            sum(&mut state.sliding.iter().take(dry)),
+            total(state.planned.get(..dry).unwrap_or_default()),
+            total(last(&state.planned, self.standing)),
+            total(state.sliding.get(..dry).unwrap_or_default()),
         ];
     }
 
@@ -396,8 +404,9 @@ impl<T: Scalar> Compensation<T> {
         };
         let (wanted, measured) = (finite(now.reference.velocity), finite(now.velocity));
         let mut instant = now.instant(one.whole);
-        let linked = state.planned.iter().rev().take(usize::from(self.on_link));
-        instant.load += linked.fold(T::ZERO, |sum, one| sum + *one);
+        if self.on_link > 0 {
+            instant.load += total(last(&state.planned, self.on_link));
+        }
         instant.period = now.period * self.round;
         // Until half of the time that it stands for has passed.
         let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
@@ -427,27 +436,15 @@ impl<T: Scalar> Compensation<T> {
         };
         // Of dry friction nothing is given where nothing moves or is to, whatever a law remembers.
         let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
-        instant.friction = now.friction(instant.velocity, bent.unwrap_or(instant.direction));
-        if bent.is_some() {
-            instant.direction = T::ONE;
+        if let Some(bent) = bent {
+            instant.direction = bent;
         }
-        let through = &mut state.through[usize::from(job.sliding)];
-        if one.effect.kind.is_presliding() && T::ZERO.lt(now.coulomb) {
-            let friction = through.iter().fold(T::ZERO, |sum, one| sum + *one);
-            instant.beside = friction / now.coulomb;
-        }
+        instant.friction = now.friction(instant.velocity, instant.direction);
         let nowhere = one.role == Role::Standing && !now.placed;
         let torque = if nowhere {
             T::ZERO
         } else {
             evaluate(&one.effect, memory, &instant)
-        };
-        let torque = match (bent, through.get_mut(k)) {
-            (Some(bent), Some(through)) => {
-                *through = torque;
-                torque * bent
-            }
-            _ => torque,
         };
         let torque = if rests { T::ZERO } else { torque };
         let sum = match (one.role, job.sliding) {
