@@ -153,7 +153,7 @@ struct Scratch {
     behind: Vec<f64>,
     /// How far the contact is bent where there is presliding, elsewhere the direction.
     slid: Vec<f64>,
-    /// Of the row before, friction of effects that act through it over the joint's own, 1.
+    /// Friction of effects that act through it over the joint's own, 1: presliding sees that of the row before.
     beside: Vec<f64>,
 }
 
@@ -276,6 +276,9 @@ impl Compensated<'_> {
                 - p[column::OFFSET];
         }
         for turn in [Turn::Presliding, Turn::Others] {
+            if turn == Turn::Others {
+                beside.fill(0.0);
+            }
             for (k, p) in placed.iter().enumerate() {
                 let kind = p.effect.kind;
                 if !is_torque(kind) || Turn::of(kind) != turn {
@@ -288,7 +291,7 @@ impl Compensated<'_> {
                 let through = kind.acts_through_contact();
                 instant.direction = if through { 1.0 } else { at.qd[p.joint].sgn() };
                 if kind.is_presliding() {
-                    instant.beside = std::mem::take(&mut beside[p.joint]);
+                    instant.beside = beside[p.joint];
                 }
                 let mut torque = p.effect.torque(&mut memory[k], &instant);
                 if kind.is_presliding() {

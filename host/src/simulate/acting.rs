@@ -27,7 +27,7 @@ pub(super) struct Acting<'a> {
     bent: Vec<Option<f64>>,
     /// What other friction adds through such a contact, whatever the direction is, one a joint.
     through: Vec<f64>,
-    /// Friction of those over the joint's own, 1, one a joint: of the pass before.
+    /// Friction of those over the joint's own, 1, one a joint: presliding sees that of the pass before.
     beside: Vec<f64>,
     /// What warming takes off viscous friction, one a joint.
     warmed: Vec<f64>,
@@ -116,8 +116,10 @@ impl<'a> Acting<'a> {
         self.bent.fill(None);
         self.through.fill(0.0);
         self.warmed.fill(0.0);
-        let mut through = vec![0.0; joints];
         for turn in Turn::ALL {
+            if turn == Turn::Others {
+                self.beside.fill(0.0);
+            }
             for (k, p) in self.effects.placed().iter().enumerate() {
                 let kind = p.effect.kind;
                 if !is_torque(kind) || Turn::of(kind) != turn {
@@ -136,7 +138,7 @@ impl<'a> Acting<'a> {
                     if let Some(bent) = bent {
                         let (whole, _) = towards(1.0, bent);
                         self.through[p.joint] += whole * bent;
-                        through[p.joint] += whole;
+                        self.beside[p.joint] += self.effects.over_coulomb(p.joint, whole);
                         continue;
                     }
                     for (side, direction) in [-1.0, 1.0].into_iter().enumerate() {
@@ -162,9 +164,6 @@ impl<'a> Acting<'a> {
                     load[p.joint] += torque;
                 }
             }
-        }
-        for (j, whole) in through.into_iter().enumerate() {
-            self.beside[j] = self.effects.over_coulomb(j, whole);
         }
         Ok(())
     }

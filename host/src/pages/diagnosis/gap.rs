@@ -8,7 +8,7 @@ use crate::report::{
     format_significant,
 };
 
-/// Letters for which there is room below the axis on a narrow window; longer names give way to numbers.
+/// Letters for which there is room below the axis on a narrow window; longer names lose their laws or give way to numbers.
 const ROOM: usize = 48;
 /// A smaller share is none.
 const LEAST_SHARE: f64 = 0.005;
@@ -60,7 +60,8 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
     Some(section.with(figures(found)))
 }
 
-/// The residual of a joint from model to model; models whose names need more than `room` letters are numbered.
+/// The residual of a joint from model to model. Where the models' names need more than `room` letters they go without the effects' laws,
+/// and where that is not enough the models are numbered.
 pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     let n = w.models.len();
     let short: Vec<String> = w
@@ -72,13 +73,16 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
             effect => format!("+ {}", words::name(effect)),
         })
         .collect();
-    let longest = short.iter().map(|m| m.chars().count()).max();
-    let numbered = longest.unwrap_or(0) * n > room;
-    let names = if numbered {
-        (1..=n).map(|k| k.to_string()).collect()
-    } else {
-        short
+    let bare: Vec<String> = (short.iter())
+        .map(|name| name.split(" (").next().unwrap_or(name).to_owned())
+        .collect();
+    let fits = |names: &Vec<String>| {
+        let longest = names.iter().map(|name| name.chars().count()).max();
+        longest.unwrap_or(0) * n <= room
     };
+    let fitting = [short, bare].into_iter().find(fits);
+    let numbered = fitting.is_none();
+    let names = fitting.unwrap_or_else(|| (1..=n).map(|k| k.to_string()).collect());
     let shown = words::shown(found, &w.unit);
     let unit = &shown.unit;
     let places: Vec<f64> = (0..n).map(|k| k as f64).collect();
