@@ -56,7 +56,11 @@ pub(super) fn by_description(
         }
         let rivals = judge.search.alternatives(judge.base, &chosen, k)?;
         let best = (rivals.into_iter())
-            .filter(|rival| equal(&chosen[k], rival) && stands(rival, &chosen, k))
+            .filter(|rival| {
+                !(judge.search).is_not(&chosen[k].candidate, rival.candidate.kind)
+                    && equal(&chosen[k], rival)
+                    && stands(rival, &chosen, k)
+            })
             .map(|rival| {
                 let mut list = chosen.clone();
                 list[k] = rival;

@@ -128,6 +128,8 @@ fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Co
 /// take it up.
 pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize) -> Map {
     let (place, edges) = bins(&over.values, &rows.keep[joint], BINS);
+    let group = told_apart(&edges);
+    let place: Vec<Option<usize>> = place.iter().map(|b| b.map(|b| group[b])).collect();
     let [before, after] = fits.map(|fit| {
         let residual = fit.residual(joint);
         means(&place, &residual, fit.block_of_rows())
@@ -137,15 +139,45 @@ pub(super) fn map(rows: &Rows, over: &Coordinate, fits: [&Fit; 2], joint: usize)
         unit: over.unit.to_owned(),
         ..Map::default()
     };
-    for b in 0..BINS {
-        if let (Some(before), Some(after)) = (before[b], after[b]) {
-            map.at.push(0.5 * (edges[b] + edges[b + 1]));
-            map.before.push(before);
-            map.after.push(after);
-            map.law.push(before[0] - after[0]);
-        }
+    for g in 0..BINS {
+        let (Some(before), Some(after)) = (before[g], after[g]) else {
+            continue;
+        };
+        let ends = [
+            edges[group.partition_point(|b| *b < g)],
+            edges[group.partition_point(|b| *b <= g)],
+        ];
+        map.at.push(0.5 * (ends[0] + ends[1]));
+        map.before.push(before);
+        map.after.push(after);
+        map.law.push(before[0] - after[0]);
     }
     map
+}
+
+/// Narrowest bin that is drawn by itself, as a share of the mean width and of its distance from zero. Where a joint is driven at
+/// one speed for long, that speed varies by noise, and so does the torque of the controller that hears it: narrower bins would draw
+/// how the two go together, which is no law of the joint.
+const NARROWEST: [f64; 2] = [0.2, 0.1];
+
+/// Numbers of bins, the same for neighbours that are too narrow to be drawn by themselves.
+fn told_apart(edges: &[f64]) -> Vec<usize> {
+    let mean = (edges[edges.len() - 1] - edges[0]) / (edges.len() - 1) as f64;
+    let wide = |low: f64, high: f64| {
+        let least = (NARROWEST[0] * mean).min(NARROWEST[1] * 0.5 * (low + high).abs());
+        high - low >= least
+    };
+    let mut from = edges[0];
+    let mut number = 0;
+    let mut list = Vec::with_capacity(edges.len() - 1);
+    for ends in edges.windows(2) {
+        if !list.is_empty() && (wide(from, ends[0]) || wide(ends[0], ends[1])) {
+            number += 1;
+            from = ends[0];
+        }
+        list.push(number);
+    }
+    list
 }
 
 /// Mean of each bin and half the width of its 95 % interval from the spread between blocks; none where fewer than two

@@ -30,6 +30,7 @@ mod evaluate;
 mod evidence;
 mod excitation;
 mod factor;
+mod fit;
 mod freed;
 mod friction_map;
 mod further;
@@ -63,6 +64,8 @@ mod terms;
 mod tilt;
 mod total;
 mod twin;
+mod warnings;
+mod window;
 
 #[cfg(test)]
 mod rows_test;

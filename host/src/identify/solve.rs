@@ -1,7 +1,5 @@
 //! The way from recordings to an [`Identification`].
 
-use std::f64::consts::TAU;
-
 use nalgebra::DMatrix;
 use rig_shared::multibody::{COLUMNS, column};
 
@@ -11,42 +9,29 @@ use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::evaluate::{Planned, covariance, torque_residuals};
-use super::excitation::{excited, not_excited};
-use super::factor::TriangularFactor;
+use super::excitation::not_excited;
+use super::fit::Fit;
 use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
 use super::lag::Lag;
-use super::linear::{classical, least_squares, spread};
-use super::model::{Plan, Tally, each_rows};
+use super::model::Plan;
 use super::problem::Problem;
 use super::residual::ResidualReport;
-use super::robust::{reweighted, spread_of};
 use super::speed::speed_thresholds;
+use super::warnings::Heard;
+use super::window::choose_window;
 use super::{
     BaseParameter, Details, Estimator, Identification, IdentifyError, JointFigures, ModelKind,
     Options,
 };
 use crate::effects::Effects;
-use crate::prepare::{
-    Choice, PrepareError, Recording, Spooled, Survey, Treatment, each_of, surveyed, threads,
-};
-use crate::report::{format_significant, format_unit};
-use crate::robot::{Joint, JointKind, Robot};
+use crate::prepare::{Choice, PrepareError, Recording, Spooled, Survey, Treatment, surveyed};
+use crate::robot::Robot;
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
 const ROWS_A_PARAMETER: usize = 10;
-/// A mean over T passes half of the power at this over T: sin²(πx)/(πx)² = ½.
-const HALF_POWER: f64 = 0.443;
 /// Looks at what the description does not state: one finds it, each further one fits it together with all parameters.
 const MOST_LOOKS: usize = 8;
-/// Share of a joint's range, by judgement, up to which its motion may be a gear that twists: 0.4 degrees of a turn.
-const CREEP: f64 = 1e-3;
-/// Samples of a lead beyond which it is questioned: drives and buses take a few.
-const MOST_LED: f64 = 10.0;
-/// Reweighting stops when no parameter moves by more than this share of its standard deviation …
-const SETTLED: f64 = 1e-3;
-/// … or after this many passes; then a warning says so.
-const MOST_PASSES: usize = 30;
 
 /// Identifies `robot` from `training` and checks the result on `holdout`; its effects stand beside these parameters, one row a joint.
 ///
@@ -71,23 +56,6 @@ pub(super) fn identify_beside(
         what: "The search for what the description does not state",
         passes: MOST_LOOKS,
     })
-}
-
-/// How far the joint at `place` moves in any recording, in words, where that is but a creep.
-fn creep(joint: &Joint, surveys: &[Survey], place: usize) -> Option<String> {
-    let travel = surveys
-        .iter()
-        .map(|survey| survey.joints[place].position)
-        .map(|[low, high]| high - low)
-        .fold(0.0, f64::max);
-    let limits = joint.limits.as_ref().map(|limits| limits.position);
-    let range = limits.map_or(f64::INFINITY, |[low, high]| high - low);
-    let (range, unit) = match joint.kind {
-        JointKind::Revolute => (range.min(TAU), "rad"),
-        JointKind::Prismatic => (range, "m"),
-    };
-    (range.is_finite() && travel < CREEP * range)
-        .then(|| format!("{} {unit}", format_significant(travel, 2)))
 }
 
 /// An identification, or what it has to begin anew with.
@@ -221,111 +189,7 @@ fn solve(
         cache: made,
         ..plan_with(&treatment, window)
     };
-    let p = base.len();
-
-    // First fit: everything into one factor an equation.
-    let equations = joints;
-    let mut factors = vec![TriangularFactor::new(p); equations];
-    let mut instants = 0u64;
-    let mut tally = Tally::default();
-    for (r, recording) in training.iter().enumerate() {
-        let weight = options.row_weight(r);
-        let part = each_rows(*recording, &plan, options.model, &mut |rows| {
-            each_of(threads(treatment.threads), &mut factors, &|k, factor| {
-                let Some(equation) = rows.equations.get(k) else {
-                    return;
-                };
-                for (i, keep) in equation.keep.iter().enumerate() {
-                    if *keep {
-                        factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], weight);
-                    }
-                }
-            });
-            instants += rows.t.len() as u64;
-            Ok(())
-        })?;
-        tally.add(&part);
-    }
-    if tally.used < 2 * p as u64 {
-        return Err(IdentifyError::NothingLeft {
-            used: tally.used,
-            unknown: p,
-            slow: tally.slow.iter().sum(),
-            saturated: tally.saturated.iter().sum(),
-        });
-    }
-    let combine = |weights: &[f64]| {
-        let mut all = TriangularFactor::new(p);
-        for (factor, weight) in factors.iter().zip(weights) {
-            all.merge(factor, *weight);
-        }
-        all
-    };
-    // Joints of different strength must not hide one another when excitation is judged.
-    let by_torque: Vec<f64> = factors
-        .iter()
-        .map(|f| {
-            let rms = (f.right_side_squares() / f.rows().max(1) as f64).sqrt();
-            if rms > 0.0 { 1.0 / rms } else { 1.0 }
-        })
-        .collect();
-    let data = excited(&base, &combine(&by_torque));
-
-    let mut weights = vec![1.0; equations];
-    let mut beta = least_squares(&combine(&weights), &data, &base)?;
-    let by_noise: Vec<f64> = {
-        let full = spread(&beta, &data.kept, p);
-        factors
-            .iter()
-            .map(|factor| {
-                let freedom = factor
-                    .rows()
-                    .saturating_sub(p as u64 / equations as u64)
-                    .max(1);
-                let sigma = (factor.residual_squares(&full) / freedom as f64).sqrt();
-                if sigma > 0.0 { 1.0 / sigma } else { 1.0 }
-            })
-            .collect()
-    };
-    let weighted_beta = least_squares(&combine(&by_noise), &data, &base)?;
-    if options.estimator != Estimator::Ols {
-        weights.clone_from(&by_noise);
-        beta.clone_from(&weighted_beta);
-    }
-    let mut factor = combine(&weights);
-    let mut scales = None;
-    let mut passes = 0;
-    let mut converged = true;
-    if options.estimator == Estimator::Robust {
-        let mut scale = spread_of(
-            training,
-            &plan,
-            options,
-            &spread(&beta, &data.kept, p),
-            equations,
-        )?;
-        converged = false;
-        while passes < MOST_PASSES && !converged {
-            let (next_factor, next_scale) = reweighted(
-                training,
-                &plan,
-                options,
-                &spread(&beta, &data.kept, p),
-                &weights,
-                &scale,
-            )?;
-            let next = least_squares(&next_factor, &data, &base)?;
-            let (std, _) = classical(&next_factor, &data, &next)?;
-            converged = next
-                .iter()
-                .zip(&beta)
-                .zip(&std)
-                .all(|((a, b), s)| (a - b).abs() <= SETTLED * s);
-            (beta, factor, scale) = (next, next_factor, next_scale);
-            passes += 1;
-        }
-        scales = Some(scale);
-    }
+    let fit = Fit::of(training, &plan, options, &base)?;
 
     let problem = Problem {
         robot,
@@ -335,21 +199,21 @@ fn solve(
         plan: &plan,
         options,
         base: &base,
-        data: &data,
-        weights: &by_noise,
-        start: &weighted_beta,
-        instants,
+        data: &fit.data,
+        weights: &fit.by_noise,
+        start: &fit.weighted,
+        instants: fit.instants,
     };
     let (known, beside) = match added {
         None => {
-            let found = further::beyond_description(&problem, &factors)?;
+            let found = further::beyond_description(&problem, &fit.factors)?;
             if !found.is_empty() {
                 return Ok(Solved::Anew(found));
             }
             (found, None)
         }
         Some(known) => {
-            let found = further::together_with(&problem, &factors, known, described.gravity)?;
+            let found = further::together_with(&problem, &fit.factors, known, described.gravity)?;
             if !found.settled {
                 return Ok(Solved::Anew(found.terms));
             }
@@ -361,22 +225,22 @@ fn solve(
         Some(own) => (own.estimate.clone(), own.fitted.full.whole.clone()),
         // Second look: residuals of the fitted equations, for the covariance.
         None => {
-            let loss = scales.as_ref().map(|s| (options.loss, s.as_slice()));
+            let loss = (fit.scales.as_ref()).map(|s| (options.loss, s.as_slice()));
             let estimate = covariance(
                 training,
                 &plan,
                 options,
-                &factor,
-                &data,
-                &beta,
-                &weights,
+                &fit.factor,
+                &fit.data,
+                &fit.beta,
+                &fit.weights,
                 loss,
-                instants,
+                fit.instants,
                 beside
                     .map(|full| problem.identified_covariance(&full))
                     .as_ref(),
             )?;
-            (estimate, spread(&beta, &data.kept, p))
+            (estimate, fit.full())
         }
     };
     let by_position = |j: usize, q: f64| -> f64 {
@@ -409,8 +273,8 @@ fn solve(
         .map(|r| memory_of(&r.autocorrelation, r.rows))
         .collect();
     let lag = Lag::of(&problem, &remembered)?;
-    let combination = &data.combination * &base.combination;
-    let columns: Vec<usize> = data.kept.iter().map(|&k| base.columns[k]).collect();
+    let combination = &fit.data.combination * &base.combination;
+    let columns: Vec<usize> = (fit.data.kept.iter()).map(|&k| base.columns[k]).collect();
     let base_parameters: Vec<BaseParameter> = (0..columns.len())
         .map(|k| BaseParameter {
             expression: expression(&combination, k, columns[k]),
@@ -429,14 +293,14 @@ fn solve(
                 / estimate.values[k].abs(),
         })
         .collect();
-    let mut not_excited = not_excited(&base, &data);
+    let mut not_excited = not_excited(&base, &fit.data);
     let beyond = further(
         &problem,
         own,
         &Outcome {
             estimate: &estimate,
             full: &full,
-            factors: &factors,
+            factors: &fit.factors,
             memory: match options.model {
                 ModelKind::Differential => remembered,
                 ModelKind::Integral => vec![estimate.memory_rows],
@@ -454,109 +318,22 @@ fn solve(
     )?;
     not_excited.extend(beyond.hardly_excited);
     let mut warnings = beyond.warnings;
-    warnings.extend(
-        surveys
-            .iter()
-            .chain(&holdout_surveys)
-            .filter_map(|survey| survey.note.clone()),
-    );
-    for (survey, own) in holdout_surveys.iter().zip(&treatments) {
-        if own.sample_rate != treatment.sample_rate {
-            warnings.push(format!(
-                "{} is sampled at {} Hz, the training data at {} Hz: its errors are of one row in {} and up to {:.3} Hz, those of the training data up to {:.3} Hz.",
-                survey.label, own.sample_rate, treatment.sample_rate, own.decimation, own.parallel_edge, treatment.parallel_edge
-            ));
-        }
-    }
-    warnings.extend(lag.map(|lag| lag.said(treatment.dt())));
-    let led = treatment.torque_lead / treatment.dt();
-    if led.abs() > MOST_LED {
-        warnings.push(format!(
-            "--torque-lead shifts the torque by {} samples, where a command that is held acts half a sample late: it is given in s.",
-            format_significant(led, 3)
-        ));
-    }
-    let row_period = match options.model {
-        ModelKind::Differential => treatment.decimation,
-        ModelKind::Integral => plan.stride,
-    } as f64
-        * treatment.dt();
-    if !converged {
-        warnings.push(format!(
-            "The robust fit had not settled after {MOST_PASSES} passes; its values may still move."
-        ));
-    }
-    let groups = instants as f64 / (10.0 * estimate.memory_rows);
-    if groups < 8.0 {
-        warnings.push(format!(
-            "The residuals remember {:.2} s, so the recording holds only {groups:.1} independent stretches; the intervals, formed from eight, may be too narrow. A longer recording would mend that.",
-            estimate.memory_rows * row_period
-        ));
-    }
-    if estimate.scaled_condition > 100.0 {
-        warnings.push(format!(
-            "The condition number of the scaled regressor is {:.0}: the motion tells some parameters apart badly; look at their intervals.",
-            estimate.scaled_condition
-        ));
-    }
-    for (j, report) in train.iter().enumerate() {
-        let name = &robot.joints[j].name;
-        let (length, effort) = robot.joints[j].kind.units();
-        if surveys.iter().all(|s| s.joints[j].still()) {
-            warnings.push(format!(
-                "Joint {name} stands still at {} {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves.",
-                surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0]),
-                length
-            ));
-            continue;
-        }
-        if let Some(way) = creep(&robot.joints[j], &surveys, j).filter(|_| report.rows > 0) {
-            warnings.push(format!(
-                "Joint {name} moves by {way} in all training recordings, less than {CREEP} of its range. That may be no more than its drive or gear giving way: friction and inertia of such a motion are not those of one that turns the joint. Record a larger motion of it, or make it fixed in the description.",
-            ));
-        }
-        let unjudged = |which: &str, surveys: &[Survey]| {
-            let slowest = format_significant(treatment.speed_threshold[j], 2);
-            if surveys
-                .iter()
-                .all(|s| s.joints[j].only_noise(s.sample_rate))
-            {
-                return format!(
-                    "Joint {name} stands still in the {which} but for the noise of its encoder: no row is faster than {slowest} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
-                );
-            }
-            format!(
-                "Joint {name}: every row of the {which} was left out (slower than {slowest} {length}/s, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed."
-            )
-        };
-        if report.rows == 0 {
-            warnings.push(unjudged("training data", &surveys));
-        }
-        if holdout_residuals
-            .as_ref()
-            .is_some_and(|held| held[j].rows == 0)
-        {
-            warnings.push(unjudged("hold-out", &holdout_surveys));
-        }
-        if report.relative_error > 0.3 {
-            warnings.push(format!(
-                "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to. Look at its zero, axis and lengths in the description, at the order of the columns, and at the robot for what no rigid model has.",
-                100.0 * report.relative_error
-            ));
-        }
-        if let Some(held) = holdout_residuals
-            .as_ref()
-            .map(|h: &Vec<ResidualReport>| &h[j])
-            && held.rms > 1.5 * report.rms
-        {
-            warnings.push(format!(
-                "Joint {name}: the residual on the hold-out ({} {}) is {:.1} times that on the training data.",
-                format_significant(held.rms, 4),
-                format_unit(effort),
-                held.rms / report.rms
-            ));
-        }
-    }
+    let heard = Heard {
+        robot,
+        options,
+        surveys: &surveys,
+        holdout_surveys: &holdout_surveys,
+        treatment: &treatment,
+        treatments: &treatments,
+        stride: plan.stride,
+        lag,
+        converged: fit.converged,
+        instants: fit.instants,
+        estimate: &estimate,
+        train: &train,
+        holdout: holdout_residuals.as_deref(),
+    };
+    warnings.extend(heard.warnings());
     let stated = Effects::of(described).map_err(|e| IdentifyError::Model(e.to_string()))?;
     let [taken, left] = stated.uncompensated();
     warnings.extend(left);
@@ -597,7 +374,7 @@ fn solve(
         comparison: beyond.comparison,
         procedure,
         details: Details {
-            masked: tally.masked(),
+            masked: fit.tally.masked(),
             training: surveys.clone(),
             holdout: holdout_surveys,
             estimate,
@@ -637,52 +414,4 @@ fn each_planned<'a>(list: &[&'a dyn Recording], plans: &'a [Plan<'a>]) -> Vec<Pl
 
 fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
     list.iter().map(AsRef::as_ref).collect()
-}
-
-/// Several joints: what passes the band of the differential model. One: a sixteenth of the period of the fastest motion: many samples, so that the work of noise averages out, yet
-/// short enough that speeding up and slowing down fall into different windows. On EMPS, where friction is not
-/// quite Coulomb and viscous, a window of 0.4 s moves the offset by 13 %, this one by 1.5 %.
-fn choose_window(
-    options: &Options,
-    treatment: &Treatment,
-    surveys: &[Survey],
-) -> Result<(usize, String), IdentifyError> {
-    let rate = treatment.sample_rate;
-    let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0) as f64 / rate;
-    let (least, most) = (4.0 / rate, shortest / 20.0);
-    let (seconds, reason) = match options.window {
-        Some(seconds) => (seconds, format!("{seconds} s, as given.")),
-        None => {
-            let several = surveys.iter().any(|s| s.joints.len() > 1);
-            let wish = if several {
-                HALF_POWER / treatment.parallel_edge
-            } else {
-                0.0625 / treatment.motion_frequency
-            };
-            let seconds = wish.clamp(least, most.max(least));
-            let why = if several {
-                format!(
-                    "over which a mean passes up to the {:.3} Hz that the differential model's low-pass does",
-                    treatment.parallel_edge
-                )
-            } else {
-                format!(
-                    "a sixteenth of the period of the fastest motion ({:.3} Hz)",
-                    treatment.motion_frequency
-                )
-            };
-            (
-                seconds,
-                format!("{seconds:.4} s, {why}; windows start every quarter of that."),
-            )
-        }
-    };
-    if options.model == ModelKind::Integral && !(seconds >= least && seconds <= most) {
-        return Err(IdentifyError::Window {
-            window: seconds,
-            least,
-            most,
-        });
-    }
-    Ok(((seconds * rate).round() as usize, reason))
 }

@@ -71,3 +71,16 @@ fn weakening_friction_is_drawn_over_the_speed() {
     );
     println!("{:#?}\n{:#?}", found.not_testable, found.next_experiment);
 }
+
+/// Bins by equal numbers of rows, of a joint that is driven at 0.05 rad/s for long: those within the noise of that speed are drawn as
+/// one, those near rest, however narrow, and those far out stand alone.
+#[test]
+fn bins_within_the_noise_of_one_speed_are_drawn_as_one() {
+    let edges = [
+        -1.0, -0.5, 0.0, 1e-4, 1e-3, 0.02, 0.049, 0.05, 0.051, 0.052, 0.3, 1.0,
+    ];
+    let group = super::told_apart(&edges);
+    assert_eq!(group, [0, 1, 2, 3, 4, 5, 6, 6, 6, 7, 8]);
+    // Twice the same edge, as of a quantity that is mostly zero, is no width.
+    assert_eq!(super::told_apart(&[0.0, 0.0, 0.0, 1.0]), [0, 1, 2]);
+}
