@@ -374,7 +374,8 @@ impl<T: Scalar> Compensation<T> {
         let contact = usize::from(job.contact?);
         let [planned, sliding] = state.memories.get(contact)?;
         let one = self.effects.get(contact)?.as_ref()?;
-        Some(one.effect.bent(if job.sliding { sliding } else { planned }))
+        let memory = if job.sliding { sliding } else { planned };
+        Some(one.effect.bent(memory, T::ZERO))
     }
 
     #[inline(always)]

@@ -3,7 +3,8 @@
 //!
 //! Where the model is right, torque and motion ask for the same values. Noise of the position, which the torque's regressors hold,
 //! is in no simulated motion; what the controller does not let through is in no motion at all, so that waves are known worse by it.
-//! The torque's values stand unless the motion gets clearly better and the torque no worse.
+//! The torque's values stand unless the motion gets clearly better and the torque no worse, away from rests and reversals: a simulated
+//! joint sticks and turns back when it does, where filters blur what a torque says of it.
 //!
 //! Leaves out: robots of several joints; gears, whose link is followed from the torque; whole numbers.
 
@@ -30,8 +31,11 @@ const PASSES: usize = 4;
 const SETTLED: f64 = 0.5;
 /// Times a step may be damped more.
 const DAMPED: usize = 5;
-/// What the torque may be left worse by for the motion's values to stand.
+/// What the torque may be left worse by for the motion's values to stand …
 const TORQUE_WORSE: f64 = 0.005;
+/// … and where they leave this share of what the motion was off by: so much a filter's blur takes up.
+const FAR_BETTER: f64 = 0.5;
+const BLURRED: f64 = 0.05;
 /// Standard deviations from which on two values of a parameter are said to differ.
 const APART: f64 = 4.0;
 
@@ -142,12 +146,26 @@ pub(super) fn by_motion(
     ) else {
         return Ok(None);
     };
-    let left = |model: &Standing, effects: &[Profile]| -> Result<f64, DiagnoseError> {
+    let left = |model: &Standing, effects: &[Profile]| -> Result<[f64; 2], DiagnoseError> {
         let residual = bench.remaining(replay.judged, model.fitted(), effects)?;
-        Ok(floor::rms(&residual[0], &replay.judged.rows.keep[0]))
+        let rows = &replay.judged.rows;
+        let away = rows.away(0);
+        let sum: f64 = (residual[0].iter().zip(&away))
+            .map(|(r, c)| c * r * r)
+            .sum();
+        let used: f64 = away.iter().sum();
+        let all = floor::rms(&residual[0], &rows.keep[0]);
+        let clear = if used > 0.0 { (sum / used).sqrt() } else { all };
+        Ok([all, clear])
     };
-    let torque_rms = [left(&before, chosen)?, left(&standing, &effects)?];
-    let adopted = was.worse_than(&is, 0) && torque_rms[1] <= (1.0 + TORQUE_WORSE) * torque_rms[0];
+    let [[all_was, clear_was], [all_is, clear_is]] =
+        [left(&before, chosen)?, left(&standing, &effects)?];
+    let torque_rms = [all_was, all_is];
+    let worse = match is.rms(0) < FAR_BETTER * was.rms(0) {
+        true => BLURRED,
+        false => TORQUE_WORSE,
+    };
+    let adopted = was.worse_than(&is, 0) && clear_is <= (1.0 + worse) * clear_was;
     let names = named(bench, source, chosen, &values.shapes);
     let parameters: Vec<Twice> = (names.into_iter().enumerate())
         .map(|(k, (parameter, unit, scale))| Twice {
@@ -259,7 +277,7 @@ fn nearest(
 fn sentence(told: &ByMotion) -> String {
     let [was, is] = told.motion_rms.map(|rms| format_significant(1e3 * rms, 3));
     let stands = if told.adopted {
-        ", and leaves the torque no worse: those values stand."
+        "; away from rests and reversals, where filters blur the torque, that is left hardly worse: those values stand."
     } else {
         "; the torque's values stand."
     };

@@ -98,7 +98,7 @@ fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -
             ..Instant::default()
         };
         effect.torque(&mut memory, &at);
-        effect.bent(&memory)
+        effect.bent(&memory, beside)
     };
     velocities.iter().zip(beside).map(along).collect()
 }
@@ -295,6 +295,12 @@ impl Source<'_> {
     pub(super) fn running(&self) -> f64 {
         let ran = |run: &Run| run.t.last().map_or(0.0, |t| t - run.began);
         self.runs.iter().map(ran).fold(0.0, f64::max)
+    }
+
+    /// The highest speed that a joint reaches, rad/s or m/s.
+    pub(super) fn fastest(&self, joint: usize) -> f64 {
+        let speeds = (self.runs.iter()).flat_map(|run| &run.joints[joint].qd);
+        speeds.fold(0.0, |most, v| v.abs().max(most))
     }
 
     /// Coulomb friction of a joint, as identified; 0 where it came out below that.

@@ -53,6 +53,6 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         maps: Vec::new(),
         curves: Vec::new(),
     };
-    diagnosis.words = sentences::verdict(&diagnosis);
+    diagnosis.words = sentences::verdict(&diagnosis, false);
     diagnosis
 }

@@ -2,6 +2,7 @@
 
 use super::anchor::Anchor;
 use super::fit::Fit;
+use super::floor::repeats;
 use super::locate::Coordinate;
 use super::motion::Positions;
 use super::outcome::Diagnosis;
@@ -77,6 +78,7 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
     diagnosis.not_testable = limits::not_testable(found)?;
     diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
     diagnosis.next_experiment = limits::next(found, diagnosis, found.model)?;
-    diagnosis.words = sentences::verdict(diagnosis);
+    let repeated = !repeats(found.search.source.runs).is_empty();
+    diagnosis.words = sentences::verdict(diagnosis, repeated);
     Ok(())
 }

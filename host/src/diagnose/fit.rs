@@ -346,6 +346,11 @@ impl<'a> Fit<'a> {
             .then(|| (share, beta.iter().copied().collect()))
     }
 
+    /// Inner product of two columns, weighted.
+    pub(super) fn product(&self, a: &Column, b: &Column) -> f64 {
+        dot(&self.weighted(a), &self.weighted(b))
+    }
+
     /// Weighted columns of a candidate projected; none where one of them is no column of its own.
     pub(super) fn distinct(&self, columns: &[Column]) -> Option<Vec<Vec<f64>>> {
         let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());

@@ -40,7 +40,8 @@ const CHANCE: f64 = 4.0;
 const TREATED: f64 = 3e-3;
 /// … and beyond this it is so much that names are guesses at it.
 const FAR_BEYOND_FLOOR: f64 = 1.25;
-/// … and, without a repeat, where a coordinate explains this share of its squares.
+/// … and where a coordinate explains this share of its squares; with a repeat, of those beyond the floor, or where it is left away
+/// from reversals too.
 const SHARE_LEFT: f64 = 0.1;
 
 /// The training data that effects are judged on.
@@ -283,7 +284,8 @@ impl Judge<'_, '_> {
             let torque = floor::rms(&self.rows.torque[joint], &self.rows.keep[joint]);
             let besides = (TREATED * torque).powi(2) + shadow;
             let more = self.beyond_noise([rms, floor], own, besides, joint)?;
-            (shown.is_some() || self.away_from_reversals(fit, chosen, joint)).then_some(more)?
+            let much = shown.is_some_and(|p| p.share > SHARE_LEFT);
+            (much || self.away_from_reversals(fit, chosen, besides, joint)).then_some(more)?
         } else {
             // The floor is what no coordinate of the motion explains.
             [rms, rms * (1.0 - shown?.share).max(0.01).sqrt()]
@@ -314,24 +316,25 @@ impl Judge<'_, '_> {
     }
 
     /// Whether more than the floor is left of a joint away from its reversals, which filters blur the same way in every run. A
-    /// gear shows at reversals.
-    fn away_from_reversals(&self, fit: &Fit, chosen: &[Profile], joint: usize) -> bool {
+    /// gear shows at reversals. `besides` as in [`Self::beyond_noise`].
+    fn away_from_reversals(
+        &self,
+        fit: &Fit,
+        chosen: &[Profile],
+        besides: f64,
+        joint: usize,
+    ) -> bool {
         if (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind)) {
             return true;
         }
-        let source = &self.search.source;
-        let clear = (source.thinning).clear_of_reversals(source.runs, joint);
+        let away = self.rows.away(joint);
         let residual = fit.residual(joint);
-        let (mut squares, mut used) = (0.0, 0.0);
-        for ((r, counts), keep) in residual.iter().zip(&clear).zip(&self.rows.keep[joint]) {
-            let counts = counts * f64::from(u8::from(*keep));
-            squares += counts * r * r;
-            used += counts;
-        }
-        self.repeated(&residual, Some(&clear), joint)
+        let squares: f64 = (residual.iter().zip(&away)).map(|(r, c)| c * r * r).sum();
+        let used: f64 = away.iter().sum();
+        self.repeated(&residual, Some(&away), joint)
             .is_none_or(|own| {
                 let all = [(squares / used.max(1.0)).sqrt(), own.noise];
-                self.beyond_noise(all, Some(own), 0.0, joint).is_some()
+                self.beyond_noise(all, Some(own), besides, joint).is_some()
             })
     }
 

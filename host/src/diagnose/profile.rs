@@ -14,7 +14,7 @@ use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};
 use super::lead::slack;
-use super::rows::Column;
+use super::rows::{Column, combined};
 use super::search::{Search, is_gear};
 use super::simplex::{MOST_ANSWERS, Simplex};
 use super::transmission::ABREAST;
@@ -190,16 +190,29 @@ fn damping_ratio(shapes: &[f64; SHAPES], mass: f64) -> f64 {
 
 /// Whether a spring pulls back, beside what it pulls everywhere alike: preload alone is a constant, which has names of its own.
 pub(super) fn stiff(fit: &Fit, columns: &[Column]) -> bool {
-    let Some((stiffness, preload)) = columns.split_first() else {
+    let (Some(stiffness), Some(preload)) = (about_its_middle(fit, columns), columns.get(1..))
+    else {
         return false;
     };
     let mut beside = fit.clone();
     for column in preload {
         beside.push(column);
     }
-    let evidence = (beside.distinct(std::slice::from_ref(stiffness)))
+    let evidence = (beside.distinct(std::slice::from_ref(&stiffness)))
         .and_then(|own| beside.evidence(&own, &[[0.0, f64::INFINITY]]));
     evidence.is_some_and(|e| e.corrected(1) < SIGNIFICANT && e.gain_sigmas >= LEAST_SIGMAS)
+}
+
+/// What a spring pulls back from the middle of the motion: by that it is told from others, wherever its coordinate is zero.
+pub(super) fn about_its_middle(fit: &Fit, columns: &[Column]) -> Option<Column> {
+    let (stiffness, preload) = columns.split_first()?;
+    let mut rest = stiffness.clone();
+    for column in preload {
+        let [along, own] = [&rest, column].map(|c| fit.product(c, column));
+        let own = own.max(f64::MIN_POSITIVE);
+        rest = combined(column.len(), [(&rest, 1.0), (column, -along / own)]);
+    }
+    Some(rest)
 }
 
 impl Search<'_> {
@@ -267,6 +280,9 @@ impl Search<'_> {
             let far = if start.is_some() { NEAR } else { FAR };
             self.descend(fit, c, &followed, far, &mut best)?;
         }
+        if kind == Kind::PreslidingLugre && fixed.is_none() {
+            self.without_fall(fit, c, &mut best)?;
+        }
         // The simplex has moved all shapes at once; one shape does not wait for another to move.
         let rounds = match about.shapes {
             _ if gear => 0,
@@ -316,6 +332,23 @@ impl Search<'_> {
             followed: None,
             otherwise: None,
         }))
+    }
+
+    /// Bristles as stiff whose friction does not fall with the speed, where they take more away: from those whose friction does they
+    /// are reached by no shape alone.
+    fn without_fall(&self, fit: &Fit, c: usize, best: &mut Best) -> Result<(), DiagnoseError> {
+        let [stroke, breakaway, velocity, ..] = best.1;
+        let mut shapes = best.1;
+        shapes[..3].copy_from_slice(&[stroke * (1.0 + breakaway), 0.0, velocity]);
+        let columns = Arc::new(self.source.columns(&self.library[c], &shapes)?);
+        if let Some(share) = self.explained(fit, c, &columns) {
+            let mut plain = (share, shapes, columns);
+            self.refine(fit, c, 0, &mut plain)?;
+            if plain.0 > best.0 {
+                *best = plain;
+            }
+        }
+        Ok(())
     }
 
     /// Simplices from each of the starts, side by side, over the coordinates of all shapes at once: stiffness, damping and
@@ -436,8 +469,11 @@ impl Search<'_> {
         let [step, fine] = spacing(shape, scales.len());
         let middle = coordinate(shape, best.1[place]);
         let told = self.least_told(self.library[c].kind, self.library[c].joint);
-        let running = self.source.running();
-        let [least, most] = searched(shape, told, running).map(|bound| coordinate(shape, bound));
+        let reached = [
+            self.source.running(),
+            self.source.fastest(self.library[c].joint),
+        ];
+        let [least, most] = searched(shape, told, reached).map(|bound| coordinate(shape, bound));
         // What is stated may lie beyond what these recordings tell.
         let mut high = (middle + step).min(most);
         let mut low = (middle - step).max(least).min(high);

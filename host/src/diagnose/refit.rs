@@ -25,6 +25,10 @@ use super::search::{is_gear, with};
 use super::solve::{Solution, jackknifed, solve};
 use super::type_b::widened;
 
+/// Standard deviations, over the value of a shape of which ratios count, from which on the motion does not tell it: as the Stribeck
+/// velocity of bristles whose friction does not fall.
+const UNTOLD: f64 = 10.0;
+
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
 const DIFFERENCE: f64 = 0.01;
 /// Relative uncertainty of what a description states, as in an identification of several joints.
@@ -218,7 +222,12 @@ impl<'r> Refit<'r> {
         for (s, (k, place)) in places.into_iter().enumerate() {
             if !is_of_contact(chosen[k].candidate.kind, place) {
                 let std = linearised.std(solution.values.len() + s);
-                stds[k][place] = std.hypot(between_ways(&chosen[k], place));
+                let shape = &chosen[k].candidate.kind.about().shapes[place];
+                let untold = shape.scale == Scale::Logarithmic
+                    && std > UNTOLD * chosen[k].shapes[place].abs();
+                if !untold {
+                    stds[k][place] = std.hypot(between_ways(&chosen[k], place));
+                }
             }
         }
         Ok(Joint {

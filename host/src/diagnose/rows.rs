@@ -29,9 +29,8 @@ const FEWEST_ABOUT_RESTS: usize = 20;
 /// sign, or stops the joint for a moment.
 const SMEAR: f64 = 0.2;
 
-/// Share of a row's neighbourhood that may reverse where none is to be in it: 2 % of dry friction, the wrong way round, is below
-/// most noise.
-const CLEAR: f64 = 0.02;
+/// Share of a row's neighbourhood that may rest or reverse where none is to be in it: twice that of dry friction is below most noise.
+const CLEAR: f64 = 0.005;
 
 /// Share of the power of a signal that the position's filter may take away at the upper end of the low-pass without being heard.
 const HEARD: f64 = 1e-4;
@@ -107,20 +106,6 @@ impl Thinning {
     /// Time by which the position's filter may move a reversal, s.
     pub(super) fn smear(&self) -> f64 {
         self.smear
-    }
-
-    /// Of each row of a joint, 1 where the filters let no reversal into it, else 0.
-    pub(super) fn clear_of_reversals(&self, runs: &[Run], joint: usize) -> Vec<f64> {
-        let mut clear = Vec::new();
-        for own in runs.iter().map(|run| &run.joints[joint]) {
-            let reverses =
-                |(v, a): (&f64, &f64)| f64::from(u8::from(v.abs() < a.abs() * self.smear));
-            let reversing: Vec<f64> = own.qd.iter().zip(&own.qdd).map(reverses).collect();
-            let mut share = Vec::new();
-            self.push_raw(&reversing, &mut share);
-            clear.extend((share.iter()).map(|s| f64::from(u8::from(s.abs() < CLEAR))));
-        }
-        clear
     }
 
     /// Samples of a run of `samples` that the position's filter has not spoilt.
@@ -225,6 +210,8 @@ pub(super) struct Rows {
     /// Whether it is used or could be: its torque tells something, but what a rest nearby may be off by. Joint by joint; empty
     /// where no row is near a rest.
     pub(super) legible: Vec<Vec<bool>>,
+    /// Whether the filters let nothing of a rest or a reversal into the row, joint by joint; empty where no row is near one.
+    pub(super) clear: Vec<Vec<bool>>,
     /// Nominal columns, one a base parameter.
     pub(super) nominal: Vec<Column>,
 }
@@ -442,7 +429,7 @@ impl Rows {
         let n = nominal.joints();
         let mut starts = vec![0];
         let mut torque = vec![Vec::new(); n];
-        let [mut keep, mut legible] = [(); 2].map(|()| vec![Vec::new(); n]);
+        let [mut keep, mut legible, mut clear] = [(); 3].map(|()| vec![Vec::new(); n]);
         let mut columns: Vec<Column> = vec![vec![None; n]; nominal.base.len()];
         for run in runs {
             let before = starts.last().copied().unwrap_or(0);
@@ -466,6 +453,14 @@ impl Rows {
                 // The low-pass rings: a share below 0 is as spoilt as one above.
                 keep[j].extend(share.iter().map(|s| s.abs() < SPOILT));
                 legible[j].extend(share.iter().map(|s| *s < ILLEGIBLE));
+                for (spoilt, (v, a)) in spoilt.iter_mut().zip(joint.qd.iter().zip(&joint.qdd)) {
+                    if v.abs() < a.abs() * thinning.smear {
+                        *spoilt = 1.0;
+                    }
+                }
+                share.clear();
+                thinning.push_raw(&spoilt, &mut share);
+                clear[j].extend(share.iter().map(|s| s.abs() < CLEAR));
             }
             let motion = motion_of(run);
             nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, values| {
@@ -486,6 +481,7 @@ impl Rows {
             torque,
             keep,
             legible,
+            clear,
             nominal: columns,
         })
     }
@@ -533,6 +529,15 @@ impl Rows {
         }
     }
 
+    /// Of each row of a joint, 1 where it is used and clear of rests and reversals, else 0.
+    pub(super) fn away(&self, joint: usize) -> Vec<f64> {
+        let clear = self.clear.get(joint);
+        let clear = |row: usize| clear.is_none_or(|clear| clear[row]);
+        (self.keep[joint].iter().enumerate())
+            .map(|(row, keep)| f64::from(u8::from(*keep && clear(row))))
+            .collect()
+    }
+
     /// Rows used of a joint.
     pub(super) fn used(&self, joint: usize) -> usize {
         self.keep[joint].iter().filter(|k| **k).count()
@@ -559,6 +564,7 @@ impl Rows {
             torque: vec![vec![0.0; count]],
             keep: vec![vec![true; count]],
             legible: vec![vec![true; count]],
+            clear: vec![vec![true; count]],
             nominal,
         }
     }

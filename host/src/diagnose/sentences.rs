@@ -55,7 +55,7 @@ fn listed(items: &[String]) -> String {
 }
 
 /// The verdict with its figures.
-pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
+pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     let mut words = Vec::new();
     match d.verdict {
         Verdict::DataFault => {
@@ -71,6 +71,12 @@ pub(super) fn verdict(d: &Diagnosis) -> Vec<String> {
                 "With its parameters fitted again the description explains the torque; no effect had to be added."
                     .to_owned(),
             );
+            if !repeated {
+                words.push(
+                    "No motion was recorded twice, so that the noise floor is what the model itself leaves: what comes back in each run could hide in it. Record the motion again and give both with --data to have it told from noise."
+                        .to_owned(),
+                );
+            }
             words.extend(closest(d));
         }
         Verdict::ParameterChange => {

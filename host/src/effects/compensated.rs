@@ -295,7 +295,7 @@ impl Compensated<'_> {
                 }
                 let mut torque = p.effect.torque(&mut memory[k], &instant);
                 if kind.is_presliding() {
-                    slid[p.joint] = p.effect.bent(&memory[k]);
+                    slid[p.joint] = p.effect.bent(&memory[k], instant.beside);
                 }
                 if through {
                     beside[p.joint] += self.effects.over_coulomb(p.joint, torque);

@@ -276,7 +276,8 @@ fn decide(joint: String, points: Vec<FrictionPoint>) -> Result<FrictionMap, Iden
             simple.leave_one_out_rms
         ),
         (Some(_), Some(p)) => format!(
-            "Coulomb and viscous friction suffice: a Stribeck term is not warranted by these points (p = {p:.2})."
+            "These {} points do not warrant a Stribeck term beside Coulomb and viscous friction (p = {p:.2}). That does not say that there is none: more speeds, slow ones above all, would tell.",
+            points.len()
         ),
         _ => "Too few stretches to judge a Stribeck term; six are needed.".to_owned(),
     };

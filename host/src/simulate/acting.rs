@@ -128,6 +128,7 @@ impl<'a> Acting<'a> {
                 let mut instant = self.instant(k, motion, 0.5 * dt);
                 instant.load = load[p.joint];
                 if kind.about().direction == Direction::Dry {
+                    let beside = instant.beside;
                     let mut towards = |direction: f64, bent: f64| {
                         instant.direction = direction;
                         instant.friction = (self.effects).friction(p.joint, instant.velocity, bent);
@@ -146,7 +147,7 @@ impl<'a> Acting<'a> {
                         self.dry[p.joint][side] += torque;
                         if kind.is_presliding() {
                             self.remembered[p.joint][side] += torque;
-                            self.bent[p.joint] = Some(p.effect.bent(&memory));
+                            self.bent[p.joint] = Some(p.effect.bent(&memory, beside));
                         }
                     }
                     continue;

@@ -93,12 +93,17 @@ pub struct Instant<T> {
 }
 
 impl<T: Real> Instant<T> {
-    /// How far a contact is moved on since the last instant, as if no more friction held it than the model's own, rad.
+    /// How far a contact is moved on since the last instant, rad.
     #[inline(always)]
     fn way(&self) -> T {
+        self.velocity * self.period
+    }
+
+    /// All friction that acts through the joint's contact over that of the model, 1.
+    #[inline(always)]
+    fn whole(&self) -> T {
         // Fits and precompensation may state a little less friction than none.
-        let friction = (T::ONE + self.beside).max(T::from_f64(LEAST_FRICTION));
-        self.velocity * self.period / friction
+        (T::ONE + self.beside).max(T::from_f64(LEAST_FRICTION))
     }
 }
 

@@ -59,10 +59,11 @@ impl Law for PreslidingDahl {
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
         let way = at.way();
-        let sign = way.sgn();
-        let kept = (-(way.abs() / shapes[0])).exp();
-        memory[0] = sign.squared() * (sign + (memory[0] - sign) * kept)
+        let (sign, whole) = (way.sgn(), at.whole());
+        let kept = (-(way.abs() / (shapes[0] * whole))).exp();
+        let goal = sign * whole;
+        memory[0] = sign.squared() * (goal + (memory[0] - goal) * kept)
             + (T::ONE - sign.squared()) * memory[0];
-        [memory[0] - at.direction, T::ZERO, T::ZERO, T::ZERO]
+        [memory[0] / whole - at.direction, T::ZERO, T::ZERO, T::ZERO]
     }
 }

@@ -48,7 +48,7 @@ impl Law for PreslidingLugre {
                 name: "breakaway",
                 unit: "1",
                 bounds: [0.0, 10.0],
-                range: [0.1, 1.0],
+                range: [0.0, 1.0],
                 scale: Scale::Linear,
                 meaning: "breakaway over Coulomb friction, less one",
             },
@@ -92,13 +92,14 @@ impl Law for PreslidingLugre {
     ) -> [T; GAINS] {
         // Exact over a period of constant velocity, so that any step is stable.
         let way = at.way();
-        let sign = way.sgn();
+        let (sign, whole) = (way.sgn(), at.whole());
         let level = T::ONE + shapes[1] * (-(at.velocity / shapes[2]).squared()).exp();
-        let kept = (-(way.abs() / (shapes[0] * level))).exp();
-        let goal = sign * level;
+        let kept = (-(way.abs() / (shapes[0] * level * whole))).exp();
+        let goal = sign * level * whole;
         memory[0] = sign.squared() * (goal + (memory[0] - goal) * kept)
             + (T::ONE - sign.squared()) * memory[0];
-        let bristle = at.velocity - at.velocity.abs() * memory[0] / level;
-        [memory[0] - at.direction, bristle, T::ZERO, T::ZERO]
+        let share = memory[0] / whole;
+        let bristle = at.velocity - at.velocity.abs() * share / level;
+        [share - at.direction, bristle, T::ZERO, T::ZERO]
     }
 }

@@ -38,6 +38,7 @@ pub(super) fn contact(equation: &Equation, nominal: &[f64]) -> Option<Contact> {
         torque: equation.load.iter().flatten().cloned().collect(),
         nominal: Vec::new(),
         legible: Vec::new(),
+        clear: Vec::new(),
         thinning: equation.rows.thinning.clone(),
         starts: equation.rows.starts.clone(),
         keep: equation.rows.keep.clone(),

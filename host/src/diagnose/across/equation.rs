@@ -215,6 +215,7 @@ impl Equation {
                 torque: vec![x],
                 keep: vec![vec![true; count]],
                 legible: Vec::new(),
+                clear: Vec::new(),
                 nominal: nominal.into_iter().map(one).collect(),
             },
             constants,

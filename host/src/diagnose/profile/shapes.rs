@@ -115,8 +115,9 @@ pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
 }
 
 /// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
-/// least that is `told`, nor a time constant beyond the time that the joints have been `running`.
-pub(super) fn searched(shape: &Parameter, told: f64, running: f64) -> [f64; 2] {
+/// least that is `told`, nor a time constant beyond the time that the joints have been `running`, nor a velocity beyond the `fastest`
+/// that the joint reaches: friction that has not fallen by then is Coulomb friction.
+pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2]) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
         Scale::Logarithmic => {
@@ -127,6 +128,8 @@ pub(super) fn searched(shape: &Parameter, told: f64, running: f64) -> [f64; 2] {
             };
             let most = if is_duration(shape) {
                 running.max(least)
+            } else if is_velocity(shape) {
+                (10.0 * most).min(fastest.max(least))
             } else {
                 10.0 * most
             };
@@ -140,7 +143,7 @@ pub(super) fn searched(shape: &Parameter, told: f64, running: f64) -> [f64; 2] {
 /// gear only play is one.
 pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<&'static str> {
     let shape = kind.about().shapes.first()?;
-    let least = (1.0 + AT_THE_END) * searched(shape, told, f64::INFINITY)[0];
+    let least = (1.0 + AT_THE_END) * searched(shape, told, [f64::INFINITY; 2])[0];
     let counts = shape.scale == Scale::Logarithmic && (!is_gear(kind) || is_distance(shape));
     (counts && shapes[0] < least).then_some(shape.name)
 }
@@ -148,6 +151,11 @@ pub(super) fn vanished(kind: Kind, shapes: &[f64; SHAPES], told: f64) -> Option<
 /// Whether a shape is a way that the position shows.
 pub(super) fn is_distance(shape: &Parameter) -> bool {
     shape.unit == "rad"
+}
+
+/// Whether a shape is a velocity.
+fn is_velocity(shape: &Parameter) -> bool {
+    shape.unit == "rad/s"
 }
 
 /// Whether a shape is a time that goes by.

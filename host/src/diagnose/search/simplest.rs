@@ -11,7 +11,7 @@ use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::judge::equal;
-use crate::diagnose::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
+use crate::diagnose::profile::{LEAST_GAIN, Profile, SIGNIFICANT, about_its_middle};
 
 impl Search<'_> {
     /// Gains and shapes of a candidate.
@@ -158,7 +158,10 @@ fn adds(fit: &Fit, larger: &Profile, smaller: &Profile, trials: usize) -> bool {
     for column in smaller.columns.iter() {
         beside.push(column);
     }
-    let own = beside.span(&larger.columns);
+    let own = match larger.candidate.kind {
+        Kind::Spring => beside.span(about_its_middle(fit, &larger.columns).as_slice()),
+        _ => beside.span(&larger.columns),
+    };
     let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; own.len()];
     !own.is_empty()
         && (beside.evidence(&own, &open))

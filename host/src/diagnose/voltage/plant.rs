@@ -81,7 +81,7 @@ impl Part {
     fn bent(&self, at: &Instant<f64>) -> f64 {
         let mut memory = self.memory;
         self.effect.torque(&mut memory, at);
-        self.effect.bent(&memory)
+        self.effect.bent(&memory, at.beside)
     }
 }
 

@@ -138,6 +138,7 @@ impl Equation {
                 torque: vec![voltage],
                 keep: vec![keep],
                 legible: Vec::new(),
+                clear: Vec::new(),
                 nominal: columns.into_iter().map(one).collect(),
             },
             dead_zones: dead.into_iter().map(one).collect(),

@@ -47,8 +47,9 @@ pub(super) fn tone(verdict: Verdict) -> Tone {
 
 pub(super) fn note(verdict: Verdict) -> NoteKind {
     match verdict {
-        Verdict::NothingMissing | Verdict::Explained => NoteKind::Good,
-        Verdict::ParameterChange => NoteKind::Info,
+        Verdict::Explained => NoteKind::Good,
+        // That nothing was seen confirms nothing.
+        Verdict::NothingMissing | Verdict::ParameterChange => NoteKind::Info,
         Verdict::Remainder => NoteKind::Warning,
         Verdict::DataFault => NoteKind::Fault,
     }
