@@ -89,7 +89,7 @@ fn everything_optional_survives_writing() {
 
 #[test]
 fn wrong_toml_is_named_by_line_and_mend() {
-    let cases: [(&str, &str, &[&str]); 17] = [
+    let cases: [(&str, &str, &[&str]); 18] = [
         (
             "mass",
             "mass = -1.0",
@@ -147,6 +147,11 @@ fn wrong_toml_is_named_by_line_and_mend() {
             &["gravity is NaN", "m/s²"],
         ),
         ("alpha", "alpha = 1.5 rad", &["TOML"]),
+        (
+            "alpha",
+            "alpha = twenty",
+            &["no TOML value", "a number like 20"],
+        ),
     ];
     for (old, new, parts) in cases {
         let text = with(old, new);

@@ -93,7 +93,7 @@ fn sentence(error: &toml::de::Error) -> String {
         .join(", ");
     // A bare word is taken for the beginning of `true` or `false`.
     if said.starts_with("invalid boolean") || said.contains("must be quoted") {
-        return "what stands here is no value; write a number like 20 or 2e-5, text in quotation marks, true or false".into();
+        return "what stands here is no TOML value; write a number like 20 or 2e-5, text in quotation marks, true or false".into();
     }
     let mend = if said.starts_with("missing field") {
         "; add this key to the table that begins here (`rig init one-link` writes an example)"
