@@ -150,12 +150,11 @@ pub(super) fn by_motion(
         let residual = bench.remaining(replay.judged, model.fitted(), effects)?;
         let rows = &replay.judged.rows;
         let away = rows.away(0);
-        let sum: f64 = (residual[0].iter().zip(&away))
-            .map(|(r, c)| c * r * r)
-            .sum();
-        let used: f64 = away.iter().sum();
         let all = floor::rms(&residual[0], &rows.keep[0]);
-        let clear = if used > 0.0 { (sum / used).sqrt() } else { all };
+        let clear = match away.contains(&true) {
+            true => floor::rms(&residual[0], &away),
+            false => all,
+        };
         Ok([all, clear])
     };
     let [[all_was, clear_was], [all_is, clear_is]] =
@@ -277,7 +276,7 @@ fn nearest(
 fn sentence(told: &ByMotion) -> String {
     let [was, is] = told.motion_rms.map(|rms| format_significant(1e3 * rms, 3));
     let stands = if told.adopted {
-        "; away from rests and reversals, where filters blur the torque, that is left hardly worse: those values stand."
+        "; away from rests and reversals, about which filters blur it, the torque is left hardly worse: those values stand."
     } else {
         "; the torque's values stand."
     };

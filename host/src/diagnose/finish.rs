@@ -74,11 +74,11 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
     for (step, profile) in diagnosis.steps.iter_mut().zip(found.found()) {
         step.why = sentences::why(found, step, profile);
     }
-    diagnosis.noise_floor_how = sentences::floor_how(found);
+    let pairs = repeats(found.search.source.runs);
+    diagnosis.noise_floor_how = sentences::floor_how(found, &pairs);
     diagnosis.not_testable = limits::not_testable(found)?;
     diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
     diagnosis.next_experiment = limits::next(found, diagnosis, found.model)?;
-    let repeated = !repeats(found.search.source.runs).is_empty();
-    diagnosis.words = sentences::verdict(diagnosis, repeated);
+    diagnosis.words = sentences::verdict(diagnosis, !pairs.is_empty());
     Ok(())
 }

@@ -329,11 +329,12 @@ impl Judge<'_, '_> {
         }
         let away = self.rows.away(joint);
         let residual = fit.residual(joint);
-        let squares: f64 = (residual.iter().zip(&away)).map(|(r, c)| c * r * r).sum();
-        let used: f64 = away.iter().sum();
-        self.repeated(&residual, Some(&away), joint)
+        let counts: Vec<f64> = (away.iter())
+            .map(|away| f64::from(u8::from(*away)))
+            .collect();
+        self.repeated(&residual, Some(&counts), joint)
             .is_none_or(|own| {
-                let all = [(squares / used.max(1.0)).sqrt(), own.noise];
+                let all = [floor::rms(&residual, &away), own.noise];
                 self.beyond_noise(all, Some(own), besides, joint).is_some()
             })
     }

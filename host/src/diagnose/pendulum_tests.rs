@@ -34,6 +34,11 @@ struct Pendulum {
     stiffening: f64,
     /// Dry friction more than in motion at rest, N·m; a third of it is gone at 0.2 rad/s.
     breakaway: f64,
+    /// Dry friction that holds what rests, as much more at rest and gone with the square of this speed, N·m and rad/s; none where it
+    /// only turns with the velocity.
+    sticking: Option<[f64; 2]>,
+    /// A straight spring about a place, N·m/rad and rad.
+    spring: [f64; 2],
     /// Noise of position and torque, rad and N·m.
     noise: [f64; 2],
     /// Angles of the motion are so many times larger.
@@ -47,6 +52,8 @@ const PLAIN: Pendulum = Pendulum {
     saturation: 0.0,
     stiffening: 0.0,
     breakaway: 0.0,
+    sticking: None,
+    spring: [0.0; 2],
     noise: [5e-6, 0.03],
     reach: 1.0,
     slowest: 0.2,
@@ -95,10 +102,20 @@ impl Pendulum {
                 joint.reference.iter_mut().for_each(|r| r.push(wanted));
             }
             let acts = torque * (1.0 - self.saturation * torque * torque);
-            let weakened = self.breakaway / (1.0 + 12.5 * v * v);
-            let friction = (COULOMB + weakened) * (v / 0.004).tanh() + VISCOUS * v;
-            let pulls = MASS * 9.81 * LENGTH * q.sin() + self.stiffening * q.powi(3);
-            v += STEP * (acts - pulls - friction) / INERTIA;
+            let [stiffness, rest] = self.spring;
+            let pulls = MASS * 9.81 * LENGTH * q.sin()
+                + self.stiffening * q.powi(3)
+                + stiffness * (q - rest);
+            if let Some([more, speed]) = self.sticking {
+                let dry = COULOMB + more * (-(v / speed).powi(2)).exp();
+                let free = v + STEP * (acts - pulls - VISCOUS * v) / INERTIA;
+                // No more than brings it to rest (Moreau 1988).
+                v = free.signum() * (free.abs() - STEP * dry / INERTIA).max(0.0);
+            } else {
+                let weakened = self.breakaway / (1.0 + 12.5 * v * v);
+                let friction = (COULOMB + weakened) * (v / 0.004).tanh() + VISCOUS * v;
+                v += STEP * (acts - pulls - friction) / INERTIA;
+            }
             q += STEP * v;
         }
         InMemory {
@@ -320,4 +337,73 @@ fn a_spring_that_takes_the_weight_of_the_link_is_not_to_be_believed() {
     let named = found.steps.iter().any(|s| s.effect == "spring");
     assert!(named, "{:?}", found.words);
     assert_eq!(found.words.iter().filter(said).count(), 1);
+}
+
+/// At each reversal it rests for a while, and its friction is anything between both directions'.
+#[test]
+fn a_pendulum_that_sticks_leaves_nothing() {
+    let sticking = Pendulum {
+        sticking: Some([0.0, 0.08]),
+        noise: [2e-5, 0.02],
+        reach: 0.7,
+        slowest: 0.1,
+        ..PLAIN
+    };
+    let (found, _) = sticking.diagnosed(&described(50.0));
+    println!("{:?} {:#?}", found.words, found.remainder);
+    assert!(found.steps.is_empty(), "{:?}", found.words);
+    assert_eq!(found.verdict, Verdict::ParameterChange);
+}
+
+/// Filters blur what the torque says of the instants at which it breaks away; a simulated pendulum breaks away when it does.
+#[test]
+fn how_it_breaks_away_is_known_by_the_motion() {
+    let sticking = Pendulum {
+        sticking: Some([0.3, 0.08]),
+        noise: [2e-5, 0.02],
+        slowest: 0.1,
+        ..PLAIN
+    };
+    let (found, _) = sticking.diagnosed(&described(50.0));
+    println!("{:?} {:#?}", found.words, found.by_motion);
+    assert_eq!(found.steps[0].effect, "stribeck", "{:?}", found.words);
+    assert!(found.by_motion.as_ref().unwrap().adopted);
+    for (name, truth) in [("breakaway", 0.3), ("velocity", 0.08)] {
+        let value = found.steps[0].parameters[name].value;
+        assert!((value / truth - 1.0).abs() < 0.05, "{name}: {value}");
+    }
+}
+
+/// The zero of its coordinate is a quarter turn from where it hangs: most of what a spring pulls there is a constant.
+#[test]
+fn a_spring_is_told_wherever_the_zero_of_the_joint_is() {
+    let sprung = Pendulum {
+        spring: [0.8, -0.7],
+        ..PLAIN
+    };
+    let mut robot = described(50.0);
+    robot.joints[0].theta = 0.0;
+    let turned = |label, motion, seed| {
+        let mut recording = sprung.recorded(label, motion, seed);
+        let joint = &mut recording.blocks[0].joints[0];
+        let places = joint
+            .q
+            .iter_mut()
+            .chain(joint.reference.iter_mut().flatten());
+        places.for_each(|q| *q -= TAU / 4.0);
+        recording
+    };
+    let [train, again, held] =
+        [("train", 1, 2), ("again", 1, 3), ("held", 4, 5)].map(|(l, m, s)| turned(l, m, s));
+    let training: [&dyn Recording; 2] = [&train, &again];
+    let held: [&dyn Recording; 1] = [&held];
+    let (found, _) =
+        super::diagnose(&robot, &training, &held, &Options::default(), &mut |_| ()).unwrap();
+    println!("{:?} {:#?}", found.words, found.steps);
+    assert_eq!(found.steps[0].effect, "spring", "{:?}", found.words);
+    let stiffness = &found.steps[0].parameters["stiffness"];
+    let std = stiffness.std;
+    assert!((stiffness.value - 0.8).abs() < 3.0 * std, "{stiffness:?}");
+    assert!(std < 0.05, "{stiffness:?}");
+    assert!(found.remainder.is_none(), "{:?}", found.remainder);
 }

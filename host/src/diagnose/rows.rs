@@ -529,12 +529,12 @@ impl Rows {
         }
     }
 
-    /// Of each row of a joint, 1 where it is used and clear of rests and reversals, else 0.
-    pub(super) fn away(&self, joint: usize) -> Vec<f64> {
+    /// Which rows of a joint are used and clear of rests and reversals.
+    pub(super) fn away(&self, joint: usize) -> Vec<bool> {
         let clear = self.clear.get(joint);
         let clear = |row: usize| clear.is_none_or(|clear| clear[row]);
         (self.keep[joint].iter().enumerate())
-            .map(|(row, keep)| f64::from(u8::from(*keep && clear(row))))
+            .map(|(row, keep)| *keep && clear(row))
             .collect()
     }
 

@@ -5,7 +5,6 @@ use rig_shared::multibody::COLUMNS;
 
 use super::bench::Bench;
 use super::finish::Found;
-use super::floor::repeats;
 use super::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};
 use super::profile::Profile;
 use super::pull;
@@ -378,9 +377,8 @@ fn effort(joint: &Joint) -> String {
 }
 
 /// How the noise floor was found.
-pub(super) fn floor_how(found: &Found) -> String {
+pub(super) fn floor_how(found: &Found, pairs: &[(usize, usize)]) -> String {
     let runs = found.search.source.runs;
-    let pairs = repeats(runs);
     let figures: Vec<String> = (found.robot.joints.iter().zip(found.floors))
         .map(|(joint, floor)| format!("{} {} {}", joint.name, number(*floor), effort(joint)))
         .collect();
