@@ -1,6 +1,6 @@
 //! `rig benchmark`: how often the diagnosis finds what was hidden.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use clap::ValueEnum;
@@ -9,7 +9,7 @@ use super::error::CommandError;
 use super::ui::Ui;
 use crate::diagnose::benchmark::peer::{Frols, Stlsq};
 use crate::diagnose::benchmark::{
-    Case, Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
+    ArmCase, Case, Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
 };
 use crate::diagnose::scenario::{Effect, Noise, Size, Truth};
 use crate::files::{folder, write_whole};
@@ -66,7 +66,7 @@ pub(crate) struct Args {
     /// Record an encoder on the link beside the motor's
     #[arg(long)]
     pub(crate) second_encoder: bool,
-    /// Seeds of arms of two and of six joints with one joint at fault; judged by the project's own diagnosis
+    /// Seeds of arms of two and of six joints with one joint at fault; judged by the project's own diagnosis alone
     #[arg(long, default_value_t = 0)]
     pub(crate) arms: u64,
     /// Methods to judge
@@ -98,7 +98,7 @@ fn truth_head() -> String {
         .to_owned()
 }
 
-/// A line of the table.
+/// A line of the table, of a rig of one joint.
 fn truth_row(folder: &str, case: &Case, truth: &Truth, sizes: &[Size]) -> String {
     let names = match truth.names() {
         none if none.is_empty() => "nothing".to_owned(),
@@ -114,6 +114,66 @@ fn truth_row(folder: &str, case: &Case, truth: &Truth, sizes: &[Size]) -> String
         truth.seed,
         ratios.join(", ")
     )
+}
+
+/// Recordings, descriptions and what is hidden, one folder a case.
+fn keep(out: &Path, cases: &[Case], arms: &[ArmCase], ui: &Ui) -> Result<(), CommandError> {
+    let count = cases.len() + arms.len();
+    let mut progress = ui.progress("recording", count as u64);
+    let mut table = truth_head();
+    let mut kept = 0;
+    let mut place = || {
+        kept += 1;
+        let name = format!("{kept:04}");
+        let place = out.join(&name);
+        folder(&place).map(|()| (name, place))
+    };
+    for case in cases {
+        let (name, place) = place()?;
+        let (made, sizes) = case.make()?;
+        made.write(&place)?;
+        let truth = serde_json::json!({
+            "group": case.group, "level": case.level, "truth": made.truth, "sizes": sizes,
+        });
+        write_truth(&place, &truth)?;
+        table.push_str(&truth_row(&name, case, &made.truth, &sizes));
+        progress.advance(1);
+    }
+    for case in arms {
+        let (name, place) = place()?;
+        let made = case.scenario.make()?;
+        made.write(&place)?;
+        let (arm, seed) = (case.arm, case.scenario.seed);
+        let hidden = case.scenario.fault.map(|(joint, fault)| {
+            let joint = made.robot.joints[joint].name.clone();
+            (fault.name(), joint, format!("{fault:?}"))
+        });
+        let truth = serde_json::json!({
+            "arm": arm, "seed": seed,
+            "hidden": hidden.as_ref().map(|(name, joint, values)| serde_json::json!({
+                "effect": name, "joint": joint, "values": values,
+            })),
+        });
+        write_truth(&place, &truth)?;
+        let named = hidden.map_or_else(
+            || "nothing".to_owned(),
+            |(effect, joint, _)| format!("{effect} at {joint}"),
+        );
+        table.push_str(&format!("| {name} | {arm} | | {seed} | {named} | |\n"));
+        progress.advance(1);
+    }
+    drop(progress);
+    write_whole(&out.join(TRUTHS), table.as_bytes())?;
+    ui.say(&format!(
+        "{}: {count} cases; {TRUTHS} has what is hidden in each.",
+        out.display(),
+    ));
+    Ok(())
+}
+
+fn write_truth(place: &Path, truth: &serde_json::Value) -> Result<(), CommandError> {
+    let text = format!("{truth:#}\n");
+    Ok(write_whole(&place.join("truth.json"), text.as_bytes())?)
 }
 
 /// Runs the command.
@@ -135,11 +195,6 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
                 "{flag} is {seconds} s; give 20 to 3600 s, so that every kind of motion fits in."
             )));
         }
-    }
-    if args.keep && args.arms > 0 {
-        return Err(CommandError::Sentence(
-            "--keep writes the recordings of one joint; leave out --arms.".into(),
-        ));
     }
     let effects = if args.effects.is_empty() {
         Effect::names().map(str::to_owned).collect()
@@ -169,30 +224,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     let arms = arm_cases(args.first_seed, args.arms)?;
     folder(&args.out)?;
     if args.keep {
-        let mut progress = ui.progress("recording", cases.len() as u64);
-        let mut table = truth_head();
-        for (k, case) in cases.iter().enumerate() {
-            let name = format!("{:04}", k + 1);
-            let place = args.out.join(&name);
-            folder(&place)?;
-            let (made, sizes) = case.make()?;
-            made.write(&place)?;
-            let truth = serde_json::json!({
-                "group": case.group, "level": case.level, "truth": made.truth, "sizes": sizes,
-            });
-            let text = format!("{truth:#}\n");
-            write_whole(&place.join("truth.json"), text.as_bytes())?;
-            table.push_str(&truth_row(&name, case, &made.truth, &sizes));
-            progress.advance(1);
-        }
-        drop(progress);
-        write_whole(&args.out.join(TRUTHS), table.as_bytes())?;
-        ui.say(&format!(
-            "{}: {} cases; {TRUTHS} has what is hidden in each.",
-            args.out.display(),
-            cases.len()
-        ));
-        return Ok(());
+        return keep(&args.out, &cases, &arms, ui);
     }
     let methods: Vec<&dyn Method> = args
         .only

@@ -416,7 +416,7 @@ impl Source<'_> {
             if candidate.joint != joint || !candidate.kind.acts_through_contact() {
                 continue;
             }
-            let (terms, _) = self.along(candidate, &profile.shapes, r, true);
+            let terms = self.along(candidate, &profile.shapes, r, true);
             for (term, gain) in terms.iter().zip(own) {
                 for (to, term) in sum.iter_mut().zip(term) {
                     *to += gain * term;
@@ -431,35 +431,17 @@ impl Source<'_> {
 
     /// The effect's terms sample by sample.
     fn terms(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Vec<Vec<f64>> {
-        self.along(candidate, shapes, r, false).0
+        self.along(candidate, shapes, r, false)
     }
 
-    /// What an effect remembers where a run begins: nothing, or where it goes on from another what that one has left.
-    fn begun(&self, candidate: &Candidate, shapes: &[f64; SHAPES], r: usize) -> Memory<f64> {
-        let end = |run: &Run| run.t.last().copied();
-        let first = self.runs[r].t.first().copied().unwrap_or(0.0);
-        let before = (self.runs.iter().enumerate())
-            .filter(|(_, run)| run.began == self.runs[r].began)
-            .filter_map(|(p, run)| Some((p, end(run)?)))
-            .filter(|(p, end)| *p != r && *end < first)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        match before {
-            Some((p, end)) if candidate.kind == Kind::ViscousWarmupHeat => {
-                let (_, memory) = self.along(candidate, shapes, p, false);
-                Effect::new(candidate.kind, &[], shapes).rested(memory, first - end)
-            }
-            _ => Memory::default(),
-        }
-    }
-
-    /// The effect's terms sample by sample, `whole` as if each went in the positive direction, and what it remembers at the end.
+    /// The effect's terms sample by sample, `whole` as if each went in the positive direction.
     fn along(
         &self,
         candidate: &Candidate,
         shapes: &[f64; SHAPES],
         r: usize,
         whole: bool,
-    ) -> (Vec<Vec<f64>>, Memory<f64>) {
+    ) -> Vec<Vec<f64>> {
         let (run, predicted) = (&self.runs[r], &self.predicted[r]);
         let bent = (self.bent.get(&(r, candidate.joint)))
             .filter(|_| candidate.kind.acts_through_contact());
@@ -478,7 +460,8 @@ impl Source<'_> {
             .unwrap_or(0.0);
         let gains = candidate.kind.about().gains.len();
         let mut out = vec![Vec::with_capacity(run.len()); gains];
-        let mut memory = self.begun(candidate, shapes, r);
+        let effect = Effect::new(candidate.kind, &[], shapes);
+        let mut memory = (run.past).remembered(&effect, candidate.joint, [viscous, coulomb]);
         for k in 0..run.len() {
             let slid = match bent {
                 Some(bent) => bent[k],
@@ -515,7 +498,7 @@ impl Source<'_> {
                 list.push(term);
             }
         }
-        (out, memory)
+        out
     }
 
     pub(super) fn slopes(&self, joint: usize, r: usize) -> Result<Arc<Slopes>, DiagnoseError> {

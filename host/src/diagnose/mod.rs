@@ -31,6 +31,7 @@ mod misfit;
 mod model;
 mod motion;
 pub mod outcome;
+mod past;
 #[cfg(test)]
 mod pendulum_tests;
 mod pictures;

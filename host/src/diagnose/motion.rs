@@ -10,6 +10,8 @@
 //! Leaves out: integral action (part of the recorded torque), controllers that couple joints, temperatures, what acts on the
 //! voltage.
 
+use rig_shared::multibody::column;
+
 use super::DiagnoseError;
 use super::bench::Loaded;
 use super::bodies::Fitting;
@@ -17,8 +19,8 @@ use super::floor;
 use super::profile::Profile;
 use super::pull;
 use super::runs::{JointRun, Run};
-use crate::robot::{Controller, Robot, title_of};
-use crate::simulate::{Inputs, Model, Motion, SimulateError, closed_loop};
+use crate::robot::{Controller, Placed, Robot, title_of};
+use crate::simulate::{Inputs, Model, Motion, Since, SimulateError, closed_loop_since};
 
 mod controller;
 
@@ -270,7 +272,7 @@ impl<'a> Replay<'a> {
 /// `substeps` within a sample.
 ///
 /// # Errors
-/// Those of [`closed_loop`].
+/// Those of [`crate::simulate::closed_loop`].
 pub(crate) fn replayed(
     robot: &Robot,
     model: &Model,
@@ -306,7 +308,16 @@ pub(crate) fn replayed(
     let first = |of: fn(&JointRun) -> &[f64]| -> Vec<f64> {
         run.joints.iter().map(|joint| of(joint)[0]).collect()
     };
-    closed_loop(
+    let remembered = |p: &Placed| {
+        let row = &model.parameters[p.joint];
+        let friction = [row[column::VISCOUS], row[column::COULOMB]];
+        run.past.remembered(&p.effect, p.joint, friction)
+    };
+    let since = Since {
+        time: run.t[0] - run.began,
+        memory: model.effects.placed().iter().map(remembered).collect(),
+    };
+    closed_loop_since(
         robot,
         model,
         controllers,
@@ -318,6 +329,7 @@ pub(crate) fn replayed(
             v: &first(|joint| &joint.qd),
             substeps,
         },
+        &since,
         |_| (),
     )
 }

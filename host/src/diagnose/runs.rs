@@ -6,11 +6,9 @@ use std::ops::Range;
 use rig_shared::safety::Mode;
 
 use super::DiagnoseError;
+use super::past::Past;
 use crate::data::Block;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
-
-/// Longest pause within a session, s: a gear keeps its warmth for some minutes.
-const ONE_SESSION: f64 = 60.0;
 
 /// One joint over a stretch, at the recording's own rate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,6 +84,8 @@ pub struct Run {
     pub rate: f64,
     /// When the joints began to run, on the clock of `t`, s: the recording's first row, or that of the one it goes on from.
     pub began: f64,
+    /// What they did from there on until this stretch.
+    pub past: Past,
     /// s
     pub t: Vec<f64>,
     /// Joint by joint.
@@ -202,24 +202,6 @@ pub(super) fn blurred(runs: &[Run], joint: usize, time: f64) -> f64 {
         }
     }
     0.5 * (squares / f64::from(count.max(1))).sqrt() * time * time
-}
-
-/// Lets recordings go on from those of `runs` and `before` that they were made after, by one clock and within
-/// [`ONE_SESSION`]: what has warmed up is warm. Clocks that begin anew with each recording say nothing of that.
-pub(super) fn in_sessions(runs: &mut [Run], before: &[Run]) {
-    let span = |run: &Run| [run.began, run.t.last().copied().unwrap_or(run.began)];
-    let mut spans: Vec<[f64; 2]> = before.iter().map(span).collect();
-    let mut order: Vec<usize> = (0..runs.len()).collect();
-    order.sort_by(|a, b| runs[*a].began.total_cmp(&runs[*b].began));
-    for k in order {
-        let run = &mut runs[k];
-        let first = run.began;
-        run.began = (spans.iter())
-            .filter(|[began, end]| *began < first && (*end..=end + ONE_SESSION).contains(&first))
-            .map(|[began, _]| *began)
-            .fold(first, f64::min);
-        spans.push(span(run));
-    }
 }
 
 /// Band of what is read across a transmission, Hz: twist and play are slow beside the steps of two encoders, whose second
@@ -413,35 +395,5 @@ fn append(run: &mut Run, block: Block) {
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);
         join(&mut to.link_raw, from.link, before);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn run(first: f64, last: f64) -> Run {
-        Run {
-            began: first,
-            t: vec![first, last],
-            ..Run::default()
-        }
-    }
-
-    #[test]
-    fn what_goes_on_by_one_clock_is_one_session() {
-        // A pause of 5 s, a stretch of the same recording behind a gap, a clock that begins anew, an hour's rest.
-        let mut runs = vec![run(100.0, 190.0), run(195.0, 280.0), run(0.0, 30.0)];
-        runs.push(Run {
-            t: vec![230.0, 280.0],
-            ..run(195.0, 280.0)
-        });
-        runs.push(run(4000.0, 4060.0));
-        in_sessions(&mut runs, &[]);
-        let began: Vec<f64> = runs.iter().map(|r| r.began).collect();
-        assert_eq!(began, [100.0, 100.0, 0.0, 100.0, 4000.0]);
-        let mut held = vec![run(281.0, 300.0)];
-        in_sessions(&mut held, &runs);
-        assert_eq!(held[0].began, 100.0);
     }
 }

@@ -3,7 +3,8 @@
 //! What differs between two runs is noise as far as any model goes. But a few short stretches that hold most of it are an
 //! event, and would drown all else: they are left out of both, and said to be.
 //!
-//! Leaves out: events in both runs at the same place of the motion, which are of the rig; events that last.
+//! Leaves out: events in both runs at the same place of the motion, which are of the rig; events that last; what touches a joint in a
+//! rest that is asked for, where friction holds what it may.
 
 use std::ops::Range;
 
@@ -75,9 +76,8 @@ pub(super) fn touched(robot: &Robot, residuals: &[Vec<f64>], loaded: &mut Loaded
             for k in 0..length {
                 let [x, y] = starts.map(|start| start + k);
                 let rests = resting.iter().all(|rests| rests[near(k)].contains(&true));
-                // Where a rest that is asked for begins or ends, each comes to stand on another side of its friction.
-                let stands = &commanded[near(k)];
-                let at_rest = rests || stands.contains(&true) && stands.contains(&false);
+                // In a rest that is asked for each comes to stand on another side of its friction.
+                let at_rest = rests || commanded[near(k)].contains(&true);
                 let known = known(a, k) || known(b, k);
                 keep[x] = rows.keep[j][x] && rows.keep[j][y] && !at_rest && !known;
                 apart[x] = residual[x] - residual[y];

@@ -3,7 +3,7 @@
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
-use super::SimulateError;
+use super::{Since, SimulateError};
 use crate::effects::{Effects, State, Turn, is_torque};
 
 /// Friction may be beyond zero by this share of itself: rounding.
@@ -48,6 +48,14 @@ impl<'a> Acting<'a> {
             through: vec![0.0; joints],
             beside: vec![0.0; joints],
             warmed: vec![0.0; joints],
+        }
+    }
+
+    /// Goes on from what has been.
+    pub(super) fn go_on(&mut self, since: &Since) {
+        self.time = since.time;
+        for (own, before) in self.memory.iter_mut().zip(&since.memory) {
+            *own = *before;
         }
     }
 

@@ -7,6 +7,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
+use rig_shared::effects::Memory;
 use rig_shared::multibody::{
     COLUMNS, Chain, ChainError, MultibodyError, inertia_matrix, inverse_dynamics,
 };
@@ -342,6 +343,15 @@ impl Motion {
     }
 }
 
+/// What has been before a simulation begins: nothing by default.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Since {
+    /// Time for which the joints have been running, s.
+    pub time: f64,
+    /// What each effect of the model remembers; empty where none does.
+    pub memory: Vec<Memory<f64>>,
+}
+
 /// Simulates the closed loop over all samples of the reference. `progress` is told how many are done.
 ///
 /// # Errors
@@ -351,11 +361,34 @@ pub fn closed_loop(
     model: &Model,
     controllers: &[Controller],
     inputs: &Inputs<'_>,
+    progress: impl FnMut(usize),
+) -> Result<Motion, SimulateError> {
+    closed_loop_since(
+        robot,
+        model,
+        controllers,
+        inputs,
+        &Since::default(),
+        progress,
+    )
+}
+
+/// [`closed_loop`] of joints that have been running.
+///
+/// # Errors
+/// As there.
+pub(crate) fn closed_loop_since(
+    robot: &Robot,
+    model: &Model,
+    controllers: &[Controller],
+    inputs: &Inputs<'_>,
+    since: &Since,
     mut progress: impl FnMut(usize),
 ) -> Result<Motion, SimulateError> {
     let n = robot.joints.len();
     let samples = inputs.reference.iter().map(Vec::len).min().unwrap_or(0);
     let mut stepper = Stepper::new(model)?;
+    stepper.go_on(since);
     let mut motion = Motion {
         q: vec![Vec::with_capacity(samples); n],
         qd: vec![Vec::with_capacity(samples); n],

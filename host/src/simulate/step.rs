@@ -22,7 +22,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use super::acting::Acting;
 use super::elastic::Elastic;
 use super::solve::{invert, invert_any};
-use super::{Model, SimulateError};
+use super::{Model, Since, SimulateError};
 
 mod friction;
 
@@ -65,6 +65,11 @@ pub struct Stepper<'a> {
 }
 
 impl<'a> Stepper<'a> {
+    /// Lets effects go on from what has been.
+    pub(crate) fn go_on(&mut self, since: &Since) {
+        self.acting.go_on(since);
+    }
+
     /// Prepares to step a model.
     ///
     /// # Errors

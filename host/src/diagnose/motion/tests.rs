@@ -1,10 +1,14 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 use std::path::Path;
 
+use rig_shared::effects::{Effect, Kind};
+
 use super::controller::regressed;
 use super::*;
+use crate::diagnose::past::in_sessions;
 use crate::diagnose::runs::JointRun;
-use crate::robot::{JointFriction, ONE_LINK_TEMPLATE};
+use crate::robot::{JointFriction, ONE_LINK_TEMPLATE, RobotEffect};
+use crate::simulate::closed_loop;
 
 const RATE: f64 = 1000.0;
 
@@ -172,4 +176,36 @@ fn worse_is_what_block_after_block_says() {
     assert!(!errors(&[0.5, 0.6, 0.4, 0.5, 0.5, 0.5]).worse_than(&before, 0));
     // One bad block is chance.
     assert!(!errors(&[1.0, 1.2, 0.9, 4.1, 1.0, 1.0]).worse_than(&before, 0));
+}
+
+/// A recording cut in two by a pause of its clock: what follows begins as warm as it was left.
+#[test]
+fn what_goes_on_in_a_session_moves_as_warm_as_it_is() {
+    let mut truth = robot(0.4);
+    truth.effects.push(RobotEffect {
+        joint: None,
+        other: None,
+        effect: Effect::new(Kind::ViscousWarmupHeat, &[0.5], &[5.0]),
+    });
+    let whole = recorded(&truth, &[own()]);
+    let part = |range: std::ops::Range<usize>| Run {
+        began: whole.t[range.start],
+        t: whole.t[range.clone()].to_vec(),
+        joints: (whole.joints.iter())
+            .map(|joint| JointRun {
+                q: joint.q[range.clone()].to_vec(),
+                qd: joint.qd[range.clone()].to_vec(),
+                tau: joint.tau[range.clone()].to_vec(),
+                ..JointRun::default()
+            })
+            .collect(),
+        ..whole.clone()
+    };
+    let half = whole.len() / 2;
+    let mut runs = vec![part(0..half), part(half..whole.len())];
+    let cold = off(&truth, &[own()], &runs[1])[0];
+    in_sessions(&mut runs, &[]);
+    assert_eq!(runs[1].began, 0.0);
+    let warm = off(&truth, &[own()], &runs[1])[0];
+    assert!(warm < 0.05 * cold, "{warm} {cold}");
 }

@@ -6,9 +6,11 @@
 //! Leaves out: twist and play of the gears, sampling that jitters.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use super::dice::Dice;
 use super::fault::{Fault, Hidden};
+use super::written::write_all;
 use crate::data::{Block, JointColumns};
 use crate::diagnose::DiagnoseError;
 use crate::prepare::InMemory;
@@ -71,6 +73,22 @@ pub struct ArmRecordings {
     pub holdout: InMemory,
 }
 
+impl ArmRecordings {
+    /// Writes `robot.toml`, `train.csv`, `repeat.csv` and `holdout.csv` into a folder that exists.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, folder: &Path) -> Result<(), DiagnoseError> {
+        let [train, repeat] = &self.train;
+        let recordings = [
+            ("train.csv", Some(train)),
+            ("repeat.csv", Some(repeat)),
+            ("holdout.csv", Some(&self.holdout)),
+        ];
+        write_all(folder, &self.robot, &recordings)
+    }
+}
+
 /// The arm's description without any fault.
 fn described(arm: Arm) -> Result<Robot, DiagnoseError> {
     let text = match arm {
@@ -79,7 +97,7 @@ fn described(arm: Arm) -> Result<Robot, DiagnoseError> {
     };
     let failed = |e: &dyn std::fmt::Display| DiagnoseError::Scenario(e.to_string());
     let mut robot =
-        Robot::from_toml(text, std::path::Path::new("arm.toml")).map_err(|e| failed(&e))?;
+        Robot::from_toml(text, Path::new("arm.toml")).map_err(|e| failed(&e))?;
     if arm == Arm::Upright {
         robot.gravity = [-9.81, 0.0, 0.0];
     }

@@ -17,6 +17,7 @@ mod reference;
 mod rig;
 mod size;
 mod surrogate;
+mod written;
 #[cfg(test)]
 mod tests;
 
@@ -34,13 +35,13 @@ pub use reference::Excitation;
 pub use rig::Noise;
 
 use super::{DiagnoseError, Unburdened};
-use crate::data::{Block, Column, RecordingWriter};
-use crate::files::write_whole;
+use crate::data::Block;
 use crate::plant::PlantConfig;
 use crate::prepare::{InMemory, Recording};
 use crate::robot::{Drive, Robot};
 use record::{Manner, Nominal, record};
 use size::{Equation, Problem, beyond};
+use written::write_all;
 
 /// Run of the hold-out's repeat, beside those of training (0, 1), hold-out (2) and experiments.
 const HELD_AGAIN: u64 = 6;
@@ -402,59 +403,12 @@ impl Made {
     /// # Errors
     /// What the system says.
     pub fn write(&self, folder: &Path) -> Result<(), DiagnoseError> {
-        let failed = |error: &dyn std::fmt::Display| DiagnoseError::Scenario(error.to_string());
-        let text = self.robot.to_toml().map_err(|error| failed(&error))?;
-        write_whole(&folder.join("robot.toml"), text.as_bytes()).map_err(|error| failed(&error))?;
         let recordings = [
             ("train.csv", Some(&self.train)),
             ("repeat.csv", self.repeat.as_ref()),
             ("holdout.csv", Some(&self.holdout)),
             ("holdout-again.csv", self.held_again.as_ref()),
         ];
-        for (name, recording) in recordings {
-            if let Some(recording) = recording {
-                write_csv(&folder.join(name), &recording.blocks).map_err(|error| failed(&error))?;
-            }
-        }
-        Ok(())
+        write_all(folder, &self.robot, &recordings)
     }
-}
-
-fn write_csv(path: &Path, blocks: &[Block]) -> Result<(), crate::data::DataError> {
-    let joints = blocks.first().map_or(0, |block| block.joints.len());
-    let mut columns = vec![Column::new("t", "s")];
-    for joint in 1..=joints {
-        for (name, unit) in [("q", "rad"), ("tau", "N*m"), ("ref", "rad"), ("u", "V")] {
-            columns.push(Column::new(&format!("{name}{joint}"), unit));
-        }
-    }
-    let links = (blocks.iter()).all(|b| b.joints.iter().all(|joint| joint.link.is_some()));
-    if links {
-        columns.extend((1..=joints).map(|joint| Column::new(&format!("ql{joint}"), "rad")));
-    }
-    let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
-    let mut row = Vec::with_capacity(columns.len());
-    for block in blocks {
-        for (k, &t) in block.t.iter().enumerate() {
-            row.clear();
-            row.push(t);
-            for joint in &block.joints {
-                let at = |column: Option<&Vec<f64>>| {
-                    column.and_then(|c| c.get(k)).copied().unwrap_or(f64::NAN)
-                };
-                row.extend([
-                    at(Some(&joint.q)),
-                    at(Some(&joint.tau)),
-                    at(joint.reference.as_ref()),
-                    at(joint.voltage.as_ref()),
-                ]);
-            }
-            if links {
-                let links = block.joints.iter().filter_map(|j| j.link.as_ref());
-                row.extend(links.map(|link| link.get(k).copied().unwrap_or(f64::NAN)));
-            }
-            writer.push_row(&row)?;
-        }
-    }
-    writer.finish()
 }
