@@ -9,7 +9,8 @@ use super::error::CommandError;
 use super::ui::Ui;
 use crate::diagnose::benchmark::peer::{Frols, Stlsq};
 use crate::diagnose::benchmark::{
-    ArmCase, Case, Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask, run_arms,
+    ArmCase, Case, Diagnose, Method, Plan, Score, arm_cases, arm_table, markdown, run as ask,
+    run_arms,
 };
 use crate::diagnose::scenario::{Effect, Noise, Size, Truth};
 use crate::files::{folder, write_whole};

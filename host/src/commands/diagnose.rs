@@ -261,7 +261,8 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     let (first, besides) = found.words.split_at(found.words.len().min(1));
     lines.extend(first.iter().cloned());
     for (k, step) in found.steps.iter().enumerate() {
-        lines.push(effect(k + 1, step));
+        let of_joint = found.waterfall.len() > 1;
+        lines.push(effect(k + 1, step, of_joint));
         lines.extend(step.parameters.iter().map(|(name, value)| {
             let unit = match value.unit.as_str() {
                 "1" => String::new(),
@@ -306,7 +307,8 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     lines
 }
 
-fn effect(number: usize, step: &Step) -> String {
+/// `of_joint` where there are several joints, each with a gap of its own.
+fn effect(number: usize, step: &Step, of_joint: bool) -> String {
     let law = step
         .law
         .as_ref()
@@ -323,10 +325,11 @@ fn effect(number: usize, step: &Step) -> String {
         format!("; these data support as well: {}", rivals.join(", "))
     };
     format!(
-        "{number}. {}{law} at joint {}, {} % of the gap before it{open}",
+        "{number}. {}{law} at joint {}, {} % of the gap {}before it{open}",
         step.effect,
         step.joint,
-        format_significant(100.0 * step.gap_closed, 3)
+        format_significant(100.0 * step.gap_closed, 3),
+        if of_joint { "of that joint " } else { "" },
     )
 }
 

@@ -129,6 +129,11 @@ impl Descent {
         })
     }
 
+    /// Whether two runs of one motion among the data held back say what their noise is at a joint.
+    pub(super) fn is_held_twice(&self, joint: usize) -> bool {
+        self.repeated[joint].is_some()
+    }
+
     /// Noise of the data held back where two runs among them repeat one motion, else that of the training data, as loud as
     /// their rate makes it.
     fn noise(&self, floors: &[f64]) -> impl Iterator<Item = f64> {

@@ -26,7 +26,7 @@ use super::descent::Descent;
 use super::fault::{faulty, of_preparing};
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, left_of_held, not_carried_over, taken_by_none};
+use super::judge::{Judge, Judged, besides, left_of_held, not_carried_over, taken_by_none};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
@@ -261,6 +261,14 @@ fn attempt(
             &held.last(),
             &descent.train.last(),
             [&judged.floors, &descent.noise_held(&judged.floors)],
+            &judged.chosen,
+            &|joint| {
+                let rows = &sealed
+                    .as_ref()
+                    .filter(|_| descent.is_held_twice(joint))?
+                    .rows;
+                Some(besides(&judged.chosen, rows, joint, held.whole(joint)))
+            },
         )
         .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
     }

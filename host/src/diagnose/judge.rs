@@ -190,11 +190,15 @@ impl Judge<'_, '_> {
             .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
         let much_left = (left.as_ref())
             .is_some_and(|left| self.pairs.is_empty() || left.ratio > FAR_BEYOND_FLOOR);
+        let throughout = || {
+            (0..quiet.len()).find_map(|j| self.falls_throughout(&chosen, j, (fit.rms(j), quiet[j])))
+        };
         let doubted = || (0..quiet.len()).find_map(|j| self.doubt(&fit, &chosen, j, quiet[j]));
         Judged {
             left: ((0..quiet.len()).find_map(|j| self.changed_besides(&fit, j)))
                 .or_else(|| (0..quiet.len()).find_map(|j| self.changed_between(&fit, j)))
                 .or(left)
+                .or_else(throughout)
                 .or_else(doubted)
                 .or_else(|| (0..floors.len()).find_map(|j| self.unproven(&fit, &chosen, j))),
             guesses: Vec::new(),
@@ -278,11 +282,7 @@ impl Judge<'_, '_> {
             return Some(self.knocked(burst, rms, joint, places));
         }
         let [rms, noise] = if repeated {
-            let explained = (self.base.rms(joint).powi(2) - rms * rms).max(0.0);
-            let names = chosen.iter().filter(|p| p.candidate.joint == joint);
-            let shadow = names.map(shadow).fold(0.0, f64::max) * explained;
-            let torque = floor::rms(&self.rows.torque[joint], &self.rows.keep[joint]);
-            let besides = (TREATED * torque).powi(2) + shadow;
+            let besides = besides(chosen, self.rows, joint, [self.base.rms(joint), rms]);
             let more = self.beyond_noise([rms, floor], own, besides, joint)?;
             let much = shown.is_some_and(|p| p.share > SHARE_LEFT);
             (much || self.away_from_reversals(fit, chosen, besides, joint)).then_some(more)?
@@ -301,8 +301,13 @@ impl Judge<'_, '_> {
         );
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         let text = format!(
-            "{:.0} % more than the noise floor is left in joint {name} and no effect of the library explains it. {shown}",
-            100.0 * (rms / noise - 1.0)
+            "{:.0} % more than the noise floor is left in joint {name} and no {}effect of the library explains it. {shown}",
+            100.0 * (rms / noise - 1.0),
+            if chosen.iter().any(|p| p.candidate.joint == joint) {
+                "further "
+            } else {
+                ""
+            },
         );
         Some(Remainder {
             joint: name.clone(),
@@ -364,6 +369,21 @@ impl Judge<'_, '_> {
             beyond([left, noise.max(rounding)], BEYOND_OWN_FLOOR.max(chance))
         })
     }
+}
+
+/// Squares that neither noise nor a missing effect leaves of a joint's torque in some rows: treatment, and the shadow of the names
+/// that take its residual from the one RMS to the other.
+pub(super) fn besides(
+    chosen: &[Profile],
+    rows: &Rows,
+    joint: usize,
+    [before, after]: [f64; 2],
+) -> f64 {
+    let explained = (before * before - after * after).max(0.0);
+    let names = chosen.iter().filter(|p| p.candidate.joint == joint);
+    let shadow = names.map(shadow).fold(0.0, f64::max) * explained;
+    let torque = floor::rms(&rows.torque[joint], &rows.keep[joint]);
+    (TREATED * torque).powi(2) + shadow
 }
 
 /// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.

@@ -5,7 +5,8 @@
 //! tilted base explains a constant but for the difference of cos q and 1. What is left then is small against the noise of
 //! a sample, and repeats with the coordinate.
 //!
-//! Leaves out: functions of two coordinates; what the motion does not tell from the name.
+//! Leaves out: functions of two coordinates other than an inertia that changes with the position; what the motion does not tell
+//! from the name.
 
 use super::columns::Source;
 use super::fit::Fit;
@@ -20,8 +21,8 @@ const DEGREE: usize = 5;
 const HARMONICS: usize = 4;
 /// Least share of the RMS that a function takes away which does not change with the direction of motion …
 const LEAST: f64 = 0.0075;
-/// … and one that does: the friction of no rig is quite a constant and a line of the speed.
-const LEAST_OF_FRICTION: f64 = 0.02;
+/// … and any other: the friction of no rig is quite a constant and a line of the speed, nor its acceleration known as its position.
+const LEAST_OF_OTHERS: f64 = 0.02;
 /// … and that many standard deviations of it.
 const LEAST_SIGMAS: f64 = 1.5;
 
@@ -30,8 +31,8 @@ const LEAST_SIGMAS: f64 = 1.5;
 pub(super) struct Misfit {
     /// Of what.
     pub(super) coordinate: &'static str,
-    /// Whether its sign changes with the direction of motion.
-    pub(super) friction: bool,
+    /// What it is multiplied by.
+    pub(super) times: Times,
     /// Share of the joint's RMS that it takes away on stretches that it was not fitted to.
     pub(super) gain: f64,
 }
@@ -52,21 +53,42 @@ pub(super) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> O
             }
             let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; own.len()];
             let evidence = fit.evidence(&own, &open)?;
-            let least = if family.turned {
-                LEAST_OF_FRICTION
-            } else {
-                LEAST
+            let least = match family.times {
+                Times::One => LEAST,
+                Times::Direction | Times::Acceleration => LEAST_OF_OTHERS,
             };
             let stands = evidence.corrected(trials) < SIGNIFICANT
                 && evidence.joint_gain >= least
                 && evidence.gain_sigmas >= LEAST_SIGMAS;
             stands.then_some(Misfit {
                 coordinate: family.coordinate,
-                friction: family.turned,
+                times: family.times,
                 gain: evidence.joint_gain,
             })
         })
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// What a free function is multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Times {
+    /// Nothing: a torque.
+    One,
+    /// The sign of the velocity: dry friction.
+    Direction,
+    /// The acceleration: an inertia.
+    Acceleration,
+}
+
+impl Times {
+    /// As in "a free function of the speed …".
+    pub(super) fn said(self) -> &'static str {
+        match self {
+            Self::One => "",
+            Self::Direction => ", turned with the direction,",
+            Self::Acceleration => ", times the acceleration,",
+        }
+    }
 }
 
 /// Free functions of one coordinate.
@@ -74,8 +96,7 @@ struct Family {
     coordinate: &'static str,
     /// At the full rate, run by run.
     values: Vec<Vec<f64>>,
-    /// Whether they change sign with the direction of motion.
-    turned: bool,
+    times: Times,
     /// Whether they repeat with every turn.
     periodic: bool,
 }
@@ -95,15 +116,20 @@ impl Family {
         let mut thin = vec![Vec::new(); count];
         for (run, values) in source.runs.iter().zip(&self.values) {
             let mut functions = vec![Vec::with_capacity(values.len()); count];
-            for (value, speed) in values.iter().zip(&run.joints[joint].qd) {
-                let sign = if self.turned { speed.signum() } else { 1.0 };
+            let own = &run.joints[joint];
+            for (k, value) in values.iter().enumerate() {
+                let factor = match self.times {
+                    Times::One => 1.0,
+                    Times::Direction => own.qd[k].signum(),
+                    Times::Acceleration => own.qdd[k],
+                };
                 let at = if self.periodic {
                     waves(*value)
                 } else {
                     polynomials(2.0 * (value - low) / width - 1.0)
                 };
                 for (function, x) in functions.iter_mut().zip(at) {
-                    function.push(sign * x);
+                    function.push(factor * x);
                 }
             }
             for (to, signal) in thin.iter_mut().zip(source.thinning.thinned_raw(&functions)) {
@@ -127,29 +153,31 @@ fn families(source: &Source, joint: usize) -> Vec<Family> {
             .map(|(r, run)| signal(r, &run.joints[joint]))
             .collect()
     };
-    let family = |coordinate, turned, values| Family {
+    let family = |coordinate, times, values| Family {
         coordinate,
         values,
-        turned,
+        times,
         periodic: false,
     };
     let position = || of(&|_, run| run.q.clone());
     let torque = of(&|r, _| source.predicted[r].torque[joint].clone());
     let load = of(&|r, _| source.predicted[r].load[joint].clone());
-    let speed = of(&|_, run| run.qd.iter().map(|v| v.abs()).collect());
+    let speed = || of(&|_, run| run.qd.iter().map(|v| v.abs()).collect());
     let mut list = vec![
-        family("position", false, position()),
-        family("torque of the drive", false, torque),
-        family("position", true, position()),
-        family("torque on the gear", true, load),
-        family("speed", true, speed),
+        family("position", Times::One, position()),
+        family("torque of the drive", Times::One, torque),
+        family("speed", Times::One, speed()),
+        family("position", Times::Direction, position()),
+        family("torque on the gear", Times::Direction, load),
+        family("speed", Times::Direction, speed()),
+        family("position", Times::Acceleration, position()),
     ];
     if ratio.abs() > 1.0 {
         list.push(Family {
             periodic: true,
             ..family(
                 "motor angle",
-                false,
+                Times::One,
                 of(&|_, run| run.q.iter().map(|q| ratio * q).collect()),
             )
         });

@@ -70,7 +70,7 @@ pub use outcome::Diagnosis;
 pub use pull::Unburdened;
 pub(crate) use runs::runs_of_blocks;
 pub use runs::{JointRun, Run};
-pub(crate) use sentences::what_falls;
+pub(crate) use sentences::{values_alike, what_falls};
 
 use rig_shared::effects::Kind;
 

@@ -20,7 +20,7 @@ use super::profile::Profile;
 use super::pull;
 use super::runs::{JointRun, Run};
 use crate::robot::{Controller, Placed, Robot, title_of};
-use crate::simulate::{Inputs, Model, Motion, Since, SimulateError, closed_loop_since};
+use crate::simulate::{Inputs, Model, Motion, SimulateError, Since, closed_loop_since};
 
 mod controller;
 

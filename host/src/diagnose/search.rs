@@ -22,8 +22,9 @@ mod pairs;
 mod shadow;
 mod side;
 mod simplest;
+mod tentative;
 
-use kinds::{depends_on_model, doubles};
+use kinds::{depends_on_model, doubles, is_searched};
 pub(super) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
@@ -176,11 +177,37 @@ impl<'a> Search<'a> {
         present: &[Candidate],
         impossible: &[Candidate],
     ) -> Result<Vec<Profile>, DiagnoseError> {
+        self.sweep_of(fit, present, impossible, &|_| true)
+    }
+
+    /// Those of one joint: what may stand in the place of an effect there.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    fn sweep_at(
+        &self,
+        joint: usize,
+        fit: &Fit,
+        present: &[Candidate],
+        impossible: &[Candidate],
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        // A tilt is one of all joints.
+        let there = |c: &Candidate| c.joint == joint || c.kind == Kind::GravityTilt;
+        self.sweep_of(fit, present, impossible, &there)
+    }
+
+    fn sweep_of(
+        &self,
+        fit: &Fit,
+        present: &[Candidate],
+        impossible: &[Candidate],
+        among: &dyn Fn(&Candidate) -> bool,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
         let open: Vec<usize> = (0..self.library.len())
             .filter(|c| {
                 let candidate = &self.library[*c];
-                // A second law under one name is no second effect.
-                is_first_law(candidate.kind)
+                is_searched(candidate.kind)
+                    && among(candidate)
                     && !present.iter().any(|w| rivals(w, candidate))
                     && !impossible.contains(candidate)
             })
@@ -191,6 +218,7 @@ impl<'a> Search<'a> {
         .into_iter()
         .filter_map(Result::transpose)
         .collect::<Result<Vec<_>, _>>()?;
+        better_laws(&mut profiles);
         for profile in &mut profiles {
             profile.doubled = present.iter().any(|p| doubles(p, &profile.candidate));
         }
@@ -206,7 +234,7 @@ impl<'a> Search<'a> {
     /// Number of trials of a sweep.
     pub(super) fn trials(&self) -> usize {
         (self.library.iter())
-            .filter(|c| is_first_law(c.kind))
+            .filter(|c| is_searched(c.kind))
             .map(|c| {
                 let shown = self.grid(c).into_iter().filter(|s| self.shows(c, s));
                 shown.count()
@@ -247,12 +275,21 @@ impl<'a> Search<'a> {
             let found = |p: &&Profile| !self.is_described(&p.candidate);
             told(chosen.iter().filter(found).count(), &profiles);
             let Some(best) = self.first_to_take(&fit, &profiles, trials) else {
+                let together =
+                    self.tried_together(base, &chosen, &profiles, trials, &impossible)?;
+                if let Some(together) =
+                    together.filter(|list| !stood.iter().any(|before| same(before, list)))
+                {
+                    stood.push(std::mem::replace(&mut chosen, together));
+                    self.anew(base, &mut chosen, renew)?;
+                    self.sides(base, &mut chosen, renew)?;
+                    continue;
+                }
                 self.nearly = profiles.into_iter().find(|p| p.is_nearly_a_play(trials));
                 break;
             };
             let best = self.plain_before_gear(base, &chosen, best, &profiles, trials)?;
             let best = self.richer_law_first(base, &chosen, best, &profiles, trials)?;
-            let best = self.law_of_its_size(&fit, best, trials)?;
             let before = chosen.clone();
             let newcomer = best.candidate;
             chosen.push(best);
@@ -343,7 +380,7 @@ impl<'a> Search<'a> {
             let unlike = |c: &&Candidate| is_gear(c.kind) && !like(c.kind.about().name);
             others.extend(self.library.iter().filter(unlike));
         }
-        self.sweep(&fit, &others, &[])
+        self.sweep_at(chosen[i].candidate.joint, &fit, &others, &[])
     }
 
     /// What the last search had to drop although it takes away much beside `chosen`, all that it found.
@@ -372,16 +409,22 @@ impl<'a> Search<'a> {
         (self.library.iter().enumerate()).filter(move |(_, c)| another(c))
     }
 
-    /// Another law under the same name where it does clearly better: it has more parameters to bend. Says whether there was one.
+    /// Another law under the same name where it does better: clearly, where it has more parameters to bend or the description states
+    /// the law. Says whether there was one.
     fn other_laws(&self, base: &Fit, chosen: &mut [Profile]) -> Result<bool, DiagnoseError> {
         let mut changed = false;
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
             let present = chosen[i].candidate;
-            for (c, _) in self.laws_beside(present) {
+            for (c, law) in self.laws_beside(present) {
+                let bends_more = self.size(law) != self.size(&present) || is_gear(law.kind);
+                let least = match bends_more || self.is_described(&present) {
+                    true => LEAST_GAIN,
+                    false => 0.0,
+                };
                 if let Some(rival) = self.profile(&fit, c, None)?
                     && rival.vanished.is_none()
-                    && rival.evidence.beyond(&chosen[i].evidence) > LEAST_GAIN
+                    && rival.evidence.beyond(&chosen[i].evidence) > least
                 {
                     chosen[i] = rival;
                     changed = true;
@@ -417,7 +460,7 @@ impl<'a> Search<'a> {
                     .map(|(_, p)| p.candidate)
                     .collect();
                 let rival = self
-                    .sweep(&fit, &others, impossible)?
+                    .sweep_at(chosen[i].candidate.joint, &fit, &others, impossible)?
                     .into_iter()
                     .find(|p| p.refused(trials).is_none());
                 if let Some(rival) = rival
@@ -472,6 +515,26 @@ impl<'a> Search<'a> {
         }
         Ok(())
     }
+}
+
+/// Leaves of the laws of one name that bend to as much the one that takes most away: a second law is no second effect.
+fn better_laws(profiles: &mut Vec<Profile>) {
+    let rank = |p: &Profile| (p.vanished.is_none(), p.evidence.gain);
+    let beaten: Vec<bool> = (profiles.iter())
+        .map(|own| {
+            (profiles.iter()).any(|other| {
+                let [a, b] = [own, other].map(|p| p.candidate.kind);
+                a != b
+                    && a.about().name == b.about().name
+                    && !(is_first_law(a) && is_first_law(b))
+                    && (own.candidate.joint, own.candidate.other)
+                        == (other.candidate.joint, other.candidate.other)
+                    && (rank(other) > rank(own) || rank(other) == rank(own) && is_first_law(b))
+            })
+        })
+        .collect();
+    let mut beaten = beaten.into_iter();
+    profiles.retain(|_| beaten.next() != Some(true));
 }
 
 /// Whether they are the same effects.

@@ -97,6 +97,7 @@ pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
         words.push(effects(d));
     }
     words.extend(constant(d));
+    words.extend(tilt_alike(d).map(str::to_owned));
     words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
     words.extend(what_falls(d).map(str::to_owned));
     words.extend(worse_refitted(d));
@@ -151,6 +152,9 @@ fn effects(d: &Diagnosis) -> String {
                 .filter(|name| **name != s.effect)
                 .cloned()
                 .collect();
+            let rivals: Vec<String> = (rivals.into_iter())
+                .chain(values_alike(d, s).map(str::to_owned))
+                .collect();
             let or = if rivals.is_empty() {
                 String::new()
             } else {
@@ -182,6 +186,19 @@ fn effects(d: &Diagnosis) -> String {
         } else {
             share
         }
+    )
+}
+
+/// Values of the description that a step's effect may stand for as well, as they would be called; none where there are none.
+pub(crate) fn values_alike(d: &Diagnosis, step: &Step) -> Option<&'static str> {
+    let single = d.waterfall.len() == 1 && step.effect == Kind::GravityTilt.about().name;
+    single.then_some("a first_moment that points elsewhere in the link, or another zero of q1")
+}
+
+/// Why a tilt of a single joint is no certain name.
+fn tilt_alike(d: &Diagnosis) -> Option<&'static str> {
+    (d.steps.iter()).any(|s| values_alike(d, s).is_some()).then_some(
+        "Of a single joint a tilted base, a first_moment that points elsewhere in the link and another zero of q1 are one function of the position, and no motion tells them apart: the name takes first_moment and zero to be as described. A spirit level on the base settles it; if it stands level, correct first_moment (`rig identify` finds it) or the zero.",
     )
 }
 

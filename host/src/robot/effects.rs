@@ -309,7 +309,7 @@ pub(super) fn check_tables(tables: &[toml::Value]) -> Result<(), Fault> {
 pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
     let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let names = format!("this robot's joints are {}", joints.join(", "));
-    let mut elastic = HashSet::new();
+    let (mut elastic, mut presliding) = (HashSet::new(), HashSet::new());
     for (i, effect) in robot.effects.iter().enumerate() {
         let table = toml::Table::from(effect.clone());
         RobotEffect::from_table(&table).map_err(|refusal| refusal.at(i))?;
@@ -335,9 +335,13 @@ pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
                 return Err(refuse("other", &effect.other, &right));
             }
         }
+        let found = Some(kind.about().name.to_owned());
         if kind.about().channel == Channel::Transmission && !elastic.insert(joint) {
             let right = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
-            let found = Some(kind.about().name.to_owned());
+            return Err(refuse("kind", &found, right));
+        }
+        if kind.is_presliding() && !presliding.insert(joint) {
+            let right = "the joint has another presliding, and one contact through which its friction acts; state one of them";
             return Err(refuse("kind", &found, right));
         }
     }

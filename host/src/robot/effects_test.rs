@@ -167,6 +167,11 @@ fn faults_name_line_value_and_mend() {
                 "another effect between motor and link",
             ],
         ),
+        (
+            "kind = 'presliding'\nlaw = 'dahl'\ncoulomb = 0.1\nstroke = 0.01\n[[effect]]\nkind = 'presliding'\nlaw = 'dahl'\ncoulomb = 0.1\nstroke = 0.02",
+            5,
+            &["presliding", "effect 2", "another presliding"],
+        ),
     ] {
         let said = with(effect).unwrap_err();
         let place = format!("robot.toml:{}:", first as i64 + line);

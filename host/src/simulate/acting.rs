@@ -3,7 +3,7 @@
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
 use rig_shared::scalar::Real as _;
 
-use super::{Since, SimulateError};
+use super::{SimulateError, Since};
 use crate::effects::{Effects, State, Turn, is_torque};
 
 /// Friction may be beyond zero by this share of itself: rounding.
@@ -214,7 +214,7 @@ impl<'a> Acting<'a> {
         let through = self.through[joint];
         // What a bent contact holds goes against what has bent it.
         let held = self.bent[joint].map_or(0.0, |bent| (coulomb * bent + through) * bent.sgn());
-        if held < -slack {
+        if held.is_nan() || held < -slack {
             return Err(driving([-held, held]));
         }
         let passive = bounds[0] - back <= slack && bounds[1] - forth >= -slack;

@@ -22,7 +22,7 @@ use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 use super::acting::Acting;
 use super::elastic::Elastic;
 use super::solve::{invert, invert_any};
-use super::{Model, Since, SimulateError};
+use super::{Model, SimulateError, Since};
 
 mod friction;
 

@@ -31,9 +31,13 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
         why: String::new(),
     };
     assert_eq!(
-        effect(1, &step),
+        effect(1, &step, false),
         "1. cogging at joint link, 50.0 % of the gap before it"
     );
+    assert_eq!(
+        effect(1, &step, true),
+        "1. cogging at joint link, 50.0 % of the gap of that joint before it"
+    );
     step.set.push("torque_ripple".into());
-    assert!(effect(2, &step).ends_with("; these data support as well: torque_ripple"));
+    assert!(effect(2, &step, true).ends_with("; these data support as well: torque_ripple"));
 }

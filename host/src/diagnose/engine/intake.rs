@@ -3,8 +3,8 @@
 use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::lead::slack;
 use crate::diagnose::outcome::DataFault;
-use crate::diagnose::refit::{Refit, open};
 use crate::diagnose::past::in_sessions;
+use crate::diagnose::refit::{Refit, open};
 use crate::diagnose::runs::{Run, copies};
 use crate::diagnose::sanity::{faults, too_short_to_judge, too_short_to_learn};
 use crate::diagnose::stated::Stated;

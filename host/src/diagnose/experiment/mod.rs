@@ -28,6 +28,7 @@ pub use primitives::{Family, Hands};
 use super::DiagnoseError;
 use super::outcome::NextExperiment;
 use crate::excite::{JointTrajectory, TrajectoryFile};
+use crate::report::format_unit;
 use crate::robot::Robot;
 
 use criterion::{Course, predictable};
@@ -110,7 +111,7 @@ pub fn next(
     let (pulled, same): (Vec<Pair>, Vec<Pair>) =
         (same.into_iter()).partition(|p| primitive.hands == Hands::None && by(p).kind == PULLS_OFF);
     let pulls_off = (pulled.first()).map(|p| by(p).text.replace("{k}", &(joint + 1).to_string()));
-    let mut text = running(robot, primitive);
+    let mut text = running(robot, joint, primitive);
     match &pulls_off {
         Some(first) => text.insert_str(0, &format!("{first} ")),
         None => text = format!("{text} {}", primitive.hands.text()),
@@ -258,8 +259,9 @@ fn nearest(
 }
 
 /// How the motion is run, sentences.
-fn running(robot: &Robot, primitive: &Primitive) -> String {
+fn running(robot: &Robot, joint: usize, primitive: &Primitive) -> String {
     let (start, seconds) = (primitive.start, primitive.duration());
+    let own = &robot.joints[joint];
     let how = if robot.joints.len() == 1 {
         let clamp = match primitive.family {
             Family::LockedRotor => ", clamp it",
@@ -274,7 +276,9 @@ fn running(robot: &Robot, primitive: &Primitive) -> String {
         )
     } else {
         format!(
-            "bring the joint to {start:.4}, the others to the middle of their ranges, and let your controller follow it; `rig simulate` shows it first"
+            "bring joint {} to {start:.4} {}, the others to the middle of their ranges, and let your controller follow it; `rig simulate` shows it first",
+            own.name,
+            format_unit(own.kind.units().0),
         )
     };
     format!(
@@ -338,7 +342,7 @@ fn by_lookup(
         _ => found.kind,
     };
     if let Some((primitive, _)) = &motion {
-        text = format!("{text} {}", running(robot, primitive));
+        text = format!("{text} {}", running(robot, joint, primitive));
     }
     Proposal {
         experiment: NextExperiment {

@@ -1,6 +1,8 @@
 //! What is left and is no plain remainder: changes between recordings, touches, what nobody knows to be noise, names that leave what
 //! right ones would not.
 
+use rig_shared::effects::Kind;
+
 use super::{Judge, QUARTER};
 use crate::diagnose::burst::Burst;
 use crate::diagnose::fit::Fit;
@@ -23,6 +25,9 @@ const UNNAMED: f64 = 0.15;
 const TIMES_READING: f64 = 3.0;
 /// … beside a gear, whose law makes more of the position's noise where motor and link resonate, and where nothing has a name.
 const TIMES_READING_WITHOUT_A_LAW: f64 = 7.0;
+/// Share of a joint's highest speed beyond which a Stribeck velocity is that of no lubricated contact: those of laboratories are
+/// tenths of it or less (Armstrong-Hélouvry 1991).
+const THROUGHOUT: f64 = 0.4;
 /// Standard deviations from which on a change between recordings is certain.
 const CERTAIN: f64 = 5.0;
 
@@ -147,6 +152,38 @@ impl Judge<'_, '_> {
         })
     }
 
+    /// Friction that falls with the speed over nearly all speeds of a joint: no Stribeck friction, which has fallen long before.
+    pub(super) fn falls_throughout(
+        &self,
+        chosen: &[Profile],
+        joint: usize,
+        (rms, floor): (f64, f64),
+    ) -> Option<Remainder> {
+        let fastest = self.search.source.fastest(joint);
+        let falls = |p: &&Profile| {
+            let kind = p.candidate.kind;
+            p.candidate.joint == joint
+                && matches!(kind, Kind::Stribeck | Kind::StribeckExponential)
+                && p.shapes[0] > THROUGHOUT * fastest
+        };
+        let own = chosen.iter().find(falls)?;
+        let Joint { name, kind, .. } = &self.robot.joints[joint];
+        let speed = format_unit(&format!("{}/s", kind.units().0));
+        Some(Remainder {
+            joint: name.clone(),
+            unit: kind.units().1.to_owned(),
+            rms: (rms * rms - floor * floor).max(0.0).sqrt(),
+            ratio: rms / floor,
+            text: format!(
+                "The friction of joint {name} falls with the speed up to {} {speed}, of {} {speed} that it goes at most. Stribeck friction has fallen long before, unless the motion is too slow to show where it ends (record a faster one): something else that falls with the speed, such as a magnetic brake, has no name here. Coulomb and viscous friction beside it are not told either way.",
+                format_significant(own.shapes[0], 3),
+                format_significant(fastest, 3),
+            ),
+            places: Vec::new(),
+            doubt: true,
+        })
+    }
+
     /// What the names of a joint leave that right ones would not.
     pub(super) fn doubt(
         &self,
@@ -165,11 +202,7 @@ impl Judge<'_, '_> {
         let what = format!(
             "a free function of the {}{}",
             found.coordinate,
-            if found.friction {
-                ", turned with the direction,"
-            } else {
-                ""
-            }
+            found.times.said()
         );
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         let percent = format_significant(100.0 * found.gain, 2);

@@ -362,7 +362,7 @@ impl<'a> Judge<'a> {
             None => (
                 "ratio",
                 best,
-                "check the gear ratio and the counts of the encoder".to_owned(),
+                "check the gear ratio, the counts of the encoder and the unit (turns for rad ask for 6.28)".to_owned(),
             ),
         };
         self.say(

@@ -139,7 +139,9 @@ impl Judge<'_> {
             Some(gravity) if gravity.value > 0.0 => {
                 format!("gravity has the right sense, so reverse q{n}")
             }
-            Some(_) => format!("gravity has the wrong sense too, so reverse tau{n}"),
+            Some(_) => format!(
+                "gravity has the wrong sense too, so reverse tau{n} (where a current was recorded: i{n}, or the sign of gear_ratio)"
+            ),
             None => "reverse one of them".to_owned(),
         };
         Ok(Some(self.say(
@@ -328,7 +330,7 @@ impl Judge<'_> {
                     1.0..100.0 => "as a tool or payload that the description does not state would make it, or ",
                     _ => "",
                 };
-                let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit".to_owned());
+                let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned());
                 let nearest = what.split(", or").next().unwrap_or_default();
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
                 self.say(

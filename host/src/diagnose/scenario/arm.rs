@@ -96,8 +96,7 @@ fn described(arm: Arm) -> Result<Robot, DiagnoseError> {
         Arm::Six => TX40,
     };
     let failed = |e: &dyn std::fmt::Display| DiagnoseError::Scenario(e.to_string());
-    let mut robot =
-        Robot::from_toml(text, Path::new("arm.toml")).map_err(|e| failed(&e))?;
+    let mut robot = Robot::from_toml(text, Path::new("arm.toml")).map_err(|e| failed(&e))?;
     if arm == Arm::Upright {
         robot.gravity = [-9.81, 0.0, 0.0];
     }

@@ -17,9 +17,9 @@ mod reference;
 mod rig;
 mod size;
 mod surrogate;
-mod written;
 #[cfg(test)]
 mod tests;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -32,9 +32,8 @@ pub(super) fn write_all(
 fn write_csv(path: &Path, blocks: &[Block]) -> Result<(), DataError> {
     let joints = blocks.first().map_or(0, |block| block.joints.len());
     let mut columns = vec![Column::new("t", "s")];
-    let every = |has: fn(&JointColumns) -> bool| {
-        (blocks.iter()).all(|block| block.joints.iter().all(has))
-    };
+    let every =
+        |has: fn(&JointColumns) -> bool| (blocks.iter()).all(|block| block.joints.iter().all(has));
     let voltages = every(|joint| joint.voltage.is_some());
     let links = every(|joint| joint.link.is_some());
     for joint in 1..=joints {

@@ -42,6 +42,13 @@ pub(in crate::diagnose) fn is_first_law(kind: Kind) -> bool {
         || kind == Kind::ViscousWarmupTemperature
 }
 
+/// Whether a kind is searched for by itself: the first law of its name, or one with as many numbers, which bends to no more.
+pub(super) fn is_searched(kind: Kind) -> bool {
+    let size = |kind: Kind| kind.about().gains.len() + kind.about().shapes.len();
+    let first = Kind::named(kind.about().name, None);
+    is_first_law(kind) || first.is_some_and(|first| !is_gear(kind) && size(first) == size(kind))
+}
+
 /// Whether an effect's columns depend on what the model predicts.
 pub(super) fn depends_on_model(kind: Kind) -> bool {
     let about = kind.about();

@@ -1,6 +1,6 @@
 //! Two plain effects against one that bends to much: a gear, or a law of friction with many shapes.
 
-use super::{Search, is_first_law, is_gear, with};
+use super::{Search, is_gear, is_searched, with};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
@@ -56,7 +56,7 @@ impl Search<'_> {
         let passing = |p: &&Profile| p.candidate.joint == joint && p.refused(trials).is_none();
         for first in profiles.iter().filter(passing) {
             for (c, law) in self.laws_beside(first.candidate) {
-                if is_first_law(law.kind) || is_gear(law.kind) {
+                if is_searched(law.kind) || is_gear(law.kind) {
                     continue;
                 }
                 if let Some(law) = self.profile(&fit, c, None)?
@@ -75,29 +75,6 @@ impl Search<'_> {
         Ok(if plain { best } else { rich })
     }
 
-    /// Of the laws of one name with as many numbers, which bend to no more, the one that takes most away.
-    pub(super) fn law_of_its_size(
-        &self,
-        fit: &Fit,
-        best: Profile,
-        trials: usize,
-    ) -> Result<Profile, DiagnoseError> {
-        let (own, size) = (best.candidate, self.size(&best.candidate));
-        let mut most = best;
-        for (c, law) in self.laws_beside(own) {
-            if is_gear(law.kind) || self.size(law) != size {
-                continue;
-            }
-            if let Some(law) = self.profile(fit, c, None)?
-                && law.refused(trials).is_none()
-                && law.evidence.gain > most.evidence.gain
-            {
-                most = law;
-            }
-        }
-        Ok(most)
-    }
-
     /// `first` and the plain effect that does most beside it, after those in the model, refined.
     fn pair(
         &self,
@@ -110,7 +87,8 @@ impl Search<'_> {
         let taken = pair.iter().map(|p| p.candidate);
         let gears = self.library.iter().filter(|c| is_gear(c.kind));
         let without: Vec<Candidate> = taken.chain(gears.copied()).collect();
-        let second = self.sweep(&with(base, &pair, None), &without, &[])?;
+        let fit = with(base, &pair, None);
+        let second = self.sweep_at(first.candidate.joint, &fit, &without, &[])?;
         pair.extend((second.into_iter()).find(|p| p.refused(trials).is_none()));
         for _ in 0..2 {
             self.refine_all(base, &mut pair)?;

@@ -211,7 +211,7 @@ impl Plant {
                     }
                     (low, high) = (low + towards(-1.0, -1.0), high + towards(1.0, 1.0));
                 }
-                if low > high {
+                if low.is_nan() || high.is_nan() || low > high {
                     return false;
                 }
                 at.beside = over_coulomb(through, coulomb);

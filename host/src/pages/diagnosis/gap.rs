@@ -25,7 +25,7 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
         "From the description down to the noise",
         match found.residual {
             Residual::Torque => {
-                "How much torque each model leaves unexplained: first the description as it was given (its own values), then the same equations with all their parameters fitted to the training data, then each effect added in turn. Where the bars reach the line, nothing but noise is left."
+                "How much torque each model leaves unexplained: first the description as it was given (its own values), then the same equations with all their parameters fitted to the training data, then each effect added in turn. Where that reaches the noise floor, nothing but noise is left."
             }
             Residual::Position => {
                 "How far the position of each model runs away from the recorded one when it is driven by the motor voltage, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."

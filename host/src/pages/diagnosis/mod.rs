@@ -15,6 +15,7 @@ pub use pictures::{NAMES as PICTURE_NAMES, pictures};
 pub use words::verdict;
 
 use crate::diagnose::outcome::{Diagnosis, Remainder, Verdict};
+use crate::diagnose::values_alike;
 use crate::report::{
     Block, Column, Document, Fact, Section, Table, Tone, format_p_value, format_significant,
 };
@@ -169,6 +170,9 @@ fn opening(found: &Diagnosis) -> Section {
                     format_p_value(step.p_value),
                     match words::rivals(step).len() {
                         0 if doubted(found, &step.joint) => "see what is left".into(),
+                        0 if values_alike(found, step).is_some() => {
+                            "no: values of the description as good".into()
+                        }
                         0 => "yes".into(),
                         n => format!("no: {} as good", words::several(n, "other name")),
                     },

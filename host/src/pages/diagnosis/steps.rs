@@ -2,6 +2,7 @@
 
 use super::{gap, parts, words};
 use crate::diagnose::outcome::{Diagnosis, Residual, Step};
+use crate::diagnose::values_alike;
 use crate::report::{Block, Column, NoteKind, Section, Table, format_p_value};
 
 /// What the figure of a step shows.
@@ -153,6 +154,11 @@ fn name(found: &Diagnosis, step: &Step) -> Block {
         (None, _) => String::new(),
     };
     let rivals = words::rivals(step);
+    if let Some(values) = values_alike(found, step).filter(|_| rivals.is_empty()) {
+        return parts::warning(format!(
+            "No other effect that is known here explains these data as well, but {values} would.{runner_up}"
+        ));
+    }
     if rivals.is_empty() {
         return Block::Text(format!(
             "No other effect that is known here explains these data as well.{runner_up}"
