@@ -15,6 +15,8 @@ use crate::data::{Block, JointColumns};
 use crate::prepare::{InMemory, Recording};
 use crate::robot::Robot;
 
+mod beyond;
+
 const MASS: f64 = 1.2;
 const LENGTH: f64 = 0.3;
 const INERTIA: f64 = 0.138;
@@ -34,9 +36,13 @@ struct Pendulum {
     stiffening: f64,
     /// Dry friction more than in motion at rest, N·m; a third of it is gone at 0.2 rad/s.
     breakaway: f64,
-    /// Dry friction that holds what rests, as much more at rest and gone with the square of this speed, N·m and rad/s; none where it
-    /// only turns with the velocity.
-    sticking: Option<[f64; 2]>,
+    /// Dry friction that holds what rests, as much more at rest and gone with this power of this speed, N·m, rad/s and 1; none where
+    /// it only turns with the velocity.
+    sticking: Option<[f64; 3]>,
+    /// A magnetic brake's torque per velocity, and the speed from which on it falls, N·m·s/rad and rad/s.
+    brake: [f64; 2],
+    /// Share of the inertia that goes and comes twice a turn, as of a crank.
+    swinging: f64,
     /// A straight spring about a place, N·m/rad and rad.
     spring: [f64; 2],
     /// Noise of position and torque, rad and N·m.
@@ -53,6 +59,8 @@ const PLAIN: Pendulum = Pendulum {
     stiffening: 0.0,
     breakaway: 0.0,
     sticking: None,
+    brake: [0.0, 1.0],
+    swinging: 0.0,
     spring: [0.0; 2],
     noise: [5e-6, 0.03],
     reach: 1.0,
@@ -105,16 +113,19 @@ impl Pendulum {
             let [stiffness, rest] = self.spring;
             let pulls = MASS * 9.81 * LENGTH * q.sin()
                 + self.stiffening * q.powi(3)
-                + stiffness * (q - rest);
-            if let Some([more, speed]) = self.sticking {
-                let dry = COULOMB + more * (-(v / speed).powi(2)).exp();
-                let free = v + STEP * (acts - pulls - VISCOUS * v) / INERTIA;
+                + stiffness * (q - rest)
+                + self.brake[0] * v / (1.0 + (v / self.brake[1]).powi(2))
+                - self.swinging * INERTIA * (2.0 * q).sin() * v * v;
+            let inertia = INERTIA * (1.0 + self.swinging * (2.0 * q).cos());
+            if let Some([more, speed, power]) = self.sticking {
+                let dry = COULOMB + more * (-(v.abs() / speed).powf(power)).exp();
+                let free = v + STEP * (acts - pulls - VISCOUS * v) / inertia;
                 // No more than brings it to rest (Moreau 1988).
-                v = free.signum() * (free.abs() - STEP * dry / INERTIA).max(0.0);
+                v = free.signum() * (free.abs() - STEP * dry / inertia).max(0.0);
             } else {
                 let weakened = self.breakaway / (1.0 + 12.5 * v * v);
                 let friction = (COULOMB + weakened) * (v / 0.004).tanh() + VISCOUS * v;
-                v += STEP * (acts - pulls - friction) / INERTIA;
+                v += STEP * (acts - pulls - friction) / inertia;
             }
             q += STEP * v;
         }
@@ -343,7 +354,7 @@ fn a_spring_that_takes_the_weight_of_the_link_is_not_to_be_believed() {
 #[test]
 fn a_pendulum_that_sticks_leaves_nothing() {
     let sticking = Pendulum {
-        sticking: Some([0.0, 0.08]),
+        sticking: Some([0.0, 0.08, 2.0]),
         noise: [2e-5, 0.02],
         reach: 0.7,
         slowest: 0.1,
@@ -359,7 +370,7 @@ fn a_pendulum_that_sticks_leaves_nothing() {
 #[test]
 fn how_it_breaks_away_is_known_by_the_motion() {
     let sticking = Pendulum {
-        sticking: Some([0.3, 0.08]),
+        sticking: Some([0.3, 0.08, 2.0]),
         noise: [2e-5, 0.02],
         slowest: 0.1,
         ..PLAIN

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use self::shapes::{coordinate, is_distance, searched, spacing, value_at, vanished};
-pub(super) use self::shapes::{goes_straight, grid, grid_on, is_straight};
+pub(super) use self::shapes::{falls_throughout, goes_straight, grid, grid_on, is_straight};
 use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::{Evidence, Fit, dot_self};

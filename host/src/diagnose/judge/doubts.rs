@@ -1,15 +1,13 @@
 //! What is left and is no plain remainder: changes between recordings, touches, what nobody knows to be noise, names that leave what
 //! right ones would not.
 
-use rig_shared::effects::Kind;
-
 use super::{Judge, QUARTER};
 use crate::diagnose::burst::Burst;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::floor;
 use crate::diagnose::misfit::misfit;
 use crate::diagnose::outcome::{Place, Remainder};
-use crate::diagnose::profile::Profile;
+use crate::diagnose::profile::{Profile, falls_throughout};
 use crate::diagnose::pull;
 use crate::diagnose::search::is_gear;
 use crate::report::{format_significant, format_unit, format_value};
@@ -25,9 +23,6 @@ const UNNAMED: f64 = 0.15;
 const TIMES_READING: f64 = 3.0;
 /// … beside a gear, whose law makes more of the position's noise where motor and link resonate, and where nothing has a name.
 const TIMES_READING_WITHOUT_A_LAW: f64 = 7.0;
-/// Share of a joint's highest speed beyond which a Stribeck velocity is that of no lubricated contact: those of laboratories are
-/// tenths of it or less (Armstrong-Hélouvry 1991).
-const THROUGHOUT: f64 = 0.4;
 /// Standard deviations from which on a change between recordings is certain.
 const CERTAIN: f64 = 5.0;
 
@@ -162,9 +157,7 @@ impl Judge<'_, '_> {
         let fastest = self.search.source.fastest(joint);
         let falls = |p: &&Profile| {
             let kind = p.candidate.kind;
-            p.candidate.joint == joint
-                && matches!(kind, Kind::Stribeck | Kind::StribeckExponential)
-                && p.shapes[0] > THROUGHOUT * fastest
+            p.candidate.joint == joint && falls_throughout(kind, &p.shapes, fastest)
         };
         let own = chosen.iter().find(falls)?;
         let Joint { name, kind, .. } = &self.robot.joints[joint];
@@ -175,7 +168,7 @@ impl Judge<'_, '_> {
             rms: (rms * rms - floor * floor).max(0.0).sqrt(),
             ratio: rms / floor,
             text: format!(
-                "The friction of joint {name} falls with the speed up to {} {speed}, of {} {speed} that it goes at most. Stribeck friction has fallen long before, unless the motion is too slow to show where it ends (record a faster one): something else that falls with the speed, such as a magnetic brake, has no name here. Coulomb and viscous friction beside it are not told either way.",
+                "The friction of joint {name} falls with the speed up to {} {speed} or beyond, of {} {speed} that it goes at most. Stribeck friction has fallen long before, unless the motion is too slow to show where it ends (record a faster one): something else that falls with the speed, such as a magnetic brake, has no name here. Coulomb and viscous friction beside it are not told either way.",
                 format_significant(own.shapes[0], 3),
                 format_significant(fastest, 3),
             ),

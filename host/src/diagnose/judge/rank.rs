@@ -9,7 +9,9 @@ use crate::diagnose::testable;
 
 /// Alternatives with this share of a step's gain are as good where their blocks do not differ by more.
 const AS_GOOD: f64 = 0.9;
-/// … that a stiffness may be larger than found.
+/// … nor leave more than so many times what it leaves: beside a name that goes down to the noise that is something missing.
+const LEAVES: f64 = 1.2;
+/// Standard deviations by which a stiffness may be larger than found.
 const SURELY: f64 = 2.0;
 /// How far from the middle of the motion a spring may be at rest, in spans of the motion.
 const SPANS_TO_REST: f64 = 2.0;
@@ -76,5 +78,6 @@ pub(super) fn may_stand(rival: &Profile, runs: &[Run]) -> bool {
 pub(in crate::diagnose) fn equal(own: &Profile, rival: &Profile) -> bool {
     rival.candidate.joint == own.candidate.joint
         && rival.evidence.gain >= AS_GOOD * own.evidence.gain
+        && 1.0 - rival.evidence.gain <= LEAVES * (1.0 - own.evidence.gain)
         && own.evidence.ahead_of(&rival.evidence) < NO_DIFFERENCE
 }

@@ -113,3 +113,37 @@ fn a_spring_may_stand_where_it_is_at_rest_not_far_away() {
     other.vanished = Some("velocity");
     assert!(!may_stand(&other, &[run]));
 }
+
+/// A motion held back twice has a floor of its own, which names have to reach, but for what filters and right laws leave; one held back
+/// once is judged by the floor of other rows, and touches of a gear are loud.
+#[test]
+fn what_is_held_back_twice_is_held_to_its_own_floor() {
+    let robot = Robot::from_toml(
+        crate::robot::ONE_LINK_TEMPLATE,
+        std::path::Path::new("one-link.toml"),
+    )
+    .unwrap();
+    let left = |held: f64, chosen: &[Profile], twice: Option<f64>| {
+        let floors: [&[f64]; 2] = [&[1.0], &[1.0]];
+        left_of_held(&robot, &[held], &[1.02], floors, chosen, &|_| twice)
+    };
+    let stribeck = [profile(Kind::Stribeck, 0, 0.5)];
+    let play = [profile(Kind::Backlash, 0, 0.5)];
+    assert!(left(1.1, &stribeck, Some(0.0)).is_none());
+    let found = left(1.17, &stribeck, Some(0.0)).unwrap();
+    assert!((found.ratio - 1.17).abs() < 1e-9 && found.text.contains("1.17 times"));
+    assert!(left(1.17, &stribeck, Some(0.2)).is_none());
+    assert!(left(1.17, &stribeck, None).is_none());
+    assert!(left(1.17, &play, Some(0.0)).is_none());
+    assert!(left(1.6, &play, Some(0.0)).is_some());
+}
+
+/// Takes nearly as much away, and leaves half as much again as noise.
+#[test]
+fn a_rival_that_leaves_clearly_more_is_no_equal() {
+    let own = profile(Kind::PreslidingDahl, 0, 0.84);
+    assert!(!equal(&own, &profile(Kind::Stribeck, 0, 0.76)));
+    assert!(equal(&own, &profile(Kind::Stribeck, 0, 0.82)));
+    let little = profile(Kind::PreslidingDahl, 0, 0.1);
+    assert!(equal(&little, &profile(Kind::Stribeck, 0, 0.091)));
+}

@@ -21,6 +21,9 @@ const SOFT_TEETH: [f64; 2] = [1500.0, 15.0];
 const SLOWEST_TEETH: f64 = 0.5 * CLOSED_TEETH;
 /// A shape within this ratio, less one, of the least of what is searched has run there: two refinements' ends.
 const AT_THE_END: f64 = 2.0 * FINE_ENOUGH;
+/// Share of a joint's highest speed beyond which friction has fallen: the Stribeck velocities of lubricated contacts are tenths of it or
+/// less (Armstrong-Hélouvry 1991).
+const THROUGHOUT: f64 = 0.4;
 /// A shape is known well enough within this ratio, less one, or this share of a linear range.
 const FINE_ENOUGH: f64 = 0.01;
 
@@ -115,8 +118,8 @@ pub(super) fn coordinate(shape: &Parameter, value: f64) -> f64 {
 }
 
 /// Where a refinement may go: beyond ten times its range a law is no longer told from its limit, nor is a distance below the
-/// least that is `told`, nor a time constant beyond the time that the joints have been `running`, nor a velocity beyond the `fastest`
-/// that the joint reaches: friction that has not fallen by then is Coulomb friction.
+/// least that is `told`, nor a time constant beyond the time that the joints have been `running`, nor a velocity beyond a share of the
+/// `fastest` that the joint reaches: what falls over all speeds bends to anything.
 pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2]) -> [f64; 2] {
     let ([low, high], [least, most]) = (shape.bounds, shape.range);
     match shape.scale {
@@ -129,7 +132,7 @@ pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2
             let most = if is_duration(shape) {
                 running.max(least)
             } else if is_velocity(shape) {
-                (10.0 * most).min(fastest.max(least))
+                (10.0 * most).min((THROUGHOUT * fastest).max(least))
             } else {
                 10.0 * most
             };
@@ -137,6 +140,16 @@ pub(super) fn searched(shape: &Parameter, told: f64, [running, fastest]: [f64; 2
         }
         Scale::Linear | Scale::Whole => [low, high],
     }
+}
+
+/// Whether friction falls as far up as it is looked for, of a joint that goes so fast at most.
+pub(in crate::diagnose) fn falls_throughout(
+    kind: Kind,
+    shapes: &[f64; SHAPES],
+    fastest: f64,
+) -> bool {
+    matches!(kind, Kind::Stribeck | Kind::StribeckExponential)
+        && shapes[0] * (1.0 + AT_THE_END) > THROUGHOUT * fastest
 }
 
 /// The shape without which there is no effect, the first of each law, where it stands at the least of what is searched; of a

@@ -194,6 +194,29 @@ fn friction_that_falls_exponentially_has_one_name() {
     }
 }
 
+/// What comes in first has no say in the law: a tilt hides most of the friction until it is in the model, and both laws explain the
+/// rest alike.
+#[test]
+fn friction_that_falls_exponentially_has_its_law_beside_a_tilt() {
+    for seed in [1, 2, 3] {
+        let found = asked(seed, |q, v| {
+            0.25 * v.signum() * (-(v / 0.08).abs()).exp() + 0.25 * q.sin()
+        });
+        let mut names = names(&found);
+        names.sort();
+        assert_eq!(
+            names,
+            ["gravity_tilt", "stribeck"],
+            "{seed}: {:?}",
+            found.words
+        );
+        let step = found.steps.iter().find(|s| s.effect == "stribeck").unwrap();
+        assert_eq!(step.law.as_deref(), Some("exponential"), "{seed}");
+        let breakaway = step.parameters["breakaway"].value;
+        assert!((breakaway / 0.25 - 1.0).abs() < 0.1, "{seed}: {breakaway}");
+    }
+}
+
 /// Twelve waves a turn of the joint have no name on one joint. What fits them by chance falls where other recordings speak
 /// against it.
 #[test]

@@ -218,6 +218,45 @@ fn a_servo_law_is_read_off_its_voltage() {
     assert_eq!(law::Law::of(&log), None);
 }
 
+/// A fit may ask for values whose torque is beyond all numbers.
+#[test]
+fn a_joint_whose_friction_is_no_number_is_no_motion() {
+    let rows = 400;
+    let log = Log {
+        t: (0..rows).map(|k| 5.0e-3 * f64::from(k)).collect(),
+        q: vec![0.0; rows as usize],
+        u: vec![3.0; rows as usize],
+        on: vec![true; rows as usize],
+        ..Log::default()
+    };
+    let plant = plant::Plant {
+        inertia: 0.01,
+        gravity: [0.0, 0.5, 0.0],
+        ratio: 1.0,
+        ..plant::Plant::default()
+    };
+    let segment = log::Segment {
+        from: 0,
+        to: rows as usize,
+        velocity: 0.0,
+    };
+    let moves = |coefficient: f64| {
+        // Drive inertia, torque per volt, back-EMF, Coulomb and viscous friction, offset; the effect's own.
+        let theta = [0.002, 0.4, 0.3, 0.05, 0.02, 0.0, coefficient, 0.0];
+        plant.simulate(
+            &[Kind::LoadFriction],
+            &theta,
+            &log,
+            &segment,
+            &mut Vec::new(),
+        )
+    };
+    assert!(moves(0.1));
+    for coefficient in [f64::NAN, f64::INFINITY] {
+        assert!(!moves(coefficient), "{coefficient}");
+    }
+}
+
 #[test]
 fn a_voltage_against_the_motion_is_a_fault_of_the_data() {
     let runs = [0, 1].map(|number| {
