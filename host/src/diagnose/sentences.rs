@@ -20,9 +20,13 @@ const MOVED: f64 = 3.0;
 const WORSE: f64 = 1.1;
 
 /// What the residuals of the description and of the refitted description say; none where fitting again has made the hold-out worse, or
-/// there is nothing to it.
+/// nothing falls.
 pub(crate) fn what_falls(d: &Diagnosis) -> Option<&'static str> {
-    if d.residual != Residual::Torque || d.waterfall.is_empty() || worse_refitted(d).is_some() {
+    // A missing effect may bend parameters so that nothing falls before it is in the model.
+    let falls =
+        |w: &Waterfall| matches!(w.judged(), [described, refitted, ..] if refitted < described);
+    let fallen = d.waterfall.iter().any(falls) && worse_refitted(d).is_none();
+    if d.residual != Residual::Torque || !fallen {
         return None;
     }
     match d.verdict {
@@ -98,7 +102,7 @@ pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     }
     words.extend(constant(d));
     words.extend(tilt_alike(d).map(str::to_owned));
-    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w, repeated)));
     words.extend(what_falls(d).map(str::to_owned));
     words.extend(worse_refitted(d));
     words.extend(motion(d));
@@ -243,8 +247,8 @@ pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
 }
 
 /// RMS of a joint as the description stands, with its parameters fitted again, and with the effects: what fitting again takes
-/// away is no merit of theirs.
-fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
+/// away is no merit of theirs. Without a `repeated` motion nobody knows the floor.
+fn fall(d: &Diagnosis, w: &Waterfall, repeated: bool) -> Option<String> {
     let [described, refitted, effects @ ..] = w.judged() else {
         return None;
     };
@@ -263,10 +267,15 @@ fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
         None => String::new(),
     };
     Some(format!(
-        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; the noise floor is {} {unit}.",
+        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; the noise floor is {}{} {unit}.",
         w.joint,
         number(*described),
         number(*refitted),
+        if repeated {
+            ""
+        } else {
+            "taken to be what the model leaves of the training data, "
+        },
         number(w.judged_floor()),
     ))
 }
