@@ -1,6 +1,7 @@
 //! Two plain effects against one that bends to much: a gear, or a law of friction with many shapes.
 
-use super::{Search, is_gear, is_searched, with};
+use super::kinds::is_searched;
+use super::{Search, is_gear, with};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::Fit;
