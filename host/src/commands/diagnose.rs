@@ -260,8 +260,8 @@ fn summary(found: &Diagnosis) -> Vec<String> {
     let mut lines = vec![format!("verdict: {}", pages::verdict(found.verdict))];
     let (first, besides) = found.words.split_at(found.words.len().min(1));
     lines.extend(first.iter().cloned());
+    let of_joint = found.waterfall.len() > 1;
     for (k, step) in found.steps.iter().enumerate() {
-        let of_joint = found.waterfall.len() > 1;
         lines.push(effect(k + 1, step, of_joint));
         lines.extend(step.parameters.iter().map(|(name, value)| {
             let unit = match value.unit.as_str() {

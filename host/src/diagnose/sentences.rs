@@ -195,8 +195,12 @@ fn effects(d: &Diagnosis) -> String {
 
 /// Values of the description that a step's effect may stand for as well, as they would be called; none where there are none.
 pub(crate) fn values_alike(d: &Diagnosis, step: &Step) -> Option<&'static str> {
-    let single = d.waterfall.len() == 1 && step.effect == Kind::GravityTilt.about().name;
-    single.then_some("a first_moment that points elsewhere in the link, or another zero of q1")
+    let tilt = step.effect == Kind::GravityTilt.about().name;
+    // Of a slide a tilt is a constant, whatever its link is like.
+    let turns = |w: &Waterfall| w.unit != "N";
+    let single = matches!(&d.waterfall[..], [only] if turns(only));
+    (tilt && single)
+        .then_some("a first_moment that points elsewhere in the link, or another zero of q1")
 }
 
 /// Why a tilt of a single joint is no certain name.
@@ -247,7 +251,7 @@ pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
 }
 
 /// RMS of a joint as the description stands, with its parameters fitted again, and with the effects: what fitting again takes
-/// away is no merit of theirs. Without a `repeated` motion nobody knows the floor.
+/// away is no merit of theirs. Without a `repeated` motion the floor is what the model leaves.
 fn fall(d: &Diagnosis, w: &Waterfall, repeated: bool) -> Option<String> {
     let [described, refitted, effects @ ..] = w.judged() else {
         return None;
@@ -271,7 +275,8 @@ fn fall(d: &Diagnosis, w: &Waterfall, repeated: bool) -> Option<String> {
         w.joint,
         number(*described),
         number(*refitted),
-        if repeated {
+        // A hold-out may have a floor of its own.
+        if repeated || w.judged_floor() != w.floor {
             ""
         } else {
             "taken to be what the model leaves of the training data, "
