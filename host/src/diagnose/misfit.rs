@@ -26,6 +26,9 @@ const LEAST_OF_OTHERS: f64 = 0.02;
 /// … and that many standard deviations of it.
 const LEAST_SIGMAS: f64 = 1.5;
 
+/// The coordinate of friction.
+const SPEED: &str = "speed";
+
 /// A free function that takes away what the names leave.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Misfit {
@@ -53,9 +56,10 @@ pub(super) fn misfit(source: &Source, rows: &Rows, fit: &Fit, joint: usize) -> O
             }
             let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; own.len()];
             let evidence = fit.evidence(&own, &open)?;
+            // What goes with the speed is friction, whichever way it turns.
             let least = match family.times {
-                Times::One => LEAST,
-                Times::Direction | Times::Acceleration => LEAST_OF_OTHERS,
+                Times::One if family.coordinate != SPEED => LEAST,
+                _ => LEAST_OF_OTHERS,
             };
             let stands = evidence.corrected(trials) < SIGNIFICANT
                 && evidence.joint_gain >= least
@@ -166,10 +170,10 @@ fn families(source: &Source, joint: usize) -> Vec<Family> {
     let mut list = vec![
         family("position", Times::One, position()),
         family("torque of the drive", Times::One, torque),
-        family("speed", Times::One, speed()),
+        family(SPEED, Times::One, speed()),
         family("position", Times::Direction, position()),
         family("torque on the gear", Times::Direction, load),
-        family("speed", Times::Direction, speed()),
+        family(SPEED, Times::Direction, speed()),
         family("position", Times::Acceleration, position()),
     ];
     if ratio.abs() > 1.0 {
