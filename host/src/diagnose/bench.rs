@@ -19,7 +19,8 @@ use super::runs::{Run, runs_of};
 use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
-use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
+use crate::identify::treatment_for;
+use crate::prepare::{LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use crate::robot::{JointKind, Robot};
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
@@ -340,23 +341,14 @@ pub(super) fn treatment_of(
     recordings: &[&dyn Recording],
     robot: &Robot,
 ) -> Result<Treatment, DiagnoseError> {
-    let n = robot.joints.len();
-    let surveys = (recordings.iter())
-        .map(|r| Survey::take(*r, n))
-        .collect::<Result<Vec<_>, _>>()?;
-    let limits: Vec<Option<f64>> = (robot.joints.iter())
-        .map(|j| j.limits.as_ref().and_then(|l| l.torque))
-        .collect();
-    let first = Treatment::decide(&surveys, &PrepareOptions::default(), &limits)?;
+    let options = PrepareOptions::default();
+    let (surveys, first) = treatment_for(robot, recordings, &options)?;
     let band = (10.0 * first.motion_frequency)
         .max(LEAST_BAND)
         .min(first.cutoff);
     let step = ((0.4 * first.sample_rate / band).floor() as usize).max(1);
-    let options = PrepareOptions {
-        decimation: Choice::Fixed(step.min(first.decimation.max(1))),
-        ..PrepareOptions::default()
-    };
-    Ok(Treatment::decide(&surveys, &options, &limits)?)
+    let step = step.min(first.decimation.max(1));
+    Ok(first.decimated(step, &surveys, &options, &robot.torque_limits())?)
 }
 
 /// Every effect on every joint that the torque can show.

@@ -1,7 +1,7 @@
 //! How far up in frequency the model explains the torque.
 
 use super::factor::TriangularFactor;
-use super::linear::product;
+use super::linear::{product, weighted_minimum_norm};
 use super::model::{Plan, each_rows};
 use super::{IdentifyError, ModelKind};
 use crate::prepare::{Recording, Welch};
@@ -31,17 +31,11 @@ pub(super) fn explained_band(
             Ok(())
         })?;
     }
-    let mut all = TriangularFactor::new(p);
-    for factor in &factors {
-        let rms = (factor.right_side_squares() / factor.rows().max(1) as f64).sqrt();
-        if rms > 0.0 {
-            all.merge(factor, 1.0 / rms);
-        }
-    }
-    let (r, z) = all.system();
-    let svd = r.svd(true, true);
-    let smallest = 1e-10 * svd.singular_values.max();
-    let Ok(beta) = svd.solve(&z, smallest) else {
+    let weights: Vec<f64> = (factors.iter())
+        .map(|f| (f.rows().max(1) as f64 / f.right_side_squares()).sqrt())
+        .map(|weight| if weight.is_finite() { weight } else { 0.0 })
+        .collect();
+    let Some(beta) = weighted_minimum_norm(&factors, &weights) else {
         return Ok(None);
     };
     let segment = (1usize << (instants / 4).max(16).ilog2()).min(1024);

@@ -20,6 +20,24 @@ pub(super) fn spread(beta: &[f64], kept: &[usize], p: usize) -> Vec<f64> {
     full
 }
 
+/// Solution of least norm over equations that count by `weights`: columns that the rows do not tell apart share their value.
+/// None where it cannot be found.
+pub(super) fn weighted_minimum_norm(
+    factors: &[TriangularFactor],
+    weights: &[f64],
+) -> Option<DVector<f64>> {
+    let mut all = TriangularFactor::new(factors.first()?.columns());
+    for (factor, weight) in factors.iter().zip(weights) {
+        if *weight > 0.0 {
+            all.merge(factor, *weight);
+        }
+    }
+    let (r, z) = all.system();
+    let svd = r.svd(true, true);
+    let smallest = 1e-10 * svd.singular_values.max();
+    svd.solve(&z, smallest).ok()
+}
+
 pub(super) fn kept_columns(
     factor: &TriangularFactor,
     data: &Independent,

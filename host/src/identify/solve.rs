@@ -8,6 +8,7 @@ use super::base::{Base, chain_of, expression, transmission_of};
 use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
+use super::cutoff::{Equations, decided};
 use super::evaluate::{Planned, covariance, torque_residuals};
 use super::excitation::not_excited;
 use super::fit::Fit;
@@ -45,9 +46,18 @@ pub(super) fn identify_beside(
     beside: &[[f64; COLUMNS]],
 ) -> Result<Identification, IdentifyError> {
     further::check(robot, options)?;
-    let mut known = None;
+    let (mut known, mut prepared) = (None, None);
     for _ in 0..=MOST_LOOKS {
-        match solve(robot, training, holdout, options, beside, known.as_ref())? {
+        let known_now = known.as_ref();
+        match solve(
+            robot,
+            training,
+            holdout,
+            options,
+            beside,
+            known_now,
+            &mut prepared,
+        )? {
             Solved::Whole(found) => return Ok(*found),
             Solved::Anew(more) => known = Some(more),
         }
@@ -71,6 +81,7 @@ fn solve(
     options: &Options,
     beside: &[[f64; COLUMNS]],
     added: Option<&Beyond>,
+    prepared: &mut Option<(Vec<Survey>, Treatment)>,
 ) -> Result<Solved, IdentifyError> {
     let nothing = Beyond::default();
     let known = added.unwrap_or(&nothing);
@@ -102,12 +113,18 @@ fn solve(
             still: surveys.iter().all(|s| s.joints[j].still()),
         });
     }
-    let limits: Vec<Option<f64>> = robot
-        .joints
-        .iter()
-        .map(|j| j.limits.as_ref().and_then(|l| l.torque))
-        .collect();
-    let decided = Treatment::decide(&surveys, &options.prepare, &limits)?;
+    let limits = robot.torque_limits();
+    let equations = Equations {
+        chain: &chain,
+        transmission: &transmission,
+        columns: &base.columns,
+    };
+    // The recordings are the same at every look, and so is what is done to them.
+    let (surveys, decided) = match prepared.take() {
+        Some(prepared) => prepared,
+        None => decided(equations, training, surveys, &options.prepare, &limits)?,
+    };
+    *prepared = Some((surveys.clone(), decided.clone()));
     let at_own_rate = |treatment: &Treatment| -> Result<Vec<Treatment>, PrepareError> {
         let of = |survey| treatment.at_rate_of(survey);
         holdout_surveys.iter().map(of).collect()

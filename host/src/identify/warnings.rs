@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::covariance::Estimate;
+use super::cutoff;
 use super::fit::MOST_PASSES;
 use super::lag::Lag;
 use super::residual::ResidualReport;
@@ -40,7 +41,7 @@ impl Heard<'_> {
     /// One sentence or more each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let treatment = self.treatment;
-        let mut warnings = Vec::new();
+        let mut warnings = cutoff::doubts(treatment, self.robot);
         warnings.extend(
             self.surveys
                 .iter()

@@ -248,6 +248,37 @@ fn dependence(joint: &Joint, d: &Dependence, report: &ResidualReport) -> Plot {
     plot
 }
 
+/// What is left of the torque with each cut-off that was tried.
+fn over_cutoff(joints: &[Joint], treatment: &Treatment) -> Plot {
+    let mut plot = Plot::new(
+        "Torque residual over the cut-off".to_owned(),
+        Axis::log("cut-off of the position filter", "Hz"),
+        Axis::log("torque residual", "% of the torque"),
+    );
+    for (j, joint) in joints.iter().enumerate() {
+        let judged = treatment
+            .trials
+            .iter()
+            .filter(|t| t.relative_error[j] > 0.0);
+        let (x, y): (Vec<f64>, Vec<f64>) = judged
+            .map(|t| (t.cutoff, 100.0 * t.relative_error[j]))
+            .unzip();
+        let role = Role::ALL[j % Role::ALL.len()];
+        plot = plot.with(Series::line(format!("joint {}", joint.name), role, x, y));
+    }
+    let mark = |hz: f64, what: &str| {
+        Marker::vertical(hz, format!("{what} {} Hz", format_significant(hz, 3)))
+    };
+    plot = plot.mark(mark(treatment.cutoff, "cut-off"));
+    if let Some(hz) = treatment.spectral_cutoff {
+        plot = plot.mark(mark(hz, "by the spectrum"));
+    }
+    plot.height = 280;
+    plot.note(
+        "A fit for each cut-off, to the same torque in the same band. A cut-off that is too low bends the motion; one that is too high lets noise into it.",
+    )
+}
+
 /// What was done to the data: sentences and the spectrum that they rest on.
 pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
     let rate = treatment.sample_rate;
@@ -273,6 +304,9 @@ pub(super) fn treatment(joints: &[Joint], treatment: &Treatment) -> Vec<Block> {
         ));
     }
     let mut blocks = vec![Block::List(items)];
+    if !treatment.trials.is_empty() {
+        blocks.push(Block::Plot(over_cutoff(joints, treatment)));
+    }
     for (joint, s) in joints.iter().zip(&treatment.spectra) {
         let position = units(joint.kind)[0];
         let ends: Vec<f64> = [s.frequency.first(), s.frequency.last()]

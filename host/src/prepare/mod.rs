@@ -29,12 +29,14 @@ pub use motion::{JointMotion, Motion, each_motion, worked_motion};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub(crate) use pieces::{first_block, stretch};
 pub(crate) use rate::same_rate;
+pub(crate) use rate::trimmed_rows;
 pub(crate) use resample::{LONGEST_STEP, Resampled};
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
 pub(crate) use spool::interpolated;
 pub use spool::{Spooled, surveyed};
 pub use survey::{JointSurvey, Survey};
-pub use treatment::{Choice, Masked, PrepareOptions, Treatment};
+pub(crate) use treatment::HIGHEST;
+pub use treatment::{Choice, CutoffTrial, Masked, PrepareOptions, Treatment};
 pub(crate) use workers::{each_of, threads};
 
 /// Why a recording cannot be prepared.
@@ -44,7 +46,9 @@ pub enum PrepareError {
     #[error("{0}")]
     Read(String),
     /// Too few rows.
-    #[error("{label} has {rows} rows; at least {needed} are needed.")]
+    #[error(
+        "{label} has {rows} rows; at least {needed} are needed. Record for longer, or keep more of the rows (`rig identify`: a lower --decimation, a higher --cutoff)."
+    )]
     TooShort {
         /// The recording.
         label: String,
@@ -55,7 +59,7 @@ pub enum PrepareError {
     },
     /// Too few rows between one gap in time and the next.
     #[error(
-        "{label} has gaps in time: the longest stretch without one holds {longest} of its {rows} rows; at least {needed} are needed. Record it again so that fewer rows are lost."
+        "{label} has gaps in time: the longest stretch without one holds {longest} of its {rows} rows; at least {needed} are needed. Record it again so that fewer rows are lost, or keep more of the rows (`rig identify`: a lower --decimation, a higher --cutoff)."
     )]
     Broken {
         /// The recording.

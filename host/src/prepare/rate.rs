@@ -76,7 +76,7 @@ pub(super) fn parallel_pass(
 }
 
 /// Rows left out at both ends of every stretch, before decimation.
-pub(super) fn trimmed_rows(cutoff: f64, decimation: usize, rate: f64) -> usize {
+pub(crate) fn trimmed_rows(cutoff: f64, decimation: usize, rate: f64) -> usize {
     ((3.0 * rate / cutoff).ceil() as usize).max(3 * decimation)
 }
 

@@ -140,32 +140,26 @@ impl PositionSpectrum {
                 .all(|d| *d < SUNK * floor)
         });
         let crossing = sunk.map_or(frequency[n - 1], |k| frequency[k]);
-        let velocity: Vec<f64> = frequency
-            .iter()
-            .zip(&density)
-            .map(|(f, d)| {
-                if *f <= crossing {
-                    (d - floor).max(0.0) * f * f
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        let total: f64 = velocity.iter().sum();
-        let mut sum = 0.0;
-        let mut motion = frequency[0];
-        for (f, v) in frequency.iter().zip(&velocity) {
-            sum += v;
-            motion = *f;
-            if sum >= 0.99 * total {
-                break;
+        Self::with(frequency, density, floor, crossing)
+    }
+
+    /// Works out what follows from the level of the noise and from where the signal ends.
+    fn with(frequency: Vec<f64>, density: Vec<f64>, floor: f64, crossing: f64) -> Self {
+        let signal = |d: f64| (d - floor).max(0.0);
+        let bins = || frequency.iter().zip(&density);
+        let velocity = bins().map(|(f, d)| {
+            if *f <= crossing {
+                signal(*d) * f * f
+            } else {
+                0.0
             }
-        }
-        let (mut noise, mut signal, mut clean) = (0.0, 0.0, frequency[0]);
-        for (f, d) in frequency.iter().zip(&density) {
+        });
+        let motion = quantile(&frequency, &velocity.collect::<Vec<f64>>(), 0.99);
+        let (mut noise, mut power, mut clean) = (0.0, 0.0, frequency[0]);
+        for (f, d) in bins() {
             noise += floor * f.powi(4);
-            signal += (d - floor).max(0.0) * f.powi(4);
-            if noise <= NOISE_SHARE * signal {
+            power += signal(*d) * f.powi(4);
+            if noise <= NOISE_SHARE * power {
                 clean = *f;
             }
         }
@@ -177,6 +171,27 @@ impl PositionSpectrum {
             motion,
             clean,
         }
+    }
+
+    /// Returns the same spectrum where the signal is known to end at `end` Hz at the latest: the density there counts as the
+    /// level of the noise if it is above the floor. Noise that is not white (a position that the drive has filtered, a coarse
+    /// encoder, time stamps with jitter) stands above the floor of the top of the band, so the spectrum alone takes it for motion.
+    pub fn ending_at(&self, end: f64) -> Self {
+        if self.crossing <= end {
+            return self.clone();
+        }
+        let near = |f: &f64| (end / 1.12..=end * 1.12).contains(f);
+        let bins = || self.frequency.iter().zip(&self.density);
+        let level: Vec<f64> = bins().filter(|(f, _)| near(f)).map(|(_, d)| *d).collect();
+        let level = level.iter().sum::<f64>() / level.len().max(1) as f64;
+        let (frequency, density) = (self.frequency.clone(), self.density.clone());
+        Self::with(frequency, density, self.floor.max(level), end)
+    }
+
+    /// Frequency below which 99.9 % of the power of the POSITION lies, Hz. A mechanism moves far more than its encoder errs, so
+    /// no error of the encoder or of the time stamps changes this frequency.
+    pub fn swing(&self) -> f64 {
+        quantile(&self.frequency, &self.density, 0.999)
     }
 
     /// Of a position that never changes: nothing, which limits no cut-off.
@@ -195,12 +210,17 @@ impl PositionSpectrum {
 
     /// RMS of the velocity, rad/s or m/s, noise beyond the crossing left out.
     pub fn velocity_rms(&self) -> f64 {
+        self.velocity_rms_below(self.crossing)
+    }
+
+    /// RMS of the velocity up to `most` Hz, rad/s or m/s.
+    pub fn velocity_rms_below(&self, most: f64) -> f64 {
         let step = self.frequency[0];
         let sum: f64 = self
             .frequency
             .iter()
             .zip(&self.density)
-            .take_while(|(f, _)| **f <= self.crossing)
+            .take_while(|(f, _)| **f <= most)
             .map(|(f, d)| (2.0 * PI * f).powi(2) * (d - self.floor).max(0.0) * step)
             .sum();
         sum.sqrt()
@@ -211,6 +231,21 @@ impl PositionSpectrum {
         // ∫₀^fc N·(2πf)² df
         (self.floor * (2.0 * PI).powi(2) * cutoff.powi(3) / 3.0).sqrt()
     }
+}
+
+/// First frequency at which the sum of `power` reaches `share` of its whole.
+fn quantile(frequency: &[f64], power: &[f64], share: f64) -> f64 {
+    let total: f64 = power.iter().sum();
+    let mut sum = 0.0;
+    let mut reached = frequency[0];
+    for (f, p) in frequency.iter().zip(power) {
+        sum += p;
+        reached = *f;
+        if sum >= share * total {
+            break;
+        }
+    }
+    reached
 }
 
 #[cfg(test)]

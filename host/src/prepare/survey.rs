@@ -97,8 +97,19 @@ struct Running {
     welch: Delayed,
 }
 
-/// Rows of the longest segments of the spectrum: at 1 kHz they resolve 0.25 Hz.
+/// Rows of the longest segments of the spectrum up to 1 kHz, where they resolve 0.25 Hz.
 const LONGEST_SEGMENT: usize = 4096;
+/// Rate up to which the segments have [`LONGEST_SEGMENT`] rows, Hz. Beyond it they last as long as at this rate: a segment that
+/// is shorter than the motion's period takes the RMS speed for a fraction of what it is (a quarter at 5 kHz).
+const SEGMENT_RATE: f64 = 1000.0;
+
+/// Returns the rows of the longest segments at a rate in Hz, a power of two.
+fn longest_segment(rate: f64) -> usize {
+    // A rate from stamps with jitter must not decide between two powers.
+    let times = (0.99 * rate / SEGMENT_RATE).ceil();
+    let most = f64::from(1 << 8);
+    LONGEST_SEGMENT * (if times > 1.0 { times.min(most) } else { 1.0 } as usize).next_power_of_two()
+}
 
 /// A spectrum whose segments are as long as the recording and its stretches without a gap allow: of a whole one at least seven
 /// of them, half overlapping. Rows wait until it is known that the recording is long enough for the longest segments.
@@ -110,7 +121,8 @@ struct Delayed {
 }
 
 impl Delayed {
-    fn push(&mut self, x: f64, follows: bool) {
+    /// Takes a value of a recording of `rate` Hz, as far as that is known.
+    fn push(&mut self, x: f64, follows: bool, rate: f64) {
         if let Some(welch) = &mut self.welch {
             if !follows {
                 welch.interrupt();
@@ -119,25 +131,25 @@ impl Delayed {
             return;
         }
         self.waiting.push((x, follows));
-        if self.waiting.len() == 4 * LONGEST_SEGMENT {
-            self.start();
+        if self.waiting.len() >= 4 * longest_segment(rate) {
+            self.start(rate);
         }
     }
 
-    fn start(&mut self) {
+    fn start(&mut self, rate: f64) {
         let stretches = self.waiting.chunk_by(|_, (_, follows)| *follows);
         let longest = stretches.map(<[_]>::len).max().unwrap_or(0);
         let most = (self.waiting.len() / 4).min(longest).max(1);
-        let segment = (1usize << most.ilog2()).clamp(64, LONGEST_SEGMENT);
+        let segment = (1usize << most.ilog2()).clamp(64, longest_segment(rate));
         self.welch = Some(Welch::new(segment));
         for (x, follows) in std::mem::take(&mut self.waiting) {
-            self.push(x, follows);
+            self.push(x, follows, rate);
         }
     }
 
-    fn finish(mut self) -> Welch {
+    fn finish(mut self, rate: f64) -> Welch {
         if self.welch.is_none() {
-            self.start();
+            self.start(rate);
         }
         self.welch.unwrap_or_else(|| Welch::new(LONGEST_SEGMENT))
     }
@@ -158,6 +170,16 @@ impl JointSurvey {
 }
 
 impl Survey {
+    /// Returns the same survey where each joint's signal ends at its frequency in `ends` at the latest, Hz; see
+    /// [`PositionSpectrum::ending_at`].
+    pub(crate) fn ending_at(&self, ends: &[f64]) -> Self {
+        let mut survey = self.clone();
+        for (joint, end) in survey.joints.iter_mut().zip(ends) {
+            joint.spectrum = joint.spectrum.ending_at(*end);
+        }
+        survey
+    }
+
     /// Reads `recording` once. `joints` is the number of joints of the robot.
     ///
     /// # Errors
@@ -223,7 +245,7 @@ impl Survey {
                     r.square += tau * tau;
                     r.high.push(tau);
                     r.low.push(-tau);
-                    r.welch.push(q, follows);
+                    r.welch.push(q, follows, steps as f64 / span);
                 }
             }
             Ok(())
@@ -266,14 +288,12 @@ impl Survey {
         let joints = running
             .into_iter()
             .map(|r| {
-                let (frequency, density) =
-                    (r.welch.finish().density(sample_rate)).ok_or_else(|| {
-                        PrepareError::Broken {
-                            label: recording.label(),
-                            longest,
-                            rows,
-                            needed: FEWEST_ROWS,
-                        }
+                let (frequency, density) = (r.welch.finish(sample_rate).density(sample_rate))
+                    .ok_or_else(|| PrepareError::Broken {
+                        label: recording.label(),
+                        longest,
+                        rows,
+                        needed: FEWEST_ROWS,
                     })?;
                 Ok(JointSurvey {
                     position: r.position,

@@ -77,6 +77,10 @@ pub struct Treatment {
     pub cutoff: f64,
     /// Why this cut-off, a sentence.
     pub cutoff_reason: String,
+    /// Cut-offs that were tried on the torque, lowest first; empty where none was.
+    pub trials: Vec<CutoffTrial>,
+    /// Cut-off that the spectrum of the position alone gives, where the torque gave another one, Hz.
+    pub spectral_cutoff: Option<f64>,
     /// Order of the Butterworth filter, forward and backward.
     pub order: usize,
     /// Every how many rows one is kept.
@@ -122,10 +126,19 @@ const LEAST_HEADROOM: f64 = 5.0;
 const PARALLEL_HEADROOM: f64 = 10.0;
 
 /// Highest cut-off as a share of the Nyquist frequency.
-pub(super) const HIGHEST: f64 = 0.8;
+pub(crate) const HIGHEST: f64 = 0.8;
 
 /// Above what rounding leaves of the velocity of a joint that stands still, below what any encoder shows, rad/s or m/s.
 const STILL: f64 = 1e-6;
+
+/// A cut-off that was tried, and how well the torque is explained with it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CutoffTrial {
+    /// Hz
+    pub cutoff: f64,
+    /// Per joint, RMS of the torque residual over RMS of the torque; not a number where no row of the joint was usable.
+    pub relative_error: Vec<f64>,
+}
 
 impl Treatment {
     /// Decides from the surveys of all training recordings and the robot's torque limits.
@@ -144,15 +157,7 @@ impl Treatment {
         for survey in surveys {
             same_rate(survey, rate)?;
         }
-        // The longest recording speaks for the spectrum, for that of a joint the longest in which it moves.
-        let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
-        let spectra: Vec<PositionSpectrum> = (0..speaker.joints.len())
-            .map(|j| {
-                let moving = surveys.iter().filter(|s| !s.joints[j].still());
-                let own = moving.max_by_key(|s| s.rows).unwrap_or(speaker);
-                own.joints[j].spectrum.clone()
-            })
-            .collect();
+        let spectra = spectra_of(surveys, first);
         let motion = spectra.iter().map(|s| s.motion).fold(0.0, f64::max);
         let nyquist = rate / 2.0;
         let (cutoff, cutoff_reason) = match options.cutoff {
@@ -167,25 +172,10 @@ impl Treatment {
             });
         }
         let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let most = (shortest / FEWEST_KEPT).max(1);
+        let most = most_decimated(shortest, FEWEST_KEPT, cutoff, rate);
         let (decimation, decimation_reason) = match options.decimation {
             Choice::Fixed(n) => (n, format!("Every {n}th row, as given.")),
-            Choice::Auto => {
-                // Torque and regressor pass the same filter, so this band costs no bias; it drops noise.
-                let band = (PARALLEL_HEADROOM * motion).min(cutoff);
-                let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
-                (
-                    n,
-                    format!(
-                        "One row in {n}: the low-pass before it passes up to {:.3} Hz, at least ten times the highest frequency of the motion ({motion:.3} Hz) or all that the position filter leaves.",
-                        if n > 1 {
-                            decimator_edge(n, rate)
-                        } else {
-                            cutoff
-                        }
-                    ),
-                )
-            }
+            Choice::Auto => choose_decimation(motion, cutoff, rate, most),
         };
         if decimation == 0 || (decimation as u64) > most {
             return Err(PrepareError::Decimation {
@@ -194,75 +184,21 @@ impl Treatment {
                 most,
             });
         }
-        let (speed_threshold, speed_reason) = match options.speed_threshold {
-            Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{speed}, as given.")),
-            Choice::Auto => {
-                let thresholds = spectra
-                    .iter()
-                    .map(|s| {
-                        let rms = s.velocity_rms();
-                        (5.0 * s.velocity_noise(cutoff)).max(0.01 * rms)
-                    })
-                    .collect();
-                (
-                    thresholds,
-                    "Five standard deviations of the velocity's noise behind the filter, at least 1 % of its RMS: below it the sign of the velocity, and with it Coulomb friction, is not known.".into(),
-                )
-            }
-        };
-        // At rest friction, or a brake, carries any part of the torque: no row of such a joint tells anything.
-        let speed_threshold = speed_threshold
-            .into_iter()
-            .enumerate()
-            .map(|(j, speed): (usize, f64)| {
-                let still = surveys.iter().all(|s| s.joints[j].still());
-                if still { speed.max(STILL) } else { speed }
-            })
-            .collect();
+        let (speed_threshold, speed_reason) =
+            choose_speeds(surveys, &spectra, cutoff, options.speed_threshold);
         let (parallel_edge, parallel_filter) =
             parallel_pass(options.order, cutoff, decimation, rate);
-        let saturation = speaker
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(j, _)| {
-                let limit = torque_limits.get(j).copied().flatten();
-                let seen = |side: usize| surveys.iter().find_map(|s| s.joints[j].clipped[side]);
-                [
-                    limit
-                        .map(|l| -l)
-                        .into_iter()
-                        .chain(seen(0))
-                        .reduce(f64::max),
-                    limit.into_iter().chain(seen(1)).reduce(f64::min),
-                ]
-            })
-            .collect();
         let trimmed = trimmed_rows(cutoff, decimation, rate);
-        let needed = FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64;
-        for survey in surveys {
-            if survey.longest < needed {
-                let label = survey.label.clone();
-                return Err(if survey.longest < survey.rows {
-                    PrepareError::Broken {
-                        label,
-                        longest: survey.longest,
-                        rows: survey.rows,
-                        needed,
-                    }
-                } else {
-                    PrepareError::TooShort {
-                        label,
-                        rows: survey.rows,
-                        needed,
-                    }
-                });
-            }
-        }
+        enough_rows(
+            surveys,
+            FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64,
+        )?;
         Ok(Self {
             sample_rate: rate,
             cutoff,
             cutoff_reason,
+            trials: Vec::new(),
+            spectral_cutoff: None,
             order: options.order,
             decimation,
             decimation_reason,
@@ -278,7 +214,7 @@ impl Treatment {
             torque_lead: options.torque_lead,
             speed_threshold,
             speed_reason,
-            saturation,
+            saturation: saturation(surveys, torque_limits, spectra.len()),
             trimmed,
             spectra,
             motion_frequency: motion,
@@ -302,21 +238,42 @@ impl Treatment {
         torque_limits: &[Option<f64>],
     ) -> Result<Self, PrepareError> {
         let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let most = (shortest / rows.max(FEWEST_KEPT)).max(1);
+        let possible = most_decimated(shortest, FEWEST_KEPT, self.cutoff, self.sample_rate);
+        let most = (shortest / rows.max(FEWEST_KEPT)).clamp(1, possible);
         let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, most) as usize;
         if options.decimation != Choice::Auto || n <= self.decimation {
             return Ok(self.clone());
         }
-        let fixed = PrepareOptions {
-            decimation: Choice::Fixed(n),
-            ..options.clone()
-        };
-        let mut narrow = Self::decide(surveys, &fixed, torque_limits)?;
+        let mut narrow = self.decimated(n, surveys, options, torque_limits)?;
         narrow.decimation_reason = format!(
             "One row in {n}: the low-pass before it passes up to {:.3} Hz; beyond {band:.3} Hz more than half of the power of every joint's torque is nothing that the model explains.",
             narrow.parallel_edge
         );
         Ok(narrow)
+    }
+
+    /// The same with one row in `decimation` kept.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn decimated(
+        &self,
+        decimation: usize,
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let fixed = PrepareOptions {
+            cutoff: Choice::Fixed(self.cutoff),
+            decimation: Choice::Fixed(decimation),
+            ..options.clone()
+        };
+        Ok(Self {
+            cutoff_reason: self.cutoff_reason.clone(),
+            trials: self.trials.clone(),
+            spectral_cutoff: self.spectral_cutoff,
+            ..Self::decide(surveys, &fixed, torque_limits)?
+        })
     }
 
     /// s
@@ -346,6 +303,105 @@ impl Treatment {
 
 /// Rows that must be left after decimation.
 const FEWEST_KEPT: u64 = 50;
+
+/// Spectrum of each joint. The longest recording speaks for it, for a joint the longest in which it moves.
+fn spectra_of(surveys: &[Survey], first: &Survey) -> Vec<PositionSpectrum> {
+    let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
+    (0..speaker.joints.len())
+        .map(|j| {
+            let moving = surveys.iter().filter(|s| !s.joints[j].still());
+            let own = moving.max_by_key(|s| s.rows).unwrap_or(speaker);
+            own.joints[j].spectrum.clone()
+        })
+        .collect()
+}
+
+/// Returns the highest decimation that leaves `kept` rows of the shortest stretch of `rows` rows once both its ends are trimmed.
+fn most_decimated(rows: u64, kept: u64, cutoff: f64, rate: f64) -> u64 {
+    let fits = |n: u64| kept * n + 2 * trimmed_rows(cutoff, n as usize, rate) as u64 <= rows;
+    let mut most = rows / kept;
+    while most > 1 && !fits(most) {
+        most -= 1;
+    }
+    most.max(1)
+}
+
+/// Every how many rows one is kept. Torque and regressor pass the same filter, so its band costs no bias; it drops noise.
+fn choose_decimation(motion: f64, cutoff: f64, rate: f64, most: u64) -> (usize, String) {
+    let band = (PARALLEL_HEADROOM * motion).min(cutoff);
+    let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
+    (
+        n,
+        format!(
+            "One row in {n}: the low-pass before it passes up to {:.3} Hz, at least ten times the highest frequency of the motion ({motion:.3} Hz) or all that the position filter leaves.",
+            if n > 1 {
+                decimator_edge(n, rate)
+            } else {
+                cutoff
+            }
+        ),
+    )
+}
+
+/// Per joint, the speed below which rows are masked, and why.
+fn choose_speeds(
+    surveys: &[Survey],
+    spectra: &[PositionSpectrum],
+    cutoff: f64,
+    choice: Choice<f64>,
+) -> (Vec<f64>, String) {
+    let (mut speeds, reason): (Vec<f64>, String) = match choice {
+        Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{speed}, as given.")),
+        Choice::Auto => (
+            (spectra.iter())
+                .map(|s| (5.0 * s.velocity_noise(cutoff)).max(0.01 * s.velocity_rms()))
+                .collect(),
+            "Five standard deviations of the velocity's noise behind the filter, at least 1 % of its RMS: below it the sign of the velocity, and with it Coulomb friction, is not known.".into(),
+        ),
+    };
+    // At rest friction, or a brake, carries any part of the torque: no row of such a joint tells anything.
+    for (j, speed) in speeds.iter_mut().enumerate() {
+        if surveys.iter().all(|s| s.joints[j].still()) {
+            *speed = speed.max(STILL);
+        }
+    }
+    (speeds, reason)
+}
+
+/// Per joint, the torques beyond which rows count as saturated: the limit that is stated, or where a recording rests.
+fn saturation(surveys: &[Survey], limits: &[Option<f64>], joints: usize) -> Vec<[Option<f64>; 2]> {
+    let of = |j: usize| {
+        let limit = limits.get(j).copied().flatten();
+        let seen = |side: usize| surveys.iter().find_map(|s| s.joints[j].clipped[side]);
+        [
+            (limit.map(|l| -l).into_iter().chain(seen(0))).reduce(f64::max),
+            limit.into_iter().chain(seen(1)).reduce(f64::min),
+        ]
+    };
+    (0..joints).map(of).collect()
+}
+
+/// Refuses a recording without a stretch of `needed` rows.
+fn enough_rows(surveys: &[Survey], needed: u64) -> Result<(), PrepareError> {
+    let Some(survey) = surveys.iter().find(|s| s.longest < needed) else {
+        return Ok(());
+    };
+    let (label, rows, longest) = (survey.label.clone(), survey.rows, survey.longest);
+    Err(if longest < rows {
+        PrepareError::Broken {
+            label,
+            longest,
+            rows,
+            needed,
+        }
+    } else {
+        PrepareError::TooShort {
+            label,
+            rows,
+            needed,
+        }
+    })
+}
 
 /// The lowest frequency at which some joint's signal sinks into its noise, or less where that still leaves
 /// too much noise in the acceleration.

@@ -20,6 +20,13 @@ impl Robot {
         self.joints.iter().map(joint).collect()
     }
 
+    /// Torque limit of each joint, N·m or N, where one is stated.
+    pub fn torque_limits(&self) -> Vec<Option<f64>> {
+        (self.joints.iter())
+            .map(|j| j.limits.as_ref().and_then(|l| l.torque))
+            .collect()
+    }
+
     /// Standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 where the description is silent.
     /// The drives' inertia and friction stand on the joint side; what coupled drives and screws add beside the joints'
     /// diagonals is [`Self::motor_parameters`].

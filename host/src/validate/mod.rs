@@ -30,7 +30,9 @@ use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
 
 use crate::effects::Compensated;
-use crate::identify::{IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals};
+use crate::identify::{
+    IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals, treatment_for,
+};
 use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
 use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
@@ -251,16 +253,7 @@ pub fn validate(
         });
     }
     let joints = robot.joints.len();
-    let surveys = recordings
-        .iter()
-        .map(|r| Survey::take(*r, joints))
-        .collect::<Result<Vec<_>, _>>()?;
-    let limits: Vec<Option<f64>> = robot
-        .joints
-        .iter()
-        .map(|j| j.limits.as_ref().and_then(|l| l.torque))
-        .collect();
-    let (treatment, note) = treatment(robot, &surveys, options, &limits)?;
+    let (surveys, treatment, note) = treatment(robot, recordings, options)?;
     let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
@@ -368,32 +361,37 @@ pub fn validate(
 /// it was fitted in, and its error is that of `identify` on the same recording. Else it is chosen from the recordings.
 fn treatment(
     robot: &Robot,
-    surveys: &[Survey],
+    recordings: &[&dyn Recording],
     options: &Options,
-    limits: &[Option<f64>],
-) -> Result<(Treatment, Option<String>), PrepareError> {
-    let (Some(band), Some(first)) = (&robot.identified, surveys.first()) else {
-        return Ok((Treatment::decide(surveys, &options.prepare, limits)?, None));
+) -> Result<(Vec<Survey>, Treatment, Option<String>), ValidateError> {
+    let chosen = |note| {
+        let (surveys, treatment) = treatment_for(robot, recordings, &options.prepare)?;
+        Ok((surveys, treatment, note))
     };
+    let Some(band) = &robot.identified else {
+        return chosen(None);
+    };
+    let surveys = (recordings.iter())
+        .map(|r| Survey::take(*r, robot.joints.len()))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut prepare = options.prepare.clone();
     let stated = "as the description was identified.";
     if prepare.cutoff == Choice::Auto {
         prepare.cutoff = Choice::Fixed(band.cutoff);
     }
-    if prepare.decimation == Choice::Auto {
+    if let (Choice::Auto, Some(first)) = (prepare.decimation, surveys.first()) {
         let rows = (first.sample_rate / band.rate).round().max(1.0);
         prepare.decimation = Choice::Fixed(rows as usize);
     }
     if prepare.torque_lead == 0.0 {
         prepare.torque_lead = band.torque_lead;
     }
-    let Ok(mut treatment) = Treatment::decide(surveys, &prepare, limits) else {
+    let Ok(mut treatment) = Treatment::decide(&surveys, &prepare, &robot.torque_limits()) else {
         let note = format!(
             "These recordings cannot be judged in the band that the description was identified in (cut-off {} Hz, {} rows per second), so one was chosen from them: the errors are not those of the identification's hold-out.",
             band.cutoff, band.rate
         );
-        let own = Treatment::decide(surveys, &options.prepare, limits)?;
-        return Ok((own, Some(note)));
+        return chosen(Some(note));
     };
     if options.prepare.cutoff == Choice::Auto {
         treatment.cutoff_reason = format!("{} Hz, {stated}", band.cutoff);
@@ -405,7 +403,7 @@ fn treatment(
         treatment.speed_threshold.clone_from(&band.min_speed);
         treatment.speed_reason = format!("By joint, {stated}");
     }
-    Ok((treatment, None))
+    Ok((surveys, treatment, None))
 }
 
 /// What the description itself gives reason to say.

@@ -41,12 +41,12 @@ fn base_parameters_group_as_papers_group_them() {
 }
 
 /// Truth of the made pendulum in the order of its base parameters: mx my Izz+Ia fv fc off.
-const TRUTH: [f64; 6] = [0.30, 0.04, 0.35, 0.30, 0.40, 0.10];
+pub(super) const TRUTH: [f64; 6] = [0.30, 0.04, 0.35, 0.30, 0.40, 0.10];
 
 /// A pendulum under PD control, integrated twenty times as fine as it is sampled, friction holding it at rest as
 /// dry friction does; torque noise coloured, position noisy and rounded to encoder steps. It shares nothing
 /// with the regressor that is fitted.
-fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
+pub(super) fn swing(seed: u64, seconds: f64, held: bool) -> InMemory {
     swing_along(seed, seconds, held, |t| t)
 }
 

@@ -5,6 +5,7 @@ mod bias;
 mod chains;
 mod emps;
 mod exact;
+mod flawed;
 mod judged;
 mod lwr4;
 mod made;
