@@ -52,7 +52,8 @@ impl Clerk {
     }
 
     /// Carries out a request and notes the answer. Gives the settings where they are to be stored: call
-    /// [`Clerk::stored`] when that is done. Nothing is answered before.
+    /// [`Clerk::stored`] when that is done. Nothing is answered before. Not inlined: it is seldom.
+    #[inline(never)]
     pub fn serve(
         &mut self,
         config: &Config,
@@ -88,7 +89,8 @@ impl Clerk {
         None
     }
 
-    /// Says that storing the settings has ended, and answers the request.
+    /// Says that storing the settings has ended, and answers the request. Not inlined: it is seldom.
+    #[inline(never)]
     pub fn stored(
         &mut self,
         state: &mut State,
@@ -157,10 +159,16 @@ impl Clerk {
             };
         }
         // One kept tick per control tick, so that it never crowds out the stream.
-        if notes.roomy() {
-            self.pass_snapshot(state, notes);
-            self.pass_capture(capture, notes);
+        if (self.snapshot.is_some() || self.capture.is_some()) && notes.roomy() {
+            self.pass_kept(state, capture, notes);
         }
+    }
+
+    /// Passes on a tick of the snapshot and one of the capture. Not inlined: it is seldom.
+    #[inline(never)]
+    fn pass_kept(&mut self, state: &State, capture: &Capture, notes: &mut impl Notes) {
+        self.pass_snapshot(state, notes);
+        self.pass_capture(capture, notes);
     }
 
     /// Telemetry windows that found no room since power on.

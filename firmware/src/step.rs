@@ -34,6 +34,9 @@ pub struct Output {
 }
 
 /// One control tick. Takes the samples of one trigger, gives the command that acts from the next one on.
+///
+/// Not inlined: `firmware/fast_code.list` names it.
+#[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     state.follow(config);
     let readings = read(config, state, sample);

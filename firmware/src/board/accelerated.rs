@@ -3,7 +3,7 @@
 use core::arch::global_asm;
 
 // In assembly because it runs before any variable has its value, and because a copying loop in Rust may become a
-// call of a function that is itself among what is copied. Section and lengths, whole words, are memory.x's.
+// call of a function that is itself among what is copied. Section and lengths, whole words, are build.rs's.
 #[allow(unsafe_code)]
 mod before_everything {
     use super::global_asm;

@@ -104,19 +104,25 @@ impl Pins {
 /// Pins of channels A and B in GPIOA, and how their pulls are set there (RM0440, GPIOx_PUPDR: 1 up, 2 down).
 const CHANNELS: [usize; 2] = [0, 1];
 
+/// Pin of a channel. Not looked up by index: rustc 1.90 then no longer sees that it is below 16, and guards the register's
+/// access with a panic.
+#[inline(always)]
+fn pin(channel: usize) -> usize {
+    let [a, b] = CHANNELS;
+    if channel & 1 == 0 { a } else { b }
+}
+
 /// Pulls a channel of the encoder up or down: what drives it does not care.
 #[inline(always)]
 pub(crate) fn pull(channel: usize, up: bool) {
     let pull = if up { Pupdr::PULL_UP } else { Pupdr::PULL_DOWN };
-    GPIOA
-        .pupdr()
-        .modify(|w| w.set_pupdr(CHANNELS[channel & 1], pull));
+    GPIOA.pupdr().modify(|w| w.set_pupdr(pin(channel), pull));
 }
 
 /// Whether a channel of the encoder is high.
 #[inline(always)]
 pub(crate) fn is_high(channel: usize) -> bool {
-    GPIOA.idr().read().idr(CHANNELS[channel & 1]) == Idr::HIGH
+    GPIOA.idr().read().idr(pin(channel)) == Idr::HIGH
 }
 
 /// Whether the bridge holds its fault line low.

@@ -59,6 +59,9 @@ fn update(config: &Config, state: &mut State, tick: &Tick) {
 }
 
 /// One update from two consecutive windows.
+///
+/// Not inlined: one tick in ten runs it, and `firmware/fast_code.list` ranks it apart from the rest of the tick.
+#[inline(never)]
 fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
     let ticks = f32::from(config.rates.estimator_decimation);
     let per_count = state.derived.radians_per_count / ticks;

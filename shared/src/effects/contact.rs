@@ -50,10 +50,14 @@ impl<T: Real> Effect<T> {
             Kind::PreslidingLugre => return share(memory.0[0]).clamp_to(-T::ONE, T::ONE),
             _ => {}
         }
-        let elements = || self.gains.iter().zip(memory.0.map(share));
-        let sum = elements().fold(T::ZERO, |sum, (gain, state)| sum + *gain * state);
-        let whole = elements().fold(T::ZERO, |sum, (gain, _)| sum + *gain);
-        let alike = elements().fold(T::ZERO, |sum, (_, state)| sum + state) * T::from_f64(0.25);
+        let (mut sum, mut whole, mut alike) = (T::ZERO, T::ZERO, T::ZERO);
+        for (gain, state) in self.gains.into_iter().zip(memory.0) {
+            let state = share(state);
+            sum += gain * state;
+            whole += gain;
+            alike += state;
+        }
+        let alike = alike * T::from_f64(0.25);
         T::select(
             T::ZERO.lt(whole),
             sum / whole.max(T::from_f64(1e-30)),

@@ -147,12 +147,14 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         self.state.filter = filtered::State::default();
     }
 
-    /// Everything that was learnt is forgotten.
+    /// Everything that was learnt is forgotten. Not inlined: it is seldom.
+    #[inline(never)]
     pub fn restart(&mut self) {
         self.state = State::default();
     }
 
-    /// See [`report`].
+    /// See [`report`]. Not inlined: it is seldom.
+    #[inline(never)]
     pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
         report(&self.config, &self.state)
     }

@@ -163,6 +163,8 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
     }
 
+    /// Ends a block. Not inlined: it is seldom, one update in a block's length.
+    #[inline(never)]
     fn close(&mut self, config: &Config<T>) -> Block {
         let mean = self.sum * config.inverse_block;
         let square = self.squares * config.inverse_block;

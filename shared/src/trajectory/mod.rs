@@ -198,7 +198,8 @@ impl<T: Scalar> Trajectory<T> {
         self.within(time, phase)
     }
 
-    /// Before its end.
+    /// Before its end. Not inlined: the chip's linker finds it by name.
+    #[inline(never)]
     fn within(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         match self {
             Self::Hold(_) => Reference::rest(T::ZERO),
@@ -206,7 +207,7 @@ impl<T: Scalar> Trajectory<T> {
             Self::Chirp(motion) => motion.at(time, phase),
             Self::Staircase(motion) => segment::at(|visit| motion.segments(visit), time),
             Self::SlowReversals(motion) => motion.at(time),
-            Self::FrictionSweep(motion) => segment::at(|visit| motion.segments(visit), time),
+            Self::FrictionSweep(motion) => motion.at(time),
         }
     }
 

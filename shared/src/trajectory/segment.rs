@@ -24,6 +24,8 @@ pub(super) enum Shape<T> {
 }
 
 impl<T: Real<Mask = bool>> Segment<T> {
+    /// The reference `micros` and a `fraction` of one after the segment's start. Not inlined: the chip's linker finds it by name.
+    #[inline(never)]
     pub(super) fn at(&self, micros: u32, fraction: T) -> Reference<T> {
         let f = T::from_f64;
         let span = Elapsed::seconds(self.micros.max(1), T::ZERO);
@@ -76,15 +78,18 @@ pub(super) fn at<T: Real<Mask = bool>>(
     time: Elapsed<T>,
 ) -> Reference<T> {
     let mut left = time.micros;
-    let mut found = Reference::rest(T::ZERO);
+    let mut found = None;
     segments(&mut |segment| {
         if left >= u64::from(segment.micros) {
             left -= u64::from(segment.micros);
             return true;
         }
-        // Below the segment's length, so within 32 bits.
-        found = segment.at(left as u32, time.fraction);
+        found = Some(segment);
         false
     });
-    found
+    // Evaluated in one place: the walk is repeated in the machine code for every sort of segment. What is left is below the
+    // segment's length, so within 32 bits.
+    found.map_or(Reference::rest(T::ZERO), |segment| {
+        segment.at(left as u32, time.fraction)
+    })
 }

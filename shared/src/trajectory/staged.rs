@@ -181,7 +181,8 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
     }
 
     /// The reference at a time. Whole amplitudes and triangles are taken off first: a tick must not take longer the
-    /// more of them there are.
+    /// more of them there are. Not inlined: the chip's linker finds it by name.
+    #[inline(never)]
     pub(super) fn at(&self, time: Elapsed<T>) -> Reference<T> {
         let mut left = time.micros;
         for quarter in self.quarter_us.iter().copied() {
@@ -314,6 +315,13 @@ impl<T: Real<Mask = bool>> FrictionSweep<T> {
         }
     }
 
+    /// The reference at a time. Not inlined: the chip's linker finds it by name.
+    #[inline(never)]
+    pub(super) fn at(&self, time: Elapsed<T>) -> Reference<T> {
+        segment::at(|visit| self.segments(visit), time)
+    }
+
+    #[inline(always)]
     pub(super) fn segments(&self, visit: &mut dyn FnMut(Segment<T>) -> bool) {
         let end = self.half_span;
         if !visit(Segment {
