@@ -63,6 +63,8 @@ pub struct Image {
     pub flash_used: usize,
     /// Bytes of RAM that statics take.
     pub ram_used: usize,
+    /// Bytes of the CCM SRAM that code takes.
+    pub code_used: usize,
     functions: Vec<Function>,
     symbols: BTreeMap<String, (u32, u32)>,
 }
@@ -103,7 +105,7 @@ impl Image {
             flash_used += bytes.len();
         }
         let file = ElfFile32::<Endianness>::parse(&*data).map_err(format)?;
-        let mut ram_used = 0;
+        let (mut ram_used, mut code_used) = (0, 0);
         for section in file.sections() {
             let allocated = match section.flags() {
                 SectionFlags::Elf { sh_flags, .. } => {
@@ -113,6 +115,9 @@ impl Image {
             };
             if allocated && map::RAM.contains(&(section.address() as u32)) {
                 ram_used += section.size() as usize;
+            }
+            if allocated && map::CCM.contains(&(section.address() as u32)) {
+                code_used += section.size() as usize;
             }
         }
         let mut functions = Vec::new();
@@ -134,6 +139,7 @@ impl Image {
             flash,
             flash_used,
             ram_used,
+            code_used,
             functions,
             symbols,
         })
