@@ -204,6 +204,7 @@ fn program_on(criterion: &mut Criterion, robot: &Robot, data: &Path) {
                 .arg(data)
                 .arg("--out")
                 .arg(folder.path().join("result"))
+                .arg("--force")
                 .stdout(std::process::Stdio::null())
                 .status()
                 .unwrap();

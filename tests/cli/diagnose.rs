@@ -150,6 +150,8 @@ fn what_pulls_on_the_joint_is_gone_where_it_is_taken_off() {
             .arg("--pulls-off")
             .arg(free);
         command.arg("--out").arg(folder.path().join("out"));
+        // One folder for all of them.
+        command.arg("--force");
         command
     };
     let name = |data: &Path, free: &Path| {
@@ -188,6 +190,8 @@ fn a_recording_may_begin_in_motion_and_a_hold_out_is_another_motion() {
         }
         command.arg("--holdout").arg(holdout);
         command.arg("--out").arg(folder.path().join("out"));
+        // One folder for all of them.
+        command.arg("--force");
         command
     };
     let train = tilted("train.csv", 3.0, 1);

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use clap::ValueEnum;
 
 use super::error::CommandError;
+use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::diagnose::benchmark::peer::{Frols, Stlsq};
 use crate::diagnose::benchmark::{
@@ -89,6 +90,9 @@ pub(crate) struct Args {
     /// and judge nothing
     #[arg(long)]
     pub(crate) keep: bool,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// What is hidden in which folder.
@@ -182,6 +186,7 @@ fn write_truth(place: &Path, truth: &serde_json::Value) -> Result<(), CommandErr
 /// # Errors
 /// Names that do not exist, files that cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    refuse_folder(&args.out, &[], args.force)?;
     let levels = args.noise.iter().map(|name| {
         let known = Noise::LEVELS.into_iter().find(|(level, _)| level == name);
         known.ok_or_else(|| {

@@ -10,6 +10,7 @@ use super::error::CommandError;
 use super::input::{
     Inputs, RobotArg, command_line, recordings, refuse_as_rest, refuse_shared, refuse_twice,
 };
+use super::overwrite::refuse_folder;
 use super::pictures::{self, forget};
 use super::ui::Ui;
 use crate::data::EffortNeed;
@@ -76,6 +77,9 @@ pub(crate) struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
     /// Seed of whatever is drawn at random; the same seed gives the same files
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -87,6 +91,7 @@ pub(crate) struct Args {
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &[MODEL, DIAGNOSIS, REPORT, FILE])?;
+    refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
     let learnt: Vec<PathBuf> = args.data.iter().chain(&args.pulls_off).cloned().collect();

@@ -22,6 +22,14 @@ pub enum CommandError {
         /// The file.
         path: PathBuf,
     },
+    /// A folder that holds results.
+    #[error("{} holds {file} of an earlier run; choose another folder with --out, or give --force to replace what is there.", folder.display())]
+    Results {
+        /// The folder.
+        folder: PathBuf,
+        /// The first of them.
+        file: &'static str,
+    },
     /// The robot description.
     #[error(transparent)]
     Robot(#[from] RobotError),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::error::CommandError;
+use super::overwrite::refuse_file;
 use super::ui::Ui;
 use crate::files::write_whole;
 use crate::robot;
@@ -57,9 +58,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         Kind::Xl330 => ("xl330.toml", robot::XL330),
     };
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(name));
-    if path.exists() && !args.force {
-        return Err(CommandError::Exists { path });
-    }
+    refuse_file(&path, args.force)?;
     write_whole(&path, text.as_bytes())?;
     ui.say(&format!(
         "{}: change what is not true of your rig, then give it to the other commands as --robot.",

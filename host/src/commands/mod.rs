@@ -12,6 +12,7 @@ mod friction_map;
 mod identify;
 mod init;
 mod input;
+mod overwrite;
 mod pictures;
 mod record;
 mod simulate;

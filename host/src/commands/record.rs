@@ -14,6 +14,7 @@ use rig_shared::wire::message::RequestBody;
 
 use super::error::CommandError;
 use super::input::described;
+use super::overwrite::refuse_file;
 use super::ui::Ui;
 use crate::data::{Column, RecordingWriter};
 use crate::emulated::{EmulatedRig, Nameplate, upload};
@@ -83,11 +84,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             args.seconds
         )));
     }
-    if args.out.exists() && !args.force {
-        return Err(CommandError::Exists {
-            path: args.out.clone(),
-        });
-    }
+    refuse_file(&args.out, args.force)?;
     let robot = match &args.robot {
         Some(path) => Some(described(path, ui)?.robot),
         None => None,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::error::CommandError;
 use super::input::{described, real};
+use super::overwrite::refuse_file;
 use super::ui::Ui;
 use crate::excite::{Noise, load_reference, replay};
 
@@ -37,6 +38,9 @@ pub(crate) struct Args {
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
+    /// Replace the file if it exists
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// Runs the command.
@@ -62,6 +66,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             )));
         }
     }
+    refuse_file(&args.out, args.force)?;
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {
         position: args.noise_position,

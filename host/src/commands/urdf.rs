@@ -6,6 +6,7 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::input::{RobotArg, described};
+use super::overwrite::refuse_file;
 use super::ui::Ui;
 use crate::files::write_whole;
 
@@ -23,6 +24,9 @@ pub(crate) struct Args {
     /// File to write (.urdf)
     #[arg(long)]
     out: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs the command.
@@ -30,6 +34,7 @@ pub(crate) struct Args {
 /// # Errors
 /// The description, a link without inertial parameters, or the file.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    refuse_file(&args.out, args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = &description.robot;
     let into = args

@@ -6,6 +6,7 @@ use clap::Args as ClapArgs;
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
@@ -29,6 +30,9 @@ pub(crate) struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs the command.
@@ -37,6 +41,7 @@ pub(crate) struct Args {
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["validation.json", "report.html"])?;
+    refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
     let inputs = Inputs::open(&robot, &args.data)?;
     for warning in inputs.warnings() {
