@@ -114,6 +114,105 @@ fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     }
 }
 
+/// Radius of gyration of a body whose inertia its motion does not show, m.
+const RADIUS: f64 = 0.05;
+/// Moments across the axis as a share of the one about it, where the motion shows that one alone. Above one half, so that the
+/// largest moment is below the sum of the others.
+const ACROSS: f64 = 0.6;
+/// Least principal moment as a share of the largest of a body that simulators take. MuJoCo refuses what is not positive.
+const POSITIVE: f64 = 1e-9;
+
+impl Robot {
+    /// The description with bodies that MuJoCo and Gazebo take, as far as no motion shows the difference, and what was done.
+    ///
+    /// Both refuse a moving link without mass, or whose principal moments of inertia about its centre are not all positive with
+    /// the largest below the sum of the others. A description of what a motion shows need not be such a body: of a link that
+    /// turns about one direction only the moment about it counts, of one that only slides the mass. What does not count is
+    /// chosen here. Where all counts nothing is changed, and the sentence says what will be refused.
+    pub(super) fn with_bodies(&self) -> (Self, Vec<String>) {
+        let mut robot = self.clone();
+        let mut remarks = Vec::new();
+        for k in 0..self.joints.len() {
+            let Some(inertial) = &self.joints[k].inertial else {
+                continue;
+            };
+            let body = SpatialInertia::of(inertial);
+            if is_taken(&body) {
+                continue;
+            }
+            let name = &self.joints[k].name;
+            let shown = self.shown(k);
+            match body_like(&body, &shown, k == 0) {
+                Some(new) => {
+                    robot.joints[k].inertial = Some(new.inertial());
+                    remarks.push(format!(
+                        "The link of joint {name}: inertia that no motion of this robot shows was chosen so that the link is a body, as MuJoCo and Gazebo demand. Its motion is the same."
+                    ));
+                }
+                None => {
+                    let why = strange(&body, &Shown::All)
+                        .or_else(|| strange(&body, &shown))
+                        .unwrap_or_else(|| "has moments of inertia that no body has".to_owned());
+                    remarks.push(format!(
+                        "MuJoCo and Gazebo will refuse the link of joint {name}: it {why}. Values of combinations (base parameters) are no bodies; give each link its own, or take identified.urdf of `rig identify` with --estimator consistent."
+                    ));
+                }
+            }
+        }
+        (robot, remarks)
+    }
+}
+
+/// Whether simulators take it: mass, and moments that a body of some extent has.
+fn is_taken(body: &SpatialInertia) -> bool {
+    let Some((_, inertia)) = body.about_centre().filter(|_| body.mass > 0.0) else {
+        return false;
+    };
+    let mut principal: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
+    principal.sort_by(f64::total_cmp);
+    match principal[..] {
+        [small, middle, large] => {
+            small > POSITIVE * large.abs() && large <= (1.0 + POSITIVE) * (small + middle)
+        }
+        _ => false,
+    }
+}
+
+/// A body of the same motion that simulators take; none where there is none. `first`: the joint stands on the base.
+fn body_like(body: &SpatialInertia, shown: &Shown, first: bool) -> Option<SpatialInertia> {
+    let direction = match shown {
+        Shown::All => return None,
+        Shown::Mass => None,
+        Shown::About(direction) => Some(*direction),
+    };
+    let mut mass = body.mass;
+    if let (true, Some(axis)) = (first, direction) {
+        // About a fixed axis the mass is free where first moment and moment of inertia are kept: the centre of mass moves towards
+        // the axis until half of the moment is the body's own.
+        let across = body.first_moment - axis * axis.dot(&body.first_moment);
+        let moment = axis.dot(&(body.inertia * axis));
+        let own = moment - across.norm_squared() / mass.max(f64::MIN_POSITIVE);
+        if moment > 0.0 && (mass <= 0.0 || own <= POSITIVE * moment) {
+            mass = (2.0 * across.norm_squared() / moment).max(moment / RADIUS.powi(2));
+        }
+    }
+    let (centre, about) = SpatialInertia { mass, ..*body }
+        .about_centre()
+        .filter(|_| mass > 0.0)?;
+    let own = match direction {
+        None => Matrix3::identity() * (mass * RADIUS.powi(2)),
+        Some(axis) => {
+            let moment = axis.dot(&(about * axis));
+            if moment <= 0.0 {
+                return None;
+            }
+            let along = axis * axis.transpose();
+            (along + (Matrix3::identity() - along) * ACROSS) * moment
+        }
+    };
+    Some(SpatialInertia::from_centre(mass, centre, own))
+}
+
 #[cfg(test)]
 #[path = "bodies_test.rs"]
 mod tests;

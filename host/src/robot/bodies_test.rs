@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::{SpatialInertia, is_taken};
 use crate::robot::{
     Description, EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, ONE_LINK_TEMPLATE, Robot, TX40, XL330,
 };
@@ -138,4 +139,42 @@ fn placeholders_of_exporters_are_no_limits() {
             .to_string()
             .contains("effort limit of joint `one` is -3")
     );
+}
+
+/// What is written for simulators is a body wherever the motion leaves that open, and where it does not the link is named. That
+/// it moves alike is a test of the writer.
+#[test]
+fn links_that_a_urdf_is_written_with_are_bodies_or_named() {
+    for (text, refused) in [
+        (ONE_LINK_TEMPLATE, 0),
+        (EMPS, 0),
+        (XL330, 0),
+        (EDDA_TEMPLATE, 0),
+        (IRP6_TEMPLATE, 0),
+        (TX40, 1),
+    ] {
+        let mut robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+        for joint in &mut robot.joints {
+            // As identified: of a slide the mass alone.
+            joint.inertial.get_or_insert(crate::robot::Inertial {
+                mass: 95.0,
+                first_moment: [0.0; 3],
+                inertia: [0.0; 6],
+            });
+        }
+        let urdf = robot.to_urdf().unwrap();
+        let named = urdf
+            .remarks
+            .iter()
+            .filter(|r| r.contains("will refuse"))
+            .count();
+        assert_eq!(named > 0, refused > 0, "{}: {:?}", robot.name, urdf.remarks);
+        let read = Robot::from_urdf(&urdf.text, Path::new("r.urdf")).unwrap();
+        if named == 0 {
+            for joint in &read.joints {
+                let body = SpatialInertia::of(joint.inertial.as_ref().unwrap());
+                assert!(is_taken(&body), "{}: {:?}", robot.name, joint.inertial);
+            }
+        }
+    }
 }

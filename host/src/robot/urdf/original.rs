@@ -86,14 +86,15 @@ impl Original {
             robot.standard_parameters(),
             self.robot.standard_parameters(),
         );
+        let (bodies, chosen) = robot.with_bodies();
         for (k, (joint, body)) in robot.joints.iter().zip(&self.chain.bodies).enumerate() {
-            if let Some(inertial) = &joint.inertial
+            if let (Some(inertial), Some(written)) = (&joint.inertial, &bodies.joints[k].inertial)
                 && self.robot.joints[k]
                     .inertial
                     .as_ref()
                     .is_none_or(|own| !same(own, inertial))
             {
-                let seen = SpatialInertia::of(inertial).seen_from(&self.links[k].inverse());
+                let seen = SpatialInertia::of(written).seen_from(&self.links[k].inverse());
                 let (link, merged) =
                     put_inertia(&document, body, &seen, &mut edits).map_err(|why| {
                         RobotError::NotUrdf {
@@ -120,6 +121,9 @@ impl Original {
         .into_iter()
         .flatten()
         .collect();
+        if !inertias.is_empty() {
+            remarks.extend(chosen);
+        }
         if !replaced.is_empty() {
             remarks.insert(
                 0,

@@ -22,7 +22,11 @@ impl SpatialInertia {
     }
 
     /// From mass, centre of mass and inertia about the centre of mass (Steiner).
-    pub(super) fn from_centre(mass: f64, centre: Vector3<f64>, about_centre: Matrix3<f64>) -> Self {
+    pub(in crate::robot) fn from_centre(
+        mass: f64,
+        centre: Vector3<f64>,
+        about_centre: Matrix3<f64>,
+    ) -> Self {
         Self {
             mass,
             first_moment: centre * mass,

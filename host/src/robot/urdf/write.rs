@@ -29,12 +29,13 @@ pub struct Urdf {
 }
 
 impl Robot {
-    /// The description as URDF text; [`Robot::from_urdf`] reads back a chain with the same dynamics.
+    /// The description as URDF text; [`Robot::from_urdf`] reads back a chain with the same dynamics. Inertia that no motion
+    /// of the robot shows is chosen where the link would be no body.
     ///
     /// # Errors
     /// [`RobotError::NotUrdf`] where a link has no inertial parameters, or a first moment without a mass.
     pub fn to_urdf(&self) -> Result<Urdf, RobotError> {
-        let mut remarks = Vec::new();
+        let (bodies, mut remarks) = self.with_bodies();
         let mut taken: HashSet<String> = HashSet::new();
         let mut name = |wish: String| {
             let mut name = wish;
@@ -70,7 +71,7 @@ impl Robot {
         }
         let mut parent = base;
         let parameters = self.standard_parameters();
-        for (joint, row) in self.joints.iter().zip(&parameters) {
+        for (joint, row) in bodies.joints.iter().zip(&parameters) {
             let link = name(format!("{}_link", escaped(&joint.name)));
             write_link(&mut body, joint, &link)?;
             let (viscous, coulomb) = (row[column::VISCOUS], row[column::COULOMB]);
@@ -230,6 +231,12 @@ fn write_joint(
                 unknown.join(", ")
             ));
         }
+    }
+    if let Some([low, high]) = limits.and_then(|l| l.soft_position) {
+        let _ = writeln!(
+            out,
+            "    <safety_controller soft_lower_limit=\"{low:?}\" soft_upper_limit=\"{high:?}\" k_velocity=\"0\"/>"
+        );
     }
     if viscous != 0.0 || coulomb != 0.0 {
         let _ = writeln!(

@@ -7,7 +7,10 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
 
-use crate::robot::{IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind, Robot, TX40};
+use crate::robot::{
+    EDDA_TEMPLATE, EMPS, IRP6_TEMPLATE, Inertial, Joint, JointFriction, JointKind,
+    ONE_LINK_TEMPLATE, Robot, TX40, XL330,
+};
 
 /// A body of eight mass points.
 pub(in crate::robot) fn body(rng: &mut Pcg64) -> Inertial {
@@ -128,8 +131,22 @@ fn what_is_written_reads_back_with_the_same_dynamics() {
         let robot = random(&mut rng);
         same_dynamics(&robot, &mut rng);
     }
-    for text in [IRP6_TEMPLATE, TX40] {
-        let robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+    for text in [
+        IRP6_TEMPLATE,
+        TX40,
+        ONE_LINK_TEMPLATE,
+        EMPS,
+        XL330,
+        EDDA_TEMPLATE,
+    ] {
+        let mut robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
+        for joint in &mut robot.joints {
+            joint.inertial.get_or_insert(Inertial {
+                mass: 95.0,
+                first_moment: [0.0; 3],
+                inertia: [0.0; 6],
+            });
+        }
         same_dynamics(&robot, &mut rng);
     }
 }
@@ -142,6 +159,23 @@ fn limits_drives_and_what_is_left_out_are_told() {
     for (a, b) in robot.joints.iter().zip(&back.joints) {
         assert_eq!(a.limits, b.limits);
     }
+    let mut soft = robot.clone();
+    let [low, high] = soft.joints[0].limits.as_ref().unwrap().position;
+    soft.joints[0].limits.as_mut().unwrap().soft_position = Some([0.9 * low, 0.8 * high]);
+    let written = soft.to_urdf().unwrap().text;
+    let read = Robot::from_urdf(&written, Path::new("r.urdf")).unwrap();
+    assert_eq!(read.joints[0].limits, soft.joints[0].limits);
+    let text = soft.to_toml().unwrap();
+    let read = Robot::from_toml(&text, Path::new("r.toml")).unwrap();
+    assert_eq!(read.joints[0].limits, soft.joints[0].limits);
+    let text = text.replace(
+        &format!("soft_position = [{:?}", 0.9 * low),
+        "soft_position = [-99.0",
+    );
+    let wrong = Robot::from_toml(&text, Path::new("r.toml"))
+        .unwrap_err()
+        .to_string();
+    assert!(wrong.contains("soft position range"), "{wrong}");
     assert_eq!(back.joints[3].drive.as_ref().unwrap().gear_ratio, -48.0);
     assert!(back.joints[5].drive.is_none());
     assert!(
