@@ -5,17 +5,23 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_faults};
+use super::overwrite::refuse_folder;
 use super::ui::Ui;
-use crate::files::{folder, write_whole};
-use crate::identify::{FrictionMapOptions, Options, friction_map, identify};
+use crate::files::{can_take, folder, write_whole};
+use crate::identify::{
+    DroppedPass, FrictionMap, FrictionMapOptions, Options, friction_map, identify,
+};
 use crate::pages::{self, Context};
 use crate::report;
+use crate::report::format_significant;
+use crate::robot::{JointKind, Robot};
 
 /// Draws friction over speed from a recording of a friction sweep.
 ///
 /// Gravity and inertia are taken from an identification on the recordings given with --data; the sweep's
-/// stretches of constant speed give one point each.
+/// stretches of constant speed give one point each. They come from the recorded reference (ref<k>), without one from the
+/// position. The sweep may have another sample rate. Stretches that give no point are listed with the reason.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -26,12 +32,35 @@ pub(crate) struct Args {
     /// Recording of the friction sweep
     #[arg(long)]
     sweep: PathBuf,
-    /// Joint, counted from 1
-    #[arg(long, default_value_t = 1)]
-    joint: usize,
+    /// Joint, by name or counted from 1
+    #[arg(long, default_value = "1")]
+    joint: String,
+    /// Draw the map although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    #[arg(long)]
+    even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
+/// The joint of that name or number.
+fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
+    let by_number = || {
+        let number = given.parse::<usize>().ok()?.checked_sub(1)?;
+        (number < robot.joints.len()).then_some(number)
+    };
+    robot.joint_index(given).or_else(by_number).ok_or_else(|| {
+        let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+        CommandError::Sentence(format!(
+            "--joint {given} does not exist: the joints of {} are {}, or 1 to {}.",
+            robot.name,
+            names.join(", "),
+            names.len()
+        ))
+    })
 }
 
 /// Runs the command.
@@ -39,24 +68,22 @@ pub(crate) struct Args {
 /// # Errors
 /// A sentence naming the file, line or value at fault.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &["friction-map.json", "report.html"])?;
+    refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
-    let training = Inputs::open(&robot, &args.data)?;
-    let sweep = Inputs::open(&robot, std::slice::from_ref(&args.sweep))?;
+    let joint = joint_of(&robot, &args.joint)?;
+    let training = Inputs::read(&robot, &args.data)?;
+    let sweep = Inputs::read(&robot, std::slice::from_ref(&args.sweep))?;
     for warning in training.warnings().chain(sweep.warnings()) {
         ui.remark(&warning);
     }
-    let Some(joint) = args
-        .joint
-        .checked_sub(1)
-        .filter(|joint| *joint < robot.joints.len())
-    else {
-        return Err(CommandError::Sentence(format!(
-            "--joint {} does not exist: {} has {} joints, counted from 1.",
-            args.joint,
-            robot.name,
-            robot.joints.len()
-        )));
-    };
+    refuse_faults(
+        &robot,
+        &[&training, &sweep],
+        Vec::new(),
+        args.even_if_wrong,
+        ui,
+    )?;
     let identification = identify(
         &robot,
         &recordings(&training.listened()),
@@ -71,7 +98,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             joint,
             FrictionMapOptions::default(),
         )?;
-        let heard = [training.heard(), sweep.heard()].concat();
+        let mut heard = [training.heard(), sweep.heard()].concat();
+        heard.extend([training.outside(), sweep.outside()].concat());
+        heard.extend(map.note.clone());
         for warning in &heard {
             ui.remark(warning);
         }
@@ -94,11 +123,55 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             &args.out.join("report.html"),
             &pages::friction_map(&robot, &map, &context),
         )?;
-        ui.say(&map.text);
+        for line in lines(&map, robot.joints[joint].kind) {
+            ui.say(&line);
+        }
     }
     ui.say(&format!(
         "report: {}",
         args.out.join("report.html").display()
     ));
     Ok(())
+}
+
+/// What is printed: which stretches gave points, which not and why, the law, the decision.
+fn lines(map: &FrictionMap, kind: JointKind) -> Vec<String> {
+    let (velocity, torque, viscous) = match kind {
+        JointKind::Revolute => ("rad/s", "N·m", "N·m·s/rad"),
+        JointKind::Prismatic => ("m/s", "N", "N·s/m"),
+    };
+    let speeds = map.points.iter().map(|p| p.speed.abs());
+    let (slow, fast) = speeds.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+    let mut lines = vec![format!(
+        "{} of {} stretches of constant speed, from {}, give points from {} to {} {velocity}.",
+        map.points.len(),
+        map.points.len() + map.dropped.len(),
+        if map.from_reference {
+            "the reference"
+        } else {
+            "the position (no ref column with such stretches was recorded)"
+        },
+        format_significant(slow, 3),
+        format_significant(fast, 3),
+    )];
+    lines.extend(map.dropped.iter().map(|pass: &DroppedPass| {
+        format!(
+            "left out: {} {velocity} at {:.2} s, {}.",
+            format_significant(pass.speed, 3),
+            pass.start,
+            pass.why
+        )
+    }));
+    let fit = map.stribeck.as_ref().unwrap_or(&map.simple);
+    let value = |value: f64, k: usize| {
+        let half = fit.half_interval.get(k).copied().unwrap_or(f64::NAN);
+        crate::report::format_value(value, half)
+    };
+    lines.push(format!(
+        "Coulomb {} {torque}, viscous {} {viscous} (± half the 95 % interval).",
+        value(fit.coulomb, 0),
+        value(fit.viscous, 1)
+    ));
+    lines.push(map.text.clone());
+    lines
 }

@@ -9,7 +9,10 @@ use clap::{Args as ClapArgs, ValueEnum};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::error::CommandError;
-use super::input::{Inputs, RobotArg, command_line, recordings, refuse_shared, refuse_twice};
+use super::input::{
+    Inputs, RobotArg, command_line, recordings, refuse_faults, refuse_shared, refuse_twice,
+};
+use super::overwrite::refuse_folder;
 use super::ui::Ui;
 use crate::files::{can_take, folder, write_whole};
 use crate::identify::{
@@ -198,6 +201,9 @@ pub(crate) struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
 }
 
 impl Args {
@@ -238,6 +244,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         "report.html",
     ];
     can_take(&args.out, &names)?;
+    refuse_folder(&args.out, &[], args.force)?;
     let description = args.robot.describe(ui)?;
     let robot = description.robot;
     let training = Inputs::read(&robot, &args.data)?;
@@ -257,13 +264,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             args.data.len()
         )));
     }
-    let (found, held) = (training.faults(&robot)?, holdout.faults(&robot)?);
-    for sentence in found.doubtful.iter().chain(&held.doubtful) {
-        ui.remark(&format!(
-            "{sentence} Or the description is that far off, or the motion too short to tell."
-        ));
-    }
-    let mut wrong = [found.wrong, held.wrong].concat();
+    let mut wrong = Vec::new();
     let strange = training.strange_references(&robot)?;
     if matches!(args.estimator, Some(Fit::OutputError)) {
         wrong.extend(strange);
@@ -274,14 +275,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
             ));
         }
     }
-    if args.even_if_wrong {
-        wrong.iter().for_each(|sentence| ui.remark(sentence));
-    } else if !wrong.is_empty() {
-        return Err(CommandError::Implausible(format!(
-            "{} Nothing was fitted; --even-if-wrong fits all the same.",
-            wrong.join(" ")
-        )));
-    }
+    refuse_faults(
+        &robot,
+        &[&training, &holdout],
+        wrong,
+        args.even_if_wrong,
+        ui,
+    )?;
     // Three passes over the training data, two over the hold-out: see `identify`.
     let progress =
         RefCell::new(ui.progress("identifying", 3 * training.bytes() + 2 * holdout.bytes()));
@@ -294,6 +294,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     drop(progress);
     for inputs in [&training, &holdout] {
         identification.warnings.extend(inputs.heard());
+        identification.warnings.extend(inputs.outside());
     }
     if !args.even_if_wrong {
         refuse_driving_friction(&robot, &identification)?;

@@ -14,7 +14,8 @@ use crate::data::{
 use crate::diagnose::outcome::About;
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
-use crate::robot::{Description, Robot};
+use crate::report::format_significant;
+use crate::robot::{Description, Joint, JointKind, Robot};
 
 /// Warnings of one recording that are said one by one.
 const SAID: usize = 5;
@@ -82,6 +83,62 @@ pub(crate) struct Inputs {
     sources: Vec<Source>,
     /// What the rows of each were worth saying, in the pass that came furthest.
     heard: Vec<RefCell<Vec<Warning>>>,
+    /// Position limits of each joint.
+    ranges: Vec<Range>,
+    /// What the pass that came furthest saw beyond them, for each recording.
+    outside: Vec<RefCell<Outside>>,
+}
+
+/// Name of a joint, its position limits where it has any, and its unit.
+struct Range {
+    joint: String,
+    limits: Option<[f64; 2]>,
+    unit: &'static str,
+}
+
+impl Range {
+    fn of(joint: &Joint) -> Self {
+        let limits = joint.limits.as_ref().map(|limits| limits.position);
+        Self {
+            joint: joint.name.clone(),
+            limits: limits.filter(|[low, high]| low.is_finite() && high.is_finite()),
+            unit: match joint.kind {
+                JointKind::Revolute => "rad",
+                JointKind::Prismatic => "m",
+            },
+        }
+    }
+}
+
+/// Positions beyond the limits.
+#[derive(Clone, Debug, Default)]
+struct Outside {
+    rows: u64,
+    /// Per joint: rows beyond, and by how much at most.
+    joints: Vec<(u64, f64)>,
+}
+
+/// Share of a range by which a position is beyond it through rounding alone.
+const ROUNDING: f64 = 1e-6;
+
+impl Outside {
+    fn take(&mut self, block: &Block, ranges: &[Range]) {
+        self.rows += block.len() as u64;
+        self.joints.resize(ranges.len(), (0, 0.0));
+        for ((own, range), columns) in self.joints.iter_mut().zip(ranges).zip(&block.joints) {
+            let Some([low, high]) = range.limits else {
+                continue;
+            };
+            let least = ROUNDING * (high - low);
+            for q in &columns.q {
+                let beyond = (q - high).max(low - q);
+                if beyond > least {
+                    own.0 += 1;
+                    own.1 = own.1.max(beyond);
+                }
+            }
+        }
+    }
 }
 
 impl Inputs {
@@ -107,7 +164,13 @@ impl Inputs {
             .map(|path| Source::open_with(path, robot, need))
             .collect::<Result<Vec<_>, _>>()?;
         let heard = sources.iter().map(|_| RefCell::default()).collect();
-        Ok(Self { sources, heard })
+        let outside = sources.iter().map(|_| RefCell::default()).collect();
+        Ok(Self {
+            sources,
+            heard,
+            ranges: robot.joints.iter().map(Range::of).collect(),
+            outside,
+        })
     }
 
     /// Opens recordings and checks their columns and units.
@@ -223,6 +286,29 @@ impl Inputs {
         all
     }
 
+    /// Where their positions left `[joint.limits]`, once they were read: one sentence for each recording and joint.
+    pub(crate) fn outside(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        for (source, outside) in self.sources.iter().zip(&self.outside) {
+            let outside = outside.borrow();
+            for (j, ((rows, most), range)) in outside.joints.iter().zip(&self.ranges).enumerate() {
+                let (Some([low, high]), true) = (range.limits, *rows > 0) else {
+                    continue;
+                };
+                all.push(format!(
+                    "{}: q{} is beyond the position limits of joint \"{}\" ({low} to {high} {unit}) in {rows} of {} rows, by up to {} {unit}. If the joint touched a stop there, its torque is in those rows and biases friction and gravity: record with more margin to the limits, or correct [joint.limits].",
+                    source.path().display(),
+                    j + 1,
+                    range.joint,
+                    outside.rows,
+                    format_significant(*most, 3),
+                    unit = range.unit,
+                ));
+            }
+        }
+        all
+    }
+
     /// Whether any of them has a torque or a current.
     pub(crate) fn any_effort(&self) -> bool {
         self.sources.iter().any(Source::has_effort)
@@ -244,11 +330,13 @@ impl Inputs {
     }
 
     fn with_progress<'a>(&'a self, progress: Option<&'a RefCell<Progress>>) -> Vec<Watched<'a>> {
-        (self.sources.iter().zip(&self.heard))
-            .map(|(source, heard)| Watched {
+        (self.sources.iter().zip(&self.heard).zip(&self.outside))
+            .map(|((source, heard), outside)| Watched {
                 source,
                 heard,
                 progress,
+                ranges: &self.ranges,
+                outside,
             })
             .collect()
     }
@@ -259,6 +347,8 @@ pub(crate) struct Watched<'a> {
     source: &'a Source,
     heard: &'a RefCell<Vec<Warning>>,
     progress: Option<&'a RefCell<Progress>>,
+    ranges: &'a [Range],
+    outside: &'a RefCell<Outside>,
 }
 
 impl Watched<'_> {
@@ -281,8 +371,11 @@ impl Recording for Watched<'_> {
     ) -> Result<(), PrepareError> {
         let mut blocks = self.source.blocks(rows);
         let mut before = 0;
+        let mut outside = Outside::default();
         while let Some(block) = blocks.next() {
-            take(block.map_err(|error| PrepareError::Read(error.to_string()))?)?;
+            let block = block.map_err(|error| PrepareError::Read(error.to_string()))?;
+            outside.take(&block, self.ranges);
+            take(block)?;
             let read = blocks.bytes_read();
             self.advance(read - before);
             before = read;
@@ -291,6 +384,10 @@ impl Recording for Watched<'_> {
         let mut heard = self.heard.borrow_mut();
         if blocks.warnings().len() > heard.len() {
             *heard = blocks.warnings().to_vec();
+        }
+        let mut kept = self.outside.borrow_mut();
+        if outside.rows > kept.rows {
+            *kept = outside;
         }
         Ok(())
     }
@@ -306,6 +403,43 @@ pub(crate) fn recordings<'a>(watched: &'a [Watched<'a>]) -> Vec<&'a dyn Recordin
         .iter()
         .map(|recording| recording as &dyn Recording)
         .collect()
+}
+
+/// Judges the columns of recordings as every command that fits something does: signs, units, ratios, clocks and columns in
+/// each other's place. What is doubtful is said; what is wrong is refused, with `more` sentences of the caller, or said where
+/// the user wants the fit all the same.
+///
+/// # Errors
+/// What is wrong with a file, by line; all that looks wrong in one sentence each.
+pub(crate) fn refuse_faults(
+    robot: &Robot,
+    inputs: &[&Inputs],
+    more: Vec<String>,
+    even_if_wrong: bool,
+    ui: &Ui,
+) -> Result<(), CommandError> {
+    let mut wrong = Vec::new();
+    for recordings in inputs {
+        let found = recordings.faults(robot)?;
+        for sentence in &found.doubtful {
+            ui.remark(&format!(
+                "{sentence} Or the description is that far off, or the motion too short to tell."
+            ));
+        }
+        wrong.extend(found.wrong);
+    }
+    wrong.extend(more);
+    if even_if_wrong {
+        wrong.iter().for_each(|sentence| ui.remark(sentence));
+        Ok(())
+    } else if wrong.is_empty() {
+        Ok(())
+    } else {
+        Err(CommandError::Implausible(format!(
+            "{} Nothing was fitted; --even-if-wrong fits all the same.",
+            wrong.join(" ")
+        )))
+    }
 }
 
 /// The same of two names of one file; a file that is not there is told of by whoever reads it.
@@ -403,6 +537,35 @@ mod tests {
             assert_eq!(heard.len(), SAID + 1, "{heard:?}");
             assert!(heard[0].contains("line 102") && heard[0].contains("0.050000 s are missing"));
             assert!(heard[SAID].contains(" 95 more "), "{}", heard[SAID]);
+        }
+    }
+
+    #[test]
+    fn positions_beyond_the_limits_are_counted_once_however_often_a_recording_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "r.toml".as_ref()).unwrap();
+        let [low, high] = robot.joints[0].limits.as_ref().unwrap().position;
+        // Seven rows beyond the upper end by up to 0.07 rad, two beyond the lower by 0.01 rad, one on the limit.
+        let q = |k: u32| match k {
+            100..107 => high + 0.01 * f64::from(k - 99),
+            200..202 => low - 0.01,
+            300 => high,
+            _ => 0.5,
+        };
+        let rows: String = (0..1000)
+            .map(|k| format!("{},{},0\n", f64::from(k) * 1e-3, q(k)))
+            .collect();
+        std::fs::write(&path, format!("t,q1,tau1\n{rows}")).unwrap();
+        let inputs = Inputs::read(&robot, &[path]).unwrap();
+        for _ in 0..2 {
+            for recording in recordings(&inputs.listened()) {
+                recording.each_block(64, &mut |_| Ok(())).unwrap();
+            }
+            let said = inputs.outside();
+            assert_eq!(said.len(), 1, "{said:?}");
+            assert!(said[0].contains("in 9 of 1000 rows") && said[0].contains("0.0700 rad"));
+            assert!(said[0].contains("q1") && said[0].contains("joint \"link\""));
         }
     }
 }

@@ -90,7 +90,9 @@ pub use endogeneity::{Endogeneity, Verdict};
 pub use essential::{Essential, EssentialSet};
 pub(crate) use evaluate::{Planned, torque_residuals};
 pub use factor::TriangularFactor;
-pub use friction_map::{FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map};
+pub use friction_map::{
+    DroppedPass, FrictionFit, FrictionMap, FrictionMapOptions, FrictionPoint, friction_map,
+};
 pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
 pub use position::PositionTorque;

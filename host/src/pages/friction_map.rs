@@ -30,7 +30,11 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
                 "Coulomb and viscous"
             },
         )
-        .note(format!("{} stretches of constant speed", map.points.len())),
+        .note(format!(
+            "{} of {} stretches of constant speed",
+            map.points.len(),
+            map.points.len() + map.dropped.len()
+        )),
         Fact::new("Coulomb", value(fit.coulomb, 0))
             .unit(torque)
             .note("± half the 95 % interval"),
@@ -87,6 +91,7 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
             })],
         }),
     );
+    sections.extend(dropped(map, velocity));
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: friction of joint {}", robot.name, map.joint),
@@ -95,6 +100,33 @@ pub fn friction_map(robot: &Robot, map: &FrictionMap, context: &Context) -> Docu
         sections,
         footer: format!("rig {} · {}", env!("CARGO_PKG_VERSION"), context.command),
     }
+}
+
+/// The stretches that gave no point, with the reason; none where there are none.
+fn dropped(map: &FrictionMap, velocity: &'static str) -> Option<Section> {
+    if map.dropped.is_empty() {
+        return None;
+    }
+    let rows = map.dropped.iter().map(|pass| {
+        vec![
+            format_significant(pass.start, 4),
+            format_significant(pass.duration, 3),
+            format_significant(pass.speed, 3),
+            pass.why.clone(),
+        ]
+    });
+    let table = Table {
+        caption: "Stretches of constant speed that gave no point".into(),
+        columns: vec![
+            Column::number("Start", "s"),
+            Column::number("Duration", "s"),
+            Column::number("Velocity", velocity),
+            Column::text("Why"),
+        ],
+        rows: rows.collect(),
+        note: String::new(),
+    };
+    Some(Section::new("dropped", "Left out", "").with(Block::Table(table)))
 }
 
 /// The law that the points warrant.

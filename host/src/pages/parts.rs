@@ -360,10 +360,10 @@ fn law(fit: &FrictionFit, v: f64) -> f64 {
     let dip = fit
         .stribeck_velocity
         .map_or(0.0, |vs| fit.breakaway_excess * (-(v / vs).powi(2)).exp());
-    v.signum() * (fit.coulomb + dip) + fit.viscous * v
+    v.signum() * (fit.coulomb + dip) + fit.viscous * v + fit.offset
 }
 
-/// Points with error bars, both laws, the profile of the Stribeck velocity, the decision.
+/// Points with error bars, the laws that they warrant, the profile of the Stribeck velocity, the decision.
 pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
     let [_, velocity, torque] = units(kind);
     let what = effort(kind);
@@ -410,12 +410,12 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
             map.points.iter().map(|p| p.friction).collect(),
         ))
         .note(format!(
-            "n = {} stretches of constant speed. RMS error on points left out: {} {torque} without, {} {torque} with the Stribeck term.",
+            "n = {} stretches of constant speed, {}. RMS error on points left out: {} {torque} without a Stribeck term{}.",
             map.points.len(),
+            if map.from_reference { "as the reference has them" } else { "as the position shows them" },
             format_significant(map.simple.leave_one_out_rms, 2),
-            map.stribeck
-                .as_ref()
-                .map_or("–".into(), |f| format_significant(f.leave_one_out_rms, 2)),
+            map.stribeck_left_out_rms
+                .map_or(String::new(), |rms| format!(", {} {torque} with it", format_significant(rms, 2))),
         ));
     let kind_of_note = if map.warranted {
         NoteKind::Good
@@ -435,7 +435,12 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
         },
         Block::Plot(plot),
         Block::Table(Table {
-            caption: "Both laws, ± half the 95 % interval".into(),
+            caption: if map.stribeck.is_some() {
+                "Both laws, ± half the 95 % interval"
+            } else {
+                "The law, ± half the 95 % interval"
+            }
+            .into(),
             columns: vec![
                 Column::text("Law"),
                 Column::number("Coulomb", torque),
@@ -451,10 +456,19 @@ pub(super) fn friction(kind: JointKind, map: &FrictionMap) -> Vec<Block> {
                 Column::number("Stribeck velocity", velocity),
             ],
             rows,
-            note: "fc·sgn v + fv·v, and the same with Δ·exp(−(v/vs)²)·sgn v.".into(),
+            note: format!(
+                "fc·sgn v + fv·v + constant{}. Constant torque beyond the identified one: {} {torque}. Standard deviation from pass to pass beyond the noise within a pass: {} {torque}.",
+                if map.stribeck.is_some() {
+                    ", and the same with Δ·exp(−(v/vs)²)·sgn v"
+                } else {
+                    ""
+                },
+                format_significant(map.stribeck.as_ref().unwrap_or(&map.simple).offset, 2),
+                format_significant(map.scatter, 2)
+            ),
         }),
     ];
-    if map.profile.len() > 1 {
+    if map.stribeck.is_some() && map.profile.len() > 1 {
         let mut profile = Plot::new(
             "What the choice of the Stribeck velocity rests on",
             Axis::log("Stribeck velocity", velocity),

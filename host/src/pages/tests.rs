@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use crate::identify::{FrictionFit, FrictionMap, FrictionPoint, Options, identify};
+use crate::identify::{DroppedPass, FrictionFit, FrictionMap, FrictionPoint, Options, identify};
 use crate::prepare::InMemory;
 use crate::report::render;
 use crate::robot::{Controller, Robot};
@@ -53,6 +53,7 @@ fn map() -> FrictionMap {
         coulomb,
         viscous: 0.3,
         breakaway_excess: if vs.is_some() { 0.11 } else { 0.0 },
+        offset: 0.004,
         stribeck_velocity: vs,
         half_interval: vec![0.01; if vs.is_some() { 3 } else { 2 }],
         squares: 12.0,
@@ -69,12 +70,22 @@ fn map() -> FrictionMap {
                 duration: 0.4,
             })
             .to_vec(),
+        dropped: vec![DroppedPass {
+            speed: 0.0123,
+            start: 30.0,
+            duration: 7.0,
+            why: "the torque is at its limit in 12 of 7000 rows".into(),
+        }],
+        from_reference: true,
+        scatter: 0.003,
         simple: fit(0.4123, None),
         stribeck: Some(fit(0.3987, Some(0.05))),
         profile: vec![[0.02, 9.0], [0.05, 8.0], [0.1, 8.5]],
         p_value: Some(1e-4),
+        stribeck_left_out_rms: Some(0.02),
         warranted: true,
         text: "A Stribeck term is warranted by four points.".into(),
+        note: None,
     }
 }
 
@@ -148,9 +159,21 @@ fn a_friction_map_shows_its_decision_and_both_laws() {
         "0.412",
         "0.399",
         "0.110",
+        "0.0123",
+        "the torque is at its limit in 12 of 7000 rows",
+        "4 of 5 stretches",
     ] {
         assert!(page.contains(text), "{text}");
     }
+    // A law that the points do not warrant stands nowhere.
+    let plain = FrictionMap {
+        stribeck: None,
+        warranted: false,
+        text: "No Stribeck term is warranted.".into(),
+        ..map()
+    };
+    let page = render(&friction_map(&robot(), &plain, &Context::default())).unwrap();
+    assert!(!page.contains("0.110") && !page.contains("with Stribeck term"));
 }
 
 fn figures() -> DemoFigures {

@@ -1,0 +1,178 @@
+//! Laws of friction over speed, fitted to the points, and the choice between them.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::super::covariance::t_quantile;
+use super::{FrictionFit, FrictionPoint};
+
+/// p-value below which the Stribeck term is taken in. Its velocity exists only if the term does, which makes
+/// the F distribution too optimistic (Davies 1977); a thousandth leaves room for that.
+const WARRANT: f64 = 1e-3;
+/// Points from which both laws are compared: the larger one has five parameters.
+const FEWEST: usize = 7;
+/// Stribeck velocities that are tried, evenly spaced in their logarithm.
+const GRID: usize = 60;
+/// Highest of them as a share of the fastest pass. Beyond it the term is a parabola over all speeds, which viscous and
+/// Coulomb friction take up.
+const HIGHEST: f64 = 0.5;
+/// Halvings of the interval in which the common variance is sought.
+const HALVINGS: usize = 60;
+
+/// What the points say of the laws.
+pub(super) struct Decision {
+    pub simple: FrictionFit,
+    pub stribeck: Option<FrictionFit>,
+    pub profile: Vec<[f64; 2]>,
+    pub p_value: Option<f64>,
+    pub warranted: bool,
+    /// Standard deviation of the points beyond their own, N·m or N.
+    pub scatter: f64,
+}
+
+/// Fits both laws and decides between them; none where all points have one speed.
+///
+/// The points' own standard deviations know the noise within a pass, but not what all passes share: an error of gravity
+/// over the sweep's range, cogging, friction that depends on position. One variance for all of this is added to each, such
+/// that the larger law leaves as much as the points' deviations say (Paule & Mandel 1982). A slow pass with much
+/// noise then counts less; it is not left out.
+pub(super) fn decide(points: &[FrictionPoint]) -> Option<Decision> {
+    let speeds = points.iter().map(|p| p.speed.abs());
+    let (slow, fast) = speeds.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+    let highest = HIGHEST * fast;
+    let grid: Vec<f64> = if points.len() >= FEWEST && slow < highest {
+        (0..=GRID)
+            .map(|k| slow * (highest / slow).powf(k as f64 / GRID as f64))
+            .collect()
+    } else {
+        Vec::new()
+    };
+    let scatter = scatter(points, &grid);
+    let weights = weights(points, scatter);
+    let simple = fit(points, &weights, None)?;
+    let (best, profile) = best(points, &weights, &grid);
+    let freedom = points.len() as f64 - 5.0;
+    let p_value = best.as_ref().and_then(|b| {
+        let f = ((simple.squares - b.squares) / 2.0) / (b.squares / freedom).max(f64::MIN_POSITIVE);
+        Some(FisherSnedecor::new(2.0, freedom).ok()?.sf(f.max(0.0)))
+    });
+    let warranted = match (&best, p_value) {
+        (Some(b), Some(p)) => {
+            let known = b
+                .half_interval
+                .get(2)
+                .is_some_and(|h| b.breakaway_excess > *h);
+            p < WARRANT && known && b.leave_one_out_rms < simple.leave_one_out_rms
+        }
+        _ => false,
+    };
+    Some(Decision {
+        simple,
+        stribeck: best,
+        profile,
+        p_value,
+        warranted,
+        scatter,
+    })
+}
+
+/// One over the standard deviation of each point with `scatter` added.
+fn weights(points: &[FrictionPoint], scatter: f64) -> Vec<f64> {
+    points
+        .iter()
+        .map(|p| 1.0 / p.std.hypot(scatter).max(f64::MIN_POSITIVE.sqrt()))
+        .collect()
+}
+
+/// The best Stribeck velocity, and the sum of squares over all that were tried.
+fn best(
+    points: &[FrictionPoint],
+    weights: &[f64],
+    grid: &[f64],
+) -> (Option<FrictionFit>, Vec<[f64; 2]>) {
+    let mut best: Option<FrictionFit> = None;
+    let mut profile = Vec::new();
+    for vs in grid {
+        let Some(candidate) = fit(points, weights, Some(*vs)) else {
+            continue;
+        };
+        profile.push([*vs, candidate.squares]);
+        if best.as_ref().is_none_or(|b| candidate.squares < b.squares) {
+            best = Some(candidate);
+        }
+    }
+    (best, profile)
+}
+
+/// Standard deviation that, added to every point's own, makes the larger law's sum of squares its degrees of freedom;
+/// 0 where the points' own are enough.
+fn scatter(points: &[FrictionPoint], grid: &[f64]) -> f64 {
+    let law = if grid.is_empty() { 3 } else { 5 };
+    let freedom = points.len().saturating_sub(law).max(1) as f64;
+    let squares = |scatter: f64| {
+        let weights = weights(points, scatter);
+        let simple = fit(points, &weights, None).map_or(0.0, |f| f.squares);
+        best(points, &weights, grid)
+            .0
+            .map_or(simple, |b| b.squares.min(simple))
+    };
+    if squares(0.0) <= freedom {
+        return 0.0;
+    }
+    let largest = points.iter().map(|p| p.friction.abs()).fold(0.0, f64::max);
+    let (mut low, mut high) = (0.0, largest);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if squares(middle) > freedom {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// Least squares of a law with a constant; none where its columns are not independent.
+fn fit(points: &[FrictionPoint], weights: &[f64], vs: Option<f64>) -> Option<FrictionFit> {
+    let columns = if vs.is_some() { 4 } else { 3 };
+    let law = |v: f64, c: usize| match (c, vs) {
+        (0, _) => v.signum(),
+        (1, _) => v,
+        (2, Some(vs)) => v.signum() * (-(v / vs).powi(2)).exp(),
+        _ => 1.0,
+    };
+    let n = points.len();
+    let a = DMatrix::from_fn(n, columns, |i, c| weights[i] * law(points[i].speed, c));
+    let y = DVector::from_fn(n, |i, _| weights[i] * points[i].friction);
+    let qr = a.clone().qr();
+    let inverse = qr.r().try_inverse()?;
+    if !inverse.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let x = &inverse * (qr.q().transpose() * &y);
+    let residual = &y - &a * &x;
+    let squares = residual.norm_squared();
+    // Leaving one out by the leverage: e/(1 − h).
+    let q = qr.q();
+    let left_out: f64 = (0..n)
+        .map(|i| {
+            let h = q.row(i).norm_squared().min(1.0 - 1e-9);
+            (residual[i] / ((1.0 - h) * weights[i])).powi(2)
+        })
+        .sum();
+    let freedom = n.saturating_sub(columns + usize::from(vs.is_some())).max(1);
+    // Never below what the points' own spread says.
+    let sigma = (squares / freedom as f64).max(1.0).sqrt();
+    let quantile = t_quantile(freedom);
+    let half = |c: usize| quantile * sigma * inverse.row(c).norm();
+    Some(FrictionFit {
+        coulomb: x[0],
+        viscous: x[1],
+        breakaway_excess: if vs.is_some() { x[2] } else { 0.0 },
+        offset: x[columns - 1],
+        stribeck_velocity: vs,
+        half_interval: (0..columns - 1).map(half).collect(),
+        squares,
+        leave_one_out_rms: (left_out / n as f64).sqrt(),
+    })
+}

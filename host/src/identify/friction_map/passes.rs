@@ -1,0 +1,295 @@
+//! Passes of a sweep: stretches of constant speed of the reference, or of the position where there is no reference.
+
+use std::ops::Range;
+
+use super::FrictionMapOptions;
+
+/// Half lengths of the windows over which a speed is taken, s, longest first.
+///
+/// Noise of a speed falls with the length of its window: the slowest passes, which last for seconds, are found by the
+/// longest window, short fast ones by the shortest.
+const WINDOWS: [f64; 3] = [0.4, 0.1, 0.025];
+/// A pass lasts at least this many half windows, so that most of its windows lie within it.
+const HALVES_PER_PASS: f64 = 4.0;
+/// Share by which the speed of a reference may leave its mean. References are computed, so this covers rounding and the
+/// jitter of time stamps; the top of a quintic move of 1 s is this constant for 0.1 s, shorter than any pass.
+const REFERENCE_TOLERANCE: f64 = 0.01;
+
+/// A signal over time in stretches without a gap.
+#[derive(Debug, Default)]
+pub(super) struct Signal {
+    /// s
+    pub t: Vec<f64>,
+    /// rad or m
+    pub x: Vec<f64>,
+    /// First row of each stretch.
+    pub starts: Vec<usize>,
+}
+
+/// A stretch of constant speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stretch {
+    /// First instant, s.
+    pub from: f64,
+    /// Last instant, s.
+    pub to: f64,
+    /// Mean speed, rad/s or m/s.
+    pub speed: f64,
+}
+
+impl Signal {
+    /// Appends a row; `follows` is false after a gap in time.
+    pub(super) fn push(&mut self, t: f64, x: f64, follows: bool) {
+        if self.t.is_empty() || !follows {
+            self.starts.push(self.t.len());
+        }
+        self.t.push(t);
+        self.x.push(x);
+    }
+
+    /// The stretches of constant speed of a computed reference, in order of time.
+    pub(super) fn passes_of_reference(&self, options: &FrictionMapOptions) -> Vec<Stretch> {
+        self.passes(REFERENCE_TOLERANCE, options.shortest)
+    }
+
+    /// The stretches of constant speed of a measured position, in order of time.
+    pub(super) fn passes_of_position(&self, options: &FrictionMapOptions) -> Vec<Stretch> {
+        self.passes(options.tolerance, options.shortest + options.settle)
+    }
+
+    fn passes(&self, tolerance: f64, shortest: f64) -> Vec<Stretch> {
+        let mut all = Vec::new();
+        for (k, &start) in self.starts.iter().enumerate() {
+            let end = self.starts.get(k + 1).copied().unwrap_or(self.t.len());
+            let mut taken = vec![false; end - start];
+            let mut found: Vec<(Range<usize>, f64)> = Vec::new();
+            for half in WINDOWS {
+                let least = shortest.max(HALVES_PER_PASS * half);
+                for run in self.runs(start..end, half, tolerance, &taken) {
+                    if self.t[run.end - 1] - self.t[run.start] < least {
+                        continue;
+                    }
+                    let Some(line) = self.straight(run.clone(), tolerance) else {
+                        continue;
+                    };
+                    let run = self.extended(run, &line, start..end, &taken);
+                    taken[run.start - start..run.end - start].fill(true);
+                    found.push((run, line.speed));
+                }
+            }
+            found.sort_by_key(|(run, _)| run.start);
+            all.extend(
+                self.joined(found, tolerance)
+                    .into_iter()
+                    .map(|(run, speed)| Stretch {
+                        from: self.t[run.start],
+                        to: self.t[run.end - 1],
+                        speed,
+                    }),
+            );
+        }
+        all
+    }
+
+    /// Neighbours that are one pass: a joint that creeps leaves its mean speed for moments, and its way is one line all the same.
+    fn joined(&self, found: Vec<(Range<usize>, f64)>, tolerance: f64) -> Vec<(Range<usize>, f64)> {
+        let mut joined: Vec<(Range<usize>, f64)> = Vec::new();
+        for (run, speed) in found {
+            if let Some((last, own)) = joined.last_mut()
+                && (speed - *own).abs() <= 2.0 * tolerance * own.abs()
+                && let Some(line) = self.straight(last.start..run.end, tolerance)
+            {
+                *last = last.start..run.end;
+                *own = line.speed;
+            } else {
+                joined.push((run, speed));
+            }
+        }
+        joined
+    }
+
+    /// Runs of rows whose speed over windows stays within a share of its mean over the run.
+    fn runs(
+        &self,
+        rows: Range<usize>,
+        half: f64,
+        tolerance: f64,
+        taken: &[bool],
+    ) -> Vec<Range<usize>> {
+        let count = rows.len();
+        if count < 3 {
+            return Vec::new();
+        }
+        let step = (self.t[rows.end - 1] - self.t[rows.start]) / (count - 1) as f64;
+        let reach = ((half / step).round() as usize).max(1);
+        let mut runs = Vec::new();
+        let (mut start, mut sum) = (rows.start, 0.0);
+        for k in rows.clone() {
+            let inside = k >= rows.start + reach && k + reach < rows.end;
+            let free = !taken[k - rows.start];
+            let speed = if inside && free {
+                let (a, b) = (k - reach, k + reach);
+                (self.x[b] - self.x[a]) / (self.t[b] - self.t[a])
+            } else {
+                0.0
+            };
+            let mean = sum / (k - start).max(1) as f64;
+            let fits = k > start && (speed - mean).abs() <= tolerance * mean.abs();
+            if k > start && !(fits && speed != 0.0) {
+                runs.push(start..k);
+                (start, sum) = (k, 0.0);
+            }
+            if speed == 0.0 || !speed.is_finite() {
+                (start, sum) = (k + 1, 0.0);
+            } else {
+                sum += speed;
+            }
+        }
+        if start < rows.end && sum != 0.0 {
+            runs.push(start..rows.end);
+        }
+        runs.retain(|run| run.len() >= 2);
+        runs
+    }
+
+    /// The line on which rows lie to within a share of the way gone. A window as long as a period of an oscillation sees no
+    /// change of speed; the line does.
+    fn straight(&self, run: Range<usize>, tolerance: f64) -> Option<Line> {
+        let speed = slope(&self.t[run.clone()], &self.x[run.clone()])?;
+        let n = run.len() as f64;
+        let mut line = Line {
+            speed,
+            t: self.t[run.clone()].iter().sum::<f64>() / n,
+            x: self.x[run.clone()].iter().sum::<f64>() / n,
+            off: 0.0,
+        };
+        let way = (self.x[run.end - 1] - self.x[run.start]).abs();
+        line.off = run
+            .map(|k| line.distance(self.t[k], self.x[k]))
+            .fold(0.0, f64::max);
+        // What tolerance in speed lets the position run off in the shortest window.
+        let shortest = WINDOWS.iter().copied().fold(f64::INFINITY, f64::min);
+        let fits = line.off <= tolerance.max(0.02) * way;
+        line.off = line.off.max(tolerance * speed.abs() * shortest);
+        fits.then_some(line)
+    }
+
+    /// The run with the rows before and behind it that lie on its line as well: a long window sees the end of a pass from
+    /// half its length away.
+    fn extended(
+        &self,
+        run: Range<usize>,
+        line: &Line,
+        rows: Range<usize>,
+        taken: &[bool],
+    ) -> Range<usize> {
+        let on =
+            |k: usize| !taken[k - rows.start] && line.distance(self.t[k], self.x[k]) <= line.off;
+        let (mut first, mut end) = (run.start, run.end);
+        while first > rows.start && on(first - 1) {
+            first -= 1;
+        }
+        while end < rows.end && on(end) {
+            end += 1;
+        }
+        first..end
+    }
+}
+
+/// A line through a run of rows.
+struct Line {
+    speed: f64,
+    t: f64,
+    x: f64,
+    /// How far from it its own rows are at most, rad or m.
+    off: f64,
+}
+
+impl Line {
+    fn distance(&self, t: f64, x: f64) -> f64 {
+        (x - self.x - self.speed * (t - self.t)).abs()
+    }
+}
+
+/// Slope of the least-squares line through points; none of fewer than two instants.
+pub(super) fn slope(t: &[f64], x: &[f64]) -> Option<f64> {
+    let n = t.len().min(x.len()) as f64;
+    let (mt, mx) = (t.iter().sum::<f64>() / n, x.iter().sum::<f64>() / n);
+    let (mut along, mut square) = (0.0, 0.0);
+    for (t, x) in t.iter().zip(x) {
+        along += (t - mt) * (x - mx);
+        square += (t - mt).powi(2);
+    }
+    let slope = along / square;
+    slope.is_finite().then_some(slope)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Position at rest, over a pass each way and a quintic move; rounded to `resolution`.
+    fn made(speeds: &[f64], travel: f64, rate: f64, resolution: f64) -> Signal {
+        let mut signal = Signal::default();
+        let (mut t, mut x) = (0.0, 0.0);
+        let mut put = |steps: usize, at: &dyn Fn(f64) -> f64, x: &mut f64| {
+            let from = *x;
+            for k in 1..=steps {
+                *x = from + at(k as f64 / steps as f64);
+                let rounded = if resolution > 0.0 {
+                    (*x / resolution).round() * resolution
+                } else {
+                    *x
+                };
+                signal.push(t, rounded, true);
+                t += 1.0 / rate;
+            }
+        };
+        for v in speeds {
+            for v in [*v, -*v] {
+                let steps = (travel / v.abs() * rate).round() as usize;
+                put(steps, &|s| s * v * steps as f64 / rate, &mut x);
+                put((0.3 * rate) as usize, &|_| 0.0, &mut x);
+            }
+        }
+        let quintic = |s: f64| 0.4 * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+        put(rate as usize, &quintic, &mut x);
+        signal
+    }
+
+    #[test]
+    fn every_pass_of_a_reference_is_found_whatever_its_speed_rate_and_rounding() {
+        let speeds = [0.01, 0.03, 0.1, 0.3, 1.0, 2.0];
+        for (rate, resolution) in [(1000.0, 0.0), (250.0, 1e-6), (1000.0, 1e-5), (100.0, 0.0)] {
+            let signal = made(&speeds, 0.4, rate, resolution);
+            let found = signal.passes_of_reference(&FrictionMapOptions::default());
+            let told: Vec<f64> = found.iter().map(|s| s.speed).collect();
+            assert_eq!(
+                found.len(),
+                2 * speeds.len(),
+                "{rate} {resolution} {told:?}"
+            );
+            for (stretch, v) in found.iter().zip(speeds.iter().flat_map(|v| [*v, -*v])) {
+                assert!((stretch.speed / v - 1.0).abs() < 0.01, "{stretch:?} {v}");
+                assert!(stretch.to - stretch.from > 0.5 * 0.4 / v.abs());
+            }
+        }
+    }
+
+    #[test]
+    fn an_oscillation_is_no_pass() {
+        let mut signal = Signal::default();
+        for k in 0..20_000 {
+            let t = f64::from(k) * 1e-3;
+            // A drift under an oscillation whose period is one of the windows.
+            signal.push(
+                t,
+                0.05 * t + 0.1 * (t * std::f64::consts::TAU / 0.8).sin(),
+                true,
+            );
+        }
+        let found = signal.passes_of_position(&FrictionMapOptions::default());
+        assert!(found.is_empty(), "{found:?}");
+    }
+}

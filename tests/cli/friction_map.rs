@@ -1,0 +1,241 @@
+//! `rig friction-map` on sweeps as they come: another rate, a wrong sign, a torque at its limit, no reference.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::run::{refuse, rig, robot, succeed};
+
+/// Weight in line with the link, N·m, inertia about the axis, and friction of the link that is made.
+const GRAVITY: f64 = 2.5;
+const INERTIA: f64 = 0.11;
+const COULOMB: f64 = 0.42;
+const VISCOUS: f64 = 0.33;
+/// Friction at standstill above Coulomb's, N·m, and the speed at which it has fallen to half of that, rad/s: a rational law (Hess
+/// & Soom 1990), not the one that the map fits.
+const EXCESS: f64 = 0.12;
+const WEAK: f64 = 0.06;
+
+/// Seeded noise of variance one.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    move || {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            sum += (state >> 11) as f64 / (1u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+fn torque(q: f64, qd: f64, qdd: f64) -> f64 {
+    let weak = EXCESS / (1.0 + (qd / WEAK).powi(2));
+    INERTIA * qdd + GRAVITY * q.cos() + qd.signum() * (COULOMB + weak) + VISCOUS * qd
+}
+
+/// Writes a recording of `motion` (position, velocity, acceleration over time).
+fn written(
+    path: &Path,
+    rate: f64,
+    seconds: f64,
+    motion: impl Fn(f64) -> [f64; 3],
+    change: impl Fn(f64) -> f64,
+    reference: bool,
+) {
+    let mut noise = noise(rate as u64);
+    let mut text = String::from(if reference {
+        "t,q1,tau1,ref1\n"
+    } else {
+        "t,q1,tau1\n"
+    });
+    for k in 0..(seconds * rate) as usize {
+        let t = k as f64 / rate;
+        let [q, qd, qdd] = motion(t);
+        let tau = change(torque(q, qd, qdd) + 0.02 * noise());
+        // An encoder's noise, in which the velocity of the slow passes drowns behind a filter of 50 Hz.
+        let measured = q + 2e-5 * noise();
+        let _ = write!(text, "{t:.6},{measured:.9},{tau:.6}");
+        if reference {
+            let _ = write!(text, ",{q:.9}");
+        }
+        text.push('\n');
+    }
+    fs::write(path, text).unwrap();
+}
+
+fn excitation(t: f64) -> [f64; 3] {
+    let (w, v) = (2.1, 5.3);
+    [
+        -1.0 + 0.9 * (w * t).sin() + 0.3 * (v * t).cos(),
+        0.9 * w * (w * t).cos() - 0.3 * v * (v * t).sin(),
+        -0.9 * w * w * (w * t).sin() - 0.3 * v * v * (v * t).cos(),
+    ]
+}
+
+/// Speeds of the passes, rad/s, each both ways.
+const SPEEDS: [f64; 9] = [0.02, 0.035, 0.06, 0.1, 0.2, 0.4, 0.8, 1.5, 2.5];
+/// Travel of a pass at constant speed, rad, with 0.1 s of linear rise and fall of the speed and 0.2 s of rest.
+const TRAVEL: f64 = 0.6;
+const RAMP: f64 = 0.1;
+const REST: f64 = 0.2;
+
+fn sweep_seconds() -> f64 {
+    SPEEDS
+        .iter()
+        .map(|v| 2.0 * (TRAVEL / v + 2.0 * RAMP + REST))
+        .sum()
+}
+
+fn sweep(t: f64) -> [f64; 3] {
+    let mut left = t;
+    let mut from = -1.8;
+    for v in SPEEDS.iter().flat_map(|v| [*v, -*v]) {
+        let cruise = TRAVEL / v.abs();
+        let length = cruise + 2.0 * RAMP;
+        let way = v * (cruise + RAMP);
+        if left >= length + REST {
+            left -= length + REST;
+            from += way;
+            continue;
+        }
+        let rise = |s: f64| 0.5 * v * s * s / RAMP;
+        return if left < RAMP {
+            [from + rise(left), v * left / RAMP, v / RAMP]
+        } else if left < RAMP + cruise {
+            [from + rise(RAMP) + v * (left - RAMP), v, 0.0]
+        } else if left < length {
+            let s = length - left;
+            [from + way - rise(s), v * s / RAMP, -v / RAMP]
+        } else {
+            [from + way, 0.0, 0.0]
+        };
+    }
+    [from, 0.0, 0.0]
+}
+
+struct Made {
+    folder: tempfile::TempDir,
+}
+
+impl Made {
+    fn new() -> Self {
+        let made = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        for rate in [1000.0, 250.0] {
+            let path = made.at(&format!("train-{rate}.csv"));
+            written(&path, rate, 30.0, excitation, |tau| tau, true);
+        }
+        made
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn sweep(&self, name: &str, rate: f64, change: impl Fn(f64) -> f64, reference: bool) {
+        written(
+            &self.at(name),
+            rate,
+            sweep_seconds(),
+            sweep,
+            change,
+            reference,
+        );
+    }
+
+    fn command(&self, train: &str, sweep: &str) -> Command {
+        let mut command = rig();
+        command
+            .args(["friction-map", "--force", "--robot"])
+            .arg(robot("one-link.toml"))
+            .arg("--data")
+            .arg(self.at(train))
+            .arg("--sweep")
+            .arg(self.at(sweep))
+            .arg("--out")
+            .arg(self.at("map"));
+        command
+    }
+
+    fn map(&self, train: &str, sweep: &str) -> (Value, String) {
+        let said = succeed(&mut self.command(train, sweep));
+        let text = fs::read_to_string(self.at("map/friction-map.json")).unwrap();
+        (serde_json::from_str(&text).unwrap(), said)
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+/// Every pass gives a point, the slow ones too, whatever the rates, with and without a reference; and each lies on the law that
+/// made it.
+#[test]
+fn every_pass_of_a_sweep_of_any_rate_gives_a_point_on_its_law() {
+    let made = Made::new();
+    for rate in [1000.0, 250.0, 100.0] {
+        made.sweep(&format!("sweep-{rate}.csv"), rate, |tau| tau, true);
+    }
+    made.sweep("sweep-bare.csv", 1000.0, |tau| tau, false);
+    for (train, sweep) in [
+        ("train-1000.csv", "sweep-1000.csv"),
+        ("train-1000.csv", "sweep-250.csv"),
+        ("train-250.csv", "sweep-1000.csv"),
+        ("train-1000.csv", "sweep-100.csv"),
+        ("train-1000.csv", "sweep-bare.csv"),
+    ] {
+        let (map, said) = made.map(train, sweep);
+        let points = map["points"].as_array().unwrap();
+        assert_eq!(points.len(), 2 * SPEEDS.len(), "{train} {sweep} {said}");
+        assert_eq!(map["from_reference"], sweep != "sweep-bare.csv");
+        for point in points {
+            let (v, friction) = (number(&point["speed"]), number(&point["friction"]));
+            let law = torque(std::f64::consts::FRAC_PI_2, v, 0.0);
+            // What the fit makes of weakening friction bends weight and offset by some hundredths.
+            assert!(
+                (friction - law).abs() < 0.04,
+                "{sweep}: {v} {friction} {law}"
+            );
+            let nearest = SPEEDS.iter().map(|s| (v.abs() / s - 1.0).abs());
+            assert!(nearest.fold(1.0, f64::min) < 0.02, "{sweep}: {v}");
+        }
+        assert_eq!(map["warranted"], true, "{train} {sweep}: {said}");
+        let law = &map["stribeck"];
+        assert!((number(&law["viscous"]) - VISCOUS).abs() < 0.02, "{law}");
+    }
+}
+
+#[test]
+fn a_sweep_is_judged_as_any_recording_and_what_is_left_out_is_listed() {
+    let made = Made::new();
+    made.sweep("minus.csv", 500.0, |tau| -tau, true);
+    let sentence = refuse(&mut made.command("train-1000.csv", "minus.csv"));
+    assert!(
+        sentence.contains("minus.csv") && sentence.contains("tau1"),
+        "{sentence}"
+    );
+    // Held at a limit that the fast passes reach.
+    made.sweep("clipped.csv", 500.0, |tau| tau.min(1.5), true);
+    let (map, said) = made.map("train-1000.csv", "clipped.csv");
+    let dropped = map["dropped"].as_array().unwrap();
+    let points = map["points"].as_array().unwrap();
+    assert_eq!(points.len() + dropped.len(), 2 * SPEEDS.len(), "{said}");
+    assert!(!dropped.is_empty());
+    for pass in dropped {
+        assert!(
+            pass["why"]
+                .as_str()
+                .unwrap()
+                .contains("torque is at its limit"),
+            "{pass}"
+        );
+    }
+    assert_eq!(said.matches("left out:").count(), dropped.len(), "{said}");
+}
