@@ -4,6 +4,9 @@
 mod bad_input;
 mod benchmark;
 mod diagnose;
+mod excite;
+mod friction_map;
 mod memory;
+mod overwrite;
 mod run;
 mod workflow;

@@ -6,8 +6,11 @@ use clap::ValueEnum;
 
 use super::error::CommandError;
 use super::input::described;
+use super::overwrite::refuse_file;
 use super::ui::Ui;
-use crate::excite::{Criterion, Design, Options, Parameters, Scaling, StagedKind, design, staged};
+use crate::excite::{
+    Criterion, Design, Options, Parameters, Scaling, StagedKind, StagedOptions, design, staged,
+};
 use crate::robot::Robot;
 
 /// What is optimised.
@@ -55,6 +58,9 @@ pub(crate) enum KindArg {
 }
 
 impl KindArg {
+    /// The motions of one joint.
+    const STAGED: [Self; 4] = [Self::Chirp, Self::Staircase, Self::Reversals, Self::Sweep];
+
     /// The motion of one joint that it is; none for the optimal one of all joints.
     fn staged(self) -> Option<StagedKind> {
         match self {
@@ -66,6 +72,21 @@ impl KindArg {
         }
     }
 }
+
+/// Share of each position range that an optimal motion keeps free, half of it at each end.
+///
+/// A loop with natural frequency ω₀ misses a turning point of a motion at ω by about (ω/ω₀)² of its amplitude. At the default
+/// period the fundamental sweeps the range at the velocity limit, ω = velocity/half range, about 1.4 rad/s for an arm of
+/// 2.2 rad/s and ±1.6 rad; harmonic k has at most 1/k of the amplitude at that speed, so it misses k times as much. With
+/// ω₀ of 2 Hz (12.6 rad/s) this is 1.2 % of the amplitude for the fundamental and 6 % for the fifth harmonic. The 5 % of the
+/// range at each end are 10 % of the amplitude.
+const MARGIN: f64 = 0.1;
+/// Share of the velocity limit that an optimal motion uses, and its square of the acceleration limit: a loop with damping 0.7
+/// overshoots a sinusoid by less than 5 %, and noise of the measured velocity comes on top.
+const SPEED_SHARE: f64 = 0.9;
+/// Condition number from which on a motion is called a poor one. Schröer 1993 asks for 100; at ten times that, noise of 1 % of
+/// the torque is 10 times the part of it that the worst combination has.
+const POOR_CONDITION: f64 = 1e3;
 
 /// Designs a motion within the robot's limits that tells its parameters apart.
 ///
@@ -113,6 +134,30 @@ pub(crate) struct Args {
     /// The joint that moves [default: the first] (all but fourier)
     #[arg(long)]
     pub(crate) joint: Option<String>,
+    /// Share of each position range that is kept free, half of it at each end, for what the controller is off by
+    /// [default: 0.1 for fourier; else the motion uses 80 % of the way from its start to the nearer limit]
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) margin: Option<f64>,
+    /// Share of the velocity limits that is used, and its square of the acceleration limits [default: 0.9 for fourier;
+    /// else 0.8 of both]. Begin with a small one on a robot that this motion is new to
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) speed_share: Option<f64>,
+    /// Distance to either side of the start, rad or m [default: from the limits] (all but fourier)
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) amplitude: Option<f64>,
+    /// Speed of reversals, or slowest and fastest of a sweep with a comma between them, rad/s or m/s [default: 0.8 % of the
+    /// limit; 0.4 to 80 %]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) speed: Option<Vec<f64>>,
+    /// Number of speeds, 2 to 16 [default: 12] (sweep)
+    #[arg(long)]
+    pub(crate) speeds: Option<usize>,
+    /// First and last frequency with a comma between them, Hz [default: from the limits] (chirp)
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) band: Option<Vec<f64>>,
+    /// Triangles, two reversals each, at each of three amplitudes [default: 2] (reversals)
+    #[arg(long)]
+    pub(crate) cycles: Option<u16>,
     /// Random starts of the optimiser: more find better motions and take longer [default: 24] (fourier)
     #[arg(long)]
     pub(crate) starts: Option<u32>,
@@ -143,18 +188,77 @@ impl Args {
             ("--seed", self.seed.is_some()),
         ];
         let unused = of_fourier.iter().find(|(_, given)| *given);
+        let staged = [
+            (
+                "--amplitude",
+                self.amplitude.is_some(),
+                &KindArg::STAGED[..],
+            ),
+            (
+                "--speed",
+                self.speed.is_some(),
+                &[KindArg::Reversals, KindArg::Sweep],
+            ),
+            ("--speeds", self.speeds.is_some(), &[KindArg::Sweep]),
+            ("--band", self.band.is_some(), &[KindArg::Chirp]),
+            ("--cycles", self.cycles.is_some(), &[KindArg::Reversals]),
+        ];
+        if let Some((option, _, kinds)) =
+            (staged.iter()).find(|(_, given, kinds)| *given && !kinds.contains(&self.kind))
+        {
+            let names: Vec<String> = kinds
+                .iter()
+                .filter_map(|kind| kind.to_possible_value())
+                .map(|value| value.get_name().to_owned())
+                .collect();
+            return Err(CommandError::Sentence(format!(
+                "{option} belongs to --kind {}; leave it out, or give that kind.",
+                names.join(", ")
+            )));
+        }
         match (self.kind.staged(), &self.joint, unused) {
             (None, Some(joint), _) => Err(CommandError::Sentence(format!(
                 "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
             ))),
             (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
-                "{option} belongs to --kind fourier, but a {} is sized by the limits alone; leave it out, or give --kind fourier.",
+                "{option} belongs to --kind fourier, but a {} is sized by the limits and its own options; leave it out, or give --kind fourier.",
                 kind.name()
             ))),
             _ => Ok(()),
         }
     }
+
+    /// What is asked of a motion of one joint.
+    ///
+    /// # Errors
+    /// A band that is no pair.
+    fn staged_options(&self) -> Result<StagedOptions, CommandError> {
+        let band = match self.band.as_deref() {
+            None => None,
+            Some(&[low, high]) => Some([low, high]),
+            Some(other) => {
+                return Err(CommandError::Sentence(format!(
+                    "--band has {} numbers; give two, the first and the last frequency in Hz, as 0.5,20.",
+                    other.len()
+                )));
+            }
+        };
+        Ok(StagedOptions {
+            joint: self.joint.clone(),
+            start: self.start.clone(),
+            margin: self.margin,
+            speed_share: self.speed_share,
+            amplitude: self.amplitude,
+            speeds: self.speed.clone(),
+            count: self.speeds,
+            band,
+            cycles: self.cycles,
+        })
+    }
 }
+
+/// What a motion is not checked against; printed with each.
+const NOT_LOOKED_AT: &str = "Not looked at: self-collision, table and other objects, cables. The limits hold for the reference alone; a controller goes beyond it (--margin and --speed-share leave it room). Watch a first run at low speed, as with --speed-share 0.2, and keep the emergency stop at hand.";
 
 /// Runs the command.
 ///
@@ -162,16 +266,12 @@ impl Args {
 /// A description or options that do not serve, no motion within the limits, a file that cannot be written.
 pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     args.refuse_unused()?;
-    if args.out.exists() && !args.force {
-        return Err(CommandError::Exists {
-            path: args.out.clone(),
-        });
-    }
+    refuse_file(&args.out, args.force)?;
     let robot = described(&args.robot, ui)?.robot;
     let Some(kind) = args.kind.staged() else {
         return optimal(args, &robot, ui);
     };
-    let (file, notes) = staged(&robot, kind, args.joint.as_deref(), args.start.as_deref())?;
+    let (file, notes) = staged(&robot, kind, &args.staged_options()?)?;
     file.save(&args.out, &robot, args.rate)?;
     for note in notes {
         ui.remark(&note);
@@ -182,6 +282,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         kind.name(),
         file.duration()
     ));
+    ui.say(NOT_LOOKED_AT);
     Ok(())
 }
 
@@ -210,6 +311,8 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         periods: args.periods.unwrap_or(default.periods),
         ramp: args.ramp,
         start: args.start.clone(),
+        margin: args.margin.unwrap_or(MARGIN),
+        speed_share: args.speed_share.unwrap_or(SPEED_SHARE),
         starts: args.starts.unwrap_or(default.starts),
         seed: args.seed.unwrap_or(default.seed),
         threads: None,
@@ -231,7 +334,30 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
         args.robot.display(),
         args.out.display()
     ));
+    ui.say(NOT_LOOKED_AT);
     Ok(())
+}
+
+/// A condition number with the digits that mean something.
+fn number(condition: f64) -> String {
+    if condition < 1e6 {
+        format!("{condition:.3}")
+    } else {
+        format!("{condition:.1e}")
+    }
+}
+
+/// What the condition number means.
+fn verdict(condition: f64) -> String {
+    if condition < 100.0 {
+        "good (below 100)".into()
+    } else if condition < POOR_CONDITION {
+        "usable (100 to 1000)".into()
+    } else {
+        format!(
+            "poor: some combination of parameters moves the torque {condition:.0e} times less than the others and will not be identified; give a longer --period, more range or more --harmonics"
+        )
+    }
 }
 
 /// What the design achieves, line by line.
@@ -244,9 +370,10 @@ fn summary(found: &Design, robot: &Robot) -> Vec<String> {
             found.base_parameters.join(", ")
         ),
         format!(
-            "condition number {:.3} with columns scaled by their sizes ({:.3} in SI units), smallest singular value {:.3}, mean {:.3}.",
-            values.condition_number,
-            values.si_condition_number,
+            "condition number {} with columns scaled by their sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
+            number(values.condition_number),
+            number(values.si_condition_number),
+            verdict(values.condition_number),
             values.smallest_singular_value,
             values.mean_singular_value
         ),

@@ -650,6 +650,7 @@ fn real_recordings_are_accepted_without_false_alarm() {
     let mut servo = arm(1);
     servo.joints[0].limits = Some(JointLimits {
         position: [-3.2, 3.2],
+        soft_position: None,
         velocity: 11.0,
         acceleration: None,
         torque: Some(0.6),

@@ -77,9 +77,13 @@ const FASTEST: f64 = 1e4;
 /// velocity limit, and the fastest harmonic no faster than where velocity and acceleration limits meet; the longest
 /// over the joints, rounded up to 0.1 s.
 pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
+    period_within(&bounds_of(robot, Room::ALL, None)?.0, harmonics)
+}
+
+fn period_within(bounds: &[Bounds], harmonics: usize) -> Result<f64, ExciteError> {
     use core::f64::consts::TAU;
     let mut period = 0.1_f64;
-    for bounds in bounds_of(robot)?.0 {
+    for bounds in bounds {
         period = period.max(TAU * bounds.half() / bounds.velocity);
         if let Some(acceleration) = bounds.acceleration {
             period = period.max(TAU * harmonics as f64 * bounds.velocity / acceleration);
@@ -89,41 +93,107 @@ pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteErro
     Ok((period * 10.0 - 1e-9).ceil() / 10.0)
 }
 
-/// Limits of all joints, and notes on what they lack.
-pub(super) fn bounds_of(robot: &Robot) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
+/// What of the limits a motion leaves to the controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Room {
+    /// Share of the position range that is kept free, half of it at each end.
+    pub margin: f64,
+    /// Share of the velocity limit that is used; its square of the acceleration limit, as if time ran slower.
+    pub speed: f64,
+}
+
+impl Room {
+    /// The limits themselves.
+    pub(super) const ALL: Self = Self {
+        margin: 0.0,
+        speed: 1.0,
+    };
+
+    /// # Errors
+    /// [`ExciteError::Option`] where a share is none.
+    pub(super) fn new(margin: f64, speed: f64) -> Result<Self, ExciteError> {
+        if !(0.0..=0.95).contains(&margin) {
+            return Err(wrong(
+                "margin",
+                margin.to_string(),
+                "it must be a share of the position range between 0 and 0.95".into(),
+            ));
+        }
+        if !(speed > 0.0 && speed <= 1.0) {
+            return Err(wrong(
+                "speed share",
+                speed.to_string(),
+                "it must be above 0 and at most 1".into(),
+            ));
+        }
+        Ok(Self { margin, speed })
+    }
+
+    /// Positions that the reference may take; the limit itself on a side where `start` already stands in the margin.
+    fn positions(&self, [low, high]: [f64; 2], start: Option<f64>) -> [f64; 2] {
+        let free = 0.5 * self.margin * (high - low);
+        let (inner_low, inner_high) = (low + free, high - free);
+        match start {
+            Some(at) if low < at && at <= inner_low => [low, inner_high],
+            Some(at) if inner_high <= at && at < high => [inner_low, high],
+            _ => [inner_low, inner_high],
+        }
+    }
+}
+
+/// Limits of all joints less the room that is left to the controller, and notes on what they lack.
+pub(super) fn bounds_of(
+    robot: &Robot,
+    room: Room,
+    start: Option<&[f64]>,
+) -> Result<(Vec<Bounds>, Vec<String>), ExciteError> {
     let mut notes = Vec::new();
     let mut list = Vec::new();
     let mut boundless = Vec::new();
     let mut limitless = Vec::new();
-    for joint in &robot.joints {
+    for (j, joint) in robot.joints.iter().enumerate() {
         let Some(limits) = joint.limits.as_ref() else {
             limitless.push(joint.name.clone());
             continue;
         };
-        let [mut low, mut high] = limits.position;
+        let [mut low, mut high] = limits.for_motions();
         if !low.is_finite() || !high.is_finite() {
             (low, high) = (-core::f64::consts::PI, core::f64::consts::PI);
             notes.push(format!(
                 "Joint \"{}\" turns endlessly; the motion stays within one turn, -pi to pi.",
                 joint.name
             ));
+        } else {
+            let stated = [low, high];
+            let at = start.and_then(|s| s.get(j).copied());
+            [low, high] = room.positions(stated, at);
+            if room.margin > 0.0 && (low == stated[0] || high == stated[1]) {
+                notes.push(format!(
+                    "Joint \"{}\" starts within the margin of its position limit; on that side the motion keeps the limit itself.",
+                    joint.name
+                ));
+            }
         }
         // A number that no drive reaches stands for "no limit" in many descriptions; a row weighed by it would be lost.
         let reachable = |limit: &f64| sound(*limit);
-        let acceleration = limits.acceleration.filter(reachable);
+        let acceleration = limits
+            .acceleration
+            .filter(reachable)
+            .map(|a| a * room.speed.powi(2));
         if acceleration.is_none() {
             boundless.push(joint.name.as_str());
         }
         // From rest over the whole range and back to rest, at the highest acceleration, is as fast as a joint gets.
         let within = acceleration.map_or(f64::INFINITY, |a| (a * (high - low)).sqrt());
-        let velocity = limits.velocity.min(within);
+        let stated = room.speed * limits.velocity;
+        let velocity = stated.min(within);
         if velocity > FASTEST {
             return Err(ExciteError::Boundless {
                 joint: joint.name.clone(),
                 velocity,
             });
         }
-        if velocity < limits.velocity {
+        if velocity < stated {
             notes.push(format!(
                 "Joint \"{}\" cannot reach its velocity limit within its range at its acceleration limit; the motion is \
                  sized by the {velocity:.3} that it can reach (SI units).",
@@ -296,7 +366,7 @@ fn wrong(name: &'static str, value: String, right: String) -> ExciteError {
     ExciteError::Option { name, value, right }
 }
 
-fn schedule_of(robot: &Robot, options: &Options) -> Result<Schedule, ExciteError> {
+fn schedule_of(bounds: &[Bounds], options: &Options) -> Result<Schedule, ExciteError> {
     if !(1..=HARMONICS).contains(&options.harmonics) {
         return Err(wrong(
             "number of harmonics",
@@ -314,7 +384,7 @@ fn schedule_of(robot: &Robot, options: &Options) -> Result<Schedule, ExciteError
     }
     let period = match options.period {
         Some(period) => period,
-        None => default_period(robot, options.harmonics)?,
+        None => period_within(bounds, options.harmonics)?,
     };
     let period_us = micros("period", period)?;
     let ramp_us = micros("ramp", options.ramp.unwrap_or(period))?;
@@ -348,12 +418,17 @@ fn check_start(
     }
     for ((value, b), joint) in start.iter().zip(bounds).zip(&robot.joints) {
         if !(b.low < *value && *value < b.high) {
+            // What the user stated, without the margin.
+            let stated = joint.limits.as_ref().map(|limits| limits.for_motions());
+            let [low, high] = stated
+                .filter(|range| range.iter().all(|v| v.is_finite()))
+                .unwrap_or([b.low, b.high]);
             return Err(wrong(
                 "start",
                 value.to_string(),
                 format!(
-                    "joint \"{}\" can move between {} and {}",
-                    joint.name, b.low, b.high
+                    "it must lie strictly between {} and {} for joint \"{}\": a motion swings to both sides of its start",
+                    low, high, joint.name
                 ),
             ));
         }
@@ -415,8 +490,9 @@ pub(super) fn frame_of(
     robot: &Robot,
     options: &Options,
 ) -> Result<(Frame, Base, Vec<String>), ExciteError> {
-    let (bounds, mut notes) = bounds_of(robot)?;
-    let schedule = schedule_of(robot, options)?;
+    let room = Room::new(options.margin, options.speed_share)?;
+    let (bounds, mut notes) = bounds_of(robot, room, options.start.as_deref())?;
+    let schedule = schedule_of(&bounds, options)?;
     let combined = Combined::of(robot);
     if let Some(start) = &options.start {
         check_start(robot, start, &bounds, &combined)?;

@@ -45,7 +45,7 @@ pub use error::ExciteError;
 pub use frame::default_period;
 pub(crate) use replay::STEP as REPLAY_STEP;
 pub use replay::{Noise, Replay, replay};
-pub use stages::{StagedKind, staged};
+pub use stages::{StagedKind, StagedOptions, staged};
 pub use trajectory_file::{
     DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
 };
@@ -73,7 +73,7 @@ pub enum Scaling {
     None,
 }
 
-/// Settings of a design.
+/// Settings of a design. The default uses the limits to their end; `rig excite` leaves room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// What is optimised.
@@ -94,6 +94,11 @@ pub struct Options {
     pub ramp: Option<f64>,
     /// Where the joints start, rad or m; free where absent.
     pub start: Option<Vec<f64>>,
+    /// Share of the position range that is kept free, half of it at each end: what the controller is off by at a turning
+    /// point must fit in there. The limits of cranks and regions of the workspace have none.
+    pub margin: f64,
+    /// Share of the velocity limits that is used, and its square of the acceleration limits, as if time ran slower.
+    pub speed_share: f64,
     /// Random starts of the optimiser.
     pub starts: u32,
     /// Seed of them.
@@ -114,6 +119,8 @@ impl Default for Options {
             periods: 5,
             ramp: None,
             start: None,
+            margin: 0.0,
+            speed_share: 1.0,
             starts: 24,
             seed: 1,
             threads: None,

@@ -12,7 +12,7 @@ use super::check_drives::{check_drive, check_transmission};
 use super::effects::check_effects;
 use super::sizes::oversized;
 use super::workspace::check_workspace;
-use super::{Joint, JointKind, Robot};
+use super::{Joint, JointKind, JointLimits, Robot};
 
 /// Names of effects beyond the standard model.
 pub const EFFECT_NAMES: [&str; 22] = [
@@ -242,6 +242,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
     }
     if let Some(limits) = &joint.limits {
         check_position_limits(joint, limits.position, angle)?;
+        check_soft_limits(joint, limits, angle)?;
         let way = |k| [Key("limits"), Key(k)];
         number(
             joint,
@@ -326,6 +327,29 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
         )?;
     }
     Ok(())
+}
+
+fn check_soft_limits(joint: &Joint, limits: &JointLimits, unit: &str) -> Result<(), Fault> {
+    let Some([lower, upper]) = limits.soft_position else {
+        return Ok(());
+    };
+    let [lowest, highest] = limits.position;
+    if lower.is_finite()
+        && upper.is_finite()
+        && lowest <= lower
+        && lower < upper
+        && upper <= highest
+    {
+        return Ok(());
+    }
+    Err(Fault {
+        way: vec![Step::Key("limits"), Step::Key("soft_position")],
+        what: format!("the soft position range of joint `{}`", joint.name),
+        found: format!("[{lower}, {upper}]"),
+        right: format!(
+            "it must be [lowest, highest], two finite numbers in {unit} within position = [{lowest}, {highest}]"
+        ),
+    })
 }
 
 fn check_position_limits(joint: &Joint, [lower, upper]: [f64; 2], unit: &str) -> Result<(), Fault> {

@@ -13,6 +13,7 @@ mod bare;
 mod bodies;
 mod check;
 mod check_drives;
+mod degrees;
 mod dh;
 mod drives;
 mod effects;
@@ -175,6 +176,10 @@ pub struct JointLimits {
     /// Lowest and highest position, rad or m; −∞ and ∞ where a revolute joint turns endlessly.
     #[serde(deserialize_with = "exact")]
     pub position: [f64; 2],
+    /// Lowest and highest position that motions are designed for where that is less than the joint can do (a URDF's
+    /// `safety_controller`), rad or m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub soft_position: Option<[f64; 2]>,
     /// Highest speed, rad/s or m/s.
     pub velocity: f64,
     /// Highest acceleration, rad/s² or m/s².
@@ -183,6 +188,13 @@ pub struct JointLimits {
     /// Highest torque or force, N·m or N.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque: Option<f64>,
+}
+
+impl JointLimits {
+    /// The range that motions are designed for.
+    pub fn for_motions(&self) -> [f64; 2] {
+        self.soft_position.unwrap_or(self.position)
+    }
 }
 
 /// Joint-side friction of the standard model.
@@ -342,6 +354,7 @@ impl Description {
         if !urdf {
             let (robot, mut remarks) = text::read(&text, path)?;
             remarks.extend(robot.implausible_bodies(None));
+            remarks.extend(robot.limits_in_degrees());
             return Ok(Self {
                 remarks,
                 robot,
@@ -352,6 +365,7 @@ impl Description {
         let robot = original.robot().clone();
         let mut remarks = original.remarks().to_vec();
         remarks.extend(robot.implausible_bodies(Some(&original)));
+        remarks.extend(robot.limits_in_degrees());
         Ok(Self {
             robot,
             urdf: Some(original),

@@ -275,6 +275,7 @@ fn urdf_drives_friction_and_limits_are_kept() {
         one.limits,
         Some(JointLimits {
             position: [-1.0, 2.0],
+            soft_position: None,
             velocity: 3.0,
             acceleration: None,
             torque: Some(4.0)

@@ -152,6 +152,14 @@ fn write_joint(out: &mut String, joint: &Joint) {
     if let Some(l) = &joint.limits {
         out.push_str("\n[joint.limits]\n");
         line(out, "position", &list(&l.position), angle);
+        if let Some(soft) = &l.soft_position {
+            line(
+                out,
+                "soft_position",
+                &list(soft),
+                &format!("{angle}, range of designed motions"),
+            );
+        }
         line(out, "velocity", &float(l.velocity), &format!("{angle}/s"));
         optional(out, "acceleration", l.acceleration, &format!("{angle}/s^2"));
         optional(out, "torque", l.torque, force);

@@ -72,7 +72,7 @@ impl Place {
         };
         let revolute = own.kind == JointKind::Revolute;
         // A joint that turns endlessly is asked for one turn.
-        let [low, high] = match limits.position {
+        let [low, high] = match limits.for_motions() {
             [l, h] if l.is_finite() && h.is_finite() => [l, h],
             _ if revolute => [-core::f64::consts::PI, core::f64::consts::PI],
             _ => return Ok(None),

@@ -65,7 +65,7 @@ fn staged_motions_keep_the_limits_and_every_kind_survives_its_file() {
         StagedKind::Reversals,
         StagedKind::Sweep,
     ] {
-        let (file, notes) = staged(&robot, kind, None, None).unwrap();
+        let (file, notes) = staged(&robot, kind, &StagedOptions::default()).unwrap();
         assert!(
             notes.is_empty() && file.duration() > 5.0 && file.duration() < 1800.0,
             "{file:?}"

@@ -3,6 +3,7 @@
 
 mod design;
 mod files;
+mod room;
 mod runs;
 mod six_joints;
 

@@ -106,7 +106,9 @@ fn a_noiseless_run_gives_its_parameters_back() {
 #[test]
 fn noise_has_its_deviation_and_its_seed_and_saturation_is_said() {
     let mut robot = one_link();
-    let file = staged(&robot, StagedKind::Staircase, None, None).unwrap().0;
+    let file = staged(&robot, StagedKind::Staircase, &StagedOptions::default())
+        .unwrap()
+        .0;
     let reference = file.sampled(500.0).unwrap();
     let run =
         |robot: &Robot, noise, seed| replay(robot, &reference, noise, seed, |_, _| ()).unwrap();

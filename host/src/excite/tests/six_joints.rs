@@ -71,6 +71,7 @@ fn arm() -> Robot {
                 }),
                 limits: Some(JointLimits {
                     position: [-range, range],
+                    soft_position: None,
                     velocity,
                     acceleration: Some(acceleration),
                     torque: Some(torque),
@@ -273,7 +274,7 @@ fn points_stay_within_their_regions_and_staged_motions_say_that_they_may_not() {
             .into_iter()
             .any(|t| place(&free.file, t)[2] < 0.15)
     );
-    let (_, notes) = staged(&robot, StagedKind::Chirp, None, None).unwrap();
+    let (_, notes) = staged(&robot, StagedKind::Chirp, &StagedOptions::default()).unwrap();
     assert!(
         notes.iter().any(|n| n.contains("[[workspace]]")),
         "{notes:?}"

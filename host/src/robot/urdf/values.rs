@@ -113,10 +113,42 @@ impl<'a> Reader<'a> {
         }
         Ok(Some(JointLimits {
             position,
+            soft_position: self.soft_limits(joint, name, position)?,
             velocity,
             acceleration: None,
             torque: (!placeholder).then_some(effort),
         }))
+    }
+
+    /// The range within which the robot's own controller keeps the joint: `<safety_controller soft_lower_limit
+    /// soft_upper_limit>`. A side that is not stated, or lies beyond the limit, is the limit.
+    fn soft_limits(
+        &self,
+        joint: Xml<'a>,
+        name: &str,
+        [low, high]: [f64; 2],
+    ) -> Result<Option<[f64; 2]>, RobotError> {
+        let Some(node) = child(joint, "safety_controller") else {
+            return Ok(None);
+        };
+        let lower = self.optional_number(node, "soft_lower_limit")?;
+        let upper = self.optional_number(node, "soft_upper_limit")?;
+        let soft = [
+            lower.map_or(low, |v| v.max(low)),
+            upper.map_or(high, |v| v.min(high)),
+        ];
+        if soft == [low, high] || !soft.iter().all(|v| v.is_finite()) {
+            return Ok(None);
+        }
+        if soft[0] >= soft[1] {
+            // The element's own defaults, both 0, say nothing.
+            let place = format!("{}:{}", self.path.display(), self.place(node));
+            self.remarks.borrow_mut().push(format!(
+                "{place}: <safety_controller> of joint `{name}` leaves no range within {low} to {high}; its soft limits are not used."
+            ));
+            return Ok(None);
+        }
+        Ok(Some(soft))
     }
 
     pub(super) fn friction(&self, joint: Xml<'a>) -> Result<Option<JointFriction>, RobotError> {
