@@ -6,10 +6,11 @@
 //! several joints a motion leaves much open: what it tells less of than the description is held, too.
 
 use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::rows::{Column, Nominal, Rows, combined};
 use super::stated::Stated;
-use crate::robot::Robot;
+use crate::robot::{Quantity, Robot, Worth, worth};
 
 /// A free direction in the space of base parameters: parameters and factors.
 pub(super) type Direction = Vec<(usize, f64)>;
@@ -23,11 +24,12 @@ pub(super) struct Anchor {
     pub(super) prior: Vec<f64>,
     /// Base parameters that are held at the prior, wholly or but for one direction.
     pub(super) held: Vec<usize>,
-    /// Whether the description states inertia and friction, so that a change against it means something.
+    /// Whether the description states the links' inertia, so that a change against it means something.
     pub(super) stated: bool,
     /// Whether the direction of gravity is held.
     pub(super) gravity_held: bool,
-    /// Free constant torques of a description that could not state them, so that no value of theirs contradicts it.
+    /// Free base parameters that the description does not state, so that no value of theirs contradicts it: constant torques where
+    /// its format has no place for them, friction where its values are worth nothing ([`worth`]).
     unstated: Vec<usize>,
 }
 
@@ -51,7 +53,6 @@ impl Anchor {
             .joints
             .iter()
             .all(|j| j.inertial.as_ref().is_some_and(|i| i.mass > 0.0));
-        let friction = robot.joints.iter().all(|j| j.friction.is_some());
         let (mut held, mut unstated) = (Vec::new(), Vec::new());
         let mut free: Vec<Direction> = Vec::new();
         let mut gravity = Direction::new();
@@ -79,6 +80,9 @@ impl Anchor {
                 held.push(k);
                 gravity.push((k, prior[k]));
             } else {
+                if inertial && is_friction(c, n) && !states_friction(robot, c, prior[k]) {
+                    unstated.push(k);
+                }
                 free.push(vec![(k, 1.0)]);
             }
         }
@@ -95,7 +99,7 @@ impl Anchor {
             free,
             prior,
             held,
-            stated: inertial && friction,
+            stated: inertial,
             gravity_held,
             unstated,
         }
@@ -179,6 +183,30 @@ impl Anchor {
             .map(|direction| direction.iter().map(|&(k, f)| self.prior[k] * f).sum())
             .collect()
     }
+}
+
+/// Whether a standard column of `n` joints is friction of a joint or a motor.
+pub(super) fn is_friction(c: usize, n: usize) -> bool {
+    match c.checked_sub(n * COLUMNS) {
+        None => [column::VISCOUS, column::COULOMB].contains(&(c % COLUMNS)),
+        Some(motor) => motor % MOTOR_COLUMNS != motor_column::INERTIA,
+    }
+}
+
+/// Whether the friction `value` of a standard column is knowledge.
+fn states_friction(robot: &Robot, c: usize, value: f64) -> bool {
+    let n = robot.joints.len();
+    let place = |c: usize| match c.checked_sub(n * COLUMNS) {
+        None => c / COLUMNS,
+        Some(motor) => motor / MOTOR_COLUMNS,
+    };
+    let joint = robot.joints.get(place(c));
+    let written = joint.is_some_and(|j| j.friction.is_some() || j.drive.is_some());
+    written
+        && matches!(
+            worth(Quantity::Friction, robot.origin, value),
+            Worth::Share(_)
+        )
 }
 
 /// The nominal columns along a direction.

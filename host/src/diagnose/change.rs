@@ -67,9 +67,9 @@ pub(super) fn change(
         return None;
     }
     let prior = anchor.prior_coefficients();
-    let mut frozen = refit.frozen(anchor);
+    let mut frozen = refit.frozen(bench);
     frozen.subtract(known);
-    // A constant torque that the description could not state is no change of it.
+    // What the description does not state is no change of it.
     let (unstated, all): (Vec<usize>, Vec<usize>) =
         (0..free.len()).partition(|k| anchor.is_unstated(*k));
     let constants = unstated.iter().map(|k| (&free[*k], after.values[*k]));

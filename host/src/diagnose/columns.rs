@@ -80,12 +80,7 @@ const OWN_ROUNDS: usize = 6;
 const MOST_LOST: f64 = 0.5;
 
 /// Effects whose torque is linear in the filtered motion, or as good as: it has passed the position's filter with it.
-const OF_THE_FILTERED_MOTION: [Kind; 4] = [
-    Kind::InertiaCoupling,
-    Kind::JointElasticity,
-    Kind::MeasurementDelay,
-    Kind::GravityTilt,
-];
+const OF_THE_FILTERED_MOTION: [Kind; 2] = [Kind::InertiaCoupling, Kind::JointElasticity];
 
 /// How far an effect of presliding is bent along the velocities of a run, `beside` so much other friction.
 fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {

@@ -34,7 +34,7 @@ pub(super) fn by_description(
     if !bench.anchor.stated || is_loaded(bench, refit, &judged.chosen) {
         return Ok(judged);
     }
-    let frozen = refit.frozen(&bench.anchor);
+    let frozen = refit.frozen(bench);
     let left = |list: &[Profile], joint: usize| with(&frozen, list, None).rms(joint);
     // Where gravity is as described, a spring that it could hide behind shows.
     let stands = |rival: &Profile, list: &[Profile], k: usize| {

@@ -36,6 +36,7 @@ use super::refit::Refit;
 use super::rounding::rounding;
 use super::search::{is_friction, with};
 use super::stated::{Now, Stated};
+use super::treated::treated;
 use super::waves::is_of_the_motor;
 use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
 use super::zeros::{another_zero, another_zero_held};
@@ -363,6 +364,7 @@ fn attempt(
         noise_floor_rms: floors.clone(),
         noise_floor_how: String::new(),
         motion_how: replay.told(chosen, described)?,
+        treatment: Some(treated(robot, loaded, sealed.as_ref())),
         torque_lead: lead,
         places: judge.places(
             refit.footing(&chosen[..described])[1],

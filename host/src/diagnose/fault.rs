@@ -35,6 +35,7 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         noise_floor_rms: Vec::new(),
         noise_floor_how: String::new(),
         motion_how: String::new(),
+        treatment: None,
         torque_lead: Vec::new(),
         places: Vec::new(),
         described: Vec::new(),

@@ -454,7 +454,8 @@ pub(super) fn dot_self(a: &[f64]) -> f64 {
     dot(a, a)
 }
 
-fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {
+/// Adds `factor` times x to y.
+pub(super) fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += factor * x;
     }

@@ -56,6 +56,7 @@ mod stated;
 pub mod testable;
 mod touched;
 mod transmission;
+mod treated;
 mod type_b;
 pub mod voltage;
 mod waves;

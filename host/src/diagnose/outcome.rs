@@ -417,6 +417,43 @@ impl Waterfall {
     }
 }
 
+/// How recordings were treated before anything was compared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Treated {
+    /// Of the training recordings, Hz.
+    pub sample_rate: f64,
+    /// Cut-off of the low-pass on the position, Hz.
+    pub position_cutoff: f64,
+    /// Why, a sentence.
+    pub position_cutoff_why: String,
+    /// Cut-off of the position that inertia and gravity are formed of before they pass the low-pass above, Hz; null where that takes
+    /// nothing away in the band, so that they are formed of the filtered position.
+    pub links_cutoff: Option<f64>,
+    /// Upper end of the band that is compared, Hz.
+    pub band: f64,
+    /// Highest frequency of the motion, Hz.
+    pub motion_frequency: f64,
+    /// Rows a second.
+    pub row_rate: f64,
+    /// Joint by joint.
+    pub rows: Vec<Rows>,
+}
+
+/// Rows of a joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rows {
+    /// Its name.
+    pub joint: String,
+    /// Speed below which rows are left out.
+    pub least_speed: f64,
+    /// Of that, ASCII.
+    pub unit: String,
+    /// Used and all of the training recordings.
+    pub train: [usize; 2],
+    /// The same of the hold-out; null without one.
+    pub holdout: Option<[usize; 2]>,
+}
+
 /// The result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -436,6 +473,8 @@ pub struct Diagnosis {
     pub noise_floor_how: String,
     /// How the motion was simulated, or why not, a sentence.
     pub motion_how: String,
+    /// How the recordings were treated; null where nothing was fitted, and of a model that a voltage drives.
+    pub treatment: Option<Treated>,
     /// Per joint, how long before it acts (negative: after) a torque was recorded, s; taken out.
     pub torque_lead: Vec<f64>,
     /// Where the gap sits, most of it first; empty where it goes with no coordinate more than chance would have it.

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rig_shared::effects::{Kind, Parameter, SHAPES, Scale};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::DiagnoseError;
-use super::anchor::Anchor;
+use super::anchor::{Direction, is_friction};
 use super::bench::Bench;
 use super::columns::Source;
-use super::fit::{Fit, dot};
+use super::fit::{Fit, axpy, dot};
 use super::floor;
 use super::lead::slack;
 use super::locate::Coordinate;
@@ -24,6 +24,8 @@ use super::rows::{Column, Rows, combined};
 use super::search::{is_gear, with};
 use super::solve::{Solution, jackknifed, solve};
 use super::type_b::widened;
+use crate::identify::contradicted;
+use crate::robot::DESCRIBED;
 
 /// Standard deviations, over the value of a shape of which ratios count, from which on the motion does not tell it: as the Stribeck
 /// velocity of bristles whose friction does not fall.
@@ -31,8 +33,8 @@ const UNTOLD: f64 = 10.0;
 
 /// Step of a difference quotient over a shape, by its size: far above rounding and within any law's own width.
 const DIFFERENCE: f64 = 0.01;
-/// Relative uncertainty of what a description states, as in an identification of several joints.
-const RIGHT_TO: f64 = 2.0;
+/// Standard deviation that stands for no knowledge, SI.
+const WIDE: f64 = 1e6;
 /// What gravity's direction of a single link stands for, as a result names it.
 const GRAVITY: &str = "m*g*l (gravity's largest torque)";
 /// Share of the description's variance from which on data have added hardly anything.
@@ -243,13 +245,20 @@ impl<'r> Refit<'r> {
         combined(self.joints, columns.zip(gains))
     }
 
-    /// What the description as it stands leaves.
-    pub(super) fn frozen(&self, anchor: &Anchor) -> Fit<'r> {
+    /// What the description as it stands leaves; friction that it does not state is fitted beside it.
+    pub(super) fn frozen(&self, bench: &Bench) -> Fit<'r> {
+        let anchor = &bench.anchor;
         let prior = anchor.prior_coefficients();
         let stated = combined(self.joints, self.free.iter().zip(prior));
         let mut frozen = self.plain.clone();
         frozen.subtract(&stated);
-        frozen
+        let (base, joints) = (&bench.nominal.base, bench.robot.joints.len());
+        let unknown = |k: &usize| {
+            let friction = matches!(anchor.free[*k].as_slice(), [(b, _)] if is_friction(base.columns[*b], joints));
+            friction && anchor.is_unstated(*k)
+        };
+        let unknown = (0..self.free.len()).filter(unknown);
+        frozen.taking(unknown.map(|k| &self.free[k]))
     }
 
     /// What moved among the nominal parameters, the surest first. `before` are their coefficients without the effects, or as
@@ -341,18 +350,82 @@ fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
     (Fit::new(rows, scale, memory), memory)
 }
 
-/// Base parameters of several joints of which a motion tells less than the description, right to a factor of
-/// [`RIGHT_TO`]: those that data and description together know hardly better than the description alone.
-pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
+/// What becomes of what the description states of several joints.
+#[derive(Default)]
+pub(super) struct Open {
+    /// Base parameters of which the motion tells less than the description: what data and description together know hardly better
+    /// than the description alone.
+    pub(super) held: Vec<usize>,
+    /// Friction as described that the data contradict, by how many standard deviations.
+    pub(super) contradicted: Vec<(usize, f64)>,
+}
+
+/// What the description is worth beside the data: right to [`DESCRIBED`], and unknown where it states nothing.
+pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
     let anchor = &bench.anchor;
     if rows.joints() < 2 || !anchor.stated {
-        return Vec::new();
+        return Open::default();
     }
     let free = anchor.columns(rows);
     let (fit, memory) = weighed(rows, &free);
+    let columns: Vec<Vec<f64>> = free.iter().map(|column| fit.weighted(column)).collect();
+    let torque = fit.weighted(&rows.torque.iter().cloned().map(Some).collect());
+    let mut spread = described_within(bench);
+    for (k, column) in columns.iter().enumerate() {
+        let whole = (dot(&torque, &torque) / dot(column, column)).sqrt();
+        // It makes all of the torque at most.
+        if anchor.is_unstated(k) && whole.is_finite() {
+            spread[k] = whole;
+        }
+    }
+    let rows_in_one = (memory / rows.period).max(1.0);
+    let size = columns.len();
+    let mut gram = DMatrix::zeros(size, size);
+    for a in 0..size {
+        for b in 0..=a {
+            gram[(a, b)] = dot(&columns[a], &columns[b]) / rows_in_one;
+            gram[(b, a)] = gram[(a, b)];
+        }
+    }
+    let mut left = torque;
+    for (column, prior) in columns.iter().zip(anchor.prior_coefficients()) {
+        axpy(-prior, column, &mut left);
+    }
+    let along = DVector::from_fn(size, |k, _| dot(&columns[k], &left) / rows_in_one);
+    let contradicted = refuted(bench, gram.clone(), &along, &spread);
+    for (k, _) in &contradicted {
+        spread[*k] = f64::INFINITY;
+    }
+    let known = DMatrix::from_fn(size, size, |a, b| {
+        let own = if a == b { 1.0 } else { 0.0 };
+        let [a_wide, b_wide] = [a, b].map(|k| spread[k].min(WIDE));
+        a_wide * b_wide * gram[(a, b)] + own
+    });
+    let Some(known) = known.cholesky() else {
+        return Open::default();
+    };
+    let left = known.inverse();
+    let alone = |direction: &Direction| match direction.as_slice() {
+        [(b, _)] => Some(*b),
+        _ => None,
+    };
+    let held = (anchor.free.iter().enumerate())
+        // What nobody stated is fitted, but for the friction and the constant of a joint that stands throughout.
+        .filter(|(k, _)| !anchor.is_unstated(*k) || dot(&columns[*k], &columns[*k]) <= 0.0)
+        .filter(|(k, _)| spread[*k].is_finite() && left[(*k, *k)] > HARDLY_BETTER)
+        .filter_map(|(_, direction)| alone(direction))
+        .collect();
+    let contradicted = (contradicted.into_iter())
+        .filter_map(|(k, times)| Some((alone(&anchor.free[k])?, times)))
+        .collect();
+    Open { held, contradicted }
+}
+
+/// Standard deviation of what the description states of each free direction.
+fn described_within(bench: &Bench) -> Vec<f64> {
     let combination = &bench.nominal.base.combination;
     let sizes = weights(bench.robot, combination.ncols());
-    let spread: Vec<f64> = (anchor.free.iter())
+    (bench.anchor.free.iter())
         .map(|direction| {
             let squares = (0..sizes.len()).map(|c| {
                 let along: f64 = direction
@@ -361,28 +434,41 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Vec<usize> {
                     .sum();
                 (along * sizes[c]).powi(2)
             });
-            RIGHT_TO * squares.sum::<f64>().sqrt()
-        })
-        .collect();
-    let columns: Vec<Vec<f64>> = free.iter().map(|column| fit.weighted(column)).collect();
-    let rows_in_one = (memory / rows.period).max(1.0);
-    let known = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
-        let own = if a == b { 1.0 } else { 0.0 };
-        spread[a] * spread[b] * dot(&columns[a], &columns[b]) / rows_in_one + own
-    });
-    let Some(known) = known.cholesky() else {
-        return Vec::new();
-    };
-    let left = known.inverse();
-    (anchor.free.iter().enumerate())
-        // What nobody stated is fitted, but for the constant of a joint that stands throughout.
-        .filter(|(k, _)| !anchor.is_unstated(*k) || dot(&columns[*k], &columns[*k]) <= 0.0)
-        .filter(|(k, _)| left[(*k, *k)] > HARDLY_BETTER)
-        .filter_map(|(_, direction)| match direction.as_slice() {
-            [(b, _)] => Some(*b),
-            _ => None,
+            DESCRIBED * squares.sum::<f64>().sqrt()
         })
         .collect()
+}
+
+/// Directions of stated friction that data contradict; `gram` and `along` are of columns with the noise as unit.
+fn refuted(
+    bench: &Bench,
+    gram: DMatrix<f64>,
+    along: &DVector<f64>,
+    spread: &[f64],
+) -> Vec<(usize, f64)> {
+    let (anchor, base) = (&bench.anchor, &bench.nominal.base);
+    let joints = bench.robot.joints.len();
+    let of_friction = |k: &usize| {
+        matches!(anchor.free[*k].as_slice(), [(b, _)] if is_friction(base.columns[*b], joints))
+            && !anchor.is_unstated(*k)
+    };
+    let stated: Vec<usize> = (0..spread.len()).filter(of_friction).collect();
+    let SymmetricEigen {
+        eigenvalues,
+        eigenvectors,
+    } = gram.symmetric_eigen();
+    let least = eigenvalues.max() * f64::EPSILON;
+    let root = eigenvalues.map(|e| if e > least { e.sqrt() } else { 0.0 });
+    let data = DMatrix::from_diagonal(&root) * eigenvectors.transpose();
+    let turned = eigenvectors.tr_mul(along);
+    let right = DVector::from_fn(root.len(), |k, _| {
+        if root[k] > 0.0 {
+            turned[k] / root[k]
+        } else {
+            0.0
+        }
+    });
+    contradicted(&data, &right, spread, &stated)
 }
 
 /// Whether a shape is of teeth while they touch: the motor's motion shows their play, and of the contact itself no more than

@@ -12,7 +12,7 @@ use super::runs::Run;
 use super::transmission::ABREAST;
 use crate::batch::{BLOCK, ChainBatch, RegressorBlock};
 use crate::identify::{Base, ModelKind, chain_of, transmission_of};
-use crate::prepare::{LowPass, Treatment};
+use crate::prepare::{LowPass, Treatment, central_difference, second_difference};
 use crate::robot::{JointKind, Robot};
 
 /// Share of a row's neighbourhood that may be slow or saturated before the row is left out: what the low-pass makes of an
@@ -34,6 +34,9 @@ const CLEAR: f64 = 0.005;
 
 /// Share of the power of a signal that the position's filter may take away at the upper end of the low-pass without being heard.
 const HEARD: f64 = 1e-4;
+
+/// Highest cut-off as a share of half the sample rate: as that of the position's filter.
+const WIDEST: f64 = 0.8;
 
 /// Directions whose angle has a sine below this are one.
 const PARALLEL: f64 = 1e-6;
@@ -64,12 +67,18 @@ pub(super) fn combined<'a>(
 /// The motion has passed the position's filter before. Torque has not, nor has what is formed from the motion by a law that is
 /// not linear in it, such as the sign of a velocity: they pass that filter here, or both sides of the equation would differ by
 /// what it takes away wherever its cut-off is near the band of the rows.
+///
+/// Inertia, gravity and what turns with the square of the speed are not linear in the motion either: M(q)·q̈ of the filtered motion is
+/// not the filtered M(q)·q̈. Where the filter is heard in the band these columns are formed of a motion that has passed a
+/// [`wide`] filter instead, which takes nothing away in the band, and pass the position's filter here, as the torque does.
 #[derive(Clone, Debug)]
 pub(super) struct Thinning {
     low_pass: LowPass,
     /// The position's filter, and whether it takes away anything that the low-pass passes.
     position: LowPass,
     heard: bool,
+    /// The filter of the motion that columns of the links are formed of, where the position's is heard.
+    wide: Option<(f64, LowPass)>,
     step: usize,
     /// Samples at either end that the position's filter spoils. They are cut before the low-pass, which would carry them far in.
     spoilt: usize,
@@ -93,14 +102,35 @@ impl Thinning {
             - position
                 .gain(treatment.parallel_edge, treatment.sample_rate)
                 .powi(2);
+        let heard = taken > HEARD;
         Ok(Self {
             low_pass,
             position,
-            heard: taken > HEARD,
+            heard,
+            wide: heard.then(|| wide(treatment)).flatten(),
             step: treatment.decimation.max(1),
             spoilt: treatment.trimmed,
             smear: SMEAR / treatment.cutoff,
         })
+    }
+
+    /// Cut-off of the position that columns of the links are formed of, Hz, where that is not the filtered one.
+    pub(super) fn links_cutoff(&self) -> Option<f64> {
+        self.wide.as_ref().map(|(cutoff, _)| *cutoff)
+    }
+
+    /// The motion that columns of the links are formed of, where that is not the filtered one.
+    fn wide_motion(&self, run: &Run) -> Option<[Vec<Vec<f64>>; 3]> {
+        let (_, filter) = self.wide.as_ref()?;
+        let step = 1.0 / run.rate;
+        let mut motion = [(); 3].map(|()| Vec::with_capacity(run.joints.len()));
+        for joint in &run.joints {
+            let q = filter.zero_phase(&joint.q_raw);
+            motion[1].push(central_difference(&q, step));
+            motion[2].push(second_difference(&q, step));
+            motion[0].push(q);
+        }
+        Some(motion)
     }
 
     /// Time by which the position's filter may move a reversal, s.
@@ -191,6 +221,19 @@ impl Thinning {
     pub(super) fn pick(&self, signal: &[f64], out: &mut Vec<f64>) {
         out.extend(self.kept(signal.len()).map(|k| signal[k]));
     }
+}
+
+/// A filter of the position that takes no more than [`HEARD`] of the power away at the upper end of the rows' band, as far as the
+/// sampling allows: behind a Butterworth filter of order n forward and backward the power falls by 2·(f/cut-off)²ⁿ.
+fn wide(treatment: &Treatment) -> Option<(f64, LowPass)> {
+    let rate = treatment.sample_rate;
+    let order = treatment.order;
+    let share = (0.5 * HEARD).powf(0.5 / order as f64);
+    let cutoff = (treatment.parallel_edge / share).min(WIDEST * 0.5 * rate);
+    (cutoff > treatment.cutoff)
+        .then(|| LowPass::butterworth(order, cutoff, rate))
+        .flatten()
+        .map(|filter| (cutoff, filter))
 }
 
 /// The regression: rows over all runs, one set a joint.
@@ -462,8 +505,12 @@ impl Rows {
                 thinning.push_raw(&spoilt, &mut share);
                 clear[j].extend(share.iter().map(|s| s.abs() < CLEAR));
             }
+            let wide = thinning.wide_motion(run);
             let motion = motion_of(run);
             nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, values| {
+                if wide.is_some() && !nominal.is_drive(k) {
+                    return;
+                }
                 let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
                 if nominal.is_coulomb(k) {
                     thinning.push_raw(values, list);
@@ -471,6 +518,14 @@ impl Rows {
                     thinning.push(values, list);
                 }
             })?;
+            if let Some([q, qd, qdd]) = &wide {
+                nominal.columns([q, qd, qdd], &mut |k, j, values| {
+                    if !nominal.is_drive(k) {
+                        let list = columns[k][j].get_or_insert_with(|| vec![0.0; before]);
+                        thinning.push_raw(values, list);
+                    }
+                })?;
+            }
             starts.push(before + rows);
         }
         Ok(Self {
@@ -554,6 +609,7 @@ impl Rows {
                 low_pass: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
                 position: LowPass::butterworth(2, 0.1, 1.0).unwrap(),
                 heard: false,
+                wide: None,
                 step: 1,
                 spoilt: 0,
                 smear: 0.0,

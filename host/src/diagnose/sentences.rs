@@ -1,7 +1,7 @@
 //! A diagnosis in sentences.
 
 use rig_shared::effects::Kind;
-use rig_shared::multibody::COLUMNS;
+use rig_shared::multibody::{COLUMNS, column};
 
 use super::bench::Bench;
 use super::finish::Found;
@@ -234,6 +234,9 @@ pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
         .filter_map(|(k, direction)| {
             let (b, _) = direction.first()?;
             let joint = bench.robot.joints.get(base[*b] / COLUMNS)?;
+            if base[*b] % COLUMNS != column::OFFSET {
+                return None;
+            }
             Some(format!(
                 "{} {} at joint {}",
                 format_value(after.values[k], after.std(k)),

@@ -148,7 +148,7 @@ fn turned(
                 *q -= by;
             }
             let told = predict(nominal, bench.robot, values, &elsewhere)?;
-            rows.thinning.push(&told.torque[0], &mut thin);
+            rows.thinning.push_raw(&told.torque[0], &mut thin);
         }
         Ok(thin)
     };

@@ -10,8 +10,8 @@ use super::IdentifyError;
 use super::consistent::{Quadratic, consistent};
 use super::describe::{Combinations, written};
 use super::prior::Prior;
-use super::standard::{DESCRIBED_UNCERTAINTY, hints};
-use crate::robot::Robot;
+use super::standard::hints;
+use crate::robot::{DESCRIBED, Robot};
 
 /// RMS values of each joint, SI.
 pub(crate) struct Sizes {
@@ -48,7 +48,7 @@ pub(crate) fn as_bodies(
         robot,
         columns,
         &hints(columns, (base.columns, base.values), sizes),
-        DESCRIBED_UNCERTAINTY,
+        DESCRIBED,
     );
     // R with RᵀR the information, which may lack rank.
     let SymmetricEigen {

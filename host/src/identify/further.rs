@@ -12,7 +12,7 @@ use super::evaluate::Planned;
 use super::excitation::hardly_excited;
 use super::factor::TriangularFactor;
 use super::linear::{classical, spread};
-use super::parts::Parts;
+use super::parts::{LeaveOut, Parts};
 use super::prior::Prior;
 use super::problem::{Fitted, Problem};
 use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
@@ -75,7 +75,13 @@ pub(super) fn own(
         return Ok(None);
     }
     let parts = Parts::collect(problem)?;
-    let fitted = fit(estimator, problem, &parts, &prior(problem))?;
+    let all = LeaveOut::of(&parts.weighted(&problem.tempered(&parts)));
+    let fitted = fit(
+        estimator,
+        problem,
+        &parts,
+        &prior_beside(problem, &all.whole),
+    )?;
     Ok(Some(Own {
         estimate: fitted.estimate(&parts, problem, beside),
         fitted,
@@ -114,6 +120,12 @@ fn prior(problem: &Problem) -> Prior {
         &problem.start_full(),
         problem.options.prior_uncertainty,
     )
+}
+
+/// The same without what the data contradict; `factor` has the residual's noise as unit, its memory allowed for.
+fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
+    let data = quadratic(factor, problem.base);
+    prior(problem).without_contradicted(&data.matrix, &data.right, problem.robot)
 }
 
 /// What stands beside the estimate.
@@ -200,7 +212,6 @@ pub(super) fn further(
             .sqrt()
     };
     further.essential = known.and_then(|known| essential(&known, &names, &left));
-    let prior = prior(problem);
     let estimator = problem.options.estimator;
     let wanted = problem.robot.joints.len() > 1
         || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
@@ -211,6 +222,7 @@ pub(super) fn further(
         None
     };
     let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
+    let prior = prior_beside(problem, &tempered);
     let (std, _) = classical(&tempered, data, problem.start)?;
     further.free = (problem.start.iter().zip(&std))
         .map(|(value, std)| [*value, value - NORMAL_95 * std, value + NORMAL_95 * std])

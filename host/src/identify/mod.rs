@@ -21,6 +21,7 @@ mod cache;
 mod closed;
 mod compare;
 mod consistent;
+mod contradicted;
 mod covariance;
 mod cutoff;
 mod describe;
@@ -82,6 +83,7 @@ pub use base::{
 pub(crate) use bodies::{Sizes, as_bodies};
 pub use cache::RowCache;
 pub use compare::{Compared, Comparison};
+pub(crate) use contradicted::contradicted;
 pub use covariance::{Ellipse, Estimate, t_quantile};
 pub(crate) use cutoff::treatment_for;
 pub use describe::identified_robot;

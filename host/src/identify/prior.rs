@@ -4,15 +4,15 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, motor_column};
 
+use super::contradicted::contradicted;
 use super::pseudo_inertia::{Divergence, INERTIAL, parameters_of};
-use crate::robot::Robot;
+use crate::report::format_significant;
+use crate::robot::{Quantity, Robot, STAND_IN, Worth, worth};
 
 /// Density of the stand-in bodies, kg/m³: aluminium castings with as much air as metal.
 const DENSITY: f64 = 1300.0;
 /// Least half-width of a stand-in body, m.
 const LEAST_HALF_WIDTH: f64 = 0.06;
-/// Relative uncertainty of a stand-in body: right to a factor of a few.
-const STAND_IN_UNCERTAINTY: f64 = 3.0;
 /// Where nothing is known of a friction or drive value: this share of what the joint's torque and speed suggest.
 const SMALL_SHARE: f64 = 0.01;
 
@@ -37,6 +37,10 @@ pub(super) struct Prior {
     /// What a column's value can plausibly be: `scale`, for unstated friction, drive inertia and offset what would make all
     /// of the joint's torque.
     pub size: Vec<f64>,
+    /// Friction and drive inertia that would make all of the joint's torque, by column; 0 of the others.
+    whole: Vec<f64>,
+    /// Least-squares value of each column of friction or drive inertia; not a number where there is none.
+    seen: Vec<f64>,
     /// Relative uncertainty of each column; infinite where nothing is known.
     pub uncertainty: Vec<f64>,
     /// Rules.
@@ -81,6 +85,8 @@ impl Prior {
             centre: described.clone(),
             scale: vec![1.0; columns],
             size: Vec::new(),
+            whole: vec![0.0; columns],
+            seen: vec![f64::NAN; columns],
             uncertainty: vec![given; columns],
             rules: vec![Rule::NotNegative; columns],
             shares,
@@ -94,58 +100,80 @@ impl Prior {
         }
         let mut sizes = vec![0.0; columns];
         for c in 0..columns {
-            // Motor columns follow the standard ones, three a joint: inertia, viscous, Coulomb.
-            let (joint, place) = if c < n * COLUMNS {
-                (c / COLUMNS, c % COLUMNS)
-            } else {
-                let after = c - n * COLUMNS;
-                let place = match after % MOTOR_COLUMNS {
-                    motor_column::INERTIA => column::DRIVE_INERTIA,
-                    motor_column::VISCOUS => column::VISCOUS,
-                    _ => column::COULOMB,
-                };
-                ((after / MOTOR_COLUMNS).min(n - 1), place)
-            };
+            let (joint, place) = place_of(c, n);
             if place < INERTIAL {
                 continue;
             }
-            let size = hints.torque[joint]
-                / match place {
-                    column::DRIVE_INERTIA => hints.acceleration[joint],
-                    column::VISCOUS => hints.speed[joint],
-                    _ => 1.0,
-                }
-                .max(f64::MIN_POSITIVE);
-            let size = if size > 0.0 && size.is_finite() {
-                size
-            } else {
-                1.0
-            };
+            let size = size_of(place, joint, hints);
             if place == column::OFFSET {
                 prior.rules[c] = Rule::Free;
                 prior.scale[c] = size;
                 prior.uncertainty[c] = f64::INFINITY;
                 continue;
             }
-            if described[c] > 0.0 {
-                prior.scale[c] = described[c];
-                continue;
-            }
-            let value = hints.values[c];
-            prior.uncertainty[c] = f64::INFINITY;
-            // Where the motion tells it badly, least squares may give what no torque was there for.
-            prior.centre[c] = if value.is_nan() {
-                SMALL_SHARE * size
-            } else {
-                value.clamp(SMALL_SHARE * size, size)
+            prior.whole[c] = size;
+            prior.seen[c] = hints.values[c];
+            let quantity = match place {
+                column::DRIVE_INERTIA => Quantity::DriveInertia,
+                _ => Quantity::Friction,
             };
-            prior.scale[c] = prior.centre[c];
-            sizes[c] = size;
+            match worth(quantity, robot.origin, described[c]) {
+                Worth::Share(_) if described[c] > 0.0 => prior.scale[c] = described[c],
+                _ => {
+                    prior.forget(c);
+                    sizes[c] = size;
+                }
+            }
         }
         prior.size = (prior.scale.iter().zip(&sizes))
             .map(|(scale, size)| scale.max(*size))
             .collect();
         prior
+    }
+
+    /// Takes what stands in the description for no knowledge: it is a first value where the data give none.
+    fn forget(&mut self, c: usize) {
+        let (size, seen) = (self.whole[c], self.seen[c]);
+        self.uncertainty[c] = f64::INFINITY;
+        // Where the motion tells it badly, least squares may give what no torque was there for.
+        let value = if seen.is_nan() { self.centre[c] } else { seen };
+        self.centre[c] = value.clamp(SMALL_SHARE * size, size);
+        self.scale[c] = self.centre[c];
+    }
+
+    /// The same without those stated values of friction and drive inertia that the data contradict; `data` has the residual's noise as
+    /// unit, over the standard columns. Each is said.
+    pub(super) fn without_contradicted(
+        mut self,
+        data: &DMatrix<f64>,
+        right: &DVector<f64>,
+        robot: &Robot,
+    ) -> Self {
+        let own = self.own(data);
+        let surprise = right - &own * DVector::from_column_slice(&self.centre);
+        let spread: Vec<f64> = (self.uncertainty.iter().zip(&self.size))
+            .map(|(u, size)| if u.is_finite() { u * size } else { *size })
+            .collect();
+        let stated: Vec<usize> = (0..spread.len())
+            .filter(|&c| self.whole[c] > 0.0 && self.uncertainty[c].is_finite())
+            .collect();
+        for (c, times) in contradicted(&own, &surprise, &spread, &stated) {
+            let (joint, place) = place_of(c, robot.joints.len());
+            self.remarks.push(format!(
+                "Joint {}: the data contradict the described {} of {} by {} standard deviations of the description's worth and theirs, so it counts as not known.",
+                robot.joints[joint].name,
+                match place {
+                    column::DRIVE_INERTIA => "drive inertia",
+                    column::VISCOUS => "viscous friction",
+                    _ => "Coulomb friction",
+                },
+                format_significant(self.centre[c], 3),
+                format_significant(times, 2)
+            ));
+            self.forget(c);
+            self.size[c] = self.scale[c].max(self.whole[c]);
+        }
+        self
     }
 
     /// The same with values behind its own of which nothing is known but their size.
@@ -155,6 +183,8 @@ impl Prior {
         prior.centre.resize(all, 0.0);
         prior.scale.extend(sizes);
         prior.size.extend(sizes);
+        prior.whole.resize(all, 0.0);
+        prior.seen.resize(all, f64::NAN);
         prior.uncertainty.resize(all, f64::INFINITY);
         prior.rules.resize(all, Rule::Free);
         prior.shares = prior.shares.map(|shares| {
@@ -191,7 +221,7 @@ impl Prior {
                     stand_in[0]
                 ));
                 for c in at..at + INERTIAL {
-                    self.uncertainty[c] = STAND_IN_UNCERTAINTY.max(given);
+                    self.uncertainty[c] = STAND_IN.max(given);
                 }
                 // A block of finite size is always a body; the unit block answers for rounding.
                 match Divergence::new(&stand_in) {
@@ -260,6 +290,36 @@ impl Prior {
             // Barrier only: keeps the value off zero by a share of its own uncertainty.
             0.1
         }
+    }
+}
+
+/// Joint and place among the joint's columns of a standard column. Motor columns follow the standard ones, three a joint: inertia,
+/// viscous, Coulomb.
+fn place_of(c: usize, joints: usize) -> (usize, usize) {
+    if c < joints * COLUMNS {
+        return (c / COLUMNS, c % COLUMNS);
+    }
+    let after = c - joints * COLUMNS;
+    let place = match after % MOTOR_COLUMNS {
+        motor_column::INERTIA => column::DRIVE_INERTIA,
+        motor_column::VISCOUS => column::VISCOUS,
+        _ => column::COULOMB,
+    };
+    ((after / MOTOR_COLUMNS).min(joints.saturating_sub(1)), place)
+}
+
+/// What a friction, drive inertia or offset would be if it made all of the joint's torque; 1 where nothing moved.
+fn size_of(place: usize, joint: usize, hints: &Hints) -> f64 {
+    let motion = match place {
+        column::DRIVE_INERTIA => hints.acceleration[joint],
+        column::VISCOUS => hints.speed[joint],
+        _ => 1.0,
+    };
+    let size = hints.torque[joint] / motion.max(f64::MIN_POSITIVE);
+    if size > 0.0 && size.is_finite() {
+        size
+    } else {
+        1.0
     }
 }
 

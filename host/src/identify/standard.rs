@@ -17,12 +17,7 @@ use super::problem::{Fitted, Problem};
 use super::pseudo_inertia::{INERTIAL, least_eigenvalue};
 use crate::prepare::Survey;
 use crate::report::format_significant;
-use crate::robot::Robot;
-
-/// Relative uncertainty of the description's inertial values where none is given: right to a factor of about three. On
-/// the real arms (docs/arms.md) errors on data held back are the same to a few per cent from 1 to 3; at 1 the Stäubli
-/// TX40's model of momentum has 52 of 60 values within two published standard deviations, at 2 and 3 it has 55.
-pub(super) const DESCRIBED_UNCERTAINTY: f64 = 2.0;
+use crate::robot::{DESCRIBED, Robot};
 
 /// One standard parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -95,7 +90,7 @@ pub(super) fn prior_of(
         robot,
         columns,
         &hints(columns, (&base.columns, full), sizes),
-        uncertainty.unwrap_or(DESCRIBED_UNCERTAINTY),
+        uncertainty.unwrap_or(DESCRIBED),
     )
 }
 
@@ -253,13 +248,7 @@ pub(super) fn consistent_fit(
         said: vec![format!(
             "Convex problem solved in {} Newton steps. Intervals are those of the posterior: the description's inertial values count as right to {} times their size.",
             whole.steps,
-            format_significant(
-                problem
-                    .options
-                    .prior_uncertainty
-                    .unwrap_or(DESCRIBED_UNCERTAINTY),
-                2
-            )
+            format_significant(problem.options.prior_uncertainty.unwrap_or(DESCRIBED), 2)
         )],
         warnings: Vec::new(),
         doubtful: None,

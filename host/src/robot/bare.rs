@@ -1,7 +1,7 @@
 //! Robots of which no more than the geometry is known.
 
 use super::dh::GRAVITY;
-use super::{Joint, JointKind, Robot};
+use super::{Joint, JointKind, Origin, Robot};
 
 impl Joint {
     /// A joint of this geometry: alpha, a, theta and d of the modified Denavit–Hartenberg convention, rad and m.
@@ -32,6 +32,7 @@ impl Robot {
             workspace: Vec::new(),
             effects: Vec::new(),
             identified: None,
+            origin: Origin::Own,
         }
     }
 }

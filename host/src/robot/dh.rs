@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::angles::{ROUNDING, angle_about, right_angle, squared_poses, squared_theta};
 use super::urdf::{Body, Chain};
-use super::{Drive, Joint, JointKind, Robot};
+use super::{Drive, Joint, JointKind, Origin, Robot};
 use crate::report::format_significant;
 
 /// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
@@ -161,7 +161,10 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         joints.push(joint(body, [alpha, a, theta, d], &link));
         links.push(link);
     }
-    let robot = Robot::new(&chain.name, joints);
+    let robot = Robot {
+        origin: Origin::Urdf,
+        ..Robot::new(&chain.name, joints)
+    };
     Converted {
         robot,
         base,

@@ -24,6 +24,7 @@ mod sizes;
 mod text;
 mod urdf;
 mod workspace;
+mod worth;
 mod written;
 
 use std::collections::BTreeMap;
@@ -46,6 +47,7 @@ pub use screw::Screw;
 pub(crate) use urdf::is_placeholder;
 pub use urdf::{Original, Urdf};
 pub use workspace::Region;
+pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};
 
 /// Largest robot description that is read; the largest published URDF files are a hundredth of it.
 pub const MAX_BYTES: u64 = 16 << 20;
@@ -92,6 +94,9 @@ pub struct Robot {
     /// Where the values come from an identification: the band that they were found in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified: Option<IdentifiedBand>,
+    /// Where the values come from, which decides what they are worth ([`worth`]); no file says it.
+    #[serde(skip)]
+    pub origin: Origin,
 }
 
 /// Revolute or prismatic.

@@ -4,7 +4,7 @@ use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::lead::slack;
 use crate::diagnose::outcome::DataFault;
 use crate::diagnose::past::in_sessions;
-use crate::diagnose::refit::{Refit, open};
+use crate::diagnose::refit::{Open, Refit, open};
 use crate::diagnose::runs::{Run, copies};
 use crate::diagnose::sanity::{faults, too_short_to_judge, too_short_to_learn};
 use crate::diagnose::stated::Stated;
@@ -30,8 +30,8 @@ pub(super) struct Material<'a> {
     pub(super) loaded: Loaded,
     /// Those held back.
     pub(super) sealed: Option<Loaded>,
-    /// Base parameters that the training data tell less of than the description, which stay as described.
-    pub(super) open: Vec<usize>,
+    /// What of the description the training data tell less of, and what they contradict.
+    pub(super) open: Open,
     /// What was left out of them, sentences.
     pub(super) touches: Vec<String>,
 }
@@ -69,8 +69,8 @@ pub(super) fn intake<'a>(
         return Ok(Intake::Hold(Box::new(more)));
     }
     let open = open(&bench, &loaded.rows);
-    if !open.is_empty() {
-        bench.anchor.hold(&open);
+    if !open.held.is_empty() {
+        bench.anchor.hold(&open.held);
         let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
         loaded = rows(loaded)?;
         sealed = sealed.map(rows).transpose()?;

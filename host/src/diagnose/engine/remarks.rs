@@ -5,6 +5,7 @@ use rig_shared::effects::Kind;
 use crate::diagnose::bench::{Bench, Loaded};
 use crate::diagnose::floor;
 use crate::diagnose::profile::Profile;
+use crate::diagnose::refit::Open;
 use crate::diagnose::sentences::offsets;
 use crate::diagnose::solve::Solution;
 use crate::report::{format_significant, format_unit, format_value};
@@ -39,13 +40,13 @@ pub(super) fn weight_of_a_spring(
     })
 }
 
-/// Sentences on recordings learnt from and held back, the base parameters `open` to doubt, what the sensors read with the drive off,
+/// Sentences on recordings learnt from and held back, the what of the description is `open` to doubt, what the sensors read with the drive off,
 /// and the constants of the last model.
 pub(super) fn remarks(
     bench: &Bench,
     loaded: &Loaded,
     sealed: Option<&Loaded>,
-    open: &[usize],
+    open: &Open,
     sensor_zeros: &[[f64; 2]],
     last: &Solution,
 ) -> Vec<String> {
@@ -53,7 +54,8 @@ pub(super) fn remarks(
     words.extend(sealed.and_then(|sealed| own_rate(bench, sealed)));
     words.extend(read_off(bench.robot, sensor_zeros));
     words.extend(offsets(bench, last));
-    words.extend(held(bench, open));
+    words.extend(contradicted(bench, &open.contradicted));
+    words.extend(held(bench, &open.held));
     words.extend(sealed.and_then(|sealed| no_other_motion(loaded, sealed)));
     words
 }
@@ -94,6 +96,21 @@ fn no_other_motion(loaded: &Loaded, sealed: &Loaded) -> Option<String> {
         "The hold-out {} repeats the motion of {}: it shows what noise a model has learnt, and not whether it holds for another motion; hold back another one.",
         own.label, same.label
     ))
+}
+
+/// Described friction that is no knowledge beside these recordings.
+fn contradicted(bench: &Bench, list: &[(usize, f64)]) -> Vec<String> {
+    (list.iter())
+        .map(|&(k, times)| {
+            format!(
+                "The recordings contradict the described {} = {} {} by {} standard deviations of the description's worth and theirs: it is not held to that.",
+                bench.nominal.base.expression(k),
+                format_significant(bench.anchor.prior[k], 3),
+                format_unit(bench.nominal.base.unit(k)),
+                format_significant(times, 2)
+            )
+        })
+        .collect()
 }
 
 /// What was left as the description has it.

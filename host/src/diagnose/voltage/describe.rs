@@ -145,6 +145,7 @@ impl Told<'_> {
                 "The motor voltage drives each model, {}.",
                 self.driven
             ),
+            treatment: None,
             torque_lead: Vec::new(),
             places: Vec::new(),
             gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),

@@ -8,6 +8,7 @@ mod pictures;
 mod steps;
 #[cfg(test)]
 mod tests;
+mod treated;
 mod words;
 
 use super::{Context, parts};
@@ -35,6 +36,7 @@ pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
     sections.extend(limits::next(found));
     sections.extend(limits::limits(found));
     sections.extend(limits::tried(found));
+    sections.extend(treated::section(found));
     sections.push(parts::repeat(context));
     Document {
         title: format!("{}: what the model lacks", found.robot),
