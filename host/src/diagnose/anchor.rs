@@ -80,7 +80,7 @@ impl Anchor {
                 held.push(k);
                 gravity.push((k, prior[k]));
             } else {
-                if inertial && is_friction(c, n) && !states_friction(robot, c, prior[k]) {
+                if inertial && !states(robot, c, prior[k]) {
                     unstated.push(k);
                 }
                 free.push(vec![(k, 1.0)]);
@@ -193,20 +193,22 @@ pub(super) fn is_friction(c: usize, n: usize) -> bool {
     }
 }
 
-/// Whether the friction `value` of a standard column is knowledge.
-fn states_friction(robot: &Robot, c: usize, value: f64) -> bool {
+/// Whether the `value` of a standard column is stated: what is neither friction nor inertia of a drive is.
+fn states(robot: &Robot, c: usize, value: f64) -> bool {
     let n = robot.joints.len();
+    let quantity = match is_friction(c, n) {
+        true => Quantity::Friction,
+        false if c < n * COLUMNS && c % COLUMNS == column::DRIVE_INERTIA => Quantity::DriveInertia,
+        false => return true,
+    };
     let place = |c: usize| match c.checked_sub(n * COLUMNS) {
         None => c / COLUMNS,
         Some(motor) => motor / MOTOR_COLUMNS,
     };
     let joint = robot.joints.get(place(c));
-    let written = joint.is_some_and(|j| j.friction.is_some() || j.drive.is_some());
-    written
-        && matches!(
-            worth(Quantity::Friction, robot.origin, value),
-            Worth::Share(_)
-        )
+    let written = joint.is_some_and(|j| j.friction.is_some() || j.drive.is_some())
+        || quantity == Quantity::DriveInertia;
+    written && matches!(worth(quantity, robot.origin, value), Worth::Share(_))
 }
 
 /// The nominal columns along a direction.

@@ -9,7 +9,7 @@ use super::bench::Bench;
 use super::fit::Evidence;
 use super::outcome::Value;
 use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
-use super::refit::Refit;
+use super::refit::{Refit, described_sizes};
 use super::rows::{Column, combined};
 use super::solve::Solution;
 use super::type_b::LINK;
@@ -86,8 +86,10 @@ pub(super) fn change(
     if whole.gain < LEAST_GAIN || corrected(&whole) > SIGNIFICANT {
         return None;
     }
+    // A value described as 0, or as a rounding of it, is no size to compare a change with.
+    let sizes = described_sizes(bench);
     let moved_most = (all.iter())
-        .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(f64::MIN_POSITIVE))
+        .map(|&k| (after.values[k] - prior[k]).abs() / prior[k].abs().max(sizes[k]))
         .fold(0.0, f64::max);
     if moved_most < LEAST_CHANGE {
         return None;

@@ -35,6 +35,8 @@ mod past;
 #[cfg(test)]
 mod pendulum_tests;
 mod pictures;
+#[cfg(test)]
+mod planar_tests;
 mod predicted;
 mod profile;
 mod pull;
@@ -48,6 +50,8 @@ pub mod runs;
 pub mod sanity;
 pub mod scenario;
 mod search;
+#[cfg(test)]
+mod self_tests;
 mod sentences;
 mod simplex;
 mod slopes;

@@ -13,7 +13,7 @@ use super::rows::Nominal;
 use super::search::is_gear;
 use crate::identify::{Combinations, described as standard, redistributed};
 use crate::report::{format_significant, format_unit};
-use crate::robot::{Robot, RobotEffect, sane};
+use crate::robot::{Origin, Robot, RobotEffect, sane};
 
 /// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
 const LEAST_WEIGHT: f64 = 0.1;
@@ -70,6 +70,7 @@ pub(super) fn completed(
     model.gravity = gravity;
     // What its values were identified from before says nothing about the new ones.
     model.identified = None;
+    model.origin = Origin::Own;
     for fitted in effects {
         let kind = fitted.candidate.kind;
         if kind == Kind::GravityTilt {

@@ -370,7 +370,9 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
     let (fit, memory) = weighed(rows, &free);
     let columns: Vec<Vec<f64>> = free.iter().map(|column| fit.weighted(column)).collect();
     let torque = fit.weighted(&rows.torque.iter().cloned().map(Some).collect());
-    let mut spread = described_within(bench);
+    let mut spread: Vec<f64> = (described_sizes(bench).into_iter())
+        .map(|size| DESCRIBED * size)
+        .collect();
     for (k, column) in columns.iter().enumerate() {
         let whole = (dot(&torque, &torque) / dot(column, column)).sqrt();
         // It makes all of the torque at most.
@@ -421,8 +423,8 @@ pub(super) fn open(bench: &Bench, rows: &Rows) -> Open {
     Open { held, contradicted }
 }
 
-/// Standard deviation of what the description states of each free direction.
-fn described_within(bench: &Bench) -> Vec<f64> {
+/// Natural size of each free direction by the description: of its parameters, each at least a share of the largest of its kind.
+pub(super) fn described_sizes(bench: &Bench) -> Vec<f64> {
     let combination = &bench.nominal.base.combination;
     let sizes = weights(bench.robot, combination.ncols());
     (bench.anchor.free.iter())
@@ -434,7 +436,7 @@ fn described_within(bench: &Bench) -> Vec<f64> {
                     .sum();
                 (along * sizes[c]).powi(2)
             });
-            DESCRIBED * squares.sum::<f64>().sqrt()
+            squares.sum::<f64>().sqrt()
         })
         .collect()
 }

@@ -396,6 +396,43 @@ impl Nominal {
         self.motor_columns(motion, visit)
     }
 
+    /// Joint by joint, samples at which a motor is slow whose friction is in the joint's torque, though the joint may move fast; nothing
+    /// where every drive moves its own joint only. A motor counts as slow below what its joints' thresholds come to at it, as in an
+    /// identification.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    fn slow_motors(&self, run: &Run, thresholds: &[f64]) -> Result<Vec<Vec<bool>>, DiagnoseError> {
+        if self.transmission.is_simple() {
+            return Ok(Vec::new());
+        }
+        let n = self.joints();
+        let mut slow = vec![vec![false; run.len()]; n];
+        let (mut q, mut directions) = (vec![0.0; n], vec![0.0; n * n]);
+        for row in 0..run.len() {
+            for (q, joint) in q.iter_mut().zip(&run.joints) {
+                *q = joint.q[row];
+            }
+            self.transmission
+                .motor_directions(&q, &mut directions)
+                .map_err(|e| DiagnoseError::Model(e.to_string()))?;
+            for direction in directions.chunks_exact(n) {
+                let speed: f64 = (direction.iter().zip(&run.joints))
+                    .map(|(along, joint)| along * joint.qd[row])
+                    .sum();
+                let least: f64 = (direction.iter().zip(thresholds))
+                    .map(|(along, threshold)| (along * threshold).powi(2))
+                    .sum();
+                if speed.abs() < least.sqrt() {
+                    let moved =
+                        (slow.iter_mut().zip(direction)).filter(|(_, along)| **along != 0.0);
+                    moved.for_each(|(slow, _)| slow[row] = true);
+                }
+            }
+        }
+        Ok(slow)
+    }
+
     fn motor_columns(
         &self,
         motion: [&[Vec<f64>]; 3],
@@ -475,6 +512,7 @@ impl Rows {
         let [mut keep, mut legible, mut clear] = [(); 3].map(|()| vec![Vec::new(); n]);
         let mut columns: Vec<Column> = vec![vec![None; n]; nominal.base.len()];
         for run in runs {
+            let motors = nominal.slow_motors(run, &treatment.speed_threshold)?;
             let before = starts.last().copied().unwrap_or(0);
             let rows = thinning.kept(run.len()).count();
             for (j, joint) in run.joints.iter().enumerate() {
@@ -488,6 +526,11 @@ impl Rows {
                         f64::from(u8::from(v.abs() < threshold || limited))
                     })
                     .collect();
+                for (spoilt, slow) in spoilt.iter_mut().zip(motors.get(j).into_iter().flatten()) {
+                    if *slow {
+                        *spoilt = 1.0;
+                    }
+                }
                 for part in &run.left_out {
                     spoilt[part.clone()].fill(1.0);
                 }

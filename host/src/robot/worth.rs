@@ -62,7 +62,9 @@ pub fn worth(quantity: Quantity, origin: Origin, value: f64) -> Worth {
         (Quantity::StandInBody, _) => Worth::Share(STAND_IN),
         // What exporters write where nothing was entered.
         (Quantity::Friction, Origin::Urdf) if value <= 0.0 => Worth::Unknown,
-        (Quantity::DriveInertia, _) | (Quantity::Friction, Origin::Own) => Worth::Share(DESCRIBED),
+        // URDF has no place for it.
+        (Quantity::DriveInertia, Origin::Urdf) => Worth::Unknown,
+        (Quantity::DriveInertia | Quantity::Friction, Origin::Own) => Worth::Share(DESCRIBED),
         (Quantity::Friction, Origin::Urdf) => Worth::Factor(URDF_FRICTION),
         // It is a matter of sensors and postures, and fitted wherever it can be.
         (Quantity::Offset, _) => Worth::Unknown,
