@@ -330,11 +330,17 @@ fn effect(number: usize, step: &Step, of_joint: bool) -> String {
         format!("; these data support as well: {}", rivals.join(", "))
     };
     format!(
-        "{number}. {}{law} at joint {}, {} % of the gap {}before it{open}",
+        "{number}. {}{law} at joint {}, {}{open}",
         step.effect,
         step.joint,
-        format_significant(100.0 * step.gap_closed, 3),
-        if of_joint { "of that joint " } else { "" },
+        match (0.0..=1.0).contains(&step.gap_closed) {
+            true => format!(
+                "{} of the gap {}before it",
+                step.fall(),
+                if of_joint { "of that joint " } else { "" }
+            ),
+            false => format!("residual {} RMS", step.fall()),
+        },
     )
 }
 

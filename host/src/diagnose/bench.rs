@@ -11,6 +11,7 @@ use super::anchor::Anchor;
 use super::columns::{Candidate, DELAY, Source};
 use super::fit::Evidence;
 use super::floor;
+use super::one_way::OneWay;
 use super::predicted::{Predicted, predict};
 use super::profile::Profile;
 use super::refit::Refit;
@@ -64,6 +65,8 @@ pub(super) struct Bench<'a> {
     treatment: Treatment,
     /// Joints of which rows about rests are used.
     rests: Vec<usize>,
+    /// Joints that move in one direction only, whose constant torques are held.
+    pub(super) one_way: Vec<OneWay>,
 }
 
 impl<'a> Bench<'a> {
@@ -86,7 +89,17 @@ impl<'a> Bench<'a> {
             nominal,
             treatment: treatment_of(training, robot)?,
             rests: Vec::new(),
+            one_way: Vec::new(),
         })
+    }
+
+    /// What a base parameter is called: of a joint that moves in one direction only, its dry friction with the constant in it.
+    pub(super) fn expression(&self, parameter: usize) -> String {
+        let own = (self.one_way.iter()).find(|own| own.friction() == parameter);
+        own.map_or_else(
+            || self.nominal.base.expression(parameter),
+            |own| own.named(self.anchor.prior[own.constant()]),
+        )
     }
 
     /// Reads recordings to learn from and takes off what the held effects and parameters contribute.
@@ -148,6 +161,9 @@ impl<'a> Bench<'a> {
         take_off(&mut rows.torque, &held);
         for &joint in &self.rests {
             rows.use_rests(joint);
+        }
+        for own in &self.one_way {
+            own.leave_out_rests(&mut rows);
         }
         Ok(Loaded {
             runs,

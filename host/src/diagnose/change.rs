@@ -142,7 +142,7 @@ pub(super) fn change(
         });
     }
     let name = |k: usize| match anchor.free[k].as_slice() {
-        [(b, _)] => bench.nominal.base.expression(*b),
+        [(b, _)] => bench.expression(*b),
         _ => "the first moment (gravity)".into(),
     };
     for &k in &all {

@@ -143,7 +143,11 @@ impl Descent {
     /// Noise floors of the data that a share of the gap is of, the training's given.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
         (self.noise(floors).zip(&self.rounding))
-            .map(|(floor, rounding)| rounding.max(floor))
+            // Of an unknown floor the steps of an encoder say nothing.
+            .map(|(floor, rounding)| match floor.is_nan() {
+                true => floor,
+                false => rounding.max(floor),
+            })
             .collect()
     }
 
@@ -155,11 +159,15 @@ impl Descent {
     }
 
     /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
-    /// parameters count as a step. 0 where there is no gap.
-    pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> f64 {
+    /// parameters count as a step. 1 at most: below the floor there is nothing to explain. None where there is no gap, it has grown, or
+    /// no joint's floor is known.
+    pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> Option<f64> {
         let fall = self.holdout.as_ref().unwrap_or(&self.train);
         let (mut gap, mut closed) = (0.0, 0.0);
         for (j, floor) in self.floors(floors).iter().enumerate() {
+            if floor.is_nan() {
+                continue;
+            }
             let [refitted, last] = fall.whole(j);
             let first = if changed {
                 fall.frozen[j].max(refitted)
@@ -169,7 +177,7 @@ impl Descent {
             gap += (first - floor) / floor;
             closed += (first - last) / floor;
         }
-        if gap > 0.0 { closed / gap } else { 0.0 }
+        (gap > 0.0 && closed >= 0.0).then(|| (closed / gap).min(1.0))
     }
 
     /// As a result has it; `found` are the effects that the description does not state.

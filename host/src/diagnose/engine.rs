@@ -4,6 +4,7 @@ mod even;
 mod follow;
 mod intake;
 mod pass;
+mod plausible;
 mod remarks;
 mod steps;
 mod trial;
@@ -32,6 +33,7 @@ use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Before, Diagnosis, Residual, Verdict};
 use super::profile::Profile;
+use super::proof::{Proof, unexplained};
 use super::refit::Refit;
 use super::rounding::rounding;
 use super::search::{is_friction, with};
@@ -278,9 +280,30 @@ fn attempt(
         fallen.extend(search.still_taking(&refit.base, &found)?);
         judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
     }
+    let proof = Proof {
+        robot,
+        fitting: &fitting,
+        base: &refit.base,
+        loaded,
+        sealed: sealed.as_ref(),
+        descent: &descent,
+    };
+    let sizes = proof.left(&judged, described)?;
+    if judged.left.is_none() {
+        let of = |name: &str| robot.joints.iter().position(|joint| joint.name == name);
+        let named = |name: &str| {
+            (judged.chosen[described..].iter()).any(|p| Some(p.candidate.joint) == of(name))
+        };
+        judged.left = unexplained(&sizes, &named);
+    }
     let left = judged.left.is_some();
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));
-    let Judged { chosen, floors, .. } = &judged;
+    let Judged {
+        chosen,
+        floors,
+        known,
+        ..
+    } = &judged;
     let stands = fitting.of(chosen)?;
     joint.solution.values = stands.coefficients(&bench.anchor);
     let after = &joint.solution;
@@ -315,8 +338,7 @@ fn attempt(
     let without = &options.without;
     let friction = chosen.iter().any(|p| is_friction(p.candidate.kind));
     let change = change(&bench, &refit, &explained, friction, left, after, without);
-    if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, floors))
-    {
+    if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, known)) {
         let given = replay.errors_of(&stated.moving());
         let last = motion.last().and_then(Option::as_ref);
         let tip = robot.joints.len() - 1;
@@ -361,7 +383,9 @@ fn attempt(
         ),
         residual: Residual::Torque,
         words: Vec::new(),
-        noise_floor_rms: floors.clone(),
+        noise_floor_rms: known.clone(),
+        noise_floor_from: judged.from.clone(),
+        left: sizes,
         noise_floor_how: String::new(),
         motion_how: replay.told(chosen, described)?,
         treatment: Some(treated(robot, loaded, sealed.as_ref())),
@@ -371,7 +395,9 @@ fn attempt(
             floors,
             &chosen[..described],
         ),
-        gap_closed: (!steps.is_empty()).then(|| descent.gap_closed(floors, change.is_some())),
+        gap_closed: (!steps.is_empty())
+            .then(|| descent.gap_closed(known, change.is_some()))
+            .flatten(),
         described: stood,
         steps,
         absorbed,
@@ -382,7 +408,7 @@ fn attempt(
         next_experiment: None,
         remainder: judged.left.clone(),
         data_faults: Vec::new(),
-        waterfall: descent.waterfall(robot, &chosen[described..], floors),
+        waterfall: descent.waterfall(robot, &chosen[described..], known),
         tried,
         maps: Vec::new(),
         curves: Vec::new(),
@@ -401,8 +427,10 @@ fn attempt(
         described,
         coordinates: &coordinates,
         floors,
+        known,
         seed: options.seed,
         sensor_zeros: &options.sensor_zeros,
+        one_way: &bench.one_way,
         drawn: Drawn {
             runs: &drawn.runs,
             rows: &drawn.rows,

@@ -33,6 +33,8 @@ pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
         residual: Residual::Torque,
         words: Vec::new(),
         noise_floor_rms: Vec::new(),
+        noise_floor_from: Vec::new(),
+        left: Vec::new(),
         noise_floor_how: String::new(),
         motion_how: String::new(),
         treatment: None,

@@ -5,6 +5,7 @@ use super::fit::Fit;
 use super::floor::repeats;
 use super::locate::Coordinate;
 use super::motion::Positions;
+use super::one_way::OneWay;
 use super::outcome::Diagnosis;
 use super::profile::Profile;
 use super::rows::{Nominal, Rows};
@@ -37,10 +38,14 @@ pub(super) struct Found<'a, 'r> {
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Noise floor, joint by joint.
     pub(super) floors: &'a [f64],
+    /// … that no model made; NaN where none is known.
+    pub(super) known: &'a [f64],
     /// Of the bootstrap.
     pub(super) seed: u64,
     /// What the sensors read with the drive off, where that was recorded.
     pub(super) sensor_zeros: &'a [[f64; 2]],
+    /// Joints that move in one direction only.
+    pub(super) one_way: &'a [OneWay],
     /// Recordings to draw.
     pub(super) drawn: Drawn<'a>,
 }
@@ -79,6 +84,59 @@ pub(super) fn finish(found: &Found, diagnosis: &mut Diagnosis) -> Result<(), Dia
     diagnosis.not_testable = limits::not_testable(found)?;
     diagnosis.detectable = limits::detectable(found, &diagnosis.not_testable)?;
     diagnosis.next_experiment = limits::next(found, diagnosis, found.model)?;
-    diagnosis.words = sentences::verdict(diagnosis, !pairs.is_empty());
+    diagnosis.words = untested(found, diagnosis, !pairs.is_empty())
+        .into_iter()
+        .chain(sentences::verdict(diagnosis, !pairs.is_empty()))
+        .collect();
     Ok(())
+}
+
+/// What the recordings did not test although it decides what a verdict is worth, a sentence; none where they did.
+///
+/// Friction near standstill is not tested where a law of it as large as the joint's dry friction would not have shown at some of its
+/// shapes: presliding turns all of the dry friction into one.
+fn untested(found: &Found, diagnosis: &Diagnosis, repeated: bool) -> Option<String> {
+    let near_rest = ["presliding", "stribeck"];
+    let friction = |name: &str| {
+        let own = found.model.joints.iter().find(|joint| joint.name == name)?;
+        Some(own.friction.as_ref()?.coulomb.abs())
+    };
+    let named = |joint: &str| {
+        let own = |effect: &str, at: &str| at == joint && near_rest.contains(&effect);
+        (diagnosis.steps.iter()).any(|step| own(&step.effect, &step.joint))
+            || (diagnosis.described.iter()).any(|stated| own(&stated.effect, &stated.joint))
+    };
+    let lacking = (diagnosis.not_testable.iter())
+        .filter(|lacking| near_rest.contains(&lacking.effect.as_str()))
+        .map(|lacking| lacking.joint.as_str());
+    let small = (diagnosis.detectable.iter())
+        .filter(|size| near_rest.contains(&size.effect.as_str()))
+        .filter(|size| {
+            let worst = size.size_at_worst.unwrap_or(size.size);
+            friction(&size.joint).is_some_and(|coulomb| coulomb > 0.0 && worst > coulomb)
+        })
+        .map(|size| size.joint.as_str());
+    let mut joints: Vec<&str> = lacking.chain(small).filter(|joint| !named(joint)).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let mut parts = Vec::new();
+    if !joints.is_empty() {
+        parts.push(format!(
+            "friction near standstill at joint {} (no slow reversals among these recordings, or too few; `rig excite --kind reversals`)",
+            joints.join(", ")
+        ));
+    }
+    if !found.one_way.is_empty() {
+        let names: Vec<&str> = (found.one_way.iter())
+            .map(|own| found.robot.joints[own.joint].name.as_str())
+            .collect();
+        parts.push(format!("the other direction of joint {}", names.join(", ")));
+    }
+    if diagnosis.waterfall.iter().all(|w| w.holdout.is_empty()) {
+        parts.push("another motion (no hold-out)".into());
+    }
+    if !repeated {
+        parts.push("what is noise (no motion was recorded twice)".into());
+    }
+    (!parts.is_empty()).then(|| format!("Not tested: {}.", parts.join("; ")))
 }

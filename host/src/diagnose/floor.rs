@@ -2,11 +2,21 @@
 
 use super::rows::Rows;
 use super::runs::{Differences, Run};
+use crate::prepare::Welch;
 
 /// Share of the band of thinned rows that the low-pass before the thinning passes.
 const PASSED: f64 = 0.8;
 /// Squares of third differences over those of second ones from which a reading counts as white, where it would be 10/3.
 const STILL_WHITE: f64 = 3.2;
+/// Samples of a segment of a torque's spectrum.
+const SEGMENT: usize = 1024;
+/// Parts, equal in log frequency, of the band in which a torque's noise is looked for.
+const BANDS: usize = 6;
+/// Upper end of that band as a share of the rate: beyond it the filter before a sampler takes part.
+const TOP: f64 = 0.45;
+/// Times by which the density of a part may be off the line of noise of first order. The median of some hundred averages of a
+/// periodogram varies by less than a tenth; a line of a drive, or a tail of the motion, is off by more than half.
+const OFF_LINE: f64 = 1.5;
 /// Two recordings repeat each other when their references (else their positions) differ by less than this share of their
 /// spread.
 const ALIKE: f64 = 0.02;
@@ -176,6 +186,80 @@ pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64>
     white.then(|| (all.variance() * passed).sqrt())
 }
 
+/// RMS on rows `period` s apart of a torque's noise, by its spectrum beyond the band of the rows. None where that band is less than an
+/// octave wide, or is not that of noise that a filter of first order has passed at most.
+///
+/// Noise of a sensor behind such a filter is an autoregression of first order, with the density S₀/(1 + (f/f₁)²). Its reciprocal is a
+/// line over f², which is fitted to the medians of [`BANDS`] parts of the band. The corner f₁ has to lie beyond the band of the rows:
+/// below it, such noise is not told from the torque of dry friction, which falls with f² as well.
+pub(super) fn beyond_band(runs: &[Run], joint: usize, period: f64) -> Option<f64> {
+    let rate = runs.first()?.rate;
+    let [low, high] = [0.5 / period, TOP * rate];
+    if high < 2.0 * low {
+        return None;
+    }
+    let mut welch = Welch::new(SEGMENT);
+    for run in runs {
+        welch.interrupt();
+        run.joints[joint]
+            .recorded()
+            .iter()
+            .for_each(|tau| welch.push(*tau));
+    }
+    let (frequency, density) = welch.density(rate)?;
+    let edge = |k: usize| low * (high / low).powf(k as f64 / BANDS as f64);
+    let bands: Vec<[f64; 2]> = (0..BANDS)
+        .filter_map(|k| {
+            let inside = |f: f64| edge(k) <= f && f < edge(k + 1);
+            let mut own: Vec<f64> = (frequency.iter().zip(&density))
+                .filter(|(f, _)| inside(**f))
+                .map(|(_, density)| *density)
+                .collect();
+            own.sort_by(f64::total_cmp);
+            let middle = *own.get(own.len() / 2)?;
+            Some([(edge(k) * edge(k + 1)).sqrt(), middle])
+        })
+        .collect();
+    let [level, corner] = first_order(&bands)?;
+    let passed = PASSED * low;
+    // The integral of the density over the rows' band.
+    let variance = match corner.is_finite() {
+        true => level * corner * (passed / corner).atan(),
+        false => level * passed,
+    };
+    (corner > low && variance > 0.0).then(|| variance.sqrt())
+}
+
+/// Density at low frequency and corner of noise of first order through points of frequency and density; an infinite corner of white
+/// noise. None where a point is off by more than [`OFF_LINE`] times.
+fn first_order(points: &[[f64; 2]]) -> Option<[f64; 2]> {
+    // The reciprocal density times the density is 1: each point counts alike, whatever its level.
+    let mut normal = [[0.0; 2]; 2];
+    let mut right = [0.0; 2];
+    for [f, density] in points {
+        let row = [*density, f * f * density];
+        for a in 0..2 {
+            right[a] += row[a];
+            for b in 0..2 {
+                normal[a][b] += row[a] * row[b];
+            }
+        }
+    }
+    let determinant = normal[0][0] * normal[1][1] - normal[0][1] * normal[1][0];
+    let slope = (normal[0][0] * right[1] - normal[1][0] * right[0]) / determinant;
+    let [constant, slope] = if slope > 0.0 {
+        [(right[0] - normal[0][1] * slope) / normal[0][0], slope]
+    } else {
+        [right[0] / normal[0][0], 0.0]
+    };
+    let on_line = |[f, density]: &[f64; 2]| {
+        let ratio = density * (constant + slope * f * f);
+        (1.0 / OFF_LINE..OFF_LINE).contains(&ratio)
+    };
+    (points.len() == BANDS && constant > 0.0 && points.iter().all(on_line))
+        .then(|| [1.0 / constant, (constant / slope).sqrt()])
+}
+
 /// Standard deviation of a sample of white noise whose RMS on rows so many `samples` apart is `noise`.
 pub(super) fn of_a_sample(noise: f64, samples: f64) -> f64 {
     noise * (samples / PASSED).max(1.0).sqrt()
@@ -240,5 +324,54 @@ mod tests {
         let filtered = white.windows(4).map(|w| w.iter().sum::<f64>() / 4.0);
         assert_eq!(reading(filtered.collect()), None);
         assert_eq!(reading((0..20_000).map(smooth).collect()), None);
+    }
+
+    /// Noise that a filter of first order has passed, beside a motion of 0.5 to 6 Hz and its dry friction; what its band below the
+    /// rows' edge holds is known by its own spectrum. Where the corner lies within the rows' band it is not told from friction.
+    #[test]
+    fn noise_behind_a_filter_is_found_beyond_the_band() {
+        let [rate, period, std] = [1000.0, 0.01, 0.2];
+        let noise = |corner: f64| {
+            let pole = (-2.0 * std::f64::consts::PI * corner / rate).exp();
+            let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+            let mut state = 0.0;
+            let own: Vec<f64> = (0..60_000)
+                .map(|_| {
+                    let white = std * 12.0_f64.sqrt() * (rng.random::<f64>() - 0.5);
+                    state = pole * state + (1.0 - pole) * white;
+                    state
+                })
+                .collect();
+            own
+        };
+        let found = |corner: f64| {
+            let tau = noise(corner).into_iter().enumerate().map(|(k, noise)| {
+                let t = k as f64 / rate;
+                let v = (3.1 * t).sin() + 0.4 * (37.0 * t).sin();
+                2.0 * v + 0.1 * (20.0 * v).tanh() + noise
+            });
+            let joint = JointRun {
+                tau: tau.collect(),
+                ..JointRun::default()
+            };
+            let run = Run {
+                rate,
+                joints: vec![joint],
+                ..Run::default()
+            };
+            beyond_band(&[run], 0, period)
+        };
+        // One-sided density of the white noise, passed in the rows' band.
+        let passed = PASSED * 0.5 / period;
+        let expected = |corner: f64| {
+            let level = std * std / (0.5 * rate);
+            (level * corner * (passed / corner).atan()).sqrt()
+        };
+        for corner in [80.0, 150.0] {
+            let ratio = found(corner).unwrap_or(f64::NAN) / expected(corner);
+            println!("{corner} Hz: {ratio}");
+            assert!((ratio - 1.0).abs() < 0.15, "{corner}: {ratio}");
+        }
+        assert_eq!(found(5.0), None);
     }
 }

@@ -16,8 +16,9 @@ use super::experiment::exact;
 use super::fit::Fit;
 use super::floor::{self, Repeated};
 use super::locate::{Coordinate, Known, Refitted, locate};
-use super::outcome::{Place, Remainder};
+use super::outcome::{FloorFrom, Place, Remainder};
 use super::profile::{Profile, SIGNIFICANT};
+use super::proof::of_torque;
 use super::rows::Rows;
 use super::search::{Search, is_gear, shadow, with};
 
@@ -74,6 +75,10 @@ pub(super) struct Judged {
     pub(super) floors: Vec<f64>,
     /// … of rows as they count.
     pub(super) quiet: Vec<f64>,
+    /// Noise floor that no model made, joint by joint; NaN where none is known.
+    pub(super) known: Vec<f64>,
+    /// What each of them rests on.
+    pub(super) from: Vec<FloorFrom>,
     /// What is left beyond it.
     pub(super) left: Option<Remainder>,
     /// Names that were no more than guesses at it.
@@ -182,6 +187,9 @@ impl Judge<'_, '_> {
                 )
             })
             .unzip();
+        let (known, from) = (0..bursts.len())
+            .map(|j| self.known_floor(noise(0, j), j))
+            .unzip();
         let left = (0..quiet.len())
             .filter_map(|j| {
                 let own = own[j][1].filter(|_| !plays(j));
@@ -206,6 +214,20 @@ impl Judge<'_, '_> {
             chosen,
             floors,
             quiet,
+            known,
+            from,
+        }
+    }
+
+    /// Noise floor of a joint that no model made, and what it rests on; `repeated` is what repeated runs say.
+    fn known_floor(&self, repeated: Option<f64>, joint: usize) -> (f64, FloorFrom) {
+        let runs = self.search.source.runs;
+        match repeated {
+            Some(noise) => (noise, FloorFrom::RepeatedRuns),
+            None => match of_torque(runs, joint, self.rows.period) {
+                Some(noise) => (noise.max(self.rounding[joint]), FloorFrom::TorqueReading),
+                None => (f64::NAN, FloorFrom::Unknown),
+            },
         }
     }
 
@@ -386,10 +408,13 @@ pub(super) fn besides(
     (TREATED * torque).powi(2) + shadow
 }
 
-/// Share of the gap to the floor that a fall of the RMS closes; 0 where there was none.
+/// Share of the gap to the floor that a fall of the RMS closes, 1 at most; 0 where there was none, NaN where the floor is not known.
 pub(super) fn closed([before, after]: [f64; 2], floor: f64) -> f64 {
-    if before > floor {
-        (before - after) / (before - floor)
+    if floor.is_nan() {
+        f64::NAN
+    } else if before > floor {
+        // Below the floor there is nothing to explain.
+        ((before - after) / (before - floor)).min(1.0)
     } else {
         0.0
     }

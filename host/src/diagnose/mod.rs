@@ -30,6 +30,7 @@ mod locate;
 mod misfit;
 mod model;
 mod motion;
+mod one_way;
 pub mod outcome;
 mod past;
 #[cfg(test)]
@@ -39,6 +40,7 @@ mod pictures;
 mod planar_tests;
 mod predicted;
 mod profile;
+mod proof;
 mod pull;
 mod quiet;
 #[cfg(test)]

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::report::{format_significant, format_value};
+use crate::report::{format_significant, format_unit, format_value};
 
 /// Shares of a gap that differ by less are written alike.
 const SAME_SHARE: f64 = 5e-4;
+
+/// Least posterior probability of a name that is called certain: the usual level of an interval.
+const CERTAIN: f64 = 0.95;
 
 /// What became of the gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -15,7 +18,7 @@ const SAME_SHARE: f64 = 5e-4;
 pub enum Verdict {
     /// The model explains the data to the noise floor as it is.
     NothingMissing,
-    /// Named effects close the gap to the noise floor.
+    /// Named effects close the gap to a noise floor that no model made, or nearly all of it.
     Explained,
     /// The structure holds; a nominal parameter has changed.
     ParameterChange,
@@ -34,6 +37,43 @@ pub enum Residual {
     Torque,
     /// The position of the model that runs freely on the recorded voltage, rad or m.
     Position,
+}
+
+/// What a noise floor rests on. None of these is a model of the torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FloorFrom {
+    /// Two runs of one motion: the difference of their residuals.
+    RepeatedRuns,
+    /// The torque's own noise beyond the band of the motion. A lower limit: noise of the position is not in it.
+    TorqueReading,
+    /// No motion was repeated, and the noise of the torque is not told from its signal.
+    Unknown,
+}
+
+/// What the model that is written leaves of a joint's torque, on data that it was not fitted to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Left {
+    /// Name of the joint.
+    pub joint: String,
+    /// ASCII, N*m or N.
+    pub unit: String,
+    /// Whether the data are the hold-out; else blocks of the training data, left out of the fit in turn.
+    pub on_holdout: bool,
+    /// RMS of the residual with the description's parameters fitted again.
+    pub before: f64,
+    /// RMS of the residual of the written model.
+    pub after: f64,
+    /// Noise floor of these data; NaN (null) where none is known.
+    pub floor: f64,
+    /// What it rests on.
+    pub floor_from: FloorFrom,
+    /// RMS of the recorded torque.
+    pub torque: f64,
+    /// `after` in per cent of `torque`.
+    pub percent_of_torque: f64,
+    /// Whether `after` is the noise floor or nearly all of the gap is closed.
+    pub explained: bool,
 }
 
 /// Where part of the gap sits.
@@ -96,6 +136,9 @@ pub struct Step {
     pub parameters: BTreeMap<String, Value>,
     /// Corrected for all that was tried.
     pub p_value: f64,
+    /// Posterior probability of the name among all that were tried in its place, by what each leaves of blocks that it was not
+    /// fitted to; NaN (null) where no search compared them.
+    pub name_probability: f64,
     /// Best name outside the set.
     pub runner_up: Option<String>,
     /// Share of this step's gap that the runner-up would have closed.
@@ -109,7 +152,8 @@ pub struct Step {
     pub holdout_rms: Option<[f64; 2]>,
     /// RMS of the simulated motion's error before and after this step, rad or m; null where it cannot be simulated.
     pub motion_rms: Option<[f64; 2]>,
-    /// Share of the hold-out's (else the training) gap that this step closes.
+    /// Share of the hold-out's (else the training) gap that this step closes, 1 at most; NaN (null) where no noise floor is known or
+    /// the RMS has grown.
     pub gap_closed: f64,
     /// Why to believe it, one sentence.
     pub why: String,
@@ -334,7 +378,7 @@ pub struct Waterfall {
     pub train: Vec<f64>,
     /// RMS over the hold-out; empty without one.
     pub holdout: Vec<f64>,
-    /// Noise floor.
+    /// Noise floor; NaN (null) where none is known.
     pub floor: f64,
     /// … of the hold-out's rows, of which fewer samples are the mean where it was recorded more slowly.
     pub holdout_floor: f64,
@@ -395,6 +439,25 @@ pub struct Tried {
     pub p_value: f64,
     /// Why it was not taken; empty for the one that was.
     pub refused: String,
+}
+
+impl Step {
+    /// RMS before and after, of the hold-out, else of the training data.
+    pub(crate) fn judged(&self) -> [f64; 2] {
+        self.holdout_rms.unwrap_or(self.train_rms)
+    }
+
+    /// How far the step closes its gap: a share from 0 to 1 in per cent, else the RMS before and after, as a share of a gap whose floor
+    /// is not known, or that has grown, is no number.
+    pub(crate) fn fall(&self) -> String {
+        match (0.0..=1.0).contains(&self.gap_closed) {
+            true => format!("{} %", format_significant(100.0 * self.gap_closed, 3)),
+            false => {
+                let [before, after] = self.judged().map(|rms| format_significant(rms, 3));
+                format!("{before} → {after} {}", format_unit(&self.rms_unit))
+            }
+        }
+    }
 }
 
 impl Waterfall {
@@ -467,8 +530,12 @@ pub struct Diagnosis {
     pub residual: Residual,
     /// The verdict in words, sentences.
     pub words: Vec<String>,
-    /// Per joint, in the residual's unit.
+    /// Per joint, in the residual's unit; NaN (null) where none is known.
     pub noise_floor_rms: Vec<f64>,
+    /// What each of them rests on; empty where the residual is no torque.
+    pub noise_floor_from: Vec<FloorFrom>,
+    /// What the written model leaves, joint by joint; empty where the residual is no torque.
+    pub left: Vec<Left>,
     /// How it was estimated, a sentence.
     pub noise_floor_how: String,
     /// How the motion was simulated, or why not, a sentence.
@@ -516,6 +583,18 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether a step's name is certain: no other name is in its set, the posterior probability of the name is at least [`CERTAIN`], and
+    /// what is left of its joint leaves nothing for another name to explain.
+    pub(crate) fn is_certain(&self, step: &Step) -> bool {
+        let own = self.left.iter().find(|left| left.joint == step.joint);
+        let left =
+            (self.remainder.as_ref()).is_some_and(|r| r.joint == step.joint && r.unit != "V");
+        step.set.len() < 2
+            && (step.name_probability.is_nan() || step.name_probability >= CERTAIN)
+            && own.is_none_or(|own| own.explained)
+            && !left
+    }
+
     /// Share that the effects close of the gap which fitting the description's parameters again leaves, where [`Self::gap_closed`]
     /// counts that fitting in; none where it is of the effects alone.
     pub(crate) fn closed_by_effects(&self) -> Option<f64> {

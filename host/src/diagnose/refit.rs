@@ -291,7 +291,7 @@ impl<'r> Refit<'r> {
 fn of_directions(bench: &Bench) -> impl Iterator<Item = (String, String, f64)> {
     let base = &bench.nominal.base;
     (bench.anchor.free.iter()).map(|direction| match direction.as_slice() {
-        [(b, _)] => (base.expression(*b), base.unit(*b).to_owned(), 1.0),
+        [(b, _)] => (bench.expression(*b), base.unit(*b).to_owned(), 1.0),
         // The one direction of several parameters is that of gravity, along the first moment as described.
         _ => (GRAVITY.to_owned(), "N*m".to_owned(), bench.nominal.pull()),
     })
@@ -553,6 +553,12 @@ impl Joint {
     pub(super) fn gains(&self, chosen: &[Profile], free: usize, k: usize) -> &[f64] {
         let at = place(chosen, free, k);
         &self.solution.values[at..at + chosen[k].columns.len()]
+    }
+
+    /// A gain of the `k`-th effect with its standard deviation.
+    pub(super) fn gain(&self, chosen: &[Profile], free: usize, k: usize, gain: usize) -> [f64; 2] {
+        let at = place(chosen, free, k) + gain;
+        [self.solution.values[at], self.solution.std(at)]
     }
 
     /// Effect and place of each shape that the motion tells, with value and standard deviation.

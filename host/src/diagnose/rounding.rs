@@ -26,22 +26,26 @@ pub(super) fn rounding(
     let Some(run) = source.runs.first() else {
         return Ok(vec![0.0; joints]);
     };
-    let mut read = run.clone();
-    for (joint, own) in read.joints.iter_mut().enumerate() {
-        let step = resolution(std::slice::from_ref(run), joint);
-        if step == 0.0 {
-            continue;
+    // The motion passes the filter twice either way: what that takes off it is not of the steps.
+    let filtered = |read: &dyn Fn(f64, f64) -> f64| {
+        let mut again = run.clone();
+        for (joint, own) in again.joints.iter_mut().enumerate() {
+            let step = resolution(std::slice::from_ref(run), joint);
+            if step == 0.0 {
+                continue;
+            }
+            let positions: Vec<f64> = own.q.iter().map(|q| read(*q, step)).collect();
+            own.q = filter.zero_phase(&positions);
+            own.qd = central_difference(&own.q, 1.0 / run.rate);
+            own.qdd = second_difference(&own.q, 1.0 / run.rate);
         }
-        let again: Vec<f64> = (own.q.iter())
-            .map(|q| step * ((q / step).floor() + 0.5))
-            .collect();
-        own.q = filter.zero_phase(&again);
-        own.qd = central_difference(&own.q, 1.0 / run.rate);
-        own.qdd = second_difference(&own.q, 1.0 / run.rate);
-    }
+        again
+    };
+    let smooth = filtered(&|q, _| q);
+    let read = filtered(&|q, step| step * ((q / step).floor() + 0.5));
     // The source's own prediction may hold effects.
     let [before, after] =
-        [run, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
+        [&smooth, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
     let (before, after) = (before?, after?);
     let keep = &rows.keep;
     Ok((after.torque.iter().zip(&before.torque).zip(keep))

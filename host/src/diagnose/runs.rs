@@ -177,17 +177,38 @@ fn holds_of(whole: &Run, other: &Run) -> bool {
     (0..places).filter(found).count() >= enough
 }
 
-/// The least step between two positions of a joint as recorded, rad or m: of an encoder a count, of a filtered position hardly
-/// anything. 0 of a joint that never moves.
+/// Steps of an encoder's count that a step of its reading may be off a whole number of them, as print rounds it.
+const OFF_A_COUNT: f64 = 0.25;
+/// Most counts in the least step of a reading: a joint that never turns back goes on by some from sample to sample.
+const MOST_COUNTS: u32 = 8;
+/// Share of the steps of a reading that are whole counts where it has any: of a reading without counts half of them are, of a motion
+/// at a few constant speeds those that are multiples of the slowest.
+const COUNTED: f64 = 0.95;
+
+/// The least step between two positions of a joint as recorded, rad or m: of an encoder a count. 0 of a joint that never moves, and of a
+/// reading whose steps are no whole number of the least, such as one without counts of a joint that never turns back.
 pub(super) fn resolution(runs: &[Run], joint: usize) -> f64 {
-    let steps = runs.iter().flat_map(|run| {
-        let raw = run.joints[joint].q_raw.windows(2);
+    let steps = || {
+        let raw = runs
+            .iter()
+            .flat_map(|run| run.joints[joint].q_raw.windows(2));
         raw.map(|pair| (pair[1] - pair[0]).abs())
-    });
-    let least = steps
-        .filter(|step| *step > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
+            .filter(|step| *step > 0.0)
+    };
+    let least = steps().fold(f64::INFINITY, f64::min);
+    // What print has rounded off the least is not in the mean of those like it.
+    let alike = || steps().filter(|step| *step < 1.2 * least);
+    let mean = alike().sum::<f64>() / alike().count().max(1) as f64;
+    let all = steps().count() as f64;
+    let counted = |n: &u32| {
+        let count = mean / f64::from(*n);
+        let off = |step: &f64| (step / count - (step / count).round()).abs();
+        steps().filter(|step| off(step) < OFF_A_COUNT).count() as f64 >= COUNTED * all
+    };
+    let counts = (1..=MOST_COUNTS).find(counted);
+    counts
+        .filter(|_| least.is_finite())
+        .map_or(0.0, |n| least / f64::from(n))
 }
 
 /// How far a joint goes, in the RMS, within `time` (s) from a reversal on, rad or m.
@@ -395,5 +416,35 @@ fn append(run: &mut Run, block: Block) {
         join(&mut to.voltage, from.voltage, before);
         join(&mut to.temperature, from.temperature, before);
         join(&mut to.link_raw, from.link, before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint that speeds up without ever turning back, 1 to 3 rad/s at 500 Hz, and the same as an encoder of 8192 counts reads it
+    /// and a file of six decimals holds it.
+    #[test]
+    fn a_joint_that_never_turns_back_has_counts_only_where_it_is_read_in_counts() {
+        let read = |of: &dyn Fn(f64) -> f64| {
+            let places = (0..5000).map(|k| {
+                let t = f64::from(k) / 500.0;
+                of(t + 0.1 * t * t)
+            });
+            let joint = JointRun {
+                q_raw: places.collect(),
+                ..JointRun::default()
+            };
+            let run = Run {
+                joints: vec![joint],
+                ..Run::default()
+            };
+            resolution(&[run], 0)
+        };
+        let count = std::f64::consts::TAU / 8192.0;
+        let counted = read(&|q| (1e6 * count * (q / count).floor()).round() * 1e-6);
+        assert!((counted / count - 1.0).abs() < 2e-3, "{counted} {count}");
+        assert_eq!(read(&|q| q), 0.0);
     }
 }

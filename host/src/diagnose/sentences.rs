@@ -7,6 +7,7 @@ use super::bench::Bench;
 use super::finish::Found;
 use super::outcome::{Before, Diagnosis, Remainder, Residual, Step, Verdict, Waterfall};
 use super::profile::Profile;
+use super::proof::sizes;
 use super::pull;
 use super::solve::Solution;
 use super::transmission::STRETCH;
@@ -76,7 +77,7 @@ pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
             );
             if !repeated {
                 words.push(
-                    "No motion was recorded twice, so that the noise floor is what the model itself leaves: what comes back in each run could hide in it. Record the motion again and give both with --data to have it told from noise."
+                    "No motion was recorded twice, so that what comes back in each run is not told from noise. Record the motion again and give both with --data."
                         .to_owned(),
                 );
             }
@@ -102,7 +103,8 @@ pub(super) fn verdict(d: &Diagnosis, repeated: bool) -> Vec<String> {
     }
     words.extend(constant(d));
     words.extend(tilt_alike(d).map(str::to_owned));
-    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w, repeated)));
+    words.extend(d.waterfall.iter().filter_map(|w| fall(d, w)));
+    words.extend(sizes(&d.left));
     words.extend(what_falls(d).map(str::to_owned));
     words.extend(worse_refitted(d));
     words.extend(motion(d));
@@ -254,8 +256,8 @@ pub(super) fn offsets(bench: &Bench, after: &Solution) -> Option<String> {
 }
 
 /// RMS of a joint as the description stands, with its parameters fitted again, and with the effects: what fitting again takes
-/// away is no merit of theirs. Without a `repeated` motion the floor is what the model leaves.
-fn fall(d: &Diagnosis, w: &Waterfall, repeated: bool) -> Option<String> {
+/// away is no merit of theirs.
+fn fall(d: &Diagnosis, w: &Waterfall) -> Option<String> {
     let [described, refitted, effects @ ..] = w.judged() else {
         return None;
     };
@@ -274,17 +276,14 @@ fn fall(d: &Diagnosis, w: &Waterfall, repeated: bool) -> Option<String> {
         None => String::new(),
     };
     Some(format!(
-        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; the noise floor is {}{} {unit}.",
+        "The torque residual of joint {} is {} {unit} RMS {on} with the description as it stands, {} with its parameters fitted again{last}; {}.",
         w.joint,
         number(*described),
         number(*refitted),
-        // A hold-out may have a floor of its own.
-        if repeated || w.judged_floor() != w.floor {
-            ""
-        } else {
-            "taken to be what the model leaves of the training data, "
+        match w.judged_floor().is_nan() {
+            true => "no noise floor is known".to_owned(),
+            false => format!("the noise floor is {} {unit}", number(w.judged_floor())),
         },
-        number(w.judged_floor()),
     ))
 }
 
@@ -342,18 +341,21 @@ fn closest(d: &Diagnosis) -> Option<String> {
 pub(super) fn why(found: &Found, step: &Step, profile: &Profile) -> String {
     let e = &profile.evidence;
     let j = profile.candidate.joint;
-    let (unit, floor) = (effort(&found.robot.joints[j]), found.floors[j]);
+    let (unit, floor) = (effort(&found.robot.joints[j]), found.known[j]);
     let unseen = step.holdout_rms.map_or(String::new(), |[before, after]| {
         format!(
-            "On the hold-out, which took no part in the fit, the residual of joint {} goes from {} to {} {unit} RMS, with a noise floor of {} {unit}. ",
+            "On the hold-out, which took no part in the fit, the residual of joint {} goes from {} to {} {unit} RMS{}. ",
             step.joint,
             number(before),
             number(after),
-            number(floor)
+            match floor.is_nan() {
+                true => String::new(),
+                false => format!(", with a noise floor of {} {unit}", number(floor)),
+            }
         )
     });
     let runner = match (&step.runner_up, step.runner_up_gap_closed) {
-        (Some(name), Some(share)) => {
+        (Some(name), Some(share)) if share.is_finite() => {
             format!(
                 " {name}, the next best, would have closed {}.",
                 percent(share)
@@ -413,8 +415,12 @@ fn effort(joint: &Joint) -> String {
 /// How the noise floor was found.
 pub(super) fn floor_how(found: &Found, pairs: &[(usize, usize)]) -> String {
     let runs = found.search.source.runs;
-    let figures: Vec<String> = (found.robot.joints.iter().zip(found.floors))
-        .map(|(joint, floor)| format!("{} {} {}", joint.name, number(*floor), effort(joint)))
+    let figure = |joint: &Joint, floor: f64| match floor.is_nan() {
+        true => format!("{} not known", joint.name),
+        false => format!("{} {} {}", joint.name, number(floor), effort(joint)),
+    };
+    let figures: Vec<String> = (found.robot.joints.iter().zip(found.known))
+        .map(|(joint, floor)| figure(joint, *floor))
         .collect();
     match pairs.first() {
         Some(&(a, b)) => {
@@ -431,7 +437,7 @@ pub(super) fn floor_how(found: &Found, pairs: &[(usize, usize)]) -> String {
             )
         }
         None => format!(
-            "No motion was recorded twice, so the floor is what the last model leaves: {}. What repeats from run to run could hide in it.",
+            "No motion was recorded twice, so the floor is the noise of the torque's reading beyond the band of the motion, a lower limit: {}. It is not known where that noise is not told from the signal.",
             figures.join(", ")
         ),
     }

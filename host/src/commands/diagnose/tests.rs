@@ -21,6 +21,7 @@ fn a_step_is_one_line_that_names_what_the_data_leave_open() {
             },
         )]),
         p_value: 1e-9,
+        name_probability: f64::NAN,
         runner_up: None,
         runner_up_gap_closed: None,
         rms_unit: "N*m".into(),

@@ -386,6 +386,7 @@ impl Between<'_, '_> {
                     set,
                     parameters,
                     p_value: found.evidence.corrected(laws.trials),
+                    name_probability: f64::NAN,
                     runner_up: None,
                     runner_up_gap_closed: None,
                     rms_unit: joint.kind.units().0.to_owned(),

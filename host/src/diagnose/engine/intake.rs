@@ -2,6 +2,7 @@
 
 use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::lead::slack;
+use crate::diagnose::one_way::{OneWay, one_way};
 use crate::diagnose::outcome::DataFault;
 use crate::diagnose::past::in_sessions;
 use crate::diagnose::refit::{Open, Refit, open};
@@ -67,6 +68,15 @@ pub(super) fn intake<'a>(
         || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without))
     {
         return Ok(Intake::Hold(Box::new(more)));
+    }
+    let one_way = one_way(&bench.nominal, &loaded.rows);
+    if !one_way.is_empty() {
+        let constants: Vec<usize> = one_way.iter().map(OneWay::constant).collect();
+        bench.anchor.hold(&constants);
+        bench.one_way = one_way;
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
     }
     let open = open(&bench, &loaded.rows);
     if !open.held.is_empty() {

@@ -3,10 +3,11 @@
 use super::follow::Follower;
 use crate::diagnose::across::{Across, across, gears, refutes};
 use crate::diagnose::bench::{Bench, Loaded, library};
+use crate::diagnose::columns::Candidate;
 use crate::diagnose::outcome::Tried;
 use crate::diagnose::profile::Profile;
 use crate::diagnose::refit::Refit;
-use crate::diagnose::search::{Search, same};
+use crate::diagnose::search::{Search, is_constant, same};
 use crate::diagnose::stated::candidate;
 use crate::diagnose::{DiagnoseError, Options};
 use crate::robot::title_of;
@@ -49,6 +50,9 @@ impl<'a> Pass<'a> {
         let across = across(&source, &bench.anchor, &refit.before, loaded, None, options)?;
         let mut library = library(bench.robot, &loaded.runs, &options.without);
         library.retain(|c| !refutes(&across, c));
+        // Of a joint that moves one way every constant is its dry friction.
+        let one_way = |c: &Candidate| bench.one_way.iter().any(|own| own.joint == c.joint);
+        library.retain(|c| !(is_constant(c.kind) && one_way(c)));
         let mut described = bench.stated.free();
         described.retain(|placed| !refutes(&across, &candidate(placed)));
         let mut search = Search::new(

@@ -4,6 +4,7 @@ use rig_shared::effects::Kind;
 
 use crate::diagnose::bench::{Bench, Loaded};
 use crate::diagnose::floor;
+use crate::diagnose::one_way::told;
 use crate::diagnose::profile::Profile;
 use crate::diagnose::refit::Open;
 use crate::diagnose::sentences::offsets;
@@ -56,6 +57,7 @@ pub(super) fn remarks(
     words.extend(offsets(bench, last));
     words.extend(contradicted(bench, &open.contradicted));
     words.extend(held(bench, &open.held));
+    words.extend(told(&bench.one_way, bench.robot, &bench.anchor, last));
     words.extend(sealed.and_then(|sealed| no_other_motion(loaded, sealed)));
     words
 }

@@ -11,6 +11,7 @@ use crate::diagnose::outcome::{Step, Tried};
 use crate::diagnose::profile::Profile;
 use crate::diagnose::refit::{Joint, Refit};
 use crate::diagnose::search::Search;
+use crate::diagnose::waves::{is_of_the_motor, ratio_is_described};
 use crate::robot::{Robot, title_of};
 
 /// One step an effect that the description does not state, with the names that may stand in its place.
@@ -23,8 +24,8 @@ pub(super) fn steps(
     descent: &Descent,
     motion: &[Option<Errors>],
 ) -> Result<Vec<Step>, DiagnoseError> {
-    let Judged { chosen, floors, .. } = judged;
-    let held_floors = descent.floors(floors);
+    let Judged { chosen, known, .. } = judged;
+    let held_floors = descent.floors(known);
     let trials = search.trials();
     let source = &search.source;
     let mut steps = Vec::new();
@@ -41,6 +42,7 @@ pub(super) fn steps(
             set: Vec::new(),
             parameters: joint.parameters(source, chosen, refit.free.len(), k),
             p_value: profile.evidence.corrected(trials),
+            name_probability: f64::NAN,
             runner_up: None,
             runner_up_gap_closed: None,
             rms_unit: source.robot.joints[j].kind.units().1.to_owned(),
@@ -48,7 +50,7 @@ pub(super) fn steps(
             holdout_rms: unseen,
             motion_rms: (motion[at].as_ref().zip(motion[at + 1].as_ref()))
                 .map(|pair| <[&Errors; 2]>::from(pair).map(|e| e.rms(j))),
-            gap_closed: closed(unseen.unwrap_or(train), held_floors[j]),
+            gap_closed: share(unseen.unwrap_or(train), held_floors[j]),
             why: String::new(),
         };
         if search.is_measured(&profile.candidate) {
@@ -57,10 +59,22 @@ pub(super) fn steps(
             let rivals = search.alternatives(&refit.base, chosen, k)?;
             let is_not = |kind| search.is_not(&profile.candidate, kind);
             rank(&mut step, profile, &rivals, source.runs, &is_not);
+            // Whether a wave comes from the motor or from the link is open where no ratio tells the motor's angle.
+            if is_of_the_motor(profile.candidate.kind)
+                && !ratio_is_described(&source.robot.joints[j])
+            {
+                step.name_probability *= 0.5;
+            }
         }
         steps.push(step);
     }
     Ok(steps)
+}
+
+/// Share of a gap that a fall closes; NaN where it has grown.
+fn share(rms: [f64; 2], floor: f64) -> f64 {
+    let share = closed(rms, floor);
+    if share < 0.0 { f64::NAN } else { share }
 }
 
 /// Says of an effect that was taken why it does not stand.
@@ -154,13 +168,14 @@ pub(super) fn change_step(
         set: vec![about.name.to_owned()],
         parameters: change.parameters.clone(),
         p_value: change.p_value,
+        name_probability: f64::NAN,
         runner_up: None,
         runner_up_gap_closed: None,
         rms_unit: robot.joints[j].kind.units().1.to_owned(),
         train_rms: train,
         holdout_rms: unseen,
         motion_rms: None,
-        gap_closed: closed(unseen.unwrap_or(train), held_floors[j]),
+        gap_closed: share(unseen.unwrap_or(train), held_floors[j]),
         why: change.words.clone(),
     })
 }

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use rig_shared::effects::{GAINS, Kind};
 
+use super::plausible::Asked;
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::bench::Loaded;
 use crate::diagnose::bodies::Fitting;
@@ -41,6 +42,15 @@ pub(super) fn unbelieved(
     }
     let joint = refit.joint(&search.source, chosen, &judge.pairs, judge.coordinates)?;
     let free = refit.free.len();
+    let asked = Asked {
+        search,
+        joint: &joint,
+        free,
+        chosen,
+    };
+    if let Some(implausible) = asked.implausible(found.clone()) {
+        return Ok(Some(implausible));
+    }
     let nothing = (found.clone())
         .filter(|k| !is_gear(chosen[*k].candidate.kind))
         .map(|k| (k, joint.of_nothing(chosen, free, k, GAINS)))

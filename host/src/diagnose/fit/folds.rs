@@ -57,6 +57,23 @@ impl Fit<'_> {
         Some((&folded.errors, more))
     }
 
+    /// Times its RMS that the fit leaves of folds left out of it in turn, joint by joint; 1 where the folds do not determine it.
+    pub(in crate::diagnose) fn left_out_in_turn(&self) -> Vec<f64> {
+        let n = self.rows.count;
+        let of_joint = |j: usize| {
+            let inside = dot(
+                &self.residual[j * n..(j + 1) * n],
+                &self.residual[j * n..(j + 1) * n],
+            );
+            let folded = self.folded.get_or_init(|| self.folded()).as_ref()?;
+            let times = (folded.errors.of_joint[j] / inside).sqrt();
+            times.is_finite().then(|| times.max(1.0))
+        };
+        (0..self.rows.joints())
+            .map(|j| of_joint(j).unwrap_or(1.0))
+            .collect()
+    }
+
     /// What does not depend on the candidate.
     fn folded(&self) -> Option<Folded> {
         let p = self.basis.len();

@@ -1,6 +1,9 @@
 //! Which other names a step may have.
 
+use std::collections::BTreeMap;
+
 use rig_shared::effects::Kind;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::diagnose::outcome::Step;
 use crate::diagnose::profile::Profile;
@@ -54,6 +57,26 @@ pub(in crate::diagnose) fn rank(
         }
     }
     step.set = names;
+    let others = rivals.iter().filter(possible).filter(|rival| {
+        let kind = rival.candidate.kind;
+        rival.candidate.joint == own.candidate.joint && kind.about().name != step.effect
+    });
+    step.name_probability = posterior(own, others);
+}
+
+/// Posterior probability of a name beside its rivals, all of them as likely before: the odds of each rival are those by which it
+/// predicts blocks better that neither was fitted to, by the mean and spread of their paired differences (pseudo-BMA with the
+/// uncertainty of a sum over blocks, Yao et al. 2018, Bayesian Analysis 13(3)).
+fn posterior<'p>(own: &Profile, rivals: impl Iterator<Item = &'p Profile>) -> f64 {
+    let normal = Normal::standard();
+    let mut best: BTreeMap<&str, f64> = BTreeMap::new();
+    for rival in rivals {
+        let ahead = own.evidence.ahead_of(&rival.evidence);
+        let odds = normal.sf(ahead) / normal.cdf(ahead).max(f64::MIN_POSITIVE);
+        let most = best.entry(rival.candidate.kind.about().name).or_default();
+        *most = most.max(odds);
+    }
+    1.0 / (1.0 + best.values().sum::<f64>())
 }
 
 /// Whether a rival may be what is there: none whose law has run to its limit, but a spring that is at rest not far from where the

@@ -49,6 +49,7 @@ fn the_runner_up_is_of_the_same_joint() {
         set: Vec::new(),
         parameters: BTreeMap::new(),
         p_value: 1e-9,
+        name_probability: f64::NAN,
         runner_up: None,
         runner_up_gap_closed: None,
         rms_unit: "N*m".into(),

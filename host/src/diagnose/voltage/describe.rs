@@ -140,6 +140,8 @@ impl Told<'_> {
             residual: Residual::Position,
             words,
             noise_floor_rms: vec![self.floor],
+            noise_floor_from: Vec::new(),
+            left: Vec::new(),
             noise_floor_how: "The encoder's smallest step over √12, of the position: a lower bound, as no repeated runs are compared here.".into(),
             motion_how: format!(
                 "The motor voltage drives each model, {}.",
@@ -208,6 +210,7 @@ impl Told<'_> {
             set,
             parameters: self.parameters(last, place),
             p_value: own.map_or(1.0, |t| t.p_value),
+            name_probability: f64::NAN,
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
                 .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),

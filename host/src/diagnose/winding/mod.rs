@@ -267,6 +267,7 @@ fn winding(
                 ))
                 .collect(),
                 p_value: profile.corrected(trials),
+                name_probability: f64::NAN,
                 runner_up: None,
                 runner_up_gap_closed: None,
                 rms_unit: "V".to_owned(),

@@ -2,7 +2,7 @@
 
 use super::super::verdict;
 use crate::diagnose::outcome::Diagnosis;
-use crate::report::{Block, Column, Section, Table, format_p_value, format_significant};
+use crate::report::{Block, Column, Section, Table, format_p_value};
 
 /// The diagnosis on the page of the demonstration.
 pub(super) fn section(found: &Diagnosis) -> Section {
@@ -22,7 +22,7 @@ pub(super) fn section(found: &Diagnosis) -> Section {
             columns: vec![
                 Column::text("Effect"),
                 Column::text("Names that fit as well"),
-                Column::number("Gap closed", "%"),
+                Column::text("Gap closed"),
                 Column::number("p", ""),
             ],
             rows: (found.steps.iter())
@@ -34,7 +34,7 @@ pub(super) fn section(found: &Diagnosis) -> Section {
                     vec![
                         step.effect.clone(),
                         others.join(", "),
-                        format_significant(100.0 * step.gap_closed, 3),
+                        step.fall(),
                         format_p_value(step.p_value),
                     ]
                 })

@@ -126,6 +126,10 @@ pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
     if tall {
         note.push_str("Logarithmic: the first model leaves far more than the last. ");
     }
+    if w.floor.is_nan() {
+        note.push_str("No noise floor is known.");
+        return plot.note(note);
+    }
     note.push_str(&format!("Noise floor {}.", shown.value(w.floor)));
     plot.mark(Marker::horizontal(
         shown.scaled(&[w.floor])[0],
@@ -166,7 +170,10 @@ fn figures(found: &Diagnosis) -> Block {
                 }
                 row.extend([
                     shown.unit.clone(),
-                    format!("{} ×", format_significant(judged / w.judged_floor(), 3)),
+                    match w.judged_floor().is_nan() {
+                        true => "–".into(),
+                        false => format!("{} ×", format_significant(judged / w.judged_floor(), 3)),
+                    },
                 ]);
                 row
             })

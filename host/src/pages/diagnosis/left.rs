@@ -1,7 +1,7 @@
 //! What the missing effects had done to the parameters, and what is left without a name.
 
 use super::{gap, parts, words};
-use crate::diagnose::outcome::{Absorbed, Before, Diagnosis};
+use crate::diagnose::outcome::{Absorbed, Before, Diagnosis, FloorFrom};
 use crate::report::{Block, Column, Section, Table, format_significant, format_value};
 
 /// From so many standard deviations on a parameter counts as having been wrong.
@@ -74,6 +74,60 @@ pub(super) fn absorbed(found: &Diagnosis) -> Option<Section> {
     )
 }
 
+/// What the written model leaves of each joint's torque.
+pub(super) fn sizes(found: &Diagnosis) -> Option<Section> {
+    let first = found.left.first()?;
+    let number = |x: f64| match x.is_nan() {
+        true => "not known".to_owned(),
+        false => format_significant(x, 3),
+    };
+    Some(
+        Section::new(
+            "sizes",
+            "What the written model leaves",
+            "RMS of the torque residual of model.toml, beside the recorded torque and a noise floor that no model made. A joint is explained where its residual is noise, or where the effects close nearly all of the gap above the floor.",
+        )
+        .with(Block::Table(Table {
+            caption: match first.on_holdout {
+                true => "On the hold-out".into(),
+                false => "On blocks of the training data, left out of the fit in turn".into(),
+            },
+            columns: vec![
+                Column::text("Joint"),
+                Column::number("Without the effects", ""),
+                Column::number("Written model", ""),
+                Column::number("Noise floor", ""),
+                Column::text("Unit"),
+                Column::text("Floor from"),
+                Column::number("Torque RMS", ""),
+                Column::number("Residual of torque", "%"),
+                Column::text("Explained?"),
+            ],
+            rows: (found.left.iter())
+                .map(|left| {
+                    vec![
+                        left.joint.clone(),
+                        number(left.before),
+                        number(left.after),
+                        number(left.floor),
+                        parts::unit(&left.unit),
+                        match left.floor_from {
+                            FloorFrom::RepeatedRuns => "repeated runs",
+                            FloorFrom::TorqueReading => "torque reading alone",
+                            FloorFrom::Unknown => "–",
+                        }
+                        .into(),
+                        number(left.torque),
+                        format_significant(left.percent_of_torque, 2),
+                        if left.explained { "yes" } else { "no" }.into(),
+                    ]
+                })
+                .collect(),
+            note: String::new(),
+        })),
+    )
+}
+
 /// The parameters by torque and by simulated motion.
 pub(super) fn by_motion(found: &Diagnosis) -> Option<Section> {
     let by_motion = found.by_motion.as_ref()?;
@@ -138,15 +192,20 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
     )
     .with(parts::warning(remainder.text.clone()))
     .with(Block::Text(format!(
-        "Joint {}: {} RMS without a name; with noise, {} is {} times the noise floor.",
+        "Joint {}: {} RMS without a name{}.",
         remainder.joint,
         shown.value(remainder.rms),
-        if remainder.of_a_voltage() {
-            "what is left of the voltage"
-        } else {
-            "the whole residual"
-        },
-        format_significant(remainder.ratio, 3)
+        match remainder.ratio.is_nan() {
+            true => "; no noise floor is known".into(),
+            false => format!(
+                "; with noise, {} is {} times the noise floor",
+                match remainder.of_a_voltage() {
+                    true => "what is left of the voltage",
+                    false => "the whole residual",
+                },
+                format_significant(remainder.ratio, 3)
+            ),
+        }
     )));
     let texts = gap::texts(&remainder.places, false);
     if !texts.is_empty() {

@@ -27,6 +27,7 @@ pub fn diagnosis(found: &Diagnosis, context: &Context) -> Document {
     sections.extend(faults(found));
     sections.extend(parts::warnings(&[&context.warnings]));
     sections.extend(gap::waterfall(found));
+    sections.extend(left::sizes(found));
     sections.extend(gap::places(found));
     sections.extend((0..found.steps.len()).map(|k| steps::section(found, k)));
     sections.extend(curves::section(found));
@@ -119,11 +120,14 @@ fn summary(found: &Diagnosis) -> Vec<Fact> {
     }
     if let ([floor], [joint]) = (found.noise_floor_rms.as_slice(), found.waterfall.as_slice()) {
         let shown = words::shown(found, &joint.unit);
-        facts.push(
-            Fact::new("Noise floor", shown.number(*floor))
+        facts.push(match floor.is_nan() {
+            true => Fact::new("Noise floor", "not known")
+                .note("record one motion twice to have it")
+                .tone(Tone::Warning),
+            false => Fact::new("Noise floor", shown.number(*floor))
                 .unit(shown.unit)
                 .note("RMS of what no model can predict"),
-        );
+        });
     }
     if !found.not_testable.is_empty() {
         facts.push(
@@ -157,7 +161,7 @@ fn opening(found: &Diagnosis) -> Section {
         columns: vec![
             Column::text("Effect"),
             Column::text("Joint"),
-            Column::number("Gap closed", "%"),
+            Column::text("Gap closed"),
             Column::number("p", ""),
             Column::text("Certain of the name?"),
         ],
@@ -168,20 +172,24 @@ fn opening(found: &Diagnosis) -> Section {
                 vec![
                     words::title(&step.effect, step.law.as_deref()),
                     step.joint.clone(),
-                    parts::percent(step.gap_closed),
+                    step.fall(),
                     format_p_value(step.p_value),
                     match words::rivals(step).len() {
                         0 if doubted(found, &step.joint) => "see what is left".into(),
                         0 if values_alike(found, step).is_some() => {
                             "no: values of the description as good".into()
                         }
-                        0 => "yes".into(),
+                        0 if found.is_certain(step) => "yes".into(),
+                        0 if step.name_probability.is_finite() && found.left.iter().all(|l| l.joint != step.joint || l.explained) => {
+                            format!("no: probability {}", format_significant(step.name_probability, 2))
+                        }
+                        0 => "see what is left".into(),
                         n => format!("no: {} as good", words::several(n, "other name")),
                     },
                 ]
             })
             .collect(),
-        note: "Gap: what the residual's RMS lies above the noise floor. p: how often chance alone would look like this, corrected for all that was tried.".into(),
+        note: "Gap: what the residual's RMS lies above the noise floor; where no floor is known, the RMS before and after. p: how often chance alone would look like this, corrected for all that was tried.".into(),
     }))
 }
 

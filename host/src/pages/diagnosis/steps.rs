@@ -131,8 +131,8 @@ fn worth(found: &Diagnosis, step: &Step) -> Block {
         ],
         rows,
         note: format!(
-            "The step closes {} % of the gap that was there before it, {}.",
-            parts::percent(step.gap_closed),
+            "The step closes its gap to the noise floor by {}, {}.",
+            step.fall(),
             if step.holdout_rms.is_some() {
                 "on data that took no part in the fit"
             } else {

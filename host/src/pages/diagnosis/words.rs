@@ -24,7 +24,7 @@ pub(super) fn meaning(verdict: Verdict) -> &'static str {
             "These data show nothing that the model as it is lacks. No effect had to be added."
         }
         Verdict::Explained => {
-            "The model lacked something, and the effects named here explain it: what is left shows nothing more that these data could tell."
+            "The model lacked something, and the effects named here explain it: on data that took no part in the fit the residual is noise, or nearly all of the gap above the noise floor is closed."
         }
         Verdict::ParameterChange => {
             "The equations hold; a value in the description does not, or does no longer."

@@ -11,7 +11,7 @@ use crate::diagnose::columns::Candidate;
 use crate::diagnose::engine::Follower;
 use crate::diagnose::fit::Evidence;
 use crate::diagnose::outcome::{Tried, Verdict};
-use crate::diagnose::scenario::{Effect, Scenario};
+use crate::diagnose::scenario::{Arm, ArmScenario, Effect, Scenario};
 use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
 use rig_shared::effects::{Kind, SHAPES};
@@ -137,4 +137,111 @@ fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
     assert!(lag.refused(300).unwrap().contains("swing"), "{lag:?}");
     let gear = profiled(Some(SPRING), 5, [700.0, 0.3, 0.25]);
     assert_eq!(gear.refused(300), None);
+}
+
+/// What is said of an effect on the second joint of an upright arm of two with nothing hidden; `count` columns of it.
+fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'static str> {
+    let made = ArmScenario {
+        seconds: [20.0, 15.0],
+        ..ArmScenario::new(Arm::Upright, None, 11)
+    }
+    .make()
+    .unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train[0]];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    let candidate = Candidate {
+        kind,
+        joint: 1,
+        other: None,
+    };
+    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let judge = Judge {
+        robot: bench.robot,
+        search: &search,
+        follower: &follower,
+        rows: &loaded.rows,
+        coordinates: &[Vec::new(), Vec::new()],
+        pairs: Vec::new(),
+        rounding: vec![0.0; 2],
+        base: &refit.base,
+        seed: 1,
+    };
+    let mut own = search.source.columns(&candidate, &shapes).unwrap();
+    own.truncate(columns);
+    let profile = Profile {
+        candidate,
+        shapes,
+        columns: Arc::new(own),
+        evidence: Evidence::default(),
+        vanished: None,
+        followed: None,
+        otherwise: None,
+        heard: false,
+        doubled: false,
+    };
+    let fallen = unbelieved(&refit, &search, &judge, &[profile]).unwrap();
+    fallen.map(|(_, why)| why)
+}
+
+/// The second link of the arm puts some newton metres on its joint.
+#[test]
+fn an_arm_does_not_stand_on_a_soft_joint() {
+    let of = |stiffness: f64| said_on_arm(Kind::JointElasticity, shapes([stiffness, 1.0, 0.25]), 1);
+    assert!(of(20.0).unwrap().contains("sag"), "{:?}", of(20.0));
+    let stiff = of(2e4);
+    assert!(stiff.is_none_or(|why| !why.contains("sag")), "{stiff:?}");
+}
+
+#[test]
+fn one_joint_of_a_recorder_has_no_clock_of_its_own() {
+    let said = said_on_arm(Kind::MeasurementDelay, [0.0; SHAPES], 1);
+    assert!(said.unwrap().contains("one clock"), "{said:?}");
+}
+
+/// Play of a thousandth of a degree on a rig without any.
+#[test]
+fn a_gap_that_may_be_none_is_none() {
+    on(None, 6, |bench, loaded, refit, search| {
+        let candidate = Candidate {
+            kind: Kind::Backlash,
+            ..GEAR
+        };
+        let shapes = [2e-5, 1500.0, 15.0, 0.25];
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            rounding: vec![0.0],
+            base: &refit.base,
+            seed: 1,
+        };
+        let play = Profile {
+            candidate,
+            shapes,
+            columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+            doubled: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[play]).unwrap();
+        let why = fallen.map(|(_, why)| why);
+        assert!(why.unwrap().contains("its gap"), "{why:?}");
+    });
 }
