@@ -21,6 +21,7 @@ fn empty(verdict: Verdict, words: &[&str]) -> Diagnosis {
         left: Vec::new(),
         motion_how: String::new(),
         noise_floor_how: String::new(),
+        treatment: None,
         torque_lead: Vec::new(),
         places: Vec::new(),
         described: Vec::new(),
