@@ -2,6 +2,7 @@
 //! used, and when to stop.
 
 mod across;
+mod alike;
 mod anchor;
 #[cfg(test)]
 mod arm_tests;
@@ -31,6 +32,8 @@ mod misfit;
 mod model;
 mod motion;
 mod one_way;
+#[cfg(test)]
+mod one_way_tests;
 pub mod outcome;
 mod past;
 #[cfg(test)]

@@ -339,7 +339,7 @@ impl Columns<'_> {
 }
 
 /// The rows in units of what columns leave of each joint, and the time that this remembers, s.
-fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
+pub(super) fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
     let n = rows.joints();
     let first = Fit::new(rows, vec![1.0; n], 0.1).taking(columns);
     let scale: Vec<f64> = (0..n)

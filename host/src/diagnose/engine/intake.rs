@@ -1,5 +1,6 @@
 //! Recordings taken in: read, looked through for faults, freed of touches, under one treatment.
 
+use crate::diagnose::alike::alike;
 use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::lead::slack;
 use crate::diagnose::one_way::{OneWay, one_way};
@@ -33,7 +34,7 @@ pub(super) struct Material<'a> {
     pub(super) sealed: Option<Loaded>,
     /// What of the description the training data tell less of, and what they contradict.
     pub(super) open: Open,
-    /// What was left out of them, sentences.
+    /// What was left out of them, and what of the model they do not tell apart, sentences.
     pub(super) touches: Vec<String>,
 }
 
@@ -85,6 +86,14 @@ pub(super) fn intake<'a>(
         loaded = rows(loaded)?;
         sealed = sealed.map(rows).transpose()?;
     }
+    let alike = alike(&bench, &loaded.rows);
+    if !alike.is_empty() {
+        let held: Vec<usize> = alike.iter().map(|one| one.parameter).collect();
+        bench.anchor.hold(&held);
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
     if bench.look_about_rests(&loaded)? {
         let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
         loaded = rows(loaded)?;
@@ -96,10 +105,11 @@ pub(super) fn intake<'a>(
             .map(|j| refit.base.residual(j))
             .collect()
     };
-    let touches = touched(bench.robot, &left, &mut loaded);
+    let mut touches = touched(bench.robot, &left, &mut loaded);
     if !touches.is_empty() {
         loaded = bench.rows(loaded.runs, &loaded.treatment)?;
     }
+    touches.extend(alike.iter().map(|one| one.said(&bench)));
     Ok(Intake::Fit(Box::new(Material {
         bench,
         loaded,
