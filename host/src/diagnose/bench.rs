@@ -20,7 +20,6 @@ use super::runs::{Run, runs_of};
 use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
-use crate::identify::treatment_for;
 use crate::prepare::{LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use crate::robot::{JointKind, Robot};
 
@@ -358,13 +357,18 @@ pub(super) fn treatment_of(
     robot: &Robot,
 ) -> Result<Treatment, DiagnoseError> {
     let options = PrepareOptions::default();
-    let (surveys, first) = treatment_for(robot, recordings, &options)?;
+    let surveys = (recordings.iter())
+        .map(|r| Survey::take(*r, robot.joints.len()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let limits = robot.torque_limits();
+    // Not by the torque, as an identification does: what the model lacks is what is looked for, and a low cut-off smears it away.
+    let first = Treatment::decide(&surveys, &options, &limits)?;
     let band = (10.0 * first.motion_frequency)
         .max(LEAST_BAND)
         .min(first.cutoff);
     let step = ((0.4 * first.sample_rate / band).floor() as usize).max(1);
     let step = step.min(first.decimation.max(1));
-    Ok(first.decimated(step, &surveys, &options, &robot.torque_limits())?)
+    Ok(first.decimated(step, &surveys, &options, &limits)?)
 }
 
 /// Every effect on every joint that the torque can show.

@@ -84,7 +84,6 @@ pub(crate) use sentences::{values_alike, what_falls};
 
 use rig_shared::effects::Kind;
 
-use crate::identify::IdentifyError;
 use crate::prepare::PrepareError;
 
 /// Settings of a diagnosis.
@@ -105,24 +104,12 @@ pub struct Options {
     pub no_offsets: bool,
 }
 
-impl From<IdentifyError> for DiagnoseError {
-    fn from(error: IdentifyError) -> Self {
-        match error {
-            IdentifyError::Prepare(error) => Self::Prepare(error),
-            other => Self::Identify(other),
-        }
-    }
-}
-
 /// Why a diagnosis is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
     /// Reading or preparing has failed.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
-    /// The model cannot be fitted to choose a cut-off.
-    #[error(transparent)]
-    Identify(IdentifyError),
     /// No recording.
     #[error("No training recording was given; name at least one with --data.")]
     NoRecording,

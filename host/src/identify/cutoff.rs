@@ -5,7 +5,8 @@
 //! like motion. The torque tells the two apart: motion needs torque, noise needs none. So the model is fitted once for each
 //! of several cut-offs, to the same torque in the same band, and the residuals are compared: a cut-off that is too low bends the
 //! motion, one that is too high lets noise into the regressor, and both leave more of the torque unexplained. The cut-off of
-//! the spectrum stays where no other one explains the torque better by [`BETTER`].
+//! the spectrum stays where no other one explains the torque better by [`BETTER`]. A lower one is taken only where the spectrum
+//! flattens above it, which noise does and motion does not: friction that the model lacks is smeared away by a low cut-off, too.
 //!
 //! Leaves out: one cut-off a joint (the regressor couples the joints); noise that the controller's answer carries into the torque,
 //! which is explained together with the noise in the position.
@@ -123,6 +124,16 @@ pub(crate) fn decided(
     // The lowest of the equals has the least noise in the speed.
     let equal = trials.iter().find(|t| score(t) <= least + EQUAL);
     let cutoff = equal.map_or(first.cutoff, |t| t.cutoff);
+    let noisy = |j: usize| {
+        let error = |cutoff: f64| trials.iter().find(|t| t.cutoff == cutoff);
+        let gain = error(first.cutoff)
+            .zip(error(cutoff))
+            .map(|(a, b)| (a.relative_error[j] / b.relative_error[j]).ln());
+        gain.is_some_and(|g| g > BETTER) && first.spectra[j].flattens(cutoff, first.cutoff)
+    };
+    if cutoff < first.cutoff && !(0..first.spectra.len()).any(noisy) {
+        return Ok((surveys, Treatment { trials, ..first }));
+    }
     let ends: Vec<f64> = (0..first.spectra.len())
         .map(|j| own_cutoff(&trials, j).max(cutoff))
         .collect();

@@ -112,6 +112,10 @@ pub struct PositionSpectrum {
 /// §1.1): a thousandth is well below what such a test bench repeats to.
 pub const NOISE_SHARE: f64 = 1e-3;
 
+/// Factor by which the density of a position falls at least from one octave to the next where it is motion. 4, between the 16
+/// of a speed that jumps (an impact; its position has a density of f⁻⁴, that of bounded torque f⁻⁶) and the 1 of white noise.
+const FLAT: f64 = 4.0;
+
 /// The signal counts as sunk where the density stays below this multiple of the floor: there the
 /// signal-to-noise ratio is one, and the best linear filter (Wiener) passes half.
 const SUNK: f64 = 2.0;
@@ -188,6 +192,27 @@ impl PositionSpectrum {
         Self::with(frequency, density, self.floor.max(level), end)
     }
 
+    /// Returns true if the density falls by less than a factor of [`FLAT`] from one octave to the next somewhere between `from` and
+    /// `to` Hz, as noise does and no motion.
+    pub fn flattens(&self, from: f64, to: f64) -> bool {
+        let mean = |low: f64, high: f64| {
+            let bins = self.frequency.iter().zip(&self.density);
+            let own: Vec<f64> = bins
+                .filter(|(f, _)| (low..high).contains(*f))
+                .map(|(_, d)| *d)
+                .collect();
+            own.iter().sum::<f64>() / own.len() as f64
+        };
+        let mut low = from;
+        while 4.0 * low <= to {
+            if mean(2.0 * low, 4.0 * low) * FLAT > mean(low, 2.0 * low) {
+                return true;
+            }
+            low *= 1.19;
+        }
+        false
+    }
+
     /// Frequency below which 99.9 % of the power of the POSITION lies, Hz. A mechanism moves far more than its encoder errs, so
     /// no error of the encoder or of the time stamps changes this frequency.
     pub fn swing(&self) -> f64 {
@@ -253,6 +278,21 @@ fn quantile(frequency: &[f64], power: &[f64], share: f64) -> f64 {
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
+
+    /// Between two frequencies of f⁻⁴, which an impact leaves, and of noise that ends at 100 Hz.
+    #[test]
+    fn noise_flattens_and_a_motion_with_impacts_does_not() {
+        let frequency: Vec<f64> = (1..2000).map(|k| 0.25 * f64::from(k)).collect();
+        let impacts = |f: &f64| f.powi(-4);
+        let filtered = |f: &f64| f.powi(-4) + 1e-5 / (1.0 + (f / 100.0).powi(8));
+        for (density, flattens) in [
+            (frequency.iter().map(impacts).collect::<Vec<f64>>(), false),
+            (frequency.iter().map(filtered).collect(), true),
+        ] {
+            let spectrum = PositionSpectrum::judge(frequency.clone(), density);
+            assert_eq!(spectrum.flattens(5.0, 400.0), flattens);
+        }
+    }
 
     #[test]
     fn welch_finds_the_level_of_white_noise_and_the_end_of_a_signal() {
