@@ -506,9 +506,14 @@ impl Within<'_> {
         let acceleration = b
             .acceleration
             .unwrap_or(5.0 * b.velocity * b.velocity / distance);
+        // A margin that is left free need not be kept to the last bit of single precision; a limit has to.
+        let rounding = match options.margin {
+            Some(margin) if margin > 0.0 => 1e-6 * (b.high - b.low),
+            _ => 0.0,
+        };
         let limits = Limits {
-            position_low: b.low,
-            position_high: b.high,
+            position_low: b.low - rounding,
+            position_high: b.high + rounding,
             velocity: b.velocity,
             acceleration: b.acceleration.unwrap_or(f64::MAX),
             ..Limits::default()

@@ -54,6 +54,8 @@ pub(crate) struct Equations<'a> {
     pub transmission: &'a Transmission<f64>,
     /// Columns of the base parameters.
     pub columns: &'a [usize],
+    /// Whether the equations are all that is described of the torque: effects beside them would count as residual.
+    pub complete: bool,
 }
 
 /// Decides how `recordings` of `robot` are treated where nothing is identified; see [`decided`].
@@ -75,6 +77,7 @@ pub(crate) fn treatment_for(
         chain: &chain,
         transmission: &transmission,
         columns: &base.columns,
+        complete: robot.effects.is_empty(),
     };
     decided(
         equations,
@@ -98,7 +101,7 @@ pub(crate) fn decided(
     limits: &[Option<f64>],
 ) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
     let first = Treatment::decide(&surveys, options, limits)?;
-    if options.cutoff != Choice::Auto {
+    if options.cutoff != Choice::Auto || !equations.complete {
         return Ok((surveys, first));
     }
     let comparison = Comparison {

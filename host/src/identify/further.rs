@@ -124,6 +124,10 @@ fn prior(problem: &Problem) -> Prior {
 
 /// The same without what the data contradict; `factor` has the residual's noise as unit, its memory allowed for.
 fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
+    // A worth that the user states is what the description is worth.
+    if problem.options.prior_uncertainty.is_some() {
+        return prior(problem);
+    }
     let data = quadratic(factor, problem.base);
     prior(problem).without_contradicted(&data.matrix, &data.right, problem.robot)
 }

@@ -118,6 +118,7 @@ fn solve(
         chain: &chain,
         transmission: &transmission,
         columns: &base.columns,
+        complete: described.effects.is_empty(),
     };
     // The recordings are the same at every look, and so is what is done to them.
     let (surveys, decided) = match prepared.take() {

@@ -334,7 +334,8 @@ impl Rows {
         let duration = pass.to - pass.from;
         let settle = options.settle.max(options.settle_share * duration);
         let first = t.partition_point(|t| *t < pass.from + settle);
-        let end = t.partition_point(|t| *t <= pass.to);
+        // The position's filter smears what comes after a pass as far into it.
+        let end = t.partition_point(|t| *t <= pass.to - options.settle);
         let rows = first..end.max(first);
         let left = match rows.clone().next_back() {
             Some(last) => t[last] - t[first],

@@ -9,8 +9,9 @@ use super::FrictionMapOptions;
 /// Noise of a speed falls with the length of its window: the slowest passes, which last for seconds, are found by the
 /// longest window, short fast ones by the shortest.
 const WINDOWS: [f64; 3] = [0.4, 0.1, 0.025];
-/// A pass lasts at least this many half windows, so that most of its windows lie within it.
-const HALVES_PER_PASS: f64 = 4.0;
+/// A pass lasts at least this many half windows, so that most of its windows lie within it and the top of a quintic move of 1 s,
+/// which is straight for 0.1 s, is none.
+const HALVES_PER_PASS: f64 = 6.0;
 /// Share by which the speed of a reference may leave its mean. References are computed, so this covers rounding and the
 /// jitter of time stamps; the top of a quintic move of 1 s is this constant for 0.1 s, shorter than any pass.
 const REFERENCE_TOLERANCE: f64 = 0.01;

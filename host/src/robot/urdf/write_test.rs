@@ -106,7 +106,11 @@ fn torques(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
 
 fn same_dynamics(robot: &Robot, rng: &mut Pcg64) {
     let text = robot.to_urdf().unwrap().text;
-    let back = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap();
+    let mut back = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap();
+    // URDF states a direction of gravity and no size; the file's comment gives it.
+    let size = |g: [f64; 3]| g.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let times = size(robot.gravity) / size(back.gravity);
+    back.gravity = back.gravity.map(|x| x * times);
     let names = |r: &Robot| r.joints.iter().map(|j| j.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&back), names(robot));
     for _ in 0..5 {
