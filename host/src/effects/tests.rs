@@ -8,7 +8,7 @@ use rig_shared::scalar::Real as _;
 
 use super::*;
 use crate::identify::identify;
-use crate::prepare::{InMemory, stretch};
+use crate::prepare::{Choice, InMemory, PrepareOptions, stretch};
 use crate::robot::{Controller, ONE_LINK_TEMPLATE, RobotEffect};
 use crate::simulate::{Inputs, Model, Stepper, closed_loop};
 use crate::validate::{Motion, Options, Validation, validate};
