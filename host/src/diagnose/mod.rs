@@ -55,8 +55,6 @@ pub mod runs;
 pub mod sanity;
 pub mod scenario;
 mod search;
-#[cfg(test)]
-mod self_tests;
 mod sentences;
 mod simplex;
 mod slopes;

@@ -186,7 +186,7 @@ pub(super) fn doubts(treatment: &Treatment, robot: &Robot) -> Vec<String> {
             ));
         }
     }
-    if !alone.is_empty() {
+    if robot.joints.len() > 1 && !alone.is_empty() {
         doubts.push(format!(
             "One cut-off serves all joints. Alone, the torque of some would be explained better with another one: {}. Their friction near reversals or the noise of their positions differs; compare the figure of the torque residual over the cut-off.",
             alone.join(", ")
@@ -228,11 +228,12 @@ impl Comparison<'_> {
     fn trials(&self) -> Result<Option<Vec<CutoffTrial>>, IdentifyError> {
         let rate = self.first.sample_rate;
         let shortest = self.surveys.iter().map(|s| s.longest).min().unwrap_or(0);
-        let least = LEAST_PERIODS * rate / shortest.max(1) as f64;
         let most = HIGHEST * rate / 2.0;
         let swing = (self.first.spectra.iter())
             .map(|s| s.swing())
             .fold(0.0, f64::max);
+        // Below the swing's own frequency a cut-off bends the swing itself, however long the recording is.
+        let least = (LEAST_PERIODS * rate / shortest.max(1) as f64).max(swing);
         // Of one row in one the torque would pass the position's filter, which differs from trial to trial.
         let decimation = ((0.4 * rate / (HEADROOM * swing)).floor() as usize).max(2);
         let trimmed = trimmed_rows(least.min(self.first.cutoff), decimation, rate);

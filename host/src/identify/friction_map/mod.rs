@@ -259,7 +259,8 @@ fn treatment_of(fitted: &Treatment, sweep: &Survey) -> Treatment {
         decimation: 1,
         parallel_edge: cutoff,
         saturation,
-        trimmed: (3.0 * rate / cutoff).ceil() as usize,
+        // One period of the filter: a pass may end with the recording.
+        trimmed: (rate / cutoff).ceil() as usize,
         ..fitted.clone()
     }
 }
