@@ -208,7 +208,8 @@ fn every_pass_of_a_sweep_of_any_rate_gives_a_point_on_its_law() {
         }
         assert_eq!(map["warranted"], true, "{train} {sweep}: {said}");
         let law = &map["stribeck"];
-        assert!((number(&law["viscous"]) - VISCOUS).abs() < 0.02, "{law}");
+        // The made friction weakens by another law than the fitted one, whose tail the viscous term takes up.
+        assert!((number(&law["viscous"]) - VISCOUS).abs() < 0.03, "{law}");
     }
 }
 
