@@ -20,7 +20,7 @@ use super::factor::TriangularFactor;
 use super::linear::weighted_minimum_norm;
 use super::model::{Plan, each_rows};
 use super::{IdentifyError, ModelKind, Options};
-use crate::data::{Block, JUDGED_ROWS};
+use crate::data::Block;
 use crate::prepare::{
     Choice, CutoffTrial, HIGHEST, PrepareError, PrepareOptions, Recording, Survey, Treatment,
     each_of, stretch, threads, trimmed_rows,
@@ -40,8 +40,9 @@ const LEAST_PERIODS: f64 = 30.0;
 /// Band in which the torque is compared, as a multiple of the frequency of the joints' swings: friction at a reversal has harmonics
 /// well above the motion, and a cut-off that smears them must show in the residual.
 const HEADROOM: f64 = 10.0;
-/// Rows that one trial uses after decimation, so that the choice costs no more on a long recording.
-const TRIAL_ROWS: usize = 20_000;
+/// Length of the recordings that a trial uses, all together, s: five periods of a usual motion of 10 s. The choice then costs no
+/// more on a long recording.
+const TRIAL_SECONDS: f64 = 50.0;
 /// Rows slower than this share of the RMS speed are left out of the comparison: the sign of their speed is noise with every cut-off.
 const SLOW: f64 = 0.05;
 
@@ -309,7 +310,7 @@ impl Comparison<'_> {
             loudness: vec![1.0; joints],
             cache: RowCache::default(),
         };
-        let rows = JUDGED_ROWS.max(TRIAL_ROWS * decimation) / recordings.len().max(1);
+        let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
         let factors = factors_of(recordings, &plan, rows)?;
         Ok(CutoffTrial {
             cutoff,

@@ -192,7 +192,7 @@ impl PositionSpectrum {
         Self::with(frequency, density, self.floor.max(level), end)
     }
 
-    /// Returns true if the density falls by less than a factor of [`FLAT`] from one octave to the next somewhere between `from` and
+    /// Returns true if the density falls by less than a factor of four from one octave to the next somewhere between `from` and
     /// `to` Hz, as noise does and no motion.
     pub fn flattens(&self, from: f64, to: f64) -> bool {
         let mean = |low: f64, high: f64| {
