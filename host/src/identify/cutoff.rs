@@ -17,7 +17,7 @@ use rig_shared::transmission::Transmission;
 use super::base::{Base, chain_of, transmission_of};
 use super::cache::RowCache;
 use super::factor::TriangularFactor;
-use super::linear::weighted_minimum_norm;
+use super::linear::by_noise;
 use super::model::{Plan, each_rows};
 use super::{IdentifyError, ModelKind, Options};
 use crate::data::Block;
@@ -42,7 +42,7 @@ const LEAST_PERIODS: f64 = 30.0;
 const HEADROOM: f64 = 10.0;
 /// Length of the recordings that a trial uses, all together, s: five periods of a usual motion of 10 s. The choice then costs no
 /// more on a long recording.
-const TRIAL_SECONDS: f64 = 50.0;
+pub(super) const TRIAL_SECONDS: f64 = 50.0;
 /// Rows slower than this share of the RMS speed are left out of the comparison: the sign of their speed is noise with every cut-off.
 const SLOW: f64 = 0.05;
 
@@ -355,28 +355,20 @@ fn factors_of(
 /// joint has no rows or no torque.
 fn relative_errors(factors: &[TriangularFactor]) -> Vec<f64> {
     let rms = |squares: f64, factor: &TriangularFactor| (squares / factor.rows() as f64).sqrt();
-    let torque: Vec<f64> = (factors.iter())
-        .map(|f| rms(f.right_side_squares(), f))
-        .collect();
-    let mut left = torque.clone();
-    for _ in 0..2 {
-        let weights: Vec<f64> = (left.iter())
-            .map(|l| if *l > 0.0 { 1.0 / l } else { 0.0 })
-            .collect();
-        let Some(beta) = weighted_minimum_norm(factors, &weights) else {
-            return vec![f64::NAN; factors.len()];
-        };
-        left = (factors.iter())
-            .map(|f| rms(f.residual_squares(beta.as_slice()), f))
-            .collect();
-    }
-    left.iter().zip(&torque).map(|(l, t)| l / t).collect()
+    let Some(beta) = by_noise(factors) else {
+        return vec![f64::NAN; factors.len()];
+    };
+    (factors.iter())
+        .map(|f| rms(f.residual_squares(&beta), f) / rms(f.right_side_squares(), f))
+        .collect()
 }
 
 /// The first rows of a recording.
-struct Beginning<'a> {
-    recording: &'a dyn Recording,
-    rows: usize,
+pub(super) struct Beginning<'a> {
+    /// The whole.
+    pub recording: &'a dyn Recording,
+    /// How many.
+    pub rows: usize,
 }
 
 impl Recording for Beginning<'_> {

@@ -38,6 +38,31 @@ pub(super) fn weighted_minimum_norm(
     svd.solve(&z, smallest).ok()
 }
 
+/// Solution of least norm over all joints, weighed by what is left of each. None where it cannot be found.
+pub(super) fn by_noise(factors: &[TriangularFactor]) -> Option<Vec<f64>> {
+    let mut squares: Vec<f64> = factors
+        .iter()
+        .map(TriangularFactor::right_side_squares)
+        .collect();
+    let mut beta = Vec::new();
+    for _ in 0..2 {
+        let weights: Vec<f64> = (factors.iter().zip(&squares))
+            .map(|(f, s)| {
+                if *s > 0.0 {
+                    (f.rows() as f64 / s).sqrt()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        beta = weighted_minimum_norm(factors, &weights)?
+            .as_slice()
+            .to_vec();
+        squares = factors.iter().map(|f| f.residual_squares(&beta)).collect();
+    }
+    Some(beta)
+}
+
 pub(super) fn kept_columns(
     factor: &TriangularFactor,
     data: &Independent,

@@ -9,6 +9,7 @@ use super::beyond::{Beyond, with_beyond};
 use super::cache::RowCache;
 use super::covariance::memory_of;
 use super::cutoff::{Equations, decided};
+use super::decimation;
 use super::evaluate::{Planned, covariance, torque_residuals};
 use super::excitation::not_excited;
 use super::fit::Fit;
@@ -176,20 +177,21 @@ fn solve(
         cache: RowCache::default(),
     };
     let wide = decided;
-    let explained = match options.prepare.decimation {
+    let bands = match options.prepare.decimation {
         // A narrow band smears the rows that a robust fit is to leave out over their neighbours.
         Choice::Auto if options.estimator != Estimator::Robust => {
-            explained_band(training, &plan_with(&wide, 1))?
-        }
-        _ => None,
-    };
-    let decided = match explained {
-        Some(band) => {
             let rows = (ROWS_A_PARAMETER * base.len()).div_ceil(joints) as u64;
-            wide.narrowed(band, rows, &surveys, &options.prepare, &limits)?
+            let narrowed = |band| wide.narrowed(band, rows, &surveys, &options.prepare, &limits);
+            let first = match explained_band(training, &plan_with(&wide, 1))? {
+                Some(band) => narrowed(band)?,
+                None => wide.clone(),
+            };
+            decimation::candidates(first, &narrowed)?
         }
-        None => wide.clone(),
+        _ => vec![wide.clone()],
     };
+    let plans: Vec<Plan> = bands.iter().map(|band| plan_with(band, 1)).collect();
+    let decided = bands[decimation::best(training, &plans)?].clone();
     let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let mut treatment = decided.clone();
     let mut made = RowCache::default();

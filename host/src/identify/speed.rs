@@ -2,19 +2,27 @@
 
 use super::covariance::Memory;
 use super::factor::TriangularFactor;
-use super::linear::product;
-use super::model::{Plan, each_rows};
+use super::left_out::{BETTER, Stretches};
+use super::linear::{by_noise, product};
+use super::model::{Plan, Rows, each_rows};
 use super::{IdentifyError, ModelKind};
 use crate::prepare::Recording;
 
 /// Rows faster than this share of the RMS speed are believed from the start; no threshold lies higher.
 const BELIEVED: f64 = 0.5;
-/// Where several joints move, the threshold is this share of the RMS speed. Their rows also say what the inertia of the
-/// others is, and friction of fast rows alone would be that of fast motion alone: on the Stäubli TX40, whose friction
-/// grows less than in proportion to speed, half the RMS speed leaves 43 of 60 parameters within two standard deviations of
-/// the published ones, 0.1 rad/s (4 % of its RMS speed) 58. Slower rows are few, and a test that they differ would
-/// hardly ever be answered: they are left out unasked.
+/// Where several joints move, no threshold lies below this share of the RMS speed: slower rows are few, and their friction is seldom
+/// Coulomb and viscous. Rows up to half the RMS speed are left out only where they are noisier ([`NOISIER`]), not where their friction
+/// differs: the rows of a joint also say what the inertia of the others is, and friction of fast rows alone would be that of fast
+/// motion alone. On the Stäubli TX40, whose friction grows less than in proportion to speed, half the RMS speed leaves 43 of 60
+/// parameters within two standard deviations of the published ones, 0.1 rad/s (4 % of its RMS speed) 58.
 const SHARE_OF_SEVERAL: f64 = 0.04;
+/// Mean square of a bin's residuals, as a multiple of that of faster rows, from which its rows are left out: more than half of it is
+/// then no noise, but friction that sticks, and what the filters carry of it into the rows around.
+const NOISIER: f64 = 2.0;
+/// … by more than this many standard deviations of the bin's mean square.
+const SURELY: f64 = 3.0;
+/// Looks at the bins: leaving out rows unbends the fit that the next look starts from.
+const LOOKS: usize = 4;
 /// Ratio of neighbouring bounds between bins of speed: half an octave.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Columns of a bin's own friction: braking and gathering speed.
@@ -64,16 +72,7 @@ pub(super) fn speed_thresholds(
     let spectra = &plan.treatment.spectra;
     let joints = spectra.len();
     if joints > 1 {
-        let thresholds = spectra.iter().zip(&plan.treatment.speed_threshold);
-        return Ok((
-            thresholds
-                .map(|(s, least)| least.max(SHARE_OF_SEVERAL * s.velocity_rms()))
-                .collect(),
-            format!(
-                "{} % of the RMS speed, or five standard deviations of the velocity's noise where that is more: slower rows are few, and their friction is seldom Coulomb and viscous.",
-                100.0 * SHARE_OF_SEVERAL
-            ),
-        ));
+        return of_several(training, plan);
     }
     let p = plan.columns.len();
     let bins: Vec<Vec<f64>> = spectra
@@ -151,6 +150,151 @@ pub(super) fn speed_thresholds(
         thresholds,
         "Read from the data: below it, within a factor of two, the joint's friction differs from the Coulomb and viscous friction of faster rows by more than chance; never below five standard deviations of the velocity's noise or 1 % of its RMS.".into(),
     ))
+}
+
+/// Thresholds of several joints: from the believed speeds downwards the first bin of speed whose residuals are [`NOISIER`] than
+/// those of all faster rows ends the range, where the faster rows are then predicted better from others of their kind alone. Slow
+/// rows that are noisy for another reason, such as noise of the position in the acceleration, bend nothing and stay.
+fn of_several(
+    training: &[&dyn Recording],
+    plan: &Plan,
+) -> Result<(Vec<f64>, String), IdentifyError> {
+    let spectra = &plan.treatment.spectra;
+    let lowest: Vec<f64> = (spectra.iter().zip(&plan.treatment.speed_threshold))
+        .map(|(s, least)| least.max(SHARE_OF_SEVERAL * s.velocity_rms()))
+        .collect();
+    let raised = raised(training, plan, &lowest)?;
+    let sorted = |thresholds: &[f64]| {
+        let fast = |rows: &Rows, j: usize, i: usize| rows.qd[j][i].abs() >= thresholds[j];
+        Stretches::of(training, plan, &fast)
+    };
+    let judge = sorted(&raised)?;
+    let mut thresholds = raised.clone();
+    let mut least = judge.error(&judge);
+    let bent = raised != lowest && least < sorted(&lowest)?.error(&judge) - BETTER;
+    if bent {
+        // The rows of a joint that bend nothing come back.
+        for j in 0..thresholds.len() {
+            let before = std::mem::replace(&mut thresholds[j], lowest[j]);
+            let error = sorted(&thresholds)?.error(&judge);
+            if before == lowest[j] || error > least + BETTER / thresholds.len() as f64 {
+                thresholds[j] = before;
+            } else {
+                least = error;
+            }
+        }
+    }
+    let share = 100.0 * SHARE_OF_SEVERAL;
+    let reason = if bent {
+        format!(
+            "Read from the data: slower rows leave more than {NOISIER} times the mean square of faster ones, as friction that sticks does, and with them the faster rows are predicted worse; never below {share} % of the RMS speed."
+        )
+    } else {
+        format!(
+            "{share} % of the RMS speed, or five standard deviations of the velocity's noise where that is more: slower rows are few, and their friction is seldom Coulomb and viscous."
+        )
+    };
+    Ok((if bent { thresholds } else { lowest }, reason))
+}
+
+/// Thresholds above every bin of speed that is noisier than faster ones, from `lowest` on.
+fn raised(
+    training: &[&dyn Recording],
+    plan: &Plan,
+    lowest: &[f64],
+) -> Result<Vec<f64>, IdentifyError> {
+    let mut thresholds = lowest.to_vec();
+    for _ in 0..LOOKS {
+        let bins: Vec<Vec<f64>> = (plan.treatment.spectra.iter().zip(&thresholds))
+            .map(|(s, least)| bounds(BELIEVED * s.velocity_rms(), *least))
+            .collect();
+        let squares = squares_by_speed(training, plan, &thresholds, &bins)?;
+        let mut risen = false;
+        for ((squares, bins), threshold) in squares.iter().zip(&bins).zip(&mut thresholds) {
+            if let Some(bin) = first_noisier(squares) {
+                (*threshold, risen) = (bins[bin - 1], true);
+            }
+        }
+        if !risen {
+            break;
+        }
+    }
+    Ok(thresholds)
+}
+
+/// Sums over the rows of one bin of speed.
+#[derive(Clone, Debug, Default)]
+struct Bin {
+    rows: u64,
+    squares: f64,
+    fourths: f64,
+}
+
+/// Number of the fastest bin whose residuals are noisier than those of all faster bins.
+fn first_noisier((bins, memory): &(Vec<Bin>, f64)) -> Option<usize> {
+    let mut faster = bins.first()?.clone();
+    for (k, bin) in bins.iter().enumerate().skip(1) {
+        if bin.rows > 0 && faster.rows > 0 {
+            let rows = bin.rows as f64;
+            let (own, other) = (bin.squares / rows, faster.squares / faster.rows as f64);
+            let variance = (bin.fourths / rows - own * own).max(0.0) * memory / rows;
+            if own > NOISIER * other && own - other > SURELY * variance.sqrt() {
+                return Some(k);
+            }
+        }
+        faster.rows += bin.rows;
+        faster.squares += bin.squares;
+    }
+    None
+}
+
+/// Per joint, the residuals in each bin of speed of a fit to all rows above `thresholds`, and their memory in rows.
+fn squares_by_speed(
+    training: &[&dyn Recording],
+    plan: &Plan,
+    thresholds: &[f64],
+    bins: &[Vec<f64>],
+) -> Result<Vec<(Vec<Bin>, f64)>, IdentifyError> {
+    let (p, joints) = (plan.columns.len(), thresholds.len());
+    let mut factors = vec![TriangularFactor::new(p); joints];
+    let used = |rows: &Rows, j: usize, i: usize| {
+        rows.equations[j].keep[i] && rows.qd[j][i].abs() >= thresholds[j]
+    };
+    for recording in training {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for (j, (factor, equation)) in factors.iter_mut().zip(&rows.equations).enumerate() {
+                for i in (0..equation.y.len()).filter(|&i| used(rows, j, i)) {
+                    factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
+                }
+            }
+            Ok(())
+        })?;
+    }
+    let Some(beta) = by_noise(&factors) else {
+        return Ok(Vec::new());
+    };
+    let mut found: Vec<(Vec<Bin>, Memory)> = (bins.iter())
+        .map(|b| (vec![Bin::default(); b.len() + 1], Memory::default()))
+        .collect();
+    for recording in training {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+            for (j, ((list, memory), equation)) in found.iter_mut().zip(&rows.equations).enumerate()
+            {
+                for i in (0..equation.y.len()).filter(|&i| used(rows, j, i)) {
+                    let e = equation.y[i] - product(&equation.x[i * p..(i + 1) * p], &beta);
+                    let speed = rows.qd[j][i].abs();
+                    let bin = &mut list[bins[j].iter().take_while(|b| speed < **b).count()];
+                    (bin.rows, bin.squares) = (bin.rows + 1, bin.squares + e * e);
+                    bin.fourths += e.powi(4);
+                    memory.push(e);
+                }
+            }
+            Ok(())
+        })?;
+    }
+    Ok((found.into_iter())
+        .map(|(bins, memory)| (bins, memory.length()))
+        .collect())
 }
 
 /// Number of the fastest bin whose own Coulomb friction differs.
