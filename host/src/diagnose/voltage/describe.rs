@@ -10,6 +10,7 @@ use crate::diagnose::outcome::{
     Verdict, Waterfall,
 };
 use crate::diagnose::stated::{Now, Stated};
+use crate::report::format_significant;
 use crate::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
 use rig_shared::effects::Effect;
 
@@ -28,6 +29,10 @@ pub(super) struct Told<'a> {
     pub train: Vec<f64>,
     /// The same on the hold-out; empty without one.
     pub holdout: Vec<f64>,
+    /// Of the last model, on the recordings that it is judged by, rad or m.
+    pub mean_absolute: f64,
+    /// RMS of the positions of those recordings about their mean.
+    pub spread: f64,
     pub deviations: Vec<Option<Vec<f64>>>,
     /// The nominal one first.
     pub models: Vec<Model>,
@@ -103,9 +108,10 @@ impl Told<'_> {
             "the recordings held back"
         };
         let mut words = vec![format!(
-            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. It is off by {} (RMS) on {on}, {} before any effect.",
+            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. It is off by {} (RMS; {} in the mean of the absolute error) on {on}, {} before any effect.",
             self.driven,
             self.thousandths(last),
+            self.thousandths(self.mean_absolute),
             self.thousandths(first)
         )];
         if self
@@ -116,6 +122,7 @@ impl Told<'_> {
         {
             words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
         }
+        words.extend(self.rotor_remark());
         if !last.is_finite() {
             words.push("With the effects the recordings held back cannot be simulated: they ask more of the drive than the effects were fitted to. Give a recording of such voltages to learn from.".into());
         }
@@ -125,12 +132,12 @@ impl Told<'_> {
             joint: self.joint(),
             rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),
             unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
-            ratio: last / self.floor.max(f64::MIN_POSITIVE),
+            ratio: match self.diverges() {
+                true => f64::NAN,
+                false => last / self.floor.max(f64::MIN_POSITIVE),
+            },
             places: Vec::new(),
-            text: format!(
-                "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
-                self.thousandths(last), last / self.floor.max(f64::MIN_POSITIVE)
-            ),
+            text: self.left_over(),
             doubt: false,
         });
         Diagnosis {
@@ -176,6 +183,43 @@ impl Told<'_> {
             maps: Vec::new(),
             curves: self.curves.clone(),
         }
+    }
+
+    /// Whether the free run of the last model is further from the recordings than a position that never changes.
+    fn diverges(&self) -> bool {
+        !(self
+            .judged()
+            .last()
+            .is_some_and(|last| *last <= self.spread))
+    }
+
+    /// What the last model leaves, a sentence.
+    fn left_over(&self) -> String {
+        let last = self.judged().last().copied().unwrap_or(f64::NAN);
+        if self.diverges() {
+            return format!(
+                "The free run diverges: without a look at the measured motion the simulated position is off by {}, more than the {} by which the position itself varies about its mean. It tells nothing of the model; give recordings of shorter motions, or with the controller's reference, whose loop holds the joint.",
+                self.thousandths(last),
+                self.thousandths(self.spread)
+            );
+        }
+        format!(
+            "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+            self.thousandths(last),
+            last / self.floor.max(f64::MIN_POSITIVE)
+        )
+    }
+
+    /// Says that less inertia of the drive was found than the description gives the rotor, where that is so.
+    fn rotor_remark(&self) -> Option<String> {
+        let drive = self.stated.robot.joints[0].drive.as_ref()?;
+        let found = self.models.last()?.theta[0] / drive.gear_ratio.powi(2);
+        (found < drive.rotor_inertia).then(|| {
+            let [stated, found] = [drive.rotor_inertia, found].map(|x| format_significant(x, 3));
+            format!(
+                "The rotor's inertia of {stated} kg·m² in the description is more than the motion shows of the drive, {found} kg·m², which stands in model.toml."
+            )
+        })
     }
 
     fn step(&self, k: usize) -> Step {
@@ -304,7 +348,9 @@ impl Told<'_> {
             ..Drive::default()
         });
         let square = plant.ratio * plant.ratio;
-        drive.joint_inertia = t[0] - square * drive.rotor_inertia;
+        // No part of a drive has less inertia than none.
+        drive.rotor_inertia = drive.rotor_inertia.min(t[0] / square);
+        drive.joint_inertia = (t[0] - square * drive.rotor_inertia).max(0.0);
         // Torque and voltage constant of a motor are one number in SI.
         drive.torque_constant = t[2] / plant.ratio.abs();
         drive.resistance = Some(t[2] / t[1]);

@@ -121,6 +121,8 @@ pub fn diagnose_voltage(
         floor: floor(&train),
         train: models.iter().map(|m| bench.freely(m)).collect(),
         holdout,
+        mean_absolute: models.last().map_or(f64::NAN, |m| drawn.mean_absolute(m)),
+        spread: spread(drawn.logs),
         deviations: models.iter().map(|m| bench.deviations(m)).collect(),
         models,
         rounds,
@@ -239,6 +241,17 @@ fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
         per_moment: weight(unit)?,
         ratio: joint.drive.as_ref().map_or(1.0, |drive| drive.gear_ratio),
     })
+}
+
+/// RMS of the positions about the mean of their recording.
+fn spread(logs: &[Log]) -> f64 {
+    let (mut squares, mut rows) = (0.0, 0);
+    for log in logs {
+        let mean = log.q.iter().sum::<f64>() / log.q.len().max(1) as f64;
+        squares += log.q.iter().map(|q| (q - mean).powi(2)).sum::<f64>();
+        rows += log.q.len();
+    }
+    (squares / rows.max(1) as f64).sqrt()
 }
 
 /// What the encoder's steps leave of any position: the smallest over √12.

@@ -112,6 +112,15 @@ impl Search<'_> {
         self.problem(model, whole).rms(&model.theta)
     }
 
+    /// Mean absolute error of the free-running position over whole recordings; infinite where they cannot be simulated.
+    pub(super) fn mean_absolute(&self, model: &Model) -> f64 {
+        let whole = segments(self.logs, |_| true, LONGEST);
+        let error = self.problem(model, whole).residual(&model.theta);
+        error.map_or(f64::INFINITY, |error| {
+            error.iter().map(|e| e.abs()).sum::<f64>() / error.len().max(1) as f64
+        })
+    }
+
     /// Simulated positions of one recording; empty where it cannot be simulated.
     pub(super) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
         let whole = segments(self.logs, |k| k == log, LONGEST);
