@@ -14,7 +14,7 @@ use rig_shared::effects::Kind;
 
 use self::even::{Uneven, borrowed};
 pub(super) use self::follow::Follower;
-use self::intake::{Intake, Material, intake};
+use self::intake::{Intake, Material, intake, without};
 use self::pass::Pass;
 use self::remarks::{remarks, weight_of_a_spring};
 use self::steps::{change_step, reconcile, steps};
@@ -27,7 +27,9 @@ use super::descent::Descent;
 use super::fault::{faulty, of_preparing};
 use super::finish::{Drawn, Found, finish};
 use super::floor;
-use super::judge::{Judge, Judged, besides, left_of_held, not_carried_over, taken_by_none};
+use super::judge::{
+    Judge, Judged, besides, left_of_held, not_carried_over, taken_by_none, too_short_for_names,
+};
 use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
@@ -119,8 +121,13 @@ fn attempt(
         loaded,
         sealed,
         open,
+        nameless,
         touches,
     } = material;
+    let options = &Options {
+        without: without(options, nameless.is_some()),
+        ..options.clone()
+    };
     progress(0.1);
     let lead = {
         let refit = Refit::of(&bench, &loaded.rows)?;
@@ -295,6 +302,10 @@ fn attempt(
             (judged.chosen[described..].iter()).any(|p| Some(p.candidate.joint) == of(name))
         };
         judged.left = unexplained(&sizes, &named);
+    }
+    if let Some(why) = nameless {
+        // No effect was tried, so that nothing says of what is left that none explains it.
+        judged.left = too_short_for_names(robot, &refit.base, &judged.known, why);
     }
     let left = judged.left.is_some();
     judged.left = judged.left.or_else(|| left_of_voltage(&windings));

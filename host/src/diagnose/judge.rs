@@ -5,7 +5,7 @@ mod rank;
 mod unseen;
 
 pub(super) use self::rank::{equal, rank};
-pub(super) use self::unseen::{left_of_held, not_carried_over, taken_by_none};
+pub(super) use self::unseen::{left_of_held, not_carried_over, taken_by_none, too_short_for_names};
 
 use rig_shared::effects::Kind;
 

@@ -56,6 +56,8 @@ pub mod sanity;
 pub mod scenario;
 mod search;
 mod sentences;
+#[cfg(test)]
+mod short_tests;
 mod simplex;
 mod slopes;
 mod solve;

@@ -1,21 +1,15 @@
 //! Joints that move in one direction only: there dry friction and a constant torque are one constant, and the data tell their sum.
 //!
-//! Rows near rest would separate the two by the way in which the direction of friction is smoothed there, which is no measurement of
-//! either. They do not count here.
+//! By the rule of an identification ([`crate::identify::Slides`]).
 
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::anchor::Anchor;
 use super::rows::{Nominal, Rows};
 use super::solve::Solution;
+use crate::identify::{SLIDES, Slides};
 use crate::report::{format_significant, format_unit, format_value};
 use crate::robot::Robot;
-
-/// Direction of dry friction from which on a joint slides in it: the rest is the smoothed change of direction about a rest.
-const SLIDES: f64 = 0.99;
-/// Time that a joint has to slide in each direction for its dry friction to be told from a constant torque, s: as long as a law of the
-/// speed needs in slow motion (`diagnose::testable`).
-const LEAST: f64 = 0.5;
 
 /// A joint that moves in one direction only.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,17 +71,14 @@ pub(super) fn one_way(nominal: &Nominal, rows: &Rows) -> Vec<OneWay> {
             let friction = place(joint, column::COULOMB)?;
             let constant = place(joint, column::OFFSET)?;
             let directions = rows.nominal[friction][joint].as_ref()?;
-            let slides = |sign: f64| {
-                let rows = directions.iter().zip(&rows.keep[joint]);
-                rows.filter(|(d, keep)| **keep && sign * **d > SLIDES)
-                    .count()
-            };
-            let time = |sign: f64| slides(sign) as f64 * rows.period;
-            let [ahead, back] = [1.0, -1.0].map(time);
-            (ahead.min(back) < LEAST && ahead.max(back) >= LEAST).then_some(OneWay {
+            let mut slides = Slides::default();
+            let used = directions.iter().zip(&rows.keep[joint]);
+            used.filter(|(_, keep)| **keep)
+                .for_each(|(direction, _)| slides.take(*direction));
+            Some(OneWay {
                 joint,
                 parameters: [friction, constant],
-                direction: if ahead > back { 1.0 } else { -1.0 },
+                direction: slides.one_way(rows.period)?,
             })
         })
         .collect()

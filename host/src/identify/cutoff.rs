@@ -308,6 +308,7 @@ impl Comparison<'_> {
             window: 1,
             stride: 1,
             loudness: vec![1.0; joints],
+            one_way: Vec::new(),
             cache: RowCache::default(),
         };
         let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);

@@ -47,6 +47,7 @@ mod likelihood;
 mod linear;
 mod model;
 mod momentum;
+mod one_way;
 mod output_error;
 mod parts;
 mod position;
@@ -99,6 +100,8 @@ pub use friction_map::{
 };
 pub use grouping::{agree, grouped};
 pub use model::{Equation, Plan, Rows, Tally, each_rows};
+pub use one_way::OneWay;
+pub(crate) use one_way::{SLIDES, Slides};
 pub use position::PositionTorque;
 pub(crate) use prior::described;
 pub use pseudo_inertia::{least_eigenvalue, pseudo_inertia};

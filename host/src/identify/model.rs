@@ -6,6 +6,7 @@ use rig_shared::transmission::{DriveKind, MOTOR_COLUMNS, Transmission};
 use super::cache::RowCache;
 use super::differential::Differential;
 use super::integral::Integral;
+use super::one_way::OneWay;
 use super::{IdentifyError, ModelKind};
 use crate::prepare::{Masked, Motion, PrepareError, Recording, Treatment, worked_motion};
 
@@ -25,6 +26,8 @@ pub struct Plan<'a> {
     pub stride: usize,
     /// Per joint, how loud its torque is taken to be in the energy balance (its RMS), N·m or N.
     pub loudness: Vec<f64>,
+    /// Joints that move in one direction only.
+    pub one_way: Vec<OneWay>,
     /// Rows made so far.
     pub cache: RowCache,
 }
@@ -161,6 +164,16 @@ pub fn each_rows(
     model: ModelKind,
     take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
 ) -> Result<Tally, IdentifyError> {
+    let mut one_way = |rows: &Rows| {
+        let mut own = rows.clone();
+        plan.one_way.iter().for_each(|joint| joint.apply(&mut own));
+        take(&own)
+    };
+    let take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError> =
+        match plan.one_way.is_empty() || model == ModelKind::Integral {
+            true => take,
+            false => &mut one_way,
+        };
     if let Some(tally) = plan.cache.replay(recording, model, take)? {
         return Ok(tally);
     }

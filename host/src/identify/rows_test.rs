@@ -224,6 +224,7 @@ fn rows_are_those_of_the_plain_way() {
             window: 0,
             stride: 1,
             loudness: vec![1.0; n],
+            one_way: Vec::new(),
             cache: RowCache::default(),
         };
         let maker = Differential::new(&plan).unwrap();

@@ -17,6 +17,7 @@ use super::freed::{freed, plain};
 use super::further::{self, Outcome, further};
 use super::lag::Lag;
 use super::model::Plan;
+use super::one_way::one_way;
 use super::problem::Problem;
 use super::residual::ResidualReport;
 use super::speed::speed_thresholds;
@@ -174,6 +175,7 @@ fn solve(
         window,
         stride: (window / 4).max(1),
         loudness: loudness.clone(),
+        one_way: Vec::new(),
         cache: RowCache::default(),
     };
     let wide = decided;
@@ -205,10 +207,11 @@ fn solve(
         };
         (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
     }
-    let plan = Plan {
+    let mut plan = Plan {
         cache: made,
         ..plan_with(&treatment, window)
     };
+    plan.one_way = one_way(training, &plan)?;
     let fit = Fit::of(training, &plan, options, &base)?;
 
     let problem = Problem {

@@ -263,6 +263,7 @@ pub fn validate(
         window: 0,
         stride: 1,
         loudness: vec![1.0; joints],
+        one_way: Vec::new(),
         cache: crate::identify::RowCache::default(),
     };
     let mut warnings = prior_warnings(robot, &columns);

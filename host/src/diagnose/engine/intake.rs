@@ -1,5 +1,7 @@
 //! Recordings taken in: read, looked through for faults, freed of touches, under one treatment.
 
+use rig_shared::effects::Kind;
+
 use crate::diagnose::alike::alike;
 use crate::diagnose::bench::{Bench, Loaded, library};
 use crate::diagnose::lead::slack;
@@ -34,6 +36,8 @@ pub(super) struct Material<'a> {
     pub(super) sealed: Option<Loaded>,
     /// What of the description the training data tell less of, and what they contradict.
     pub(super) open: Open,
+    /// Why no name is learnt from them, a sentence: they are too short. None where they are not.
+    pub(super) nameless: Option<String>,
     /// What was left out of them, and what of the model they do not tell apart, sentences.
     pub(super) touches: Vec<String>,
 }
@@ -63,10 +67,13 @@ pub(super) fn intake<'a>(
     if !wrong.is_empty() {
         return Ok(Intake::Faulty(wrong));
     }
+    // From a short motion the parameters follow, and no name: both need stretches that nothing was fitted to.
+    let nameless = too_short_to_learn(&loaded.runs).map(|fault| fault.text);
+    let without = without(options, nameless.is_some());
     let mut more = stated.clone();
     if more.lift_limits(&loaded.runs)
         || more.hold_delays(slack(&loaded.runs))
-        || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &options.without))
+        || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &without))
     {
         return Ok(Intake::Hold(Box::new(more)));
     }
@@ -115,8 +122,17 @@ pub(super) fn intake<'a>(
         loaded,
         sealed,
         open,
+        nameless,
         touches,
     })))
+}
+
+/// Kinds that are left out of the search: all where recordings are `nameless`.
+pub(super) fn without(options: &Options, nameless: bool) -> Vec<Kind> {
+    match nameless {
+        true => Kind::ALL.to_vec(),
+        false => options.without.clone(),
+    }
 }
 
 /// What about the recordings cannot be.
@@ -133,9 +149,6 @@ fn wrong(
         return Err(DiagnoseError::Copy { label, again });
     }
     let mut wrong = faults(&stated.robot, &loaded.runs)?;
-    if wrong.is_empty() {
-        wrong.extend(too_short_to_learn(&loaded.runs));
-    }
     if let (true, Some(sealed)) = (wrong.is_empty(), sealed) {
         wrong = faults(&stated.robot, &sealed.runs)?;
         if wrong.is_empty() {

@@ -1,9 +1,11 @@
 //! What is left that only recordings held back show, or that a law took which could not stand.
 
+use crate::diagnose::fit::Fit;
+use crate::diagnose::floor;
 use crate::diagnose::outcome::Remainder;
 use crate::diagnose::profile::Profile;
 use crate::diagnose::search::is_gear;
-use crate::report::format_significant;
+use crate::report::{format_significant, format_unit};
 use crate::robot::{Joint, Robot, title_of};
 
 /// What is left of data held back, whose motion is another, counts as more than noise beyond this ratio to the training data's floor,
@@ -112,6 +114,41 @@ pub(in crate::diagnose) fn taken_by_none(
             "The law of {} takes {:.0} % off what is left of joint {name}, on stretches that it was not fitted to, but not with values that such a rig has: something is missing that has no name here.",
             title_of(most.candidate.kind),
             100.0 * gain(&most)
+        ),
+        places: Vec::new(),
+        doubt: true,
+    })
+}
+
+/// What recordings leave that are too short to learn a name from, of the joint that they leave most of its torque; `why` says how short.
+pub(in crate::diagnose) fn too_short_for_names(
+    robot: &Robot,
+    base: &Fit,
+    known: &[f64],
+    why: String,
+) -> Option<Remainder> {
+    let share = |j: &usize| {
+        let rows = base.rows();
+        base.even_rms(*j) / floor::rms(&rows.torque[*j], &rows.keep[*j])
+    };
+    let joint = (0..known.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let rms = base.even_rms(joint);
+    let (floor, ratio) = match known[joint] {
+        floor if floor > 0.0 => (floor, rms / floor),
+        _ => (0.0, f64::NAN),
+    };
+    let Joint { name, kind, .. } = &robot.joints[joint];
+    let unit = kind.units().1;
+    Some(Remainder {
+        joint: name.clone(),
+        unit: unit.to_owned(),
+        rms: (rms * rms - floor * floor).max(0.0).sqrt(),
+        ratio,
+        text: format!(
+            "{why} The parameters are fitted; of joint {name} {} {} RMS are left, {} % of its torque, and nobody knows whether an effect is missing.",
+            format_significant(rms, 3),
+            format_unit(unit),
+            format_significant(100.0 * share(&joint), 2)
         ),
         places: Vec::new(),
         doubt: true,
