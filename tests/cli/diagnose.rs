@@ -41,8 +41,8 @@ fn noise(seed: u64) -> impl Fn() -> f64 {
     }
 }
 
-/// What `rig diagnose` writes and says of a recording.
-fn diagnosed(change: impl Fn(f64, f64) -> (f64, f64)) -> (Value, String) {
+/// What `rig diagnose` with `options` writes and says of a recording.
+fn diagnosed(options: &[&str], change: impl Fn(f64, f64) -> (f64, f64)) -> (Value, String) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let data = recording(folder.path(), change);
@@ -53,6 +53,7 @@ fn diagnosed(change: impl Fn(f64, f64) -> (f64, f64)) -> (Value, String) {
             .arg(robot("one-link.toml"))
             .arg("--data")
             .arg(&data)
+            .args(options)
             .arg("--out")
             .arg(&out),
     );
@@ -64,7 +65,7 @@ fn diagnosed(change: impl Fn(f64, f64) -> (f64, f64)) -> (Value, String) {
 }
 
 fn fault(change: impl Fn(f64, f64) -> (f64, f64), kind: &str, names: &str) {
-    let (found, said) = diagnosed(change);
+    let (found, said) = diagnosed(&[], change);
     assert_eq!(found["verdict"], "data-fault", "{found}");
     assert_eq!(found["steps"], serde_json::json!([]));
     let faults = found["data_faults"].as_array().unwrap();
@@ -83,6 +84,17 @@ fn degrees_are_a_fault_of_the_data() {
 #[test]
 fn a_torque_with_its_sign_swapped_is_a_fault_of_the_data() {
     fault(|q, tau| (q, -tau), "sign", "tau1");
+}
+
+#[test]
+fn a_recording_that_looks_wrong_is_fitted_where_asked_for() {
+    let (found, said) = diagnosed(&["--even-if-wrong"], |q, tau| (q, 30.0 * tau));
+    assert_ne!(found["verdict"], "data-fault", "{found}");
+    let faults = found["data_faults"].as_array().unwrap();
+    assert!(!faults.is_empty(), "{found}");
+    assert!(!said.contains("nothing was fitted"), "{said}");
+    let before = &found["waterfall"][0];
+    assert!(before.is_object(), "{found}");
 }
 
 /// A servo without a current sensor: its voltage alone, of some of the recordings, names what its makers' study names.

@@ -74,6 +74,9 @@ pub(crate) struct Args {
     /// left, or another name stands in for it
     #[arg(long, value_parser = known)]
     without: Vec<String>,
+    /// Fit although recordings look wrong (sign, unit, ratio, clock, swapped columns); what looks wrong is said first
+    #[arg(long)]
+    even_if_wrong: bool,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
@@ -123,6 +126,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(warning);
     }
     let options = Options {
+        even_if_wrong: args.even_if_wrong,
         seed: args.seed,
         sensor_zeros: zeros(&robot, args, ui)?,
         clamped: clamps(&robot, args, ui)?,
@@ -245,17 +249,18 @@ fn clamps(robot: &Robot, args: &Args, ui: &Ui) -> Result<Vec<Run>, CommandError>
 
 /// The result at a glance.
 fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
-    for line in summary(found) {
-        ui.say(&line);
-    }
+    let lines = summary(found);
     for fault in &found.data_faults {
         ui.remark(&match fault.recording.as_str() {
             recording if fault.text.contains(recording) => fault.text.clone(),
             recording => format!("{recording}: {}", fault.text),
         });
     }
+    for line in lines {
+        ui.say(&line);
+    }
     if found.verdict == Verdict::DataFault {
-        ui.remark("nothing was fitted; model.toml is the description as it was given.");
+        ui.remark("nothing was fitted; model.toml is the description as it was given. --even-if-wrong fits all the same.");
     }
     ui.say(&format!("report: {}", out.join(REPORT).display()));
 }

@@ -123,6 +123,7 @@ fn attempt(
         open,
         nameless,
         touches,
+        faults,
     } = material;
     let options = &Options {
         without: without(options, nameless.is_some()),
@@ -418,7 +419,7 @@ fn attempt(
         detectable: Vec::new(),
         next_experiment: None,
         remainder: judged.left.clone(),
-        data_faults: Vec::new(),
+        data_faults: faults,
         waterfall: descent.waterfall(robot, &chosen[described..], known),
         tried,
         maps: Vec::new(),

@@ -91,6 +91,8 @@ use crate::prepare::PrepareError;
 pub struct Options {
     /// Effects that are left out of the library.
     pub without: Vec<Kind>,
+    /// Whether recordings that cannot be what they say are fitted all the same.
+    pub even_if_wrong: bool,
     /// Threads; 0 for as many as the machine has.
     pub threads: usize,
     /// Seed of the bootstrap.

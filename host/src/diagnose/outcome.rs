@@ -352,6 +352,13 @@ pub struct DataFault {
     pub text: String,
 }
 
+impl DataFault {
+    /// Whether rows are left to fit: not of a recording that is too short or does not move.
+    pub(super) fn leaves_rows(&self) -> bool {
+        !["too-short", "not-moving"].contains(&self.kind.as_str())
+    }
+}
+
 /// What of a recording a fault is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {

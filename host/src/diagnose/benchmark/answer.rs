@@ -73,6 +73,7 @@ impl Method for Diagnose {
 
     fn answer(&self, made: &Made, without: &[Kind]) -> Result<Answer, DiagnoseError> {
         let options = crate::diagnose::Options {
+            even_if_wrong: false,
             without: without.to_vec(),
             threads: 1,
             seed: made.truth.seed,

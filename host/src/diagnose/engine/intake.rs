@@ -40,6 +40,8 @@ pub(super) struct Material<'a> {
     pub(super) nameless: Option<String>,
     /// What was left out of them, and what of the model they do not tell apart, sentences.
     pub(super) touches: Vec<String>,
+    /// What cannot be about the recordings and was fitted all the same.
+    pub(super) faults: Vec<DataFault>,
 }
 
 /// Reads the recordings.
@@ -63,9 +65,10 @@ pub(super) fn intake<'a>(
     if let Some(sealed) = &mut sealed {
         in_sessions(&mut sealed.runs, &loaded.runs);
     }
-    let wrong = wrong(stated, &loaded, sealed.as_ref())?;
-    if !wrong.is_empty() {
-        return Ok(Intake::Faulty(wrong));
+    let faults = wrong(stated, &loaded, sealed.as_ref())?;
+    let fits = |fault: &DataFault| options.even_if_wrong && fault.leaves_rows();
+    if !faults.iter().all(fits) {
+        return Ok(Intake::Faulty(faults));
     }
     // From a short motion the parameters follow, and no name: both need stretches that nothing was fitted to.
     let nameless = too_short_to_learn(&loaded.runs).map(|fault| fault.text);
@@ -124,6 +127,7 @@ pub(super) fn intake<'a>(
         open,
         nameless,
         touches,
+        faults,
     })))
 }
 

@@ -207,7 +207,11 @@ fn faults(found: &Diagnosis) -> Option<Section> {
         Section::new(
             "faults",
             "What is wrong with the data",
-            "These cannot come from any robot that the description fits. Fitting such data would only bend parameters, so mend them first.",
+            if found.verdict == Verdict::DataFault {
+                "These cannot come from any robot that the description fits. Fitting such data would only bend parameters, so mend them first."
+            } else {
+                "These cannot come from any robot that the description fits. They were fitted all the same, as asked for: whatever this page says of parameters and effects may be their doing."
+            },
         )
         .with(Block::Table(Table {
             caption: "Faults".into(),
