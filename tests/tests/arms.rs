@@ -129,7 +129,8 @@ fn what_links_that_can_exist_cost() {
     }
     if let Some((robot, data)) = lwr() {
         // One slow motion, which the free fit follows a third better, with values that no arm has, and worse when it is
-        // repeated. Joint 5 alone is better left free (docs/arms.md).
+        // repeated. Joint 5 alone is better left free (docs/arms.md): with the slow rows left out in which it sticks, the hold-out
+        // error of the bodies falls from 20.5 to 16.2 %, that of the free fit more.
         let [train, rest] = ["run1.csv", "run2.csv"].map(|name| data.join(name));
         costs_little(
             "LWR4+",
@@ -137,7 +138,7 @@ fn what_links_that_can_exist_cost() {
             &[train],
             &[rest],
             [42.0, 3.0],
-            &[(5, 17.0)],
+            &[(5, 25.0)],
         );
     }
     if let Some(data) = folder("dfki_double_pendulum") {
@@ -180,7 +181,6 @@ fn lwr_names_what_its_slow_runs_leave_open() {
         "Iyz6",
     ];
     let first_alone = [
-        "Ixz3",
         "Izz4 + 0.1521 m5 + 0.78 mz5 + Iyy5 + 0.1521 m6 + 0.1521 m7",
         "Ixx6 - Iyy6 + Iyy7",
     ];
