@@ -15,7 +15,7 @@ use super::pictures::{self, forget};
 use super::ui::Ui;
 use crate::data::EffortNeed;
 use crate::diagnose::experiment::FILE;
-use crate::diagnose::outcome::{Diagnosis, Step, Verdict};
+use crate::diagnose::outcome::{DataFault, Diagnosis, Step, Verdict};
 use crate::diagnose::runs::Run;
 use crate::diagnose::voltage::diagnose_voltage;
 use crate::diagnose::{DiagnoseError, Options, Unburdened, clamped, diagnose, sensor_zeros};
@@ -260,7 +260,13 @@ fn print(ui: &Ui, found: &Diagnosis, out: &Path) {
         ui.say(&line);
     }
     if found.verdict == Verdict::DataFault {
-        ui.remark("nothing was fitted; model.toml is the description as it was given. --even-if-wrong fits all the same.");
+        let way_on = match found.data_faults.iter().all(DataFault::leaves_rows) {
+            true => " --even-if-wrong fits all the same.",
+            false => "",
+        };
+        ui.remark(&format!(
+            "nothing was fitted; model.toml is the description as it was given.{way_on}"
+        ));
     }
     ui.say(&format!("report: {}", out.join(REPORT).display()));
 }

@@ -17,7 +17,7 @@ pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
     };
     Some(DataFault {
         kind: kind.into(),
-        about: About::Recording,
+        about: About::Preparation,
         recording: label.clone(),
         joint: String::new(),
         text: error.to_string(),

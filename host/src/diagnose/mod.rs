@@ -76,6 +76,7 @@ pub use clamped::clamped;
 pub use drive_off::sensor_zeros;
 pub use engine::diagnose;
 pub(crate) use motion::{of_joints, replayed};
+use outcome::DataFault;
 pub use outcome::Diagnosis;
 pub use pull::Unburdened;
 pub(crate) use runs::runs_of_blocks;
@@ -104,6 +105,13 @@ pub struct Options {
     /// Whether the description comes from a format without a place for a constant torque, so that its having none says
     /// nothing: the constant is then fitted beside the friction, as in an identification.
     pub no_offsets: bool,
+}
+
+impl Options {
+    /// Whether recordings of which so much is wrong are fitted.
+    fn fits(&self, faults: &[DataFault]) -> bool {
+        faults.is_empty() || self.even_if_wrong && faults.iter().all(DataFault::leaves_rows)
+    }
 }
 
 /// Why a diagnosis is not possible.

@@ -353,15 +353,18 @@ pub struct DataFault {
 }
 
 impl DataFault {
-    /// Whether rows are left to fit: not of a recording that is too short or does not move.
-    pub(super) fn leaves_rows(&self) -> bool {
-        !["too-short", "not-moving"].contains(&self.kind.as_str())
+    /// Whether rows are left to fit: not of a recording that cannot be prepared, is too short or does not move.
+    pub fn leaves_rows(&self) -> bool {
+        self.about != About::Preparation
+            && !["too-short", "not-moving"].contains(&self.kind.as_str())
     }
 }
 
 /// What of a recording a fault is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum About {
+    /// The recording, which cannot be prepared: it is broken or irregular.
+    Preparation,
     /// Time, or the recording as a whole.
     Recording,
     /// A joint's position or velocity.

@@ -18,7 +18,7 @@ use super::base::{Base, chain_of, transmission_of};
 use super::cache::RowCache;
 use super::factor::TriangularFactor;
 use super::linear::by_noise;
-use super::model::{Plan, each_rows};
+use super::model::{Plan, Rows, each_rows};
 use super::{IdentifyError, ModelKind, Options};
 use crate::data::Block;
 use crate::prepare::{
@@ -42,7 +42,7 @@ const LEAST_PERIODS: f64 = 30.0;
 const HEADROOM: f64 = 10.0;
 /// Length of the recordings that a trial uses, all together, s: five periods of a usual motion of 10 s. The choice then costs no
 /// more on a long recording.
-pub(super) const TRIAL_SECONDS: f64 = 50.0;
+const TRIAL_SECONDS: f64 = 50.0;
 /// Rows slower than this share of the RMS speed are left out of the comparison: the sign of their speed is noise with every cut-off.
 const SLOW: f64 = 0.05;
 
@@ -311,8 +311,9 @@ impl Comparison<'_> {
             one_way: Vec::new(),
             cache: RowCache::default(),
         };
-        let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
-        let factors = factors_of(recordings, &plan, rows)?;
+        let beginnings = beginnings(recordings, &treatment);
+        let beginnings: Vec<&dyn Recording> = beginnings.iter().map(|b| b as _).collect();
+        let factors = factors_of(&beginnings, &plan, &kept)?;
         Ok(CutoffTrial {
             cutoff,
             relative_error: relative_errors(&factors),
@@ -320,20 +321,30 @@ impl Comparison<'_> {
     }
 }
 
-/// The rows of each joint's equation, of the beginning of each recording.
-fn factors_of(
+/// The beginnings of `recordings` that a trial uses.
+pub(super) fn beginnings<'a>(
+    recordings: &[&'a dyn Recording],
+    treatment: &Treatment,
+) -> Vec<Beginning<'a>> {
+    let rows = (TRIAL_SECONDS * treatment.sample_rate) as usize / recordings.len().max(1);
+    (recordings.iter())
+        .map(|&recording| Beginning { recording, rows })
+        .collect()
+}
+
+/// The rows of each joint's equation for which `used` (of the rows, joint, row) is true.
+///
+/// # Errors
+/// [`IdentifyError`]: recordings that cannot be read.
+pub(super) fn factors_of(
     recordings: &[&dyn Recording],
     plan: &Plan,
-    rows: usize,
+    used: &(dyn Fn(&Rows, usize, usize) -> bool + Sync),
 ) -> Result<Vec<TriangularFactor>, IdentifyError> {
     let p = plan.columns.len();
     let mut factors = vec![TriangularFactor::new(p); plan.loudness.len()];
     for recording in recordings {
-        let beginning = Beginning {
-            recording: *recording,
-            rows,
-        };
-        each_rows(&beginning, plan, ModelKind::Differential, &mut |rows| {
+        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
             each_of(
                 threads(plan.treatment.threads),
                 &mut factors,
@@ -341,7 +352,7 @@ fn factors_of(
                     let Some(equation) = rows.equations.get(k) else {
                         return;
                     };
-                    for i in (0..equation.y.len()).filter(|&i| equation.keep[i]) {
+                    for i in (0..equation.y.len()).filter(|&i| used(rows, k, i)) {
                         factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
                     }
                 },
@@ -350,6 +361,11 @@ fn factors_of(
         })?;
     }
     Ok(factors)
+}
+
+/// Whether a row is usable.
+pub(super) fn kept(rows: &Rows, joint: usize, row: usize) -> bool {
+    rows.equations[joint].keep[row]
 }
 
 /// Per joint, what least squares over all joints leaves of the torque, weighed by what is left of each; not a number where a
@@ -366,10 +382,8 @@ fn relative_errors(factors: &[TriangularFactor]) -> Vec<f64> {
 
 /// The first rows of a recording.
 pub(super) struct Beginning<'a> {
-    /// The whole.
-    pub recording: &'a dyn Recording,
-    /// How many.
-    pub rows: usize,
+    recording: &'a dyn Recording,
+    rows: usize,
 }
 
 impl Recording for Beginning<'_> {

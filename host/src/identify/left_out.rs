@@ -15,14 +15,14 @@ pub(super) const BETTER: f64 = 0.02;
 pub(super) struct Stretches(Vec<Vec<TriangularFactor>>);
 
 impl Stretches {
-    /// Sorts the usable rows of the recordings for which `chosen` (of the rows, joint, row) is true.
+    /// Sorts the rows of the recordings for which `used` (of the rows, joint, row) is true.
     ///
     /// # Errors
     /// [`IdentifyError`]: recordings that cannot be read.
     pub(super) fn of(
         recordings: &[&dyn Recording],
         plan: &Plan,
-        chosen: &dyn Fn(&Rows, usize, usize) -> bool,
+        used: &dyn Fn(&Rows, usize, usize) -> bool,
     ) -> Result<Self, IdentifyError> {
         let p = plan.columns.len();
         let empty = vec![TriangularFactor::new(p); plan.loudness.len()];
@@ -40,7 +40,7 @@ impl Stretches {
                     let stretch = (((t - start) / length) as usize).min(STRETCHES - 1);
                     let factors = sorted[stretch].iter_mut().zip(&rows.equations);
                     for (j, (factor, equation)) in factors.enumerate() {
-                        if equation.keep[i] && chosen(rows, j, i) {
+                        if used(rows, j, i) {
                             factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
                         }
                     }

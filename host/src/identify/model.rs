@@ -164,16 +164,30 @@ pub fn each_rows(
     model: ModelKind,
     take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
 ) -> Result<Tally, IdentifyError> {
-    let mut one_way = |rows: &Rows| {
+    if plan.one_way.is_empty() || model == ModelKind::Integral {
+        return each_row_made(recording, plan, model, take);
+    }
+    let mut left_out = Tally::default();
+    let mut slide = |rows: &Rows| {
         let mut own = rows.clone();
-        plan.one_way.iter().for_each(|joint| joint.apply(&mut own));
+        for joint in &plan.one_way {
+            joint.apply(&mut own, &mut left_out);
+        }
         take(&own)
     };
-    let take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError> =
-        match plan.one_way.is_empty() || model == ModelKind::Integral {
-            true => take,
-            false => &mut one_way,
-        };
+    let mut tally = each_row_made(recording, plan, model, &mut slide)?;
+    tally.used -= left_out.slow.iter().sum::<u64>();
+    tally.add(&left_out);
+    Ok(tally)
+}
+
+/// The same with all rows of joints that move one way.
+fn each_row_made(
+    recording: &dyn Recording,
+    plan: &Plan,
+    model: ModelKind,
+    take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
+) -> Result<Tally, IdentifyError> {
     if let Some(tally) = plan.cache.replay(recording, model, take)? {
         return Ok(tally);
     }

@@ -5,7 +5,7 @@
 
 use rig_shared::multibody::{COLUMNS, column};
 
-use super::model::{Plan, Rows, each_rows};
+use super::model::{Plan, Rows, Tally, each_rows};
 use super::{IdentifyError, ModelKind};
 use crate::prepare::Recording;
 
@@ -50,17 +50,20 @@ pub struct OneWay {
 }
 
 impl OneWay {
-    /// Leaves out rows of the joint about rests. In the others it slides.
-    pub(super) fn apply(&self, rows: &mut Rows) {
+    /// Leaves out rows of the joint about rests, and counts them. In the others it slides.
+    pub(super) fn apply(&self, rows: &mut Rows, tally: &mut Tally) {
         let Some(equation) = rows.equations.get_mut(self.joint) else {
             return;
         };
         let width = equation.x.len() / equation.y.len().max(1);
         for (row, keep) in equation.x.chunks_mut(width.max(1)).zip(&mut equation.keep) {
-            *keep &= self.direction * row[self.place] > SLIDES;
-            if *keep {
+            let slides = self.direction * row[self.place] > SLIDES;
+            if slides {
                 row[self.place] = self.direction;
+            } else if *keep {
+                Tally::count(&mut tally.slow, self.joint);
             }
+            *keep &= slides;
         }
     }
 }

@@ -193,19 +193,20 @@ fn solve(
         _ => vec![wide.clone()],
     };
     let plans: Vec<Plan> = bands.iter().map(|band| plan_with(band, 1)).collect();
-    let decided = bands[decimation::best(training, &plans)?].clone();
+    let decided = decimation::best(training, &bands[0], &plans)?;
     let (window, window_reason) = choose_window(options, &decided, &surveys)?;
     let mut treatment = decided.clone();
     let mut made = RowCache::default();
     if options.prepare.speed_threshold == Choice::Auto {
         let by_noise = plan_with(&decided, window);
-        let (speeds, reason) = speed_thresholds(training, &by_noise)?;
-        made = if speeds == decided.speed_threshold {
+        let chosen = speed_thresholds(training, &by_noise)?;
+        made = if chosen.fitted == decided.speed_threshold {
             by_noise.cache
         } else {
             RowCache::after(by_noise.cache)
         };
-        (treatment.speed_threshold, treatment.speed_reason) = (speeds, reason);
+        (treatment.speed_threshold, treatment.judged_speed) = (chosen.fitted, chosen.judged);
+        treatment.speed_reason = chosen.reason;
     }
     let mut plan = Plan {
         cache: made,
@@ -282,7 +283,7 @@ fn solve(
         &surveys,
         whole.map(|[training, _]| fitted(training)).as_deref(),
     )?;
-    let treatments = at_own_rate(&treatment)?;
+    let treatments = at_own_rate(&treatment.judging())?;
     let plans: Vec<Plan> = treatments.iter().map(|t| plan_with(t, window)).collect();
     let held = each_planned(holdout, &plans);
     let holdout_residuals = if holdout.is_empty() {

@@ -1,6 +1,7 @@
 //! From which speed on friction is Coulomb and viscous, read from the recordings themselves.
 
 use super::covariance::Memory;
+use super::cutoff::{factors_of, kept};
 use super::factor::TriangularFactor;
 use super::left_out::{BETTER, Stretches};
 use super::linear::{by_noise, product};
@@ -57,8 +58,17 @@ fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
     }
 }
 
-/// Per joint, the speed from which on one Coulomb and one viscous coefficient describe its friction, rad/s or
-/// m/s, and a sentence of how it was found. `plan` brings the lowest thresholds that make sense, those of noise.
+/// The speeds from which on rows count, per joint, rad/s or m/s.
+pub(super) struct Thresholds {
+    /// In the fit.
+    pub fitted: Vec<f64>,
+    /// Where what was fitted is judged.
+    pub judged: Vec<f64>,
+    /// How they were found, a sentence.
+    pub reason: String,
+}
+
+/// Per joint, the speed from which on one Coulomb and one viscous coefficient describe its friction. `plan` brings the lowest thresholds that make sense, those of noise.
 ///
 /// Of one joint: from the believed speeds downwards each bin of speed in turn is given a Coulomb friction of its own beside the
 /// full model (the test of Chow 1960 for a changed parameter); the first bin where it differs significantly,
@@ -68,7 +78,7 @@ fn add(to: &mut TriangularFactor, bin: &TriangularFactor, own: bool) {
 pub(super) fn speed_thresholds(
     training: &[&dyn Recording],
     plan: &Plan,
-) -> Result<(Vec<f64>, String), IdentifyError> {
+) -> Result<Thresholds, IdentifyError> {
     let spectra = &plan.treatment.spectra;
     let joints = spectra.len();
     if joints > 1 {
@@ -136,7 +146,7 @@ pub(super) fn speed_thresholds(
             Ok(())
         })?;
     }
-    let thresholds = (0..joints)
+    let thresholds: Vec<f64> = (0..joints)
         .map(|j| {
             let refused = first_refused(&factors[j], memories[j].length());
             let least = plan.treatment.speed_threshold[j];
@@ -146,55 +156,68 @@ pub(super) fn speed_thresholds(
             }
         })
         .collect();
-    Ok((
-        thresholds,
-        "Read from the data: below it, within a factor of two, the joint's friction differs from the Coulomb and viscous friction of faster rows by more than chance; never below five standard deviations of the velocity's noise or 1 % of its RMS.".into(),
-    ))
+    Ok(Thresholds {
+        judged: thresholds.clone(),
+        fitted: thresholds,
+        reason: "Read from the data: below it, within a factor of two, the joint's friction differs from the Coulomb and viscous friction of faster rows by more than chance; never below five standard deviations of the velocity's noise or 1 % of its RMS.".into(),
+    })
 }
 
 /// Thresholds of several joints: from the believed speeds downwards the first bin of speed whose residuals are [`NOISIER`] than
 /// those of all faster rows ends the range, where the faster rows are then predicted better from others of their kind alone. Slow
 /// rows that are noisy for another reason, such as noise of the position in the acceleration, bend nothing and stay.
-fn of_several(
-    training: &[&dyn Recording],
-    plan: &Plan,
-) -> Result<(Vec<f64>, String), IdentifyError> {
+fn of_several(training: &[&dyn Recording], plan: &Plan) -> Result<Thresholds, IdentifyError> {
     let spectra = &plan.treatment.spectra;
     let lowest: Vec<f64> = (spectra.iter().zip(&plan.treatment.speed_threshold))
         .map(|(s, least)| least.max(SHARE_OF_SEVERAL * s.velocity_rms()))
         .collect();
-    let raised = raised(training, plan, &lowest)?;
-    let sorted = |thresholds: &[f64]| {
-        let fast = |rows: &Rows, j: usize, i: usize| rows.qd[j][i].abs() >= thresholds[j];
-        Stretches::of(training, plan, &fast)
-    };
-    let judge = sorted(&raised)?;
-    let mut thresholds = raised.clone();
-    let mut least = judge.error(&judge);
-    let bent = raised != lowest && least < sorted(&lowest)?.error(&judge) - BETTER;
-    if bent {
-        // The rows of a joint that bend nothing come back.
-        for j in 0..thresholds.len() {
-            let before = std::mem::replace(&mut thresholds[j], lowest[j]);
-            let error = sorted(&thresholds)?.error(&judge);
-            if before == lowest[j] || error > least + BETTER / thresholds.len() as f64 {
-                thresholds[j] = before;
-            } else {
-                least = error;
-            }
-        }
-    }
     let share = 100.0 * SHARE_OF_SEVERAL;
-    let reason = if bent {
-        format!(
-            "Read from the data: slower rows leave more than {NOISIER} times the mean square of faster ones, as friction that sticks does, and with them the faster rows are predicted worse; never below {share} % of the RMS speed."
-        )
-    } else {
+    let fitted = unbent(training, plan, &lowest)?;
+    let reason = if fitted == lowest {
         format!(
             "{share} % of the RMS speed, or five standard deviations of the velocity's noise where that is more: slower rows are few, and their friction is seldom Coulomb and viscous."
         )
+    } else {
+        format!(
+            "Read from the data: slower rows leave more than {NOISIER} times the mean square of faster ones, as friction that sticks does, and with them the faster rows are predicted worse; never below {share} % of the RMS speed, from which on the rows of the hold-out count."
+        )
     };
-    Ok((if bent { thresholds } else { lowest }, reason))
+    Ok(Thresholds {
+        fitted,
+        judged: lowest,
+        reason,
+    })
+}
+
+/// Thresholds without the slow rows that bend the fit; `lowest` where none do.
+fn unbent(
+    training: &[&dyn Recording],
+    plan: &Plan,
+    lowest: &[f64],
+) -> Result<Vec<f64>, IdentifyError> {
+    let mut thresholds = raised(training, plan, lowest)?;
+    if thresholds == lowest {
+        return Ok(thresholds);
+    }
+    let sorted = |thresholds: &[f64]| Stretches::of(training, plan, &faster(thresholds));
+    let judge = sorted(&thresholds)?;
+    let mut least = judge.error(&judge);
+    if least >= sorted(lowest)?.error(&judge) - BETTER {
+        return Ok(lowest.to_vec());
+    }
+    // The rows of a joint that bend nothing come back.
+    for (j, lowest_one) in lowest.iter().enumerate() {
+        if thresholds[j] == *lowest_one {
+            continue;
+        }
+        let mut fewer = thresholds.clone();
+        fewer[j] = *lowest_one;
+        let error = sorted(&fewer)?.error(&judge);
+        if error <= least + BETTER / lowest.len() as f64 {
+            (thresholds, least) = (fewer, error);
+        }
+    }
+    Ok(thresholds)
 }
 
 /// Thresholds above every bin of speed that is noisier than faster ones, from `lowest` on.
@@ -220,6 +243,11 @@ fn raised(
         }
     }
     Ok(thresholds)
+}
+
+/// Whether a row (of the rows, joint, row) is usable and no slower than the joint's threshold.
+fn faster(thresholds: &[f64]) -> impl Fn(&Rows, usize, usize) -> bool + Sync {
+    |rows, j, i| kept(rows, j, i) && rows.qd[j][i].abs() >= thresholds[j]
 }
 
 /// Sums over the rows of one bin of speed.
@@ -255,21 +283,9 @@ fn squares_by_speed(
     thresholds: &[f64],
     bins: &[Vec<f64>],
 ) -> Result<Vec<(Vec<Bin>, f64)>, IdentifyError> {
-    let (p, joints) = (plan.columns.len(), thresholds.len());
-    let mut factors = vec![TriangularFactor::new(p); joints];
-    let used = |rows: &Rows, j: usize, i: usize| {
-        rows.equations[j].keep[i] && rows.qd[j][i].abs() >= thresholds[j]
-    };
-    for recording in training {
-        each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
-            for (j, (factor, equation)) in factors.iter_mut().zip(&rows.equations).enumerate() {
-                for i in (0..equation.y.len()).filter(|&i| used(rows, j, i)) {
-                    factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
-                }
-            }
-            Ok(())
-        })?;
-    }
+    let p = plan.columns.len();
+    let used = faster(thresholds);
+    let factors = factors_of(training, plan, &used)?;
     let Some(beta) = by_noise(&factors) else {
         return Ok(Vec::new());
     };

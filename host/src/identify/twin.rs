@@ -116,6 +116,7 @@ pub(super) fn each_pair(
 fn twice(treatment: &Treatment) -> Treatment {
     let mut both = treatment.clone();
     both.speed_threshold.extend(&treatment.speed_threshold);
+    both.judged_speed.extend(&treatment.judged_speed);
     both.saturation.extend(&treatment.saturation);
     // The companion has positions only; both motions get their derivatives in the same way.
     both.measured_derivatives = false;

@@ -99,6 +99,9 @@ pub struct Treatment {
     pub torque_lead: f64,
     /// Per joint, speed below which rows are masked, rad/s or m/s.
     pub speed_threshold: Vec<f64>,
+    /// The same where values are judged by recordings that they were not fitted to: no higher, as rows that are left out of a
+    /// fit because they bend it still say how good it is.
+    pub judged_speed: Vec<f64>,
     /// Why these thresholds, a sentence.
     pub speed_reason: String,
     /// Per joint, torques beyond which rows count as saturated (lowest, highest).
@@ -212,6 +215,7 @@ impl Treatment {
             },
             measured_derivatives: options.measured_derivatives,
             torque_lead: options.torque_lead,
+            judged_speed: speed_threshold.clone(),
             speed_threshold,
             speed_reason,
             saturation: saturation(surveys, torque_limits, spectra.len()),
@@ -274,6 +278,14 @@ impl Treatment {
             spectral_cutoff: self.spectral_cutoff,
             ..Self::decide(surveys, &fixed, torque_limits)?
         })
+    }
+
+    /// The same for recordings that fitted values are judged by.
+    pub fn judging(&self) -> Self {
+        Self {
+            speed_threshold: self.judged_speed.clone(),
+            ..self.clone()
+        }
     }
 
     /// s

@@ -18,7 +18,7 @@ pub struct IdentifiedBand {
     pub cutoff: f64,
     /// Rows per second after the low-pass over torque and regressor.
     pub rate: f64,
-    /// Per joint, speed below which rows were left out, rad/s or m/s.
+    /// Per joint, speed below which rows do not count in that error, rad/s or m/s.
     pub min_speed: Vec<f64>,
     /// How much later the torque recorded at an instant acts, s.
     #[serde(default)]
@@ -31,7 +31,7 @@ impl IdentifiedBand {
         Self {
             cutoff: treatment.cutoff,
             rate: treatment.kept_rate(),
-            min_speed: treatment.speed_threshold.clone(),
+            min_speed: treatment.judged_speed.clone(),
             torque_lead: treatment.torque_lead,
         }
     }

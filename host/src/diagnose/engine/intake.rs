@@ -65,9 +65,8 @@ pub(super) fn intake<'a>(
     if let Some(sealed) = &mut sealed {
         in_sessions(&mut sealed.runs, &loaded.runs);
     }
-    let faults = wrong(stated, &loaded, sealed.as_ref())?;
-    let fits = |fault: &DataFault| options.even_if_wrong && fault.leaves_rows();
-    if !faults.iter().all(fits) {
+    let faults = wrong(stated, &loaded, sealed.as_ref(), options)?;
+    if !options.fits(&faults) {
         return Ok(Intake::Faulty(faults));
     }
     // From a short motion the parameters follow, and no name: both need stretches that nothing was fitted to.
@@ -144,6 +143,7 @@ fn wrong(
     stated: &Stated,
     loaded: &Loaded,
     sealed: Option<&Loaded>,
+    options: &Options,
 ) -> Result<Vec<DataFault>, DiagnoseError> {
     let all: Vec<&Run> = (loaded.runs.iter())
         .chain(sealed.iter().flat_map(|sealed| &sealed.runs))
@@ -153,11 +153,10 @@ fn wrong(
         return Err(DiagnoseError::Copy { label, again });
     }
     let mut wrong = faults(&stated.robot, &loaded.runs)?;
-    if let (true, Some(sealed)) = (wrong.is_empty(), sealed) {
-        wrong = faults(&stated.robot, &sealed.runs)?;
-        if wrong.is_empty() {
-            wrong.extend(too_short_to_judge(&sealed.runs));
-        }
+    if let (true, Some(sealed)) = (options.fits(&wrong), sealed) {
+        let held = faults(&stated.robot, &sealed.runs)?;
+        let short = too_short_to_judge(&sealed.runs).filter(|_| options.fits(&held));
+        wrong.extend(held.into_iter().chain(short));
     }
     Ok(wrong)
 }

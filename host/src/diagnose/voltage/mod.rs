@@ -65,7 +65,7 @@ pub fn diagnose_voltage(
     let train = logs(training)?;
     let sealed = logs(holdout)?;
     let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &sealed])?;
-    if !wrong.is_empty() {
+    if !options.fits(&wrong) {
         return Ok((faulty(robot, wrong), robot.clone()));
     }
     let search = |logs| Search {
@@ -129,7 +129,8 @@ pub fn diagnose_voltage(
         unseen,
         driven: driven(&train, &sealed),
     };
-    let result = (found.diagnosis(), found.robot(&plant));
+    let mut result = (found.diagnosis(), found.robot(&plant));
+    result.0.data_faults = wrong;
     progress(1.0);
     Ok(result)
 }
