@@ -3,6 +3,7 @@
 use super::factor::TriangularFactor;
 use super::linear::by_noise;
 use super::model::{Plan, Rows, each_rows};
+use super::parts::LeaveOut;
 use super::{IdentifyError, ModelKind};
 use crate::prepare::Recording;
 
@@ -54,15 +55,14 @@ impl Stretches {
     /// Mean over the joints of the logarithm of the RMS that fits to all of these stretches but one leave of that one in `judge`.
     pub(super) fn error(&self, judge: &Self) -> f64 {
         let joints = self.0.first().map_or(0, Vec::len);
+        let without = |j: usize| {
+            let own: Vec<TriangularFactor> = self.0.iter().map(|list| list[j].clone()).collect();
+            LeaveOut::of(&own).without
+        };
+        let without: Vec<Vec<TriangularFactor>> = (0..joints).map(without).collect();
         let (mut squares, mut rows) = (vec![0.0; joints], vec![0u64; joints]);
         for (out, judge) in judge.0.iter().enumerate() {
-            let columns = judge.first().map_or(0, TriangularFactor::columns);
-            let mut rest = vec![TriangularFactor::new(columns); joints];
-            for (_, stretch) in self.0.iter().enumerate().filter(|(k, _)| *k != out) {
-                for (whole, part) in rest.iter_mut().zip(stretch) {
-                    whole.merge(part, 1.0);
-                }
-            }
+            let rest: Vec<TriangularFactor> = without.iter().map(|own| own[out].clone()).collect();
             let Some(beta) = by_noise(&rest) else {
                 return f64::INFINITY;
             };
