@@ -11,7 +11,6 @@ use crate::data::{
     Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, Warning, plausibility,
     strange_references,
 };
-use crate::diagnose::outcome::About;
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
 use crate::report::format_significant;
@@ -224,11 +223,9 @@ impl Inputs {
         }
         for source in &self.sources {
             for fault in faults_at_start(robot, source, JUDGED_ROWS)? {
-                // How large a torque should be is known from the description alone, whose masses may be stand-ins.
-                let list = if fault.about == About::TorqueScale {
-                    &mut faults.doubtful
-                } else {
-                    &mut faults.wrong
+                let list = match fault.certain {
+                    true => &mut faults.wrong,
+                    false => &mut faults.doubtful,
                 };
                 list.push(format!("{}: {}", source.path().display(), fault.text));
             }
@@ -422,9 +419,7 @@ pub(crate) fn refuse_faults(
     for recordings in inputs {
         let found = recordings.faults(robot)?;
         for sentence in &found.doubtful {
-            ui.remark(&format!(
-                "{sentence} Or the description is that far off, or the motion too short to tell."
-            ));
+            ui.remark(sentence);
         }
         wrong.extend(found.wrong);
     }

@@ -20,6 +20,7 @@ pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
         about: About::Preparation,
         recording: label.clone(),
         joint: String::new(),
+        certain: true,
         text: error.to_string(),
     })
 }

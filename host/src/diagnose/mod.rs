@@ -108,9 +108,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether recordings of which so much is wrong are fitted.
+    /// Returns true if recordings with these faults are fitted.
     fn fits(&self, faults: &[DataFault]) -> bool {
-        faults.is_empty() || self.even_if_wrong && faults.iter().all(DataFault::leaves_rows)
+        (faults.iter()).all(|fault| !fault.certain || self.even_if_wrong && fault.leaves_rows())
     }
 }
 

@@ -339,7 +339,7 @@ impl Remainder {
 /// Something about a recording that no physics explains.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataFault {
-    /// `sign`, `unit`, `ratio`, `clock`, `swap`, `gravity`, `saturation`, `jump`, `too-short`, `not-moving`.
+    /// `sign`, `magnitude`, `unit`, `ratio`, `clock`, `swap`, `gravity`, `saturation`, `jump`, `too-short`, `not-moving`.
     pub kind: String,
     /// Which columns.
     #[serde(skip)]
@@ -348,6 +348,8 @@ pub struct DataFault {
     pub recording: String,
     /// Name of the joint.
     pub joint: String,
+    /// Whether nothing else explains the data; what is not certain stops nothing.
+    pub certain: bool,
     /// What is wrong and what would be right, a sentence.
     pub text: String,
 }

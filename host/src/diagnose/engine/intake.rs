@@ -40,7 +40,7 @@ pub(super) struct Material<'a> {
     pub(super) nameless: Option<String>,
     /// What was left out of them, and what of the model they do not tell apart, sentences.
     pub(super) touches: Vec<String>,
-    /// What cannot be about the recordings and was fitted all the same.
+    /// What may be wrong with them, or is wrong where they were fitted all the same.
     pub(super) faults: Vec<DataFault>,
 }
 

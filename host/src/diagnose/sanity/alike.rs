@@ -9,11 +9,13 @@
 //! positions, which have no period.
 
 use super::super::DiagnoseError;
-use super::super::outcome::{About, DataFault};
+use super::super::outcome::About;
 use super::fit::Fit;
 use super::model::Judge;
 use super::rows::Rows;
 use super::senses::{Described, columns};
+use super::trial::Suspicion;
+use super::undo::Undo;
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
@@ -58,7 +60,7 @@ impl Judge<'_> {
         &self,
         j: usize,
         described: Option<&Described>,
-    ) -> Result<Option<DataFault>, DiagnoseError> {
+    ) -> Result<Option<Suspicion>, DiagnoseError> {
         let Some(described) = described else {
             return Ok(None);
         };
@@ -72,7 +74,7 @@ impl Judge<'_> {
     }
 
     /// A torque that is a multiple of the joint's.
-    fn torque_alike(&self, j: usize, shares: &Shares) -> Result<Option<DataFault>, DiagnoseError> {
+    fn torque_alike(&self, j: usize, shares: &Shares) -> Result<Option<Suspicion>, DiagnoseError> {
         let three = [shares.weight, shares.viscous, shares.dry];
         let factor = three.iter().product::<f64>().cbrt();
         let drive = self.robot.joints[j].drive.as_ref();
@@ -87,7 +89,7 @@ impl Judge<'_> {
             && inertia < ALIKE
             && three.iter().all(|s| apart(*s, factor) < RIGHT);
         Ok(alike.then(|| {
-            self.say(
+            let fault = self.say(
                 "ratio",
                 About::TorqueScale,
                 j,
@@ -99,7 +101,8 @@ impl Judge<'_> {
                     format_significant(shares.viscous, 3),
                     format_significant(shares.dry, 3),
                 ),
-            )
+            );
+            Suspicion::new(fault, Undo::Torque(Some(j), 1.0 / factor))
         }))
     }
 
@@ -108,7 +111,7 @@ impl Judge<'_> {
         &self,
         j: usize,
         recorded: &Shares,
-    ) -> Result<Option<DataFault>, DiagnoseError> {
+    ) -> Result<Option<Suspicion>, DiagnoseError> {
         let far = |shares: &Shares| apart(shares.inertia, 1.0) > LEAST.sqrt();
         if self.robot.joints[j].kind == JointKind::Prismatic || !far(recorded) {
             return Ok(None);

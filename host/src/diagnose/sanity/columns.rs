@@ -49,6 +49,7 @@ pub(super) fn fault(
         about,
         recording: label(runs),
         joint: joint.to_owned(),
+        certain: true,
         text,
     }
 }

@@ -39,6 +39,14 @@ pub(super) struct Measured {
 }
 
 impl Measured {
+    pub(super) fn new(value: f64, std: f64, freedom: f64) -> Self {
+        Self {
+            value,
+            std,
+            freedom,
+        }
+    }
+
     /// In standard deviations of a normal distribution that are as rare: Student's t at its degrees of freedom, turned into
     /// them by Wallace's formula (1959).
     pub(super) fn sigmas(self) -> f64 {

@@ -11,6 +11,8 @@ use super::fit::{Fit, about_mean};
 use super::model::{GOOD, Judge};
 use super::rows::Rows;
 use super::senses::friction;
+use super::trial::Suspicion;
+use super::undo::Undo;
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
@@ -37,7 +39,7 @@ impl Judge<'_> {
     /// A single revolute joint on which gravity acts from elsewhere than described: its zero is not where the description has it, or its
     /// axis does not stand so. The link's weight is as described within a factor; a spring may pull beside it. Gravity the other way
     /// round is a matter of signs.
-    pub(super) fn single_zero(&self) -> Result<Option<DataFault>, DiagnoseError> {
+    pub(super) fn single_zero(&self) -> Result<Option<Suspicion>, DiagnoseError> {
         let ([joint], true) = (&self.robot.joints[..], self.states_from(0)) else {
             return Ok(None);
         };
@@ -92,21 +94,24 @@ impl Judge<'_> {
         }
         let name = &joint.name;
         let [strength, stated] = [strength, stated].map(|x| format_significant(x, 3));
-        let text = if upright {
-            format!(
+        let (undo, text) = if upright {
+            let text = format!(
                 "Gravity acts on joint {name} by up to {strength} N·m, as on an axis that lies level; by the description its axis stands upright and gravity does {stated} N·m at most: is its `alpha` right (in a URDF its `axis` and the `rpy` of its origin), and `gravity`?"
-            )
+            );
+            (None, text)
         } else {
             let theta = joint.theta + off;
-            format!(
+            let text = format!(
                 "Gravity on joint {name} is strongest at q1 = {} rad, where the description has {} rad: the joint's zero in this recording (`--home`), or the base, is turned by about {:.0} degrees against the description. With theta near {} it fits (in a URDF turn the joint's origin by its `rpy`).",
                 hundredths(strongest[0]),
                 hundredths(strongest[1]),
                 off.to_degrees(),
                 hundredths((theta + PI).rem_euclid(TAU) - PI),
-            )
+            );
+            (Some(Undo::Zero(0, off)), text)
         };
-        Ok(Some(self.say("gravity", About::Recording, 0, text)))
+        let fault = self.say("gravity", About::Recording, 0, text);
+        Ok(Some(Suspicion { fault, undo }))
     }
 
     /// Gravity as strong as described along the direction that the torques show (in frame 0), where that is far from the described

@@ -15,12 +15,17 @@ mod columns;
 mod fit;
 mod gravity;
 mod link;
+mod magnitude;
 mod model;
 mod names;
+mod nnls;
+mod physical;
 mod rotor;
 mod rows;
 mod senses;
 mod swaps;
+mod trial;
+mod undo;
 
 #[cfg(test)]
 mod tests;

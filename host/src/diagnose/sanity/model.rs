@@ -8,6 +8,8 @@ use super::columns::fault;
 use super::fit::{Fit, Measured};
 use super::names;
 use super::rows::{Form, Rows};
+use super::trial::Suspicion;
+use super::undo::Undo;
 use crate::identify::preference;
 use crate::robot::{JointKind, Robot};
 
@@ -58,9 +60,12 @@ pub(super) fn model_error(error: impl ToString) -> DiagnoseError {
 
 impl<'a> Judge<'a> {
     pub(super) fn new(robot: &'a Robot, runs: &'a [&'a Run]) -> Result<Self, DiagnoseError> {
+        Self::of_rows(robot, runs, Rows::of(runs, robot.joints.len()))
+    }
+
+    fn of_rows(robot: &'a Robot, runs: &'a [&'a Run], rows: Rows) -> Result<Self, DiagnoseError> {
         let form = Form::of(robot)?;
         let kinds: Vec<JointKind> = robot.joints.iter().map(|j| j.kind).collect();
-        let rows = Rows::of(runs, robot.joints.len());
         let mut order = preference(&kinds);
         order.extend(order.len()..form.width());
         let matrices = rows.regressors(&form)?;
@@ -80,54 +85,62 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Everything that the torque says; the first that is wrong with the times or scales of positions ends the search,
-    /// because all else follows from it.
+    /// Everything that the torque says and that no other explanation says better. What is certain is taken back, and what is left
+    /// is looked through again: what followed from it is gone.
     pub(super) fn faults(&self) -> Result<Vec<DataFault>, DiagnoseError> {
         let n = self.robot.joints.len();
         let clipped: Vec<DataFault> = (0..n).filter_map(|j| self.clipped(j)).collect();
-        if !clipped.is_empty() {
+        let (mut found, mut undo) = self.tried(self.suspicions()?)?;
+        let lost = found
+            .iter()
+            .any(|fault| fault.kind == "magnitude" && fault.certain);
+        if !clipped.is_empty() && !lost {
             return Ok(clipped);
         }
-        let mixed = self.mixed()?;
-        if let Some(swap) = mixed.as_ref().filter(|m| m.ends_search()) {
-            return Ok(vec![self.said(swap)]);
+        let mut rows = self.rows.clone();
+        for _ in 0..n {
+            // Without a fault of the description it is another robot.
+            let Some(one) = undo.filter(|undo| !undo.is_of_robot()) else {
+                break;
+            };
+            rows = one.applied(self.robot, &rows);
+            let without = Judge::of_rows(self.robot, self.runs, rows.clone())?;
+            let (more, next) = without.tried(without.suspicions()?)?;
+            let new = |fault: &DataFault| fault.certain && !found.contains(fault);
+            let more: Vec<DataFault> = more.into_iter().filter(|fault| new(fault)).collect();
+            found.extend(more);
+            undo = next;
         }
-        let shifted: Vec<DataFault> = (0..n).filter_map(|j| self.shifted(j)).collect();
-        if !shifted.is_empty() {
-            return Ok(shifted);
-        }
-        let scaled = self.positions()?;
-        if !scaled.is_empty() {
-            return Ok(scaled);
-        }
+        Ok(found)
+    }
+
+    /// What may be wrong by what the torque says.
+    fn suspicions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
+        let n = self.robot.joints.len();
         // What states any joint's torque states the last's.
         let described = self.stated(&self.rows, n.saturating_sub(1))?;
         let described = described.as_ref();
-        if let Some(unit) = self.thousandfold(described) {
-            return Ok(vec![unit]);
-        }
-        if let Some(turned) = self.single_zero()? {
-            return Ok(vec![turned]);
-        }
-        let mut found = Vec::new();
+        let mut all: Vec<Suspicion> = (0..n)
+            .filter_map(|j| self.magnitude(j, described))
+            .collect();
+        let (swapped, turned): (Vec<_>, Vec<_>) =
+            (self.mixed()?.into_iter()).partition(|found| found.is_of_two());
+        all.extend(swapped.iter().filter_map(|found| self.said(found)));
+        all.extend((0..n).filter_map(|j| self.shifted(j)));
+        all.extend(self.positions()?);
+        all.extend(self.thousandfold(described));
+        all.extend(self.single_zero()?);
         for j in (0..n).filter(|j| self.stirs(*j)) {
-            found.extend(self.against_description(j, described)?);
-            if found.iter().all(|f: &DataFault| f.joint != self.name(j))
-                && let Some(fault) = self.sign(j, described)?
-            {
-                found.push(fault);
+            let before = all.len();
+            all.extend(self.against_description(j, described)?);
+            all.extend(self.sign(j, described)?);
+            if all.len() == before {
+                all.extend(self.alike(j, described)?);
             }
-            if found.iter().all(|f: &DataFault| f.joint != self.name(j)) {
-                found.extend(self.alike(j, described)?);
-            }
-            if found.iter().all(|f: &DataFault| f.joint != self.name(j)) {
-                found.extend(self.heavy_rotor(j)?);
-            }
+            all.extend(self.heavy_rotor(j)?);
         }
-        if let (true, Some(turned)) = (found.is_empty(), mixed) {
-            found.push(self.said(&turned));
-        }
-        Ok(found)
+        all.extend(turned.iter().filter_map(|found| self.said(found)));
+        Ok(all)
     }
 
     fn poor(&self) -> f64 {
@@ -185,7 +198,7 @@ impl<'a> Judge<'a> {
     }
 
     /// A torque that belongs to another time than the motion.
-    fn shifted(&self, j: usize) -> Option<DataFault> {
+    fn shifted(&self, j: usize) -> Option<Suspicion> {
         let fit = self.fits[j].as_ref()?;
         let poor = self.poor();
         if fit.unexplained() < poor {
@@ -213,7 +226,7 @@ impl<'a> Judge<'a> {
         let shown = moving.count() as f64 * self.rows.period > SHOWN_BY * shift.abs();
         (shift.abs() > SHIFT[usize::from(self.robot.joints.len() > 1)] && shown).then(|| {
             let (word, mend) = if shift > 0.0 { ("behind", "earlier") } else { ("ahead of", "later") };
-            self.say(
+            let fault = self.say(
                 "clock",
                 About::Torque,
                 j,
@@ -225,12 +238,13 @@ impl<'a> Judge<'a> {
                     100.0 * least,
                     100.0 * left[reach]
                 ),
-            )
+            );
+            Suspicion::new(fault, Undo::Earlier(j, at as i64 - reach as i64))
         })
     }
 
     /// Positions of which gravity and coupling say that they are multiples of the joint's.
-    fn positions(&self) -> Result<Vec<DataFault>, DiagnoseError> {
+    fn positions(&self) -> Result<Vec<Suspicion>, DiagnoseError> {
         let n = self.robot.joints.len();
         let left: Vec<f64> = self
             .fits
@@ -350,7 +364,7 @@ impl<'a> Judge<'a> {
     }
 
     /// A position that is a multiple of the joint's: what the factors that fit, the best first, are called.
-    pub(super) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> DataFault {
+    pub(super) fn scaled(&self, j: usize, factors: &[f64], before: f64, after: f64) -> Suspicion {
         let named = factors
             .iter()
             .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
@@ -365,7 +379,7 @@ impl<'a> Judge<'a> {
                 "check the gear ratio, the counts of the encoder and the unit (turns for rad ask for 6.28)".to_owned(),
             ),
         };
-        self.say(
+        let fault = self.say(
             kind,
             About::Motion,
             j,
@@ -375,7 +389,8 @@ impl<'a> Judge<'a> {
                 100.0 * after,
                 100.0 * before
             ),
-        )
+        );
+        Suspicion::new(fault, Undo::Position(Some(j), factor))
     }
 }
 

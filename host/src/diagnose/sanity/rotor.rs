@@ -2,13 +2,15 @@
 //!
 //! A rotor acts on its joint by the square of the gear ratio. Where a current was recorded a ratio k times too large makes the
 //! recorded torque, and with it all inertia, k times too large, and the described rotor k² times: sooner or later more than the
-//! whole joint shows. No change of the robot does that, whatever its links, its friction and its payload are.
+//! whole joint shows. No change of the links, the friction or the payload does that; a description of the rotor that is wrong does.
 //!
 //! Leaves out: motors that move several joints, and ratios too small, which make the rotor lighter than it is.
 
 use super::super::DiagnoseError;
-use super::super::outcome::{About, DataFault};
+use super::super::outcome::About;
 use super::model::Judge;
+use super::trial::Suspicion;
+use super::undo::Undo;
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
@@ -24,7 +26,7 @@ impl Judge<'_> {
     ///
     /// # Errors
     /// [`DiagnoseError::Model`] where the description is no chain.
-    pub(super) fn heavy_rotor(&self, j: usize) -> Result<Option<DataFault>, DiagnoseError> {
+    pub(super) fn heavy_rotor(&self, j: usize) -> Result<Option<Suspicion>, DiagnoseError> {
         let joint = &self.robot.joints[j];
         let alone = (self.robot.joints.iter().filter_map(|j| j.drive.as_ref()))
             .all(|drive| drive.couples.is_empty());
@@ -43,7 +45,7 @@ impl Judge<'_> {
             JointKind::Revolute => "kg·m²",
             JointKind::Prismatic => "kg",
         };
-        Ok(Some(self.say(
+        let fault = self.say(
             "ratio",
             About::TorqueScale,
             j,
@@ -54,6 +56,7 @@ impl Judge<'_> {
                 drive.gear_ratio,
                 format_significant(whole.value, 3),
             ),
-        )))
+        );
+        Ok(Some(Suspicion::new(fault, Undo::Rotor(j))))
     }
 }

@@ -5,12 +5,14 @@ use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::super::DiagnoseError;
-use super::super::outcome::{About, DataFault};
+use super::super::outcome::About;
 use super::columns::fault;
 use super::fit::{Fit, Measured, about_mean};
 use super::model::{Judge, model_error};
 use super::names;
 use super::rows::Rows;
+use super::trial::Suspicion;
+use super::undo::Undo;
 use crate::batch::ModelBatch;
 use crate::data::reference_scale;
 use crate::identify::chain_of;
@@ -117,7 +119,7 @@ impl Judge<'_> {
         &self,
         j: usize,
         described: Option<&Described>,
-    ) -> Result<Option<DataFault>, DiagnoseError> {
+    ) -> Result<Option<Suspicion>, DiagnoseError> {
         let Some(fit) = self.fits[j].as_ref() else {
             return Ok(None);
         };
@@ -131,20 +133,26 @@ impl Judge<'_> {
             return Ok(None);
         }
         let n = j + 1;
-        let which = match self.scales(&self.rows, j, described).0 {
+        let (torque, position) = (Undo::Torque(Some(j), -1.0), Undo::Position(Some(j), -1.0));
+        let (undo, which) = match self.scales(&self.rows, j, described).0 {
             // A witness that needs no description.
-            _ if self.reference_against(j) => {
-                format!("ref{n} runs against q{n} as well, so reverse q{n}")
-            }
-            Some(gravity) if gravity.value > 0.0 => {
-                format!("gravity has the right sense, so reverse q{n}")
-            }
-            Some(_) => format!(
-                "gravity has the wrong sense too, so reverse tau{n} (where a current was recorded: i{n}, or the sign of gear_ratio)"
+            _ if self.reference_against(j) => (
+                position,
+                format!("ref{n} runs against q{n} as well, so reverse q{n}"),
             ),
-            None => "reverse one of them".to_owned(),
+            Some(gravity) if gravity.value > 0.0 => (
+                position,
+                format!("gravity has the right sense, so reverse q{n}"),
+            ),
+            Some(_) => (
+                torque,
+                format!(
+                    "gravity has the wrong sense too, so reverse tau{n} (where a current was recorded: i{n}, or the sign of gear_ratio)"
+                ),
+            ),
+            None => (torque, "reverse one of them".to_owned()),
         };
-        Ok(Some(self.say(
+        let fault = self.say(
             "sign",
             About::Torque,
             j,
@@ -152,7 +160,8 @@ impl Judge<'_> {
                 "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
                 -loss.value, inertia.value
             ),
-        )))
+        );
+        Ok(Some(Suspicion::new(fault, undo)))
     }
 
     /// Whether the joint's reference is counted against its position.
@@ -256,7 +265,7 @@ impl Judge<'_> {
 
     /// Torques of several joints that are all a thousand times as large or as small as the description needs: no description is
     /// that far off everywhere.
-    pub(super) fn thousandfold(&self, described: Option<&Described>) -> Option<DataFault> {
+    pub(super) fn thousandfold(&self, described: Option<&Described>) -> Option<Suspicion> {
         let mut shown = Vec::new();
         let mut weighed = false;
         for j in 0..self.robot.joints.len() {
@@ -288,7 +297,8 @@ impl Judge<'_> {
         let most = shown.iter().map(|(_, f)| f.abs()).fold(0.0, f64::max);
         let columns: Vec<String> = shown.iter().map(|(j, _)| format!("tau{}", j + 1)).collect();
         let (last, others) = columns.split_last()?;
-        Some(fault(
+        let factor = if near(1000.0) { 1e-3 } else { 1000.0 };
+        let fault = fault(
             self.runs,
             "unit",
             About::Torque,
@@ -299,7 +309,8 @@ impl Judge<'_> {
                 format_significant(least, 4),
                 format_significant(most, 4)
             ),
-        ))
+        );
+        Some(Suspicion::new(fault, Undo::Torque(None, factor)))
     }
 
     /// Factors between the recording and the description that no change of the robot makes.
@@ -307,7 +318,7 @@ impl Judge<'_> {
         &self,
         j: usize,
         described: Option<&Described>,
-    ) -> Result<Option<DataFault>, DiagnoseError> {
+    ) -> Result<Option<Suspicion>, DiagnoseError> {
         let joint = &self.robot.joints[j];
         let (gravity, inertia) = self.scales(&self.rows, j, described);
         // What the description does not state of the drive makes the inertia larger, never smaller.
@@ -333,7 +344,7 @@ impl Judge<'_> {
                 let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned());
                 let nearest = what.split(", or").next().unwrap_or_default();
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
-                self.say(
+                let fault = self.say(
                     kind,
                     About::TorqueScale,
                     j,
@@ -341,7 +352,8 @@ impl Judge<'_> {
                         "tau{n} is {} times what the description's {of} needs, {tool}{what}.",
                         format_significant(factor, 4)
                     ),
-                )
+                );
+                Suspicion::new(fault, Undo::Torque(Some(j), 1.0 / factor))
             })
         };
         Ok(match (gravity.map(|m| m.value), inertia) {
@@ -350,7 +362,7 @@ impl Judge<'_> {
             (None, Some(i)) if large(i) => torque(i, "inertia"),
             (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
                 let clock = (i / g).abs().sqrt();
-                Some(self.say(
+                let fault = self.say(
                     "clock",
                     About::Recording,
                     j,
@@ -359,7 +371,8 @@ impl Judge<'_> {
                         i / g,
                         names::of_clock(clock)
                     ),
-                ))
+                );
+                Some(Suspicion::new(fault, Undo::Clock(1.0 / clock)))
             }
             (Some(g), _) if (-2.0..-0.5).contains(&g) && self.sign(j, described)?.is_none() => {
                 let held = match self.fits[j].as_ref() {
@@ -376,14 +389,19 @@ impl Judge<'_> {
                 } else {
                     format!("reverse tau{n} or q{n}, unless the zero of q{n} is half a turn off")
                 };
-                Some(self.say(
+                let undo = match held {
+                    true => Undo::Both(j),
+                    false => Undo::Torque(Some(j), -1.0),
+                };
+                let fault = self.say(
                     "sign",
                     About::Motion,
                     j,
                     format!(
                         "Gravity acts on joint {n} {g:.2} times as the description says; {which}."
                     ),
-                ))
+                );
+                Some(Suspicion::new(fault, undo))
             }
             _ => None,
         })

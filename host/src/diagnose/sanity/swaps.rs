@@ -2,45 +2,32 @@
 //! direction.
 //!
 //! Each such fault is undone in turn and the torques of all joints are explained anew; what makes the data by far the most
-//! likely is named.
+//! likely is suspected.
 
 use nalgebra::DMatrix;
 
 use super::super::DiagnoseError;
-use super::super::outcome::{About, DataFault};
+use super::super::outcome::About;
 use super::fit::{Fit, about_mean};
 use super::model::{GOOD, Judge, POOR, TRIAL};
 use super::rows::Rows;
 use super::senses::{Described, friction};
+use super::trial::Suspicion;
+use super::undo::Undo;
 
 /// Rise of the logarithm of the residuals' variances, summed over the joints, from which on an undone fault is believed: as
 /// if one joint's variance fell to a tenth. A description may be far off, and a fault undone may by chance bring it nearer.
 const CONVINCING_TO_DESCRIPTION: f64 = 2.3;
 /// The same where all parameters are fitted, so that only the model's form speaks: a fall to less than a quarter.
 const CONVINCING_TO_FIT: f64 = 1.5;
+/// How many are tried.
+const SUSPECTS: usize = 4;
 /// Joints that move less than this share of the widest do not count, rad or m.
 const STILL: f64 = 1e-4;
 
-/// What may have been done to the columns.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Mixed {
-    /// Torques of two joints swapped.
-    Torques([usize; 2]),
-    /// Positions of two joints swapped.
-    Positions([usize; 2]),
-    /// Both: the joints stand in another order than in the description.
-    Joints([usize; 2]),
-    /// A torque counted the other way round.
-    Torque(usize),
-    /// A position counted the other way round.
-    Position(usize),
-    /// None of the columns, but gravity of another direction, m/s² in frame 0.
-    Gravity([f64; 3]),
-}
-
 /// A fault, and shares of the torques' variance that are left of the joints it concerns, as recorded and without it.
 pub(super) struct Found {
-    pub(super) mixed: Mixed,
+    pub(super) undo: Undo,
     gain: f64,
     left: [f64; 2],
     /// Whether the other columns of the same joints would explain it, too.
@@ -48,8 +35,8 @@ pub(super) struct Found {
 }
 
 impl Judge<'_> {
-    /// The one that explains the recording, where there is one.
-    pub(super) fn mixed(&self) -> Result<Option<Found>, DiagnoseError> {
+    /// Those that would explain the recording, the likeliest first.
+    pub(super) fn mixed(&self) -> Result<Vec<Found>, DiagnoseError> {
         let rows = self.rows.thinned(TRIAL);
         let ranges: Vec<f64> = rows.q.iter().map(|q| range(q)).collect();
         let widest = ranges.iter().copied().fold(0.0, f64::max);
@@ -57,33 +44,32 @@ impl Judge<'_> {
             .filter(|j| ranges[*j] > STILL * widest)
             .collect();
         if self.robot.joints.len() < 2 {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let before = self.left(&rows)?;
         if moving.iter().all(|j| before[*j] <= POOR) {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let mut all: Vec<Found> = Vec::new();
         let gravity = match self.states_from(0) {
-            true => self.gravity_shown(&rows)?.map(Mixed::Gravity),
+            true => self.gravity_shown(&rows)?.map(Undo::Gravity),
             false => None,
         };
-        for mixed in candidates(&moving).into_iter().chain(gravity) {
-            let after = match mixed {
-                Mixed::Gravity(other) => self.left_of_description(&rows, other)?,
-                _ => self.left(&self.undone(&rows, mixed))?,
+        for undo in candidates(&moving).into_iter().chain(gravity) {
+            let after = match undo {
+                Undo::Gravity(other) => self.left_of_description(&rows, other)?,
+                _ => self.left(&undo.applied(self.robot, &rows))?,
             };
-            let concerned: Vec<usize> = match mixed {
-                Mixed::Gravity(_) => (moving.iter().copied())
+            let concerned: Vec<usize> = match undo {
+                Undo::Gravity(_) => (moving.iter().copied())
                     .filter(|j| before[*j] > POOR && after[*j] < 0.5 * before[*j])
                     .collect(),
-                Mixed::Torques(pair) | Mixed::Positions(pair) | Mixed::Joints(pair) => {
-                    pair.to_vec()
-                }
-                Mixed::Torque(j) | Mixed::Position(j) => vec![j],
+                Undo::Torques(pair) | Undo::Positions(pair) | Undo::Joints(pair) => pair.to_vec(),
+                Undo::Torque(Some(j), _) | Undo::Position(Some(j), _) => vec![j],
+                _ => Vec::new(),
             };
             // One joint's gravity is turned by its own columns as well.
-            if concerned.len() < 2 && matches!(mixed, Mixed::Gravity(_)) {
+            if concerned.len() < 2 && matches!(undo, Undo::Gravity(_)) {
                 continue;
             }
             let mean = |left: &[f64]| {
@@ -94,7 +80,7 @@ impl Judge<'_> {
                 .map(|j| (before[*j].max(EXACT) / after[*j].max(EXACT)).ln())
                 .sum();
             all.push(Found {
-                mixed,
+                undo,
                 gain,
                 left: [mean(&before), mean(&after)],
                 twin: false,
@@ -107,15 +93,18 @@ impl Judge<'_> {
         };
         all.retain(|found| found.convinces(enough));
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let mut all = all.into_iter();
-        Ok(all.next().map(|best| Found {
-            twin: all.any(|other| other.is_twin(&best)),
-            ..best
-        }))
+        let twins: Vec<bool> = (all.iter())
+            .map(|own| all.iter().any(|other| other.is_twin(own)))
+            .collect();
+        for (found, twin) in all.iter_mut().zip(twins) {
+            found.twin = twin;
+        }
+        all.truncate(SUSPECTS);
+        Ok(all)
     }
 
     /// As a fault of the recording.
-    pub(super) fn said(&self, found: &Found) -> DataFault {
+    pub(super) fn said(&self, found: &Found) -> Option<Suspicion> {
         let [recorded, without] = found.left.map(|share| 100.0 * share);
         let model = format!(
             "the model leaves {without:.1} % of the torque's variance, as recorded {recorded:.1} %"
@@ -151,10 +140,10 @@ impl Judge<'_> {
                 ),
             )
         };
-        match found.mixed {
-            Mixed::Torques(pair) => swapped(About::Torque, "tau", "q", pair),
-            Mixed::Positions(pair) => swapped(About::Motion, "q", "tau", pair),
-            Mixed::Joints([i, j]) => self.say(
+        let fault = match found.undo.clone() {
+            Undo::Torques(pair) => swapped(About::Torque, "tau", "q", pair),
+            Undo::Positions(pair) => swapped(About::Motion, "q", "tau", pair),
+            Undo::Joints([i, j]) => self.say(
                 "swap",
                 About::Motion,
                 i,
@@ -166,46 +155,12 @@ impl Judge<'_> {
                     self.robot.joints[j].name
                 ),
             ),
-            Mixed::Torque(j) => turned(About::Torque, "tau", "q", j),
-            Mixed::Position(j) => turned(About::Motion, "q", "tau", j),
-            Mixed::Gravity(other) => self.gravity_said(other, found.left),
-        }
-    }
-
-    /// Rows without the fault.
-    fn undone(&self, rows: &Rows, mixed: Mixed) -> Rows {
-        let mut rows = rows.clone();
-        let scale =
-            |column: &mut Vec<f64>, factor: f64| column.iter_mut().for_each(|v| *v *= factor);
-        match mixed {
-            Mixed::Joints(pair) => {
-                rows = self.undone(&rows, Mixed::Torques(pair));
-                rows = self.undone(&rows, Mixed::Positions(pair));
-            }
-            Mixed::Gravity(_) => {}
-            Mixed::Torque(j) => scale(&mut rows.tau[j], -1.0),
-            Mixed::Position(j) => rows = rows.rescaled(Some(j), -1.0),
-            Mixed::Torques([i, j]) => {
-                // What was measured at the motors went through the ratio of the other joint.
-                let share = self.ratio(i) / self.ratio(j);
-                rows.tau.swap(i, j);
-                scale(&mut rows.tau[i], share);
-                scale(&mut rows.tau[j], 1.0 / share);
-            }
-            Mixed::Positions([i, j]) => {
-                let share = self.ratio(i) / self.ratio(j);
-                for columns in [&mut rows.q, &mut rows.qd, &mut rows.qdd] {
-                    columns.swap(i, j);
-                    scale(&mut columns[i], 1.0 / share);
-                    scale(&mut columns[j], share);
-                }
-            }
-        }
-        rows
-    }
-
-    fn ratio(&self, joint: usize) -> f64 {
-        self.robot.joints[joint].gear_ratio()
+            Undo::Torque(Some(j), _) => turned(About::Torque, "tau", "q", j),
+            Undo::Position(Some(j), _) => turned(About::Motion, "q", "tau", j),
+            Undo::Gravity(other) => self.gravity_said(other, found.left),
+            _ => return None,
+        };
+        Some(Suspicion::new(fault, found.undo.clone()))
     }
 
     /// Share of each torque's variance that is left: by the description as it stands where it states every link, which has few
@@ -277,22 +232,21 @@ impl Found {
         recorded > POOR && without < GOOD.max(0.2 * recorded).min(0.5) && self.gain > enough
     }
 
-    /// Whether both say the same of torque and position of the same joints.
-    fn is_twin(&self, other: &Self) -> bool {
-        match (self.mixed, other.mixed) {
-            (Mixed::Torques(a), Mixed::Positions(b)) | (Mixed::Positions(a), Mixed::Torques(b)) => {
-                a == b
-            }
-            (Mixed::Torque(a), Mixed::Position(b)) | (Mixed::Position(a), Mixed::Torque(b)) => {
-                a == b
-            }
-            _ => false,
-        }
+    /// Whether it is about more than one joint.
+    pub(super) fn is_of_two(&self) -> bool {
+        !matches!(self.undo, Undo::Torque(..) | Undo::Position(..))
     }
 
-    /// Whether all else that is wrong may follow from it: columns of two joints that are swapped, and gravity.
-    pub(super) fn ends_search(&self) -> bool {
-        !matches!(self.mixed, Mixed::Torque(_) | Mixed::Position(_))
+    /// Whether both say the same of torque and position of the same joints.
+    fn is_twin(&self, other: &Self) -> bool {
+        match (&self.undo, &other.undo) {
+            (Undo::Torques(a), Undo::Positions(b)) | (Undo::Positions(a), Undo::Torques(b)) => {
+                a == b
+            }
+            (Undo::Torque(a, _), Undo::Position(b, _))
+            | (Undo::Position(a, _), Undo::Torque(b, _)) => a == b,
+            _ => false,
+        }
     }
 }
 
@@ -302,16 +256,16 @@ fn range(values: &[f64]) -> f64 {
 }
 
 /// All faults of these joints.
-fn candidates(moving: &[usize]) -> Vec<Mixed> {
+fn candidates(moving: &[usize]) -> Vec<Undo> {
     let mut all = Vec::new();
     for (k, &i) in moving.iter().enumerate() {
-        all.extend([Mixed::Torque(i), Mixed::Position(i)]);
+        all.extend([Undo::Torque(Some(i), -1.0), Undo::Position(Some(i), -1.0)]);
         for &j in &moving[k + 1..] {
             let pair = [i, j];
             all.extend([
-                Mixed::Torques(pair),
-                Mixed::Positions(pair),
-                Mixed::Joints(pair),
+                Undo::Torques(pair),
+                Undo::Positions(pair),
+                Undo::Joints(pair),
             ]);
         }
     }

@@ -30,6 +30,7 @@ pub(super) fn faults(
         about: About::Recording,
         recording,
         joint: joint.clone(),
+        certain: true,
         text,
     };
     let mut found = Vec::new();

@@ -208,9 +208,11 @@ fn faults(found: &Diagnosis) -> Option<Section> {
             "faults",
             "What is wrong with the data",
             if found.verdict == Verdict::DataFault {
-                "These cannot come from any robot that the description fits. Fitting such data would only bend parameters, so mend them first."
+                "A certain fault cannot come from any robot that the description fits. A fit of such data would only bend parameters: mend the recording first. An open fault has another explanation that predicts the data as well."
+            } else if found.data_faults.iter().any(|fault| fault.certain) {
+                "A certain fault cannot come from any robot that the description fits. The recordings were fitted all the same, as asked for: any number on this page may be bent by it. An open fault has another explanation that predicts the data as well."
             } else {
-                "These cannot come from any robot that the description fits. They were fitted all the same, as asked for: whatever this page says of parameters and effects may be their doing."
+                "Each of these has another explanation that predicts the data as well, so the recordings were fitted as they are. Check them: a fault would bend the numbers on this page."
             },
         )
         .with(Block::Table(Table {
@@ -219,6 +221,7 @@ fn faults(found: &Diagnosis) -> Option<Section> {
                 Column::text("Kind"),
                 Column::text("Recording"),
                 Column::text("Joint"),
+                Column::text("Certain"),
                 Column::text("What is wrong, and what would be right"),
             ],
             rows: found
@@ -229,6 +232,7 @@ fn faults(found: &Diagnosis) -> Option<Section> {
                         fault.kind.clone(),
                         words::or_dash(&fault.recording),
                         words::or_dash(&fault.joint),
+                        if fault.certain { "yes" } else { "open" }.into(),
                         fault.text.clone(),
                     ]
                 })

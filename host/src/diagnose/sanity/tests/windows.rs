@@ -15,6 +15,16 @@ pub(super) fn sound_arms(folder: &Path) -> Vec<(Robot, Vec<Run>)> {
 
 /// The TX40 with friction of its own in every motor, its coupled sixth too, on a motion of `seconds`.
 fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) {
+    changed_wrist(folder, seconds, seed, |_| ())
+}
+
+/// The same of another arm than the one described.
+pub(super) fn changed_wrist(
+    folder: &Path,
+    seconds: f64,
+    seed: u64,
+    change: impl FnOnce(&mut Robot),
+) -> (Robot, Vec<Run>) {
     let described = text("tx40.toml", TX40);
     let mut robot = described.clone();
     for (k, joint) in robot.joints.iter_mut().enumerate() {
@@ -31,6 +41,7 @@ fn simulated_wrist(folder: &Path, seconds: f64, seed: u64) -> (Robot, Vec<Run>) 
             drive.viscous = 2.0 / drive.gear_ratio.powi(2);
         }
     }
+    change(&mut robot);
     let phase = |j: usize, h: u32| {
         let turns = (seed + 3) as f64 * (7 * j + 3 * h as usize) as f64 * 0.137;
         core::f64::consts::TAU * turns.fract()
@@ -102,7 +113,7 @@ fn no_window_of_a_real_recording_is_accused() {
                     count += 1;
                     for fault in faults(&set.robot, &[window]).unwrap() {
                         // A window in which nothing moves holds nothing.
-                        if fault.kind != "not-moving" {
+                        if fault.certain && fault.kind != "not-moving" {
                             accused.push(format!(
                                 "{} {start} {seconds}: {} {}",
                                 run.label, fault.kind, fault.text

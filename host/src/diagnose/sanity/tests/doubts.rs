@@ -1,0 +1,86 @@
+//! What looks like a fault and is none, and faults that look like others.
+
+use super::windows::changed_wrist;
+use super::*;
+
+/// A mass at a place of the last link that the description knows nothing of.
+fn loaded(robot: &mut Robot, mass: f64, [x, y, z]: [f64; 3]) {
+    let last = robot.joints.last_mut().unwrap();
+    let inertial = last.inertial.as_mut().unwrap();
+    inertial.mass += mass;
+    for (moment, p) in inertial.first_moment.iter_mut().zip([x, y, z]) {
+        *moment += mass * p;
+    }
+    let own = [
+        y * y + z * z,
+        -x * y,
+        -x * z,
+        x * x + z * z,
+        -y * z,
+        x * x + y * y,
+    ];
+    for (inertia, i) in inertial.inertia.iter_mut().zip(own) {
+        *inertia += mass * i;
+    }
+}
+
+fn certain(robot: &Robot, runs: &[Run]) -> Vec<String> {
+    let found = faults(robot, runs).unwrap().into_iter();
+    let texts = found.map(|fault| (fault.certain, fault.text));
+    let all: Vec<(bool, String)> = texts.collect();
+    println!("{all:?}");
+    (all.into_iter().filter(|f| f.0)).map(|f| f.1).collect()
+}
+
+#[test]
+fn a_payload_is_no_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    let places = [[0.0, 0.0, 0.15], [0.1, -0.05, 0.2], [-0.15, 0.1, 0.05]];
+    for (seed, place) in places.into_iter().enumerate() {
+        for mass in [0.5, 2.8] {
+            let (robot, runs) = changed_wrist(folder.path(), 20.0, seed as u64, |robot| {
+                loaded(robot, mass, place);
+            });
+            assert_eq!(certain(&robot, &runs), [""; 0], "{mass} kg at {place:?}");
+        }
+    }
+}
+
+#[test]
+fn a_recording_cut_in_two_is_no_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    let (robot, runs) = changed_wrist(folder.path(), 20.0, 1, |_| ());
+    let half = |from: usize, to: usize| {
+        let mut run = runs[0].clone();
+        run.t = run.t[from..to].to_vec();
+        for joint in &mut run.joints {
+            joint.q_raw = joint.q_raw[from..to].to_vec();
+            joint.tau = joint.tau[from..to].to_vec();
+            joint.measured_velocity = None;
+            joint.reference = None;
+        }
+        run
+    };
+    let middle = runs[0].len() / 2;
+    let both = injured(&[half(0, middle), half(middle, runs[0].len())], |_| ());
+    assert_eq!(faults(&robot, &both).unwrap(), []);
+}
+
+/// It was called a reversed sense, a delay and a wrong scale.
+#[test]
+fn a_torque_that_lost_its_sign_is_named_as_that() {
+    let folder = tempfile::tempdir().unwrap();
+    let (robot, runs) = changed_wrist(folder.path(), 20.0, 2, |_| ());
+    for j in [0, 3, 4] {
+        let lost = injured(&runs, |run| {
+            run.joints[j].tau.iter_mut().for_each(|v| *v = v.abs());
+        });
+        only(&robot, &lost, "magnitude", j, "never negative");
+        assert_eq!(certain(&robot, &lost).len(), 1, "joint {}", j + 1);
+    }
+    let (robot, runs) = emulated();
+    let lost = injured(&runs[..1], |run| {
+        run.joints[0].tau.iter_mut().for_each(|v| *v = v.abs());
+    });
+    only(&robot, &lost, "magnitude", 0, "never negative");
+}
