@@ -1,5 +1,5 @@
 //! Arms of several joints: with one joint at fault, made up; and real ones.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -7,7 +7,7 @@ use std::time::Instant;
 use rig_shared::effects::Kind;
 use rig_shared::multibody::column;
 
-use super::outcome::Step;
+use super::outcome::{Step, Verdict};
 use super::scenario::{Arm, ArmScenario, Fault};
 use super::waves::is_of_the_motor;
 use super::{Diagnosis, Options, diagnose};
@@ -93,6 +93,42 @@ fn told(what: &str, diagnosis: &Diagnosis) {
             "    tried {} on {}: gain {:.4} ({:.1} sigmas) p {:.1e} {}",
             t.effect, t.joint, t.gain, t.gain_sigmas, t.p_value, t.refused
         );
+    }
+}
+
+/// A payload is a verdict: its mass and its place, wherever on the link, within what is said of them, and the joints that show it.
+#[test]
+fn a_payload_on_an_arm_is_told_with_mass_and_place() {
+    for (seed, mass, place) in [(1, 1.2, [0.08, -0.05, 0.1]), (2, 0.4, [-0.03, 0.06, 0.15])] {
+        let [x, y, z] = place;
+        let fault = Some((5, Fault::Payload([mass, x, y, z])));
+        let diagnosis = asked(&ArmScenario::new(Arm::Six, fault, seed)).0;
+        told("payload", &diagnosis);
+        println!("{:?}", diagnosis.words);
+        assert_eq!(diagnosis.verdict, Verdict::ParameterChange);
+        let [step] = &diagnosis.steps[..] else {
+            panic!("one step: a payload")
+        };
+        assert_eq!(step.effect, "payload");
+        for (name, truth) in [("mass", mass), ("x", x), ("y", y), ("z", z)] {
+            let value = &step.parameters[name];
+            let off = (value.value - truth).abs();
+            assert!(off < 4.0 * value.std, "{name}: {value:?}, truth {truth}");
+        }
+        assert!(step.parameters["mass"].std < 0.05 * mass);
+        assert!(diagnosis.words.iter().any(|w| w.contains("RMS at joint")));
+    }
+    // Turning about upright axes in a plane, two joints do not tell how high it is.
+    let fault = Some((1, Fault::Payload([0.5, 0.1, 0.05, 0.2])));
+    let diagnosis = asked(&ArmScenario::new(Arm::Planar, fault, 1)).0;
+    told("payload", &diagnosis);
+    let [step] = &diagnosis.steps[..] else {
+        panic!("one step: a payload")
+    };
+    assert!(!step.parameters.contains_key("z"));
+    for (name, truth) in [("mass", 0.5), ("x", 0.1), ("y", 0.05)] {
+        let value = &step.parameters[name];
+        assert!((value.value - truth).abs() < 4.0 * value.std, "{value:?}");
     }
 }
 

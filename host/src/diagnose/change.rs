@@ -3,17 +3,15 @@
 use std::collections::BTreeMap;
 
 use rig_shared::effects::Kind;
-use rig_shared::multibody::column;
 
 use super::bench::Bench;
 use super::fit::Evidence;
 use super::outcome::Value;
+use super::payload::{on_last_link, on_single_link};
 use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
 use super::refit::{Refit, described_sizes};
-use super::rows::{Column, combined};
+use super::rows::{Column, Rows, combined};
 use super::solve::Solution;
-use super::type_b::LINK;
-use crate::robot::JointKind;
 
 /// Share of the whole change's gain that a part of the parameters must reach to speak for it.
 const SPEAKS_FOR_ALL: f64 = 0.9;
@@ -30,8 +28,8 @@ const LEAST_CHANGE: f64 = 0.04;
 const LEAST_OF_BOTH: f64 = 0.02;
 /// … and where something is left besides, which moves parameters as it likes.
 const LEAST_OF_BOTH_BESIDE: f64 = 0.04;
-/// … and that in standard deviations.
-const LEAST_SIGMAS: f64 = 4.0;
+/// Least standard deviations of a change.
+pub(super) const LEAST_SIGMAS: f64 = 4.0;
 
 /// Parameters that are told with their values.
 const MOST_TOLD: usize = 8;
@@ -51,11 +49,12 @@ pub(super) struct Change {
     pub(super) p_value: f64,
 }
 
-/// Compares the refit with the description. `known` is the torque that the effects found explain, `beside_friction` whether friction is
+/// Compares the refit to `rows` with the description. `known` is the torque that the effects found explain, `beside_friction` whether friction is
 /// among them, `left` whether they leave something, `without` is not named.
 pub(super) fn change(
     bench: &Bench,
     refit: &Refit,
+    rows: &Rows,
     known: &Column,
     beside_friction: bool,
     left: bool,
@@ -105,18 +104,27 @@ pub(super) fn change(
     } else {
         LEAST_OF_BOTH
     };
-    if !without.contains(&Kind::Payload)
-        && let Some(load) = payload(bench, after, &prior, least)
-        && let Some(e) = evidence(&load.1)
-        && (speaks(&e) || beside_friction && carries(&e, &load.1))
-    {
-        return Some(Change {
-            words: "Inertia and gravity have grown in the ratio of a mass at one place: a payload."
-                .into(),
+    if !without.contains(&Kind::Payload) {
+        let told = |words: String, parameters, e: &Evidence| Change {
+            words,
             effect: Some(Kind::Payload),
-            parameters: load.0,
-            p_value: corrected(&e),
-        });
+            parameters,
+            p_value: corrected(e),
+        };
+        if let Some((parameters, directions)) = on_single_link(bench, after, &prior, least)
+            && let Some(e) = evidence(&directions)
+            && (speaks(&e) || beside_friction && carries(&e, &directions))
+        {
+            let words =
+                "Inertia and gravity have grown in the ratio of a mass at one place: a payload.";
+            return Some(told(words.into(), parameters, &e));
+        }
+        if let Some((load, e)) = on_last_link(bench, rows, &frozen)
+            && load.mass.value > LEAST_SIGMAS * load.mass.std
+            && (speaks(&e) || beside_friction && e.gain >= SPEAKS_BESIDE_FRICTION * whole.gain)
+        {
+            return Some(told(load.words(bench.robot), load.parameters(), &e));
+        }
     }
     let scale = combined(known.len(), free.iter().zip(prior.iter().copied()));
     let open = [[f64::NEG_INFINITY, f64::INFINITY]];
@@ -194,68 +202,6 @@ pub(super) fn change(
 /// Whether inertia and gravity beside these effects have grown as a payload on a single link makes them.
 pub(super) fn is_loaded(bench: &Bench, refit: &Refit, chosen: &[Profile]) -> bool {
     let prior = bench.anchor.prior_coefficients();
-    let grown = |after| payload(bench, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
+    let grown = |after| on_single_link(bench, &after, &prior, LEAST_OF_BOTH_BESIDE).is_some();
     refit.solution(chosen).is_ok_and(grown)
-}
-
-/// Mass and distance of a payload on a single link that changes gravity and inertia by a share of `least` at least, and the free
-/// directions that it moves.
-fn payload(
-    bench: &Bench,
-    after: &Solution,
-    prior: &[f64],
-    least: f64,
-) -> Option<(BTreeMap<String, Value>, [usize; 2])> {
-    let (nominal, anchor) = (&bench.nominal, &bench.anchor);
-    let [joint] = bench.robot.joints.as_slice() else {
-        return None;
-    };
-    if joint.kind != JointKind::Revolute {
-        return None;
-    }
-    let inertia = anchor.free.iter().position(
-        |d| matches!(d.as_slice(), [(b, _)] if nominal.base.columns[*b] == column::INERTIA + 5),
-    )?;
-    let moment = anchor.first_moment(nominal)?;
-    // First moment and inertia of a point mass m at distance l: m·l and m·l².
-    let (dm, dj) = (
-        after.values[moment] - prior[moment],
-        after.values[inertia] - prior[inertia],
-    );
-    let material = |change: f64, k: usize| {
-        change > least * prior[k].abs() && change > LEAST_SIGMAS * after.std(k)
-    };
-    if !(material(dm, moment) && material(dj, inertia)) {
-        return None;
-    }
-    let (distance, mass) = (dj / dm, dm * dm / dj);
-    let (vm, vj, c) = (
-        after.covariance[(moment, moment)] + (LINK * after.values[moment]).powi(2),
-        after.covariance[(inertia, inertia)] + (LINK * after.values[inertia]).powi(2),
-        after.covariance[(moment, inertia)],
-    );
-    let spread = |gm: f64, gj: f64| {
-        (gm * gm * vm + gj * gj * vj + 2.0 * gm * gj * c)
-            .max(0.0)
-            .sqrt()
-    };
-    let value = |value: f64, std: f64, unit: &str| Value {
-        value,
-        std,
-        unit: unit.into(),
-    };
-    let parameters = BTreeMap::from([
-        (
-            "mass".to_owned(),
-            value(mass, spread(2.0 * dm / dj, -dm * dm / (dj * dj)), "kg"),
-        ),
-        (
-            "distance".to_owned(),
-            value(distance, spread(-dj / (dm * dm), 1.0 / dm), "m"),
-        ),
-    ]);
-    // A mass on a link lies within some metres of its axis.
-    (0.01..3.0)
-        .contains(&distance)
-        .then_some((parameters, [inertia, moment]))
 }

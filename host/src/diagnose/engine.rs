@@ -349,7 +349,16 @@ fn attempt(
     let explained = refit.explained(chosen, after);
     let without = &options.without;
     let friction = chosen.iter().any(|p| is_friction(p.candidate.kind));
-    let change = change(&bench, &refit, &explained, friction, left, after, without);
+    let change = change(
+        &bench,
+        &refit,
+        &loaded.rows,
+        &explained,
+        friction,
+        left,
+        after,
+        without,
+    );
     if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, known)) {
         let given = replay.errors_of(&stated.moving());
         let last = motion.last().and_then(Option::as_ref);

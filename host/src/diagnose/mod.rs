@@ -36,6 +36,7 @@ mod one_way;
 mod one_way_tests;
 pub mod outcome;
 mod past;
+mod payload;
 #[cfg(test)]
 mod pendulum_tests;
 mod pictures;

@@ -33,6 +33,7 @@ impl Robot {
             effects: Vec::new(),
             identified: None,
             origin: Origin::Own,
+            last_link: nalgebra::Isometry3::identity(),
         }
     }
 }

@@ -163,6 +163,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     }
     let robot = Robot {
         origin: Origin::Urdf,
+        last_link: links.last().copied().unwrap_or_default(),
         ..Robot::new(&chain.name, joints)
     };
     Converted {

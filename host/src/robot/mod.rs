@@ -97,6 +97,10 @@ pub struct Robot {
     /// Where the values come from, which decides what they are worth ([`worth`]); no file says it.
     #[serde(skip)]
     pub origin: Origin,
+    /// Frame of the last link as a URDF has it, in the frame of the last joint here; the same frame where no URDF was read. No file
+    /// says it.
+    #[serde(skip)]
+    pub last_link: nalgebra::Isometry3<f64>,
 }
 
 /// Revolute or prismatic.

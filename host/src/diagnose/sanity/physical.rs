@@ -20,7 +20,7 @@ use crate::robot::{DESCRIBED as WORTH, Robot};
 /// Stretches of time that are left out in turn.
 pub(super) const BLOCKS: usize = 8;
 /// Rows that tell as much as all of them do: a recording has so many independent ones.
-const INDEPENDENT: f64 = 50.0;
+pub(super) const INDEPENDENT: f64 = 50.0;
 /// Share of the torque that no model of rigid bodies explains, which its rows are taken to be uncertain by.
 const UNCERTAIN: f64 = 0.1;
 /// Standard deviation of what a description says of a link or a rotor, as a share of it, where it is believed.

@@ -15,7 +15,7 @@ use super::super::DiagnoseError;
 use super::super::outcome::DataFault;
 use super::fit::Measured;
 use super::model::{GOOD, Judge};
-use super::physical::{Belief, Load, Physical, Score};
+use super::physical::{Belief, INDEPENDENT, Load, Physical, Score};
 use super::rows::{Form, Rows};
 use super::undo::Undo;
 use crate::report::format_significant;
@@ -31,8 +31,8 @@ const CLEAR: f64 = 2.33;
 const ODDS: f64 = 6.9;
 /// Shares of a torque's variance below this are as good as none: no model is closer to a real robot.
 const EXACT: f64 = 1e-4;
-/// Heaviest payload as a multiple of the links' mass.
-const CARRIED: f64 = 3.0;
+/// Heaviest payload as a multiple of the links' mass: a tool weighs many times what a light link does.
+const CARRIED: f64 = 30.0;
 
 /// Something that may be wrong.
 #[derive(Clone, Debug)]
@@ -105,9 +105,15 @@ fn gain(a: &Score, b: &Score) -> Measured {
     )
 }
 
-/// Whether `a` predicts decisively better than `b`.
+/// Whether `a` predicts decisively better than `b`: stretch by stretch, or where few of them are alike, by the likelihood of all.
 fn beats(a: &Score, b: &Score) -> bool {
-    gain(a, b).value > WORTH && clearly(a, b)
+    gain(a, b).value > WORTH && (clearly(a, b) || odds(a, b) > ODDS)
+}
+
+/// Logarithm of how much likelier the data are under `a`, at the noise that each leaves.
+fn odds(a: &Score, b: &Score) -> f64 {
+    let joints = a.errors.first().map_or(0, Vec::len) as f64;
+    0.5 * joints * INDEPENDENT * (b.cost / a.cost).ln()
 }
 
 /// Whether `a` predicts better than `b`, be it by little.
@@ -234,11 +240,6 @@ impl Judge<'_> {
 
     /// What explains the data as recorded best, a clause.
     fn other(&self, recorded: &Reading) -> String {
-        let last = self
-            .robot
-            .joints
-            .last()
-            .map_or("", |joint| joint.name.as_str());
         let best = best(recorded.all());
         let is = |score: &Option<Score>| {
             let pair = best.zip(score.as_ref());
@@ -248,17 +249,18 @@ impl Judge<'_> {
             "the description, with friction of its own, explains these data as well".to_owned()
         } else if is(&recorded.loaded) {
             let load = recorded.loaded.as_ref().map(|score| score.load);
-            load.map_or_else(String::new, |load| loaded(load, last))
+            load.map_or_else(String::new, |load| loaded(load, self.robot))
         } else {
             "other masses and friction than described explain these data as well".to_owned()
         }
     }
 }
 
-fn loaded(load: Load, last: &str) -> String {
-    let [x, y, z] = load
-        .place
-        .map(|p| format!("{:.2}", 0.0 + (100.0 * p).round() / 100.0));
+fn loaded(load: Load, robot: &Robot) -> String {
+    let last = robot.joints.last().map_or("", |joint| joint.name.as_str());
+    let place = robot.last_link.inverse_transform_point(&load.place.into());
+    let [x, y, z] =
+        [place.x, place.y, place.z].map(|p| format!("{:.2}", 0.0 + (100.0 * p).round() / 100.0));
     format!(
         "a payload of about {} kg at ({x}, {y}, {z}) m in the frame of joint {last} explains these data as well",
         format_significant(load.mass, 2)
