@@ -8,6 +8,7 @@ use rig_shared::multibody::Chain;
 
 use super::DiagnoseError;
 use super::anchor::Anchor;
+use super::coherent;
 use super::columns::{Candidate, DELAY, Source};
 use super::fit::Evidence;
 use super::floor;
@@ -20,7 +21,7 @@ use super::runs::{Run, runs_of};
 use super::sanity::moves;
 use super::stated::{Stated, candidate, gains};
 use crate::effects::{Compensated, Effects};
-use crate::prepare::{LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
+use crate::prepare::{Choice, LowPass, PrepareOptions, Recording, Survey, Treatment, same_rate};
 use crate::robot::{JointKind, Robot};
 
 /// Least pass band that the waves of effects need of the low-pass before thinning, Hz.
@@ -361,14 +362,53 @@ pub(super) fn treatment_of(
         .map(|r| Survey::take(*r, robot.joints.len()))
         .collect::<Result<Vec<_>, _>>()?;
     let limits = robot.torque_limits();
-    // Not by the torque, as an identification does: what the model lacks is what is looked for, and a low cut-off smears it away.
+    // Not by what the model leaves of the torque, as an identification does: what it lacks is what is looked for, and a low cut-off
+    // smears it away.
     let first = Treatment::decide(&surveys, &options, &limits)?;
+    let (surveys, options, first) = match end_of_motion(recordings, &surveys, &first)? {
+        None => (surveys, options, first),
+        Some(end) => {
+            let surveys: Vec<Survey> = (surveys.iter())
+                .map(|s| s.ending_at(&vec![end; s.joints.len()]))
+                .collect();
+            let options = PrepareOptions {
+                cutoff: Choice::Fixed(end),
+                ..options
+            };
+            let mut treatment = Treatment::decide(&surveys, &options, &limits)?;
+            treatment.cutoff_reason = format!(
+                "{end:.3} Hz: up to there the torque goes with the acceleration. The spectrum of the position alone gives {:.3} Hz; its noise is not white (time stamps with jitter, a coarse encoder, or a position that was filtered before it was recorded).",
+                first.cutoff
+            );
+            treatment.spectral_cutoff = Some(first.cutoff);
+            (surveys, options, treatment)
+        }
+    };
     let band = (10.0 * first.motion_frequency)
         .max(LEAST_BAND)
         .min(first.cutoff);
     let step = ((0.4 * first.sample_rate / band).floor() as usize).max(1);
     let step = step.min(first.decimation.max(1));
     Ok(first.decimated(step, &surveys, &options, &limits)?)
+}
+
+/// Where the motion ends by what torque it takes, Hz, where the spectrum of the position cannot tell: noise is in its acceleration
+/// below the highest frequency that it takes for motion. Noise beyond that frequency, however loud, leaves the motion known, and a
+/// cut-off below its headroom would bend it.
+fn end_of_motion(
+    recordings: &[&dyn Recording],
+    surveys: &[Survey],
+    first: &Treatment,
+) -> Result<Option<f64>, DiagnoseError> {
+    let doubtful = (first.spectra.iter()).any(|s| s.crossing.min(s.clean) < s.motion);
+    if !doubtful {
+        return Ok(None);
+    }
+    let longest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+    let (joints, rate) = (first.spectra.len(), first.sample_rate);
+    let end = coherent::highest(recordings, joints, rate, longest)?;
+    let swing = first.spectra.iter().map(|s| s.swing()).fold(0.0, f64::max);
+    Ok(end.filter(|end| (swing..first.cutoff).contains(end)))
 }
 
 /// Every effect on every joint that the torque can show.
@@ -388,7 +428,7 @@ pub(super) fn library(robot: &Robot, runs: &[Run], without: &[Kind]) -> Vec<Cand
             if !stirs && kind != Kind::GravityTilt {
                 continue;
             }
-            let at = |other| Candidate { kind, joint, other };
+            let at = |other| Candidate::on(kind, joint).naming(other);
             let warm = runs.iter().all(|r| r.joints[joint].temperature.is_some());
             match kind {
                 Kind::InertiaCoupling => {

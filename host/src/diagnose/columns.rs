@@ -65,6 +65,52 @@ pub(super) struct Candidate {
     pub(super) joint: usize,
     /// The other joint that it names.
     pub(super) other: Option<usize>,
+    /// The bits of a wave's order; none of what is no wave, and of a wave whose order is still to be found.
+    pub(super) order: Option<u64>,
+}
+
+impl Candidate {
+    /// A kind on a joint, whatever its order.
+    pub(super) const fn on(kind: Kind, joint: usize) -> Self {
+        Self {
+            kind,
+            joint,
+            other: None,
+            order: None,
+        }
+    }
+
+    /// The same with another joint that it names.
+    pub(super) fn naming(self, other: Option<usize>) -> Self {
+        Self { other, ..self }
+    }
+
+    /// The same with these shapes: waves of different orders are different effects, which add up.
+    pub(super) fn shaped(self, shapes: &[f64; SHAPES]) -> Self {
+        let wave = repeats_by_order(self.kind);
+        Self {
+            order: wave.then(|| shapes[0].to_bits()),
+            ..self
+        }
+    }
+
+    /// What a library holds of it: waves of all orders in one.
+    pub(super) fn sort(self) -> Self {
+        Self {
+            order: None,
+            ..self
+        }
+    }
+
+    /// Whether they are two orders of one wave, which a joint may have both.
+    pub(super) fn is_another_order(&self, other: &Self) -> bool {
+        self.sort() == other.sort() && self.order != other.order
+    }
+}
+
+/// Whether a kind is a torque that repeats with an angle: a joint may have it with several orders at once.
+pub(super) fn repeats_by_order(kind: Kind) -> bool {
+    kind.periodic().is_some() && kind.about().channel == Channel::Torque
 }
 
 /// Delay at which the column of a delay is taken until one is known, s: first order would be 2 % off at 3 Hz and 10 ms.

@@ -111,7 +111,12 @@ impl Judge<'_, '_> {
             let closes = |k: usize| {
                 let j = chosen[k].candidate.joint;
                 let last = on(j).unwrap_or(&judged);
-                let [before, after] = [Some(k), None].map(|but| with(self.base, &last.chosen, but));
+                // The name is in doubt, not one of its orders, each of which closes a part of the gap.
+                let sort = chosen[k].candidate.sort();
+                let others = last.chosen.iter().filter(|p| p.candidate.sort() != sort);
+                let others: Vec<Profile> = others.cloned().collect();
+                let [before, after] =
+                    [&others, &last.chosen].map(|list| with(self.base, list, None));
                 // A gear is worth what it does at its touches, which hardly count beside all else.
                 if is_gear(chosen[k].candidate.kind) {
                     closed([before.even_rms(j), after.even_rms(j)], last.floors[j])

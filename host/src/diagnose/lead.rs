@@ -49,11 +49,7 @@ pub(super) fn leads(
     let late = slack(source.runs);
     (present.iter().enumerate())
         .map(|(joint, &present)| {
-            let candidate = Candidate {
-                kind: Kind::MeasurementDelay,
-                joint,
-                other: None,
-            };
+            let candidate = Candidate::on(Kind::MeasurementDelay, joint);
             let columns = source.columns(&candidate, &Default::default())?;
             let evidence = fit
                 .distinct(&columns)

@@ -124,7 +124,8 @@ pub(super) fn detectable(
         let hidden = without
             .iter()
             .any(|t| t.effect == about.name && t.joint == joint.name);
-        let taken = (found.chosen.iter()).any(|p| rivals(&p.candidate, candidate));
+        let taken = (found.chosen.iter())
+            .any(|p| rivals(&p.candidate, candidate) || p.candidate.sort() == *candidate);
         let gains = found.search.source.gains(candidate);
         if hidden || taken || !is_first_law(candidate.kind) || is_gear(candidate.kind) {
             continue;

@@ -13,6 +13,7 @@ mod burst;
 mod by_motion;
 mod change;
 mod clamped;
+mod coherent;
 mod columns;
 mod descent;
 mod described;
@@ -34,6 +35,7 @@ mod motion;
 mod one_way;
 #[cfg(test)]
 mod one_way_tests;
+mod orders;
 pub mod outcome;
 mod past;
 mod payload;

@@ -149,7 +149,9 @@ fn turned(
 
 /// The effect as a table of the description, its values within what a description may hold.
 fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
-    let Candidate { kind, joint, other } = fitted.candidate;
+    let Candidate {
+        kind, joint, other, ..
+    } = fitted.candidate;
     let mut effect = Effect::new(kind, gains, &fitted.shapes);
     let name = |j: usize| robot.joints[j].name.clone();
     let about = kind.about();

@@ -77,7 +77,9 @@ impl Map {
 
 /// The coordinate over which an effect shows.
 fn telling(profile: &Profile, all: &[Coordinate], joints: &[Joint]) -> Option<Coordinate> {
-    let Candidate { kind, joint, other } = profile.candidate;
+    let Candidate {
+        kind, joint, other, ..
+    } = profile.candidate;
     let wave = |order: f64| {
         let ratio = joints[joint].gear_ratio();
         let position = all.iter().find(|c| c.name == "position")?;

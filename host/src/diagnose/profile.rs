@@ -234,6 +234,20 @@ impl Search<'_> {
         c: usize,
         start: Option<[f64; SHAPES]>,
     ) -> Result<Option<Profile>, DiagnoseError> {
+        self.profile_but(fit, c, start, &[])
+    }
+
+    /// The same of a wave of none of the orders that are taken `but` for it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn profile_but(
+        &self,
+        fit: &Fit,
+        c: usize,
+        start: Option<[f64; SHAPES]>,
+        but: &[Candidate],
+    ) -> Result<Option<Profile>, DiagnoseError> {
         let kind = self.library[c].kind;
         let fixed = self.fixed(&self.library[c]);
         let start = fixed.or(start);
@@ -248,7 +262,9 @@ impl Search<'_> {
             }
         } else if points.iter().any(|s| self.shows(&self.library[c], s)) {
             for (shapes, columns) in points.iter().zip(self.cached(c, &points)?) {
-                if !self.shows(&self.library[c], shapes) {
+                if !self.shows(&self.library[c], shapes)
+                    || but.contains(&self.library[c].shaped(shapes))
+                {
                     continue;
                 }
                 let Some(share) = self.explained(fit, c, &columns) else {
@@ -322,7 +338,7 @@ impl Search<'_> {
             vanished = Some("stiffness");
         }
         Ok(Some(Profile {
-            candidate: self.library[c],
+            candidate: self.library[c].shaped(&best.1),
             shapes: best.1,
             columns: best.2,
             evidence,

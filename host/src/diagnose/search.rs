@@ -9,6 +9,7 @@ use super::DiagnoseError;
 use super::columns::{Candidate, Source};
 use super::fit::Fit;
 use super::judge::equal;
+use super::orders::Orders;
 use super::profile::{LEAST_GAIN, Profile, goes_straight, grid, grid_on};
 use super::rows::Column;
 use super::runs::{blurred, resolution};
@@ -24,7 +25,7 @@ mod simplest;
 mod sweep;
 mod tentative;
 
-use kinds::{depends_on_model, doubles};
+use kinds::{depends_on_model, doubles, has_many_orders};
 pub(super) use kinds::{is_constant, is_first_law, is_friction, is_gear, rivals};
 use shadow::in_the_shadow;
 pub(super) use shadow::shadow;
@@ -35,7 +36,7 @@ const STEPS_OF_A_DISTANCE: f64 = 2.0;
 const STAYS: f64 = 1e-3;
 /// How often laws are weighed against others of their names, each time beside those that have changed.
 const LAWS_ANEW: usize = 2;
-/// Most effects beside those of the description.
+/// Most effects beside those of the description, the orders of one wave counting once.
 const MOST_EFFECTS: usize = 6;
 
 /// The search over a library.
@@ -58,6 +59,8 @@ pub(super) struct Search<'a> {
     blurred: Vec<f64>,
     /// Lowest to highest position, joint by joint, rad or m.
     spans: Vec<f64>,
+    /// Orders of waves of the motors' torque beyond the grids', joint by joint.
+    orders: Vec<Orders>,
     /// Constants of which a gear has told on which side of it they act.
     sided: Vec<Candidate>,
     /// What the last search had to drop.
@@ -86,6 +89,9 @@ impl<'a> Search<'a> {
                 .collect(),
             spans: (0..source.nominal.joints())
                 .map(|joint| waves::span(source.runs, joint))
+                .collect(),
+            orders: (0..source.nominal.joints())
+                .map(|joint| orders_of(&source, &library, joint))
                 .collect(),
             source,
             library,
@@ -131,6 +137,11 @@ impl<'a> Search<'a> {
         waves::shown(candidate.kind, joint, shapes, self.spans[candidate.joint])
     }
 
+    /// Place of a candidate in the library.
+    pub(super) fn place(&self, candidate: &Candidate) -> Option<usize> {
+        self.library.iter().position(|l| *l == candidate.sort())
+    }
+
     /// Shapes that the search of a candidate begins with.
     pub(super) fn grid(&self, candidate: &Candidate) -> Vec<[f64; SHAPES]> {
         let joints = &self.source.robot.joints;
@@ -140,6 +151,13 @@ impl<'a> Search<'a> {
         } else {
             grid_on(candidate.kind, &joints[candidate.joint])
         };
+        if has_many_orders(candidate.kind) {
+            points.extend(self.orders[candidate.joint].loud.iter().map(|order| {
+                let mut point = [0.0; SHAPES];
+                point[0] = *order;
+                point
+            }));
+        }
         let running = self.source.running();
         points.retain(|point| !goes_straight(candidate.kind, point, running));
         points
@@ -190,10 +208,10 @@ impl<'a> Search<'a> {
             }
         };
         let trials = self.trials();
-        let most = chosen.len() + MOST_EFFECTS;
+        let most = sorts(&chosen) + MOST_EFFECTS;
         let mut impossible: Vec<Candidate> = Vec::new();
         let mut stood: Vec<Vec<Profile>> = Vec::new();
-        while chosen.len() < most {
+        while sorts(&chosen) < most {
             let fit = with(base, &chosen, None);
             let present: Vec<Candidate> = chosen.iter().map(|p| p.candidate).collect();
             let profiles = self.sweep(&fit, &present, &impossible)?;
@@ -321,7 +339,7 @@ impl<'a> Search<'a> {
         let trials = self.trials();
         let mut taking = Vec::new();
         for candidate in &self.dropped {
-            let place = self.library.iter().position(|c| c == candidate);
+            let place = self.place(candidate);
             let profile = place.map(|c| self.profile(&fit, c, None)).transpose()?;
             taking.extend(profile.flatten().filter(|p| p.takes_much(trials)));
         }
@@ -420,7 +438,7 @@ impl<'a> Search<'a> {
     fn refine_all(&self, base: &Fit, chosen: &mut [Profile]) -> Result<(), DiagnoseError> {
         for i in 0..chosen.len() {
             let fit = with(base, chosen, Some(i));
-            let c = (self.library.iter()).position(|l| *l == chosen[i].candidate);
+            let c = self.place(&chosen[i].candidate);
             let Some(c) = c else { continue };
             let mut better = self.profile(&fit, c, Some(chosen[i].shapes))?;
             if better.is_none() && chosen[i].candidate.kind.is_presliding() {
@@ -440,6 +458,27 @@ impl<'a> Search<'a> {
         }
         Ok(())
     }
+}
+
+/// Orders of a joint beyond those of the grids that the library's waves of its motor begin with.
+fn orders_of(source: &Source, library: &[Candidate], joint: usize) -> Orders {
+    let own = |c: &&Candidate| c.joint == joint && has_many_orders(c.kind);
+    let highest = (library.iter().filter(own))
+        .filter_map(|c| c.kind.about().shapes.first())
+        .map(|order| order.range[1])
+        .fold(0.0, f64::max);
+    let of = &source.robot.joints[joint];
+    if highest == 0.0 || !waves::motor_is_known(of) {
+        return Orders::default();
+    }
+    Orders::of(source.runs, joint, of.gear_ratio(), highest as usize)
+}
+
+/// How many effects there are, the orders of one wave counting once.
+fn sorts(chosen: &[Profile]) -> usize {
+    let sort = |p: &Profile| p.candidate.sort();
+    let first = |k: &usize| !chosen[..*k].iter().any(|p| sort(p) == sort(&chosen[*k]));
+    (0..chosen.len()).filter(first).count()
 }
 
 /// Whether they are the same effects.

@@ -166,7 +166,12 @@ fn effects(d: &Diagnosis) -> String {
             } else {
                 format!(" (or {})", rivals.join(" or "))
             };
-            format!("{}{or} at joint {}", s.effect, s.joint)
+            // A joint may have one name several times, with one order each.
+            let order = match s.parameters.get("order") {
+                Some(order) => format!(" of order {}", format_significant(order.value, 4)),
+                None => String::new(),
+            };
+            format!("{}{order}{or} at joint {}", s.effect, s.joint)
         })
         .collect();
     let held = d.steps.iter().all(|s| s.holdout_rms.is_some());

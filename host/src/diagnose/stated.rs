@@ -184,7 +184,7 @@ impl Stated {
     pub(super) fn hold_what_is_not_in(&mut self, library: &[Candidate]) -> bool {
         let mut changed = false;
         for (_, placed, way) in self.effects.iter_mut().filter(|(.., w)| *w == Way::Free) {
-            if !library.contains(&candidate(placed)) {
+            if !library.contains(&candidate(placed).sort()) {
                 let why = match placed.effect.kind {
                     Kind::ViscousWarmupTemperature => "the temperature was not recorded throughout",
                     _ => "it was left out of the search",
@@ -422,11 +422,9 @@ fn what_changed(effect: &RobotEffect, now: &Now, kind: JointKind) -> String {
 
 /// The place of a described effect in a library.
 pub(super) fn candidate(placed: &Placed) -> Candidate {
-    Candidate {
-        kind: placed.effect.kind,
-        joint: placed.joint,
-        other: placed.other,
-    }
+    Candidate::on(placed.effect.kind, placed.joint)
+        .naming(placed.other)
+        .shaped(&placed.effect.shapes)
 }
 
 /// What the columns of a described effect are multiplied by: a gear's twist counts once.
@@ -437,11 +435,12 @@ pub(super) fn gains(placed: &Placed) -> Vec<f64> {
     placed.effect.gains[..placed.effect.kind.about().gains.len()].to_vec()
 }
 
-/// Whether an effect is the described one, by whatever law.
-pub(super) fn is_one(placed: &Placed, candidate: &Candidate) -> bool {
-    placed.effect.kind.about().name == candidate.kind.about().name
-        && placed.joint == candidate.joint
-        && placed.other == candidate.other
+/// Whether an effect is the described one, by whatever law; a wave of another order is another effect.
+pub(super) fn is_one(placed: &Placed, effect: &Candidate) -> bool {
+    placed.effect.kind.about().name == effect.kind.about().name
+        && placed.joint == effect.joint
+        && placed.other == effect.other
+        && !candidate(placed).is_another_order(effect)
 }
 
 /// Counts a payload to its link, where the description says what the link weighs.

@@ -130,11 +130,7 @@ pub(super) fn refutes(across: &[Across], candidate: &Candidate) -> bool {
 pub(super) fn gears(across: &[Across]) -> Vec<(Candidate, [f64; SHAPES])> {
     let of = |a: &Across| {
         let (kind, shapes) = a.gear?;
-        let candidate = Candidate {
-            kind,
-            joint: a.joint,
-            other: None,
-        };
+        let candidate = Candidate::on(kind, a.joint);
         Some((candidate, shapes))
     };
     across.iter().filter_map(of).collect()
@@ -142,15 +138,9 @@ pub(super) fn gears(across: &[Across]) -> Vec<(Candidate, [f64; SHAPES])> {
 
 /// Whether they name something that the description does not state.
 pub(super) fn names_something(across: &[Across], stated: &dyn Fn(&Candidate) -> bool) -> bool {
-    across.iter().any(|a| {
-        (a.named.iter()).any(|n| {
-            !stated(&Candidate {
-                kind: n.kind,
-                joint: a.joint,
-                other: None,
-            })
-        })
-    })
+    across
+        .iter()
+        .any(|a| (a.named.iter()).any(|n| !stated(&Candidate::on(n.kind, a.joint))))
 }
 
 /// One joint's transmission.

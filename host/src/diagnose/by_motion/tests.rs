@@ -67,6 +67,13 @@ fn a_noisy_position_costs_the_motion_less_than_the_torque() {
     }
     let found = diagnosed(&made);
     println!("{:#?}", found.by_motion);
+    // The noise is white, so that the spectrum of the position tells how fast the motion is, which the cut-off does not bend.
+    let treated = found.treatment.as_ref().unwrap();
+    let why = &treated.position_cutoff_why;
+    assert!(
+        treated.position_cutoff > 4.9 * treated.motion_frequency,
+        "{why}"
+    );
     for name in ["Izz1 + Ia1", "fv1", "fc1"] {
         let p = of(&found, name);
         assert!(p.motion_std < 0.7 * p.torque_std, "{p:?}");

@@ -131,8 +131,17 @@ pub(super) fn reconcile(robot: &Robot, tried: &mut Vec<Tried>, found: &[Profile]
             None => took_over(robot, tried, profile, trials),
         }
     }
+    let mut rounds = vec![0; found.len()];
     for fallen in tried.iter_mut().filter(|t| t.refused.is_empty()) {
-        if !found.iter().any(|profile| is(fallen, profile)) {
+        let own: Vec<usize> = (0..found.len())
+            .filter(|k| is(fallen, &found[*k]))
+            .collect();
+        // Each order of a wave was taken in a round of its own.
+        let stands = own.first().is_some_and(|first| {
+            rounds[*first] += 1;
+            found[*first].candidate.order.is_none() || rounds[*first] <= own.len()
+        });
+        if !stands {
             fallen.refused =
                 "fell again: beside all others it takes too little away, or another name takes as much"
                     .into();

@@ -16,11 +16,7 @@ use crate::diagnose::runs::{JointRun, Run};
 
 fn profile(kind: Kind, joint: usize, gain: f64) -> Profile {
     Profile {
-        candidate: Candidate {
-            kind,
-            joint,
-            other: None,
-        },
+        candidate: Candidate::on(kind, joint),
         shapes: Default::default(),
         columns: Arc::default(),
         evidence: Evidence {

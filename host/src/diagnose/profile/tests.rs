@@ -4,11 +4,7 @@ use super::*;
 
 fn profile(kind: Kind, joint_gain: f64, gain_sigmas: f64) -> Profile {
     Profile {
-        candidate: Candidate {
-            kind,
-            joint: 0,
-            other: None,
-        },
+        candidate: Candidate::on(kind, 0),
         shapes: Default::default(),
         columns: Arc::default(),
         evidence: Evidence {

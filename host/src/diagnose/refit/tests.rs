@@ -89,11 +89,7 @@ fn outcome(robot: &Robot, seed: u64, unknown: f64) -> Outcome {
     let refit = Refit::of(&bench, &loaded.rows).unwrap();
     let source = (bench.source(&loaded, &bench.anchor.values(&refit.before.values))).unwrap();
     let profile = |kind, shapes: [f64; SHAPES]| {
-        let candidate = Candidate {
-            kind,
-            joint: 0,
-            other: None,
-        };
+        let candidate = Candidate::on(kind, 0);
         Profile {
             candidate,
             shapes,

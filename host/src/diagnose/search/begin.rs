@@ -67,7 +67,7 @@ impl<'a> Search<'a> {
             if !self.is_gear_by_torque(&candidate) {
                 continue;
             }
-            let place = self.library.iter().position(|l| *l == candidate);
+            let place = self.place(&candidate);
             let beside = with(base, chosen, Some(i));
             if let Some(c) = place
                 && let Some(better) = self.profile(&beside, c, Some(shapes))?

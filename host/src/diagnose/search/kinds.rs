@@ -14,10 +14,10 @@ pub(in crate::diagnose) fn is_friction(kind: Kind) -> bool {
     kind.about().direction == Direction::Dry && kind != Kind::AsymmetricCoulomb
 }
 
-/// Whether two candidates exclude each other: one name twice on a joint, or two transmissions.
+/// Whether two candidates exclude each other: one name twice on a joint, but for waves of two orders, or two transmissions.
 pub(in crate::diagnose) fn rivals(a: &Candidate, b: &Candidate) -> bool {
     let one = a.kind.about().name == b.kind.about().name || is_gear(a.kind) && is_gear(b.kind);
-    one && a.joint == b.joint && a.other == b.other
+    one && a.joint == b.joint && a.other == b.other && !a.is_another_order(b)
 }
 
 /// Whether it is one constant in the torque of a joint that moves.
@@ -32,6 +32,11 @@ pub(in crate::diagnose) fn is_constant(kind: Kind) -> bool {
 pub(super) fn doubles(a: &Candidate, b: &Candidate) -> bool {
     let of = |a: &Candidate, b: &Candidate| is_constant(a.kind) && b.kind == Kind::GravityTilt;
     a.joint == b.joint && (of(a, b) || of(b, a))
+}
+
+/// Whether it is a torque of the motor with any number of periods in its turn.
+pub(super) fn has_many_orders(kind: Kind) -> bool {
+    matches!(kind, Kind::Cogging | Kind::TorqueRipple)
 }
 
 /// Whether a kind is the law that its name is searched by; others take its place only where they do better.

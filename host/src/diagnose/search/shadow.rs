@@ -3,6 +3,7 @@
 use rig_shared::effects::Kind;
 
 use super::{is_constant, is_gear};
+use crate::diagnose::columns::Candidate;
 use crate::diagnose::fit::sigmas;
 use crate::diagnose::profile::Profile;
 use crate::robot::Robot;
@@ -14,7 +15,8 @@ const SHADOW: f64 = 0.005;
 const SHADOW_OF_A_CURVE: f64 = 0.02;
 /// … a constant and the direction of gravity have no other form: what they leave is what the joint does at rest …
 const SHADOW_OF_A_CONSTANT: f64 = 0.001;
-/// … and 86 % for gears, whose motion is driven by the measured one.
+/// … and 86 % for gears, whose motion is driven by the measured one; so much of an eccentric gear's wave its harmonics may be, which are
+/// no second effect.
 const SHADOW_OF_A_GEAR: f64 = 0.02;
 
 /// Standard deviations between blocks by which an effect stands clear of another's shadow where that other does little.
@@ -30,17 +32,36 @@ pub(super) fn in_the_shadow(robot: &Robot, chosen: &[Profile], i: usize) -> bool
     let own = taken(&chosen[i]);
     (chosen.iter().enumerate()).any(|(k, other)| {
         let casting = taken(other);
+        let harmonic = is_harmonic(&chosen[i].candidate, &other.candidate);
         let share = match [other, &chosen[i]].map(|p| p.candidate.kind) {
             [Kind::LoadFriction, Kind::PositionFriction] if !knows_drive(robot, other) => {
                 SHADOW_OF_AN_UNKNOWN_DRIVE
             }
+            _ if harmonic => SHADOW_OF_A_GEAR,
             _ => shadow(other),
         };
         k != i
             && other.candidate.joint == chosen[i].candidate.joint
             && own.iter().sum::<f64>() < share * casting.iter().sum::<f64>()
-            && !(errs_where_it_acts(other.candidate.kind) && clear(&own, &casting, share))
+            // The form of a wave errs all over its turn, most where the wave itself passes zero.
+            && (harmonic
+                || !errs_where_it_acts(other.candidate.kind)
+                || !clear(&own, &casting, share))
     })
+}
+
+/// Whether a wave of a gear is a harmonic of another: the error of teeth over a turn of their shaft is no pure sine, and its next periods
+/// are of the same teeth. As far up as the orders of a shaft are searched.
+fn is_harmonic(own: &Candidate, of: &Candidate) -> bool {
+    if own.kind != Kind::GearEccentricity || !own.is_another_order(of) {
+        return false;
+    }
+    let [Some(order), Some(first)] = [own, of].map(|c| c.order.map(f64::from_bits)) else {
+        return false;
+    };
+    let [lowest, highest] = own.kind.about().shapes[0].range;
+    let times = (order / first).round();
+    (2.0..=highest / lowest).contains(&times) && (order - times * first).abs() < 1e-6 * order
 }
 
 /// Whether the description says what of the inertia is the motor's, which no gear carries.
@@ -106,6 +127,26 @@ mod tests {
         let mut once = vec![0.0; 80];
         once[1] = 24.0;
         assert!(!clear(&once, &casting, share));
+    }
+
+    #[test]
+    fn harmonics_of_a_gear_are_of_the_same_teeth() {
+        let wave = |kind, order| Candidate::on(kind, 1).shaped(&[order, 0.0, 0.0, 0.0]);
+        let gear = |order| wave(Kind::GearEccentricity, order);
+        for (own, of) in [(2.0, 1.0), (3.0, 1.0), (6.0 / 45.0, 2.0 / 45.0)] {
+            assert!(is_harmonic(&gear(own), &gear(of)), "{own} of {of}");
+            assert!(!is_harmonic(&gear(of), &gear(own)), "{of} of {own}");
+        }
+        // Another shaft; and what a motor has of them is as large as its slots and poles make it.
+        assert!(!is_harmonic(&gear(1.0), &gear(2.0 / 45.0)));
+        assert!(!is_harmonic(&gear(3.0), &gear(2.0)));
+        let cogging = |order| wave(Kind::Cogging, order);
+        assert!(!is_harmonic(&cogging(24.0), &cogging(12.0)));
+        let elsewhere = Candidate {
+            joint: 2,
+            ..gear(1.0)
+        };
+        assert!(!is_harmonic(&gear(2.0), &elsewhere));
     }
 
     #[test]

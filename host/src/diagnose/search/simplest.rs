@@ -74,7 +74,7 @@ impl Search<'_> {
             {
                 continue;
             }
-            let Some(place) = self.library.iter().position(|l| l == c) else {
+            let Some(place) = self.place(c) else {
                 continue;
             };
             let Some(now) = self.profile(&fit, place, Some(rival.shapes))? else {

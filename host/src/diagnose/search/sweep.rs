@@ -2,7 +2,7 @@
 
 use rig_shared::effects::Kind;
 
-use super::kinds::{doubles, is_searched};
+use super::kinds::{doubles, has_many_orders, is_searched};
 use super::{Search, is_first_law, rivals};
 use crate::batch::each_by;
 use crate::diagnose::DiagnoseError;
@@ -56,8 +56,9 @@ impl Search<'_> {
                     && !impossible.contains(candidate)
             })
             .collect();
+        let taken = [present, impossible].concat();
         let mut profiles = each_by(open.len(), self.threads, |k| {
-            self.profile(fit, open[k], None)
+            self.profile_but(fit, open[k], None, &taken)
         })
         .into_iter()
         .filter_map(Result::transpose)
@@ -81,7 +82,13 @@ impl Search<'_> {
             .filter(|c| is_searched(c.kind))
             .map(|c| {
                 let shown = self.grid(c).into_iter().filter(|s| self.shows(c, s));
-                shown.count()
+                // Of the orders beyond a grid the loudest were chosen from all.
+                let chosen_from = if has_many_orders(c.kind) {
+                    self.orders[c.joint].scanned
+                } else {
+                    0
+                };
+                shown.count() + chosen_from
             })
             .sum()
     }

@@ -145,11 +145,7 @@ fn winding(
     }
     let robot = bench.robot;
     let own = &robot.joints[joint];
-    let candidate = Candidate {
-        kind: Kind::DriveDeadzone,
-        joint,
-        other: None,
-    };
+    let candidate = Candidate::on(Kind::DriveDeadzone, joint);
     let trials = robot.joints.len() * FADES.len();
     let dead = |k: usize| std::slice::from_ref(&training.dead_zones[k]);
     let likeliest = (0..FADES.len())

@@ -96,11 +96,7 @@ fn made_up(kind: Kind, made_of: &[f64], effect: Option<Effect>, seed: u64) -> [f
         Vec::new(),
         2,
     );
-    let candidate = Candidate {
-        kind,
-        joint: 0,
-        other: None,
-    };
+    let candidate = Candidate::on(kind, 0);
     let shapes = {
         let mut shapes = [0.0; SHAPES];
         shapes[..made_of.len()].copy_from_slice(made_of);

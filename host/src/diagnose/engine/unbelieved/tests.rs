@@ -20,11 +20,7 @@ const SPRING: Effect = Effect::JointElasticity {
     stiffness: 700.0,
     damping: 0.3,
 };
-const GEAR: Candidate = Candidate {
-    kind: Kind::JointElasticity,
-    joint: 0,
-    other: None,
-};
+const GEAR: Candidate = Candidate::on(Kind::JointElasticity, 0);
 
 /// What `ask` makes of the library on a rig with that hidden.
 fn on<T>(
@@ -160,11 +156,7 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
         Vec::new(),
         2,
     );
-    let candidate = Candidate {
-        kind,
-        joint: 1,
-        other: None,
-    };
+    let candidate = Candidate::on(kind, 1);
     let follower = Follower::new(&bench, &loaded, &refit, &search);
     let judge = Judge {
         robot: bench.robot,
