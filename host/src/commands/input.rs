@@ -13,11 +13,8 @@ use crate::data::{
 };
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
-use crate::report::format_significant;
+use crate::report::{Finding, format_significant, one_a_kind};
 use crate::robot::{Description, Joint, JointKind, Robot};
-
-/// Warnings of one recording that are said one by one.
-const SAID: usize = 5;
 
 /// The robot description.
 #[derive(Debug, ClapArgs)]
@@ -265,25 +262,27 @@ impl Inputs {
         })
     }
 
-    /// What their rows made worth saying, once they were read: gaps, uneven steps, text where a number belongs. The first
-    /// few of each recording, and how many there are.
+    /// What their rows made worth saying, once they were read: of each recording one line a kind, that of the worst row, and how
+    /// many more there are of it.
     pub(crate) fn heard(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, heard) in self.sources.iter().zip(&self.heard) {
             let (path, heard) = (source.path().display(), heard.borrow());
-            all.extend((heard.iter().take(SAID)).map(|warning| format!("{path}: {warning}")));
-            if heard.len() > SAID {
-                all.push(format!(
-                    "{path}: {}{} more of gaps, uneven steps in time or text where a number belongs.",
-                    if heard.len() < KEPT_WARNINGS { "" } else { "at least " },
-                    heard.len() - SAID
-                ));
+            let at_least = match heard.len() {
+                KEPT_WARNINGS.. => "at least ",
+                _ => "",
+            };
+            for (worst, more) in Warning::worst_of_each_kind(&heard) {
+                all.push(match more {
+                    0 => format!("{path}: {worst}"),
+                    _ => format!("{path}: {worst}; {at_least}{more} more of this kind, none worse"),
+                });
             }
         }
         all
     }
 
-    /// Where their positions left `[joint.limits]`, once they were read: one sentence for each recording and joint.
+    /// Where their positions left `[joint.limits]`, once they were read: the recording and joint that went farthest, and the others.
     pub(crate) fn outside(&self) -> Vec<String> {
         let mut all = Vec::new();
         for (source, outside) in self.sources.iter().zip(&self.outside) {
@@ -292,18 +291,20 @@ impl Inputs {
                 let (Some([low, high]), true) = (range.limits, *rows > 0) else {
                     continue;
                 };
-                all.push(format!(
-                    "{}: q{} is beyond the position limits of joint \"{}\" ({low} to {high} {unit}) in {rows} of {} rows, by up to {} {unit}. If the joint touched a stop there, its torque is in those rows and biases friction and gravity: record with more margin to the limits, or correct [joint.limits].",
-                    source.path().display(),
-                    j + 1,
-                    range.joint,
-                    outside.rows,
-                    format_significant(*most, 3),
-                    unit = range.unit,
-                ));
+                let (path, unit, n) = (source.path().display(), range.unit, j + 1);
+                let beyond = format!("{} {unit}", format_significant(*most, 3));
+                all.push(Finding {
+                    kind: "outside",
+                    size: *most,
+                    sentence: format!(
+                        "{path}: q{n} is beyond the position limits of joint \"{}\" ({low} to {high} {unit}) in {rows} of {} rows, by up to {beyond}. If the joint touched a stop there, its torque is in those rows and biases friction and gravity: record with more margin to the limits, or correct [joint.limits].",
+                        range.joint, outside.rows,
+                    ),
+                    short: format!("q{n} of {path} ({rows} rows, {beyond})"),
+                });
             }
         }
-        all
+        one_a_kind(all)
     }
 
     /// Whether any of them has a torque or a current.
@@ -505,7 +506,7 @@ pub(crate) fn command_line() -> String {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
+#[allow(clippy::unwrap_used, clippy::panic)]
 mod tests {
     use super::*;
     use crate::robot::ONE_LINK_TEMPLATE;
@@ -529,9 +530,15 @@ mod tests {
                 recording.each_block(64, &mut |_| Ok(())).unwrap();
             }
             let heard = inputs.heard();
-            assert_eq!(heard.len(), SAID + 1, "{heard:?}");
-            assert!(heard[0].contains("line 102") && heard[0].contains("0.050000 s are missing"));
-            assert!(heard[SAID].contains(" 95 more "), "{}", heard[SAID]);
+            let [gap] = &heard[..] else {
+                panic!("one line a kind: {heard:?}")
+            };
+            // The longest of them, and the others.
+            assert!(
+                gap.contains("line 102") && gap.contains("0.050000 s are missing"),
+                "{gap}"
+            );
+            assert!(gap.contains("99 more of this kind"), "{gap}");
         }
     }
 

@@ -187,30 +187,32 @@ pub(crate) fn torque_residuals(
     let mut reports: Vec<ResidualReport> =
         streams.into_iter().map(ResidualStream::report).collect();
     if let Some(measured) = measured {
-        for (report, rms) in reports.iter_mut().zip(torque_rms(measured, joints)?) {
+        for (report, [rms, all]) in reports.iter_mut().zip(torque_rms(measured, joints)?) {
             report.torque_rms = rms;
             report.relative_error = report.rms / rms.max(f64::MIN_POSITIVE);
+            report.all.relative_error = report.all.rms / all.max(f64::MIN_POSITIVE);
         }
     }
     Ok(reports)
 }
 
-/// Per joint, RMS of the torque over the rows that count.
-fn torque_rms(recordings: &[Planned], joints: usize) -> Result<Vec<f64>, IdentifyError> {
-    let mut sums = vec![(0u64, 0.0); joints];
+/// Per joint, RMS of the torque over the rows that count, and over all.
+fn torque_rms(recordings: &[Planned], joints: usize) -> Result<Vec<[f64; 2]>, IdentifyError> {
+    let mut sums = vec![[(0u64, 0.0); 2]; joints];
     for recording in recordings {
         recording.each_rows(&mut |rows| {
-            for ((count, squares), equation) in sums.iter_mut().zip(&rows.equations) {
-                for (y, _) in equation.y.iter().zip(&equation.keep).filter(|(_, k)| **k) {
-                    *count += 1;
-                    *squares += y * y;
+            for ([used, all], equation) in sums.iter_mut().zip(&rows.equations) {
+                for (y, keep) in equation.y.iter().zip(&equation.keep) {
+                    let counting = [Some(&mut *all), keep.then_some(&mut *used)];
+                    for sum in counting.into_iter().flatten() {
+                        sum.0 += 1;
+                        sum.1 += y * y;
+                    }
                 }
             }
             Ok(())
         })?;
     }
-    Ok(sums
-        .into_iter()
-        .map(|(count, squares)| (squares / count.max(1) as f64).sqrt())
-        .collect())
+    let rms = |(count, squares): (u64, f64)| (squares / count.max(1) as f64).sqrt();
+    Ok(sums.into_iter().map(|both| both.map(rms)).collect())
 }

@@ -466,6 +466,32 @@ pub struct JointFigures {
     pub train_relative_error: f64,
     /// The same over the hold-out.
     pub holdout_relative_error: Option<f64>,
+    /// Share of the training rows that these errors are over: slow rows, and ones at the torque limit, are left out.
+    pub train_rows_share: f64,
+    /// The same of the hold-out.
+    pub holdout_rows_share: Option<f64>,
+    /// RMS of the residual over RMS of the torque, over all rows.
+    pub train_relative_error_all_rows: f64,
+    /// The same over the hold-out.
+    pub holdout_relative_error_all_rows: Option<f64>,
+}
+
+impl JointFigures {
+    /// Of residuals over the training data, and over the hold-out where there is one.
+    fn of(name: &str, train: &ResidualReport, held: Option<&ResidualReport>) -> Self {
+        let share = |r: &ResidualReport| r.rows as f64 / r.all.rows.max(1) as f64;
+        Self {
+            name: name.to_owned(),
+            train_residual_rms: train.rms,
+            holdout_residual_rms: held.map(|h| h.rms),
+            train_relative_error: train.relative_error,
+            holdout_relative_error: held.map(|h| h.relative_error),
+            train_rows_share: share(train),
+            holdout_rows_share: held.map(share),
+            train_relative_error_all_rows: train.all.relative_error,
+            holdout_relative_error_all_rows: held.map(|h| h.all.relative_error),
+        }
+    }
 }
 
 /// A combination that these data say nothing about, or less than the description does.

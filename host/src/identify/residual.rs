@@ -29,6 +29,17 @@ pub struct Dependence {
     pub text: String,
 }
 
+/// What is left over all rows of a joint, those that its report leaves out among them: slow ones, and ones at the torque limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct AllRows {
+    /// Rows.
+    pub rows: u64,
+    /// RMS of the residual, N·m or N; not a number where there are none.
+    pub rms: f64,
+    /// That over the RMS of the torque.
+    pub relative_error: f64,
+}
+
 /// Results for one joint over one set of recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResidualReport {
@@ -40,6 +51,8 @@ pub struct ResidualReport {
     pub relative_error: f64,
     /// Rows.
     pub rows: u64,
+    /// The same over all rows.
+    pub all: AllRows,
     /// Autocorrelation from lag 0 on.
     pub autocorrelation: Vec<f64>,
     /// p-value of Ljung & Box's test (1978) over 20 lags.
@@ -192,6 +205,8 @@ pub(super) struct ResidualStream {
     moments: [f64; 5],
     torque_squares: f64,
     memory: Memory,
+    /// Of all rows: their number, squares of the residual and of the torque.
+    all: (u64, f64, f64),
     binned: Vec<Binned>,
     series: Series,
 }
@@ -205,6 +220,7 @@ impl ResidualStream {
             moments: [0.0; 5],
             torque_squares: 0.0,
             memory: Memory::default(),
+            all: (0, 0.0, 0.0),
             binned: vec![
                 Binned::new("position", ranges.position, BINS),
                 Binned::new("velocity", [-ranges.speed, ranges.speed], BINS),
@@ -232,10 +248,13 @@ impl ResidualStream {
             self.series.measured.push(measured);
             self.series.predicted.push(predicted);
         }
+        let e = measured - predicted;
+        self.all.0 += 1;
+        self.all.1 += e * e;
+        self.all.2 += measured * measured;
         if !used {
             return;
         }
-        let e = measured - predicted;
         let mut power = 1.0;
         for m in &mut self.moments {
             *m += power;
@@ -311,6 +330,11 @@ impl ResidualStream {
                 f64::NAN
             },
             rows: self.moments[0] as u64,
+            all: AllRows {
+                rows: self.all.0,
+                rms: (self.all.1 / self.all.0 as f64).sqrt(),
+                relative_error: (self.all.1 / self.all.2.max(f64::MIN_POSITIVE)).sqrt(),
+            },
             autocorrelation: correlation,
             series: self.series,
             rms: if self.moments[0] > 0.0 { rms } else { f64::NAN },

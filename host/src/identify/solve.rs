@@ -380,13 +380,7 @@ fn solve(
             .enumerate()
             .map(|(j, joint)| {
                 let held = holdout_residuals.as_ref().map(|h| &h[j]);
-                JointFigures {
-                    name: joint.name.clone(),
-                    train_residual_rms: train[j].rms,
-                    holdout_residual_rms: held.map(|h| h.rms),
-                    train_relative_error: train[j].relative_error,
-                    holdout_relative_error: held.map(|h| h.relative_error),
-                }
+                JointFigures::of(&joint.name, &train[j], held)
             })
             .collect(),
         position_torques: known.torques.clone(),

@@ -9,7 +9,7 @@ use super::lag::Lag;
 use super::residual::ResidualReport;
 use super::{ModelKind, Options};
 use crate::prepare::{Survey, Treatment};
-use crate::report::{format_significant, format_unit};
+use crate::report::{Finding, format_significant, format_unit, one_a_kind};
 use crate::robot::{Joint, JointKind, Robot};
 
 /// Share of a joint's range, by judgement, up to which its motion may be a gear that twists: 0.4 degrees of a turn.
@@ -87,68 +87,105 @@ impl Heard<'_> {
                 self.estimate.scaled_condition
             ));
         }
-        for (j, report) in self.train.iter().enumerate() {
-            warnings.extend(self.of_joint(j, report));
-        }
+        let joints = self.train.iter().enumerate();
+        let findings = joints.flat_map(|(j, report)| self.of_joint(j, report));
+        warnings.extend(one_a_kind(findings.collect()));
         warnings
     }
 
-    fn of_joint(&self, j: usize, report: &ResidualReport) -> Vec<String> {
-        let treatment = self.treatment;
-        let mut warnings = Vec::new();
+    fn of_joint(&self, j: usize, report: &ResidualReport) -> Vec<Finding> {
         let name = &self.robot.joints[j].name;
         let (length, effort) = self.robot.joints[j].kind.units();
         if self.surveys.iter().all(|s| s.joints[j].still()) {
-            warnings.push(format!(
-                "Joint {name} stands still at {} {} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves.",
-                self.surveys.first().map_or(f64::NAN, |s| s.joints[j].position[0]),
-                length
-            ));
-            return warnings;
+            let at = (self.surveys.first()).map_or(f64::NAN, |s| s.joints[j].position[0]);
+            return vec![Finding {
+                kind: "still",
+                size: 0.0,
+                sentence: format!(
+                    "Joint {name} stands still at {at} {length} in all training recordings. Its torque was not used, because at rest friction or a brake carries any part of it: its friction, constant torque and drive inertia are those of the description or guesses, and its link counts as one with the link before it. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
+                ),
+                short: format!("{name} (at {at} {length})"),
+            }];
         }
-        if let Some(way) = creep(&self.robot.joints[j], self.surveys, j).filter(|_| report.rows > 0)
-        {
-            warnings.push(format!(
-                "Joint {name} moves by {way} in all training recordings, less than {CREEP} of its range. That may be no more than its drive or gear giving way: friction and inertia of such a motion are not those of one that turns the joint. Record a larger motion of it, or make it fixed in the description.",
-            ));
-        }
-        let unjudged = |which: &str, surveys: &[Survey]| {
-            let slowest = format_significant(treatment.speed_threshold[j], 2);
-            if surveys
-                .iter()
-                .all(|s| s.joints[j].only_noise(s.sample_rate))
-            {
-                return format!(
-                    "Joint {name} stands still in the {which} but for the noise of its encoder: no row is faster than {slowest} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
-                );
-            }
-            format!(
-                "Joint {name}: every row of the {which} was left out (slower than {slowest} {length}/s, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed."
-            )
-        };
-        if report.rows == 0 {
-            warnings.push(unjudged("training data", self.surveys));
-        }
-        if self.holdout.is_some_and(|held| held[j].rows == 0) {
-            warnings.push(unjudged("hold-out", self.holdout_surveys));
-        }
+        let mut findings = Vec::new();
         if report.relative_error > 0.3 {
-            warnings.push(format!(
-                "Joint {name}: the model leaves {:.0} % of the torque unexplained on the data it was fitted to. Look at its zero, axis and lengths in the description, at the order of the columns, and at the robot for what no rigid model has.",
-                100.0 * report.relative_error
-            ));
+            let left = 100.0 * report.relative_error;
+            findings.push(Finding {
+                kind: "unexplained",
+                size: left,
+                sentence: format!(
+                    "Joint {name}: the model leaves {left:.0} % of the torque unexplained on the data it was fitted to. Look at its zero, axis and lengths in the description, at the order of the columns, and at the robot for what no rigid model has."
+                ),
+                short: format!("{name} ({left:.0} %)"),
+            });
         }
         if let Some(held) = self.holdout.map(|held| &held[j])
             && held.rms > 1.5 * report.rms
         {
-            warnings.push(format!(
-                "Joint {name}: the residual on the hold-out ({} {}) is {:.1} times that on the training data.",
+            let times = held.rms / report.rms;
+            let rms = format!(
+                "{} {}",
                 format_significant(held.rms, 4),
-                format_unit(effort),
-                held.rms / report.rms
-            ));
+                format_unit(effort)
+            );
+            findings.push(Finding {
+                kind: "worse on the hold-out",
+                size: times,
+                sentence: format!(
+                    "Joint {name}: the residual on the hold-out ({rms}) is {times:.1} times that on the training data."
+                ),
+                short: format!("{name} ({rms}, {times:.1} times)"),
+            });
         }
-        warnings
+        findings.extend(self.unjudged(j, report));
+        if let Some(way) = creep(&self.robot.joints[j], self.surveys, j).filter(|_| report.rows > 0)
+        {
+            findings.push(Finding {
+                kind: "creep",
+                size: 0.0,
+                sentence: format!(
+                    "Joint {name} moves by {way} in all training recordings, less than {CREEP} of its range. That may be no more than its drive or gear giving way: friction and inertia of such a motion are not those of one that turns the joint. Record a larger motion of it, or make it fixed in the description."
+                ),
+                short: format!("{name} ({way})"),
+            });
+        }
+        findings
+    }
+
+    /// A joint of which no row is left to fit or to judge by.
+    fn unjudged(&self, j: usize, report: &ResidualReport) -> Vec<Finding> {
+        let name = &self.robot.joints[j].name;
+        let (length, _) = self.robot.joints[j].kind.units();
+        let none_held = self.holdout.is_some_and(|held| held[j].rows == 0);
+        let slowest = format_significant(self.treatment.speed_threshold[j], 2);
+        let unjudged = |which: &str, kinds: [&'static str; 2], surveys: &[Survey]| {
+            let noise = surveys
+                .iter()
+                .all(|s| s.joints[j].only_noise(s.sample_rate));
+            let sentence = match noise {
+                true => format!(
+                    "Joint {name} stands still in the {which} but for the noise of its encoder: no row is faster than {slowest} {length}/s, so nothing is said of its torque there. Record a motion of it for more, or make it type=\"fixed\" in the URDF where it never moves."
+                ),
+                false => format!(
+                    "Joint {name}: every row of the {which} was left out (slower than {slowest} {length}/s, or at the torque limit), so nothing is said of its torque there; look at its position for jumps, or give --min-speed."
+                ),
+            };
+            Finding {
+                kind: kinds[usize::from(noise)],
+                size: 0.0,
+                sentence,
+                short: format!("{name} ({slowest} {length}/s)"),
+            }
+        };
+        let trained = (report.rows == 0).then(|| {
+            let kinds = ["no row", "noise alone"];
+            unjudged("training data", kinds, self.surveys)
+        });
+        let held = none_held.then(|| {
+            let kinds = ["no row held back", "noise alone held back"];
+            unjudged("hold-out", kinds, self.holdout_surveys)
+        });
+        trained.into_iter().chain(held).collect()
     }
 }
 

@@ -242,6 +242,10 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
                 Column::number("Residual RMS, held back", ""),
                 Column::number("Left, training", "%"),
                 Column::number("Left, held back", "%"),
+                Column::number("Rows used, training", "%"),
+                Column::number("Left on all rows, training", "%"),
+                Column::number("Rows used, held back", "%"),
+                Column::number("Left on all rows, held back", "%"),
             ],
             rows: found
                 .joints
@@ -255,10 +259,14 @@ fn fit(robot: &Robot, found: &Identification) -> Section {
                         optional(j.holdout_residual_rms, &|v| format_significant(v, 3)),
                         parts::percent(j.train_relative_error),
                         optional(j.holdout_relative_error, &parts::percent),
+                        parts::percent(j.train_rows_share),
+                        parts::percent(j.train_relative_error_all_rows),
+                        optional(j.holdout_rows_share, &parts::percent),
+                        optional(j.holdout_relative_error_all_rows, &parts::percent),
                     ]
                 })
                 .collect(),
-            note: "Left: residual RMS over torque RMS.".into(),
+            note: "Left: residual RMS over torque RMS. Rows used: those that the fit and these figures count, without slow ones and ones at the torque limit.".into(),
         }));
     }
     for (j, joint) in robot.joints.iter().enumerate() {

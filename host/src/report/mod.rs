@@ -11,6 +11,7 @@ mod axis;
 mod document;
 mod escape;
 mod format;
+mod grouped;
 mod html;
 mod plot;
 mod scene;
@@ -23,6 +24,7 @@ use crate::files::write_whole;
 
 pub use document::{Alignment, Block, Column, Document, Fact, NoteKind, Section, Table, Tone};
 pub use format::{format_interval, format_p_value, format_significant, format_unit, format_value};
+pub use grouped::{Finding, one_a_kind};
 pub use html::render;
 pub use plot::{Axis, Direction, Marker, Plot, Role, Series, Style};
 pub use svg::svg;

@@ -34,6 +34,7 @@ use crate::identify::{
     IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals, treatment_for,
 };
 use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
+use crate::report::{Finding, one_a_kind};
 use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
 
@@ -295,21 +296,7 @@ pub fn validate(
             residual,
         })
         .collect();
-        for check in &torque {
-            if check.residual.rows == 0 {
-                warnings.push(format!(
-                    "{}, joint {}: every row is masked (too slow, or at the torque limit), so its torque was not checked.",
-                    survey.label, check.joint
-                ));
-            } else if check.residual.relative_error > UNEXPLAINED {
-                warnings.push(format!(
-                    "{}, joint {}: the description leaves {:.0} % of the torque unexplained.",
-                    survey.label,
-                    check.joint,
-                    100.0 * check.residual.relative_error
-                ));
-            }
-        }
+        warnings.extend(one_a_kind(unexplained(&survey.label, &torque)));
         let done = k as f64 * share;
         let motion = motion::check(
             robot,
@@ -356,6 +343,35 @@ pub fn validate(
         taken_off: taken,
         treatment,
     })
+}
+
+/// Joints of a recording whose torque the description does not explain, or of which no row is left to check.
+fn unexplained(recording: &str, torque: &[TorqueCheck]) -> Vec<Finding> {
+    let of = |check: &TorqueCheck| {
+        let (joint, left) = (&check.joint, 100.0 * check.residual.relative_error);
+        if check.residual.rows == 0 {
+            Some(Finding {
+                kind: "masked",
+                size: 0.0,
+                sentence: format!(
+                    "{recording}, joint {joint}: every row is masked (too slow, or at the torque limit), so its torque was not checked."
+                ),
+                short: joint.clone(),
+            })
+        } else if check.residual.relative_error > UNEXPLAINED {
+            Some(Finding {
+                kind: "unexplained",
+                size: left,
+                sentence: format!(
+                    "{recording}, joint {joint}: the description leaves {left:.0} % of the torque unexplained."
+                ),
+                short: format!("{joint} ({left:.0} %)"),
+            })
+        } else {
+            None
+        }
+    };
+    torque.iter().filter_map(of).collect()
 }
 
 /// What is not given is as it was when the description was identified, where it says so: a model is judged in the band that

@@ -4,6 +4,9 @@ use super::super::ui::Ui;
 use crate::identify::{Estimator, Identification, NotExcited, StandardSet};
 use crate::report::{format_interval, format_value};
 
+/// Share of rows from which on a figure is over as good as all of them.
+const ALL_BUT_A_FEW: f64 = 0.99;
+
 /// The result at a glance.
 pub(super) fn print(ui: &Ui, result: &Identification) {
     let width = result
@@ -22,10 +25,16 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         ));
     }
     for joint in &result.joints {
-        let holdout = match joint.holdout_relative_error {
+        let held = (joint.holdout_relative_error.zip(joint.holdout_rows_share))
+            .zip(joint.holdout_relative_error_all_rows);
+        let holdout = match held {
             None => String::new(),
-            Some(error) if error.is_nan() => ", no row of the hold-out left to judge by".to_owned(),
-            Some(error) => format!(", {:.2} % on the hold-out", 100.0 * error),
+            Some(((error, _), _)) if error.is_nan() => {
+                ", no row of the hold-out left to judge by".to_owned()
+            }
+            Some(((error, share), all)) => {
+                format!(", on the hold-out {}", left(error, share, all))
+            }
         };
         if joint.train_residual_rms.is_nan() {
             ui.say(&format!(
@@ -35,10 +44,14 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
             continue;
         }
         ui.say(&format!(
-            "{}: residual {:.4} rms, {:.2} % of the torque{holdout}",
+            "{}: residual {:.4} rms, {}{holdout}",
             joint.name,
             joint.train_residual_rms,
-            100.0 * joint.train_relative_error,
+            left(
+                joint.train_relative_error,
+                joint.train_rows_share,
+                joint.train_relative_error_all_rows
+            ),
         ));
     }
     if result.estimator != Estimator::Consistent
@@ -57,6 +70,20 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
     }
     for warning in &result.warnings {
         ui.remark(warning);
+    }
+}
+
+/// How much of the torque is left, over how many of the rows, and over all of them.
+fn left(error: f64, share: f64, all: f64) -> String {
+    let error = format!("{:.2} % of the torque", 100.0 * error);
+    match share {
+        // A few rows at reversals change nothing that is worth a word.
+        ALL_BUT_A_FEW.. => error,
+        _ => format!(
+            "{error} on {:.0} % of the rows, {:.2} % on all",
+            100.0 * share,
+            100.0 * all
+        ),
     }
 }
 

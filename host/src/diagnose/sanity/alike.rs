@@ -15,7 +15,6 @@ use super::model::Judge;
 use super::rows::Rows;
 use super::senses::{Described, columns};
 use super::trial::Suspicion;
-use super::undo::Undo;
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
@@ -102,7 +101,8 @@ impl Judge<'_> {
                     format_significant(shares.dry, 3),
                 ),
             );
-            Suspicion::new(fault, Undo::Torque(Some(j), 1.0 / factor))
+            // Four values by one factor: no trial of masses alone sees that.
+            Suspicion { fault, undo: None }
         }))
     }
 
@@ -137,8 +137,9 @@ impl Judge<'_> {
         let better = |s: &Shares| s.unexplained < BETTER * recorded.unexplained;
         Ok(best
             .filter(|(_, shares)| better(shares))
-            .map(|(factor, shares)| {
-                self.scaled(j, &[factor], recorded.unexplained, shares.unexplained)
+            .map(|(factor, shares)| Suspicion {
+                undo: None,
+                ..self.scaled(j, &[factor], recorded.unexplained, shares.unexplained)
             }))
     }
 

@@ -19,9 +19,11 @@ pub(super) const POOR: f64 = 0.1;
 const POOR_ALONE: f64 = 0.01;
 /// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
 const BETTER: f64 = 0.35;
+/// Share of what was left that a shift has to leave at most to be suspected; the trial decides.
+const LESS: f64 = 0.7;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
 const MUCH_BETTER: f64 = 0.2;
-/// … and for a small misfit or a small shift, which slow reversals under friction like better by chance, too.
+/// … and for a small misfit.
 const FAR_BETTER: f64 = 0.1;
 pub(super) const GOOD: f64 = 0.2;
 /// Shifts up to this belong to filters and buses, not to clocks, s: half a row. Those of several joints up to the second,
@@ -208,7 +210,7 @@ impl<'a> Judge<'a> {
         let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
         let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        if left[reach] < poor || least > BETTER * left[reach] || least > GOOD {
+        if left[reach] < poor || least > LESS * left[reach] {
             return None;
         }
         // Of a periodic motion the nearest period.
@@ -216,8 +218,7 @@ impl<'a> Judge<'a> {
             .filter(|k| left[*k] <= 1.3 * least)
             .min_by_key(|k| k.abs_diff(reach))?;
         let shift = (at as f64 - reach as f64) * self.rows.period;
-        let small = shift.abs() <= SMALL || left[reach] < POOR;
-        if small && least > FAR_BETTER * left[reach] {
+        if shift.abs() <= SMALL && least > BETTER * left[reach] {
             return None;
         }
         let speed = &self.rows.qd[j];

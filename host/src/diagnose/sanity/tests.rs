@@ -109,7 +109,7 @@ fn emulated() -> (Robot, Vec<Run>) {
     (demo.robot, runs)
 }
 
-/// The one fault that is found of a joint, and is certain.
+/// The one fault that is found of a joint, and is certain in a recording at least.
 fn only(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str) {
     named(robot, runs, kind, joint, words, true);
 }
@@ -136,8 +136,8 @@ fn named(robot: &Robot, runs: &[Run], kind: &str, joint: usize, words: &str, cer
         assert_eq!(fault.kind, kind, "{}", fault.text);
         assert_eq!(fault.joint, robot.joints[joint].name);
         assert!(fault.text.contains(words), "{words}: {}", fault.text);
-        assert_eq!(fault.certain, certain, "{}", fault.text);
     }
+    assert_eq!(found.iter().any(|fault| fault.certain), certain, "{words}");
 }
 
 #[test]
@@ -410,8 +410,7 @@ fn injured_recordings_of_the_emulated_rig_are_named() {
     };
     only(&robot, &wide(57.296), "unit", 0, "degrees");
     only(&robot, &wide(50.0), "ratio", 0, "motor");
-    // Half the motion under half the gravity and a spring looks alike.
-    open(&robot, &wide(2.0), "ratio", 0, "gear ratio");
+    only(&robot, &wide(2.0), "ratio", 0, "gear ratio");
     only(&robot, &wide(0.5), "ratio", 0, "gear ratio");
     let sweep: Vec<Run> = q(57.296).into_iter().filter(|r| r.recording == 2).collect();
     assert!(!faults(&robot, &sweep).unwrap().is_empty());

@@ -126,10 +126,10 @@ fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
 }
 
 /// Whether the description without the fault, `own`, explains decisively more of what the description as `recorded` does not than
-/// free parameters explain beyond it: one fault is likelier than that every link is other than described.
+/// free parameters explain beyond it, and predicts no worse: one fault is likelier than that every link is other than described.
 fn explains(own: &Score, recorded: &Score, free: &Score) -> bool {
     let gained = recorded.cost - own.cost;
-    gained > ODDS && gained > own.cost - free.cost
+    gained > ODDS && gained > own.cost - free.cost && gain(own, recorded).value > 0.0
 }
 
 /// What came of a suspicion.

@@ -61,7 +61,8 @@ fn a_rotor_that_outweighs_the_joint_is_a_wrong_ratio() {
     assert_eq!(faults(&robot, &sound).unwrap(), []);
     robot.joints[0].drive.as_mut().unwrap().gear_ratio *= 10.0;
     let given = tau(&sound, 0, 10.0);
-    only(&robot, &given, "ratio", 0, "the rotor of joint");
+    // The rotor's inertia may be described wrong as well.
+    open(&robot, &given, "ratio", 0, "the rotor of joint");
 }
 
 #[test]

@@ -1,0 +1,65 @@
+//! Sentences of one kind, told once.
+
+/// A sentence about one joint or recording of several that may deserve the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// What kind of sentence it is.
+    pub kind: &'static str,
+    /// How bad it is among its kind: the larger the worse.
+    pub size: f64,
+    /// The whole sentence.
+    pub sentence: String,
+    /// What it is about and its figure, in a few words: `elbow (31 %)`.
+    pub short: String,
+}
+
+/// One line a kind: the sentence of the worst of it, then whom else it holds for. The kinds keep the order of their first finding.
+pub fn one_a_kind(findings: Vec<Finding>) -> Vec<String> {
+    let mut kinds: Vec<(&str, Vec<Finding>)> = Vec::new();
+    for finding in findings {
+        match kinds.iter_mut().find(|(kind, _)| *kind == finding.kind) {
+            Some((_, own)) => own.push(finding),
+            None => kinds.push((finding.kind, vec![finding])),
+        }
+    }
+    let line = |mut own: Vec<Finding>| {
+        own.sort_by(|a, b| b.size.total_cmp(&a.size));
+        let mut own = own.into_iter();
+        let worst = own.next().map_or_else(String::new, |worst| worst.sentence);
+        let others: Vec<String> = own.map(|other| other.short).collect();
+        match others.as_slice() {
+            [] => worst,
+            _ => format!("{worst} The same holds for {}.", others.join(", ")),
+        }
+    };
+    kinds.into_iter().map(|(_, own)| line(own)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_of_a_kind_speaks_for_the_others() {
+        let of = |kind, size: f64, name: &str| Finding {
+            kind,
+            size,
+            sentence: format!("Joint {name} leaves {size} %."),
+            short: format!("{name} ({size} %)"),
+        };
+        let list = vec![
+            of("left", 31.0, "a"),
+            of("still", 0.0, "d"),
+            of("left", 52.0, "b"),
+            of("left", 40.0, "c"),
+        ];
+        let said = one_a_kind(list);
+        assert_eq!(
+            said,
+            [
+                "Joint b leaves 52 %. The same holds for c (40 %), a (31 %).",
+                "Joint d leaves 0 %."
+            ]
+        );
+    }
+}
