@@ -70,7 +70,7 @@ def said(rig, place):
 
 
 def is_of_data(text):
-    words = "wrong sign|reverse|opposite|looks like|too large|too small|behind q|ahead of q|give both by one clock|exchanged|in each other|"
+    words = "wrong sign|reverse|opposite|looks like|too large|too small|behind q|ahead of q|exchanged|in each other|"
     words += "never negative|times what the description|times as large|Gravity (acts|points)|lost its sign|sign was lost|stands for"
     return re.search(words, text) is not None
 

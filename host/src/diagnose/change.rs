@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rig_shared::effects::Kind;
 
 use super::bench::Bench;
-use super::fit::Evidence;
+use super::fit::{Evidence, Fit};
 use super::outcome::Value;
 use super::payload::{on_last_link, on_single_link};
 use super::profile::{LEAST_GAIN, Profile, SIGNIFICANT};
@@ -71,13 +71,16 @@ pub(super) fn change(
     // What the description does not state is no change of it.
     let (unstated, all): (Vec<usize>, Vec<usize>) =
         (0..free.len()).partition(|k| anchor.is_unstated(*k));
+    let beside_constants = frozen.clone().taking(unstated.iter().map(|k| &free[*k]));
     let constants = unstated.iter().map(|k| (&free[*k], after.values[*k]));
     frozen.subtract(&combined(known.len(), constants));
-    let evidence = |picked: &[usize]| {
-        let columns: Vec<Vec<f64>> = picked.iter().map(|k| frozen.weighted(&free[*k])).collect();
+    let evidence_in = |fit: &Fit, picked: &[usize]| {
+        let own = |k: &usize| fit.projected(fit.weighted(&free[*k]));
+        let columns: Vec<Vec<f64>> = picked.iter().map(own).collect();
         let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; picked.len()];
-        frozen.evidence(&columns, &open)
+        fit.evidence(&columns, &open)
     };
+    let evidence = |picked: &[usize]| evidence_in(&frozen, picked);
     // All, a payload's, all in one ratio, each alone: what may be tried counts, not what was until one spoke.
     let tried = 3 + all.len();
     let corrected = |e: &Evidence| e.corrected(tried);
@@ -119,9 +122,15 @@ pub(super) fn change(
                 "Inertia and gravity have grown in the ratio of a mass at one place: a payload.";
             return Some(told(words.into(), parameters, &e));
         }
-        if let Some((load, e)) = on_last_link(bench, rows, &frozen)
+        // Constants that nothing states are fitted with it: gravity's part of them is not known before.
+        let share = match beside_friction {
+            true => SPEAKS_BESIDE_FRICTION,
+            false => SPEAKS_FOR_ALL,
+        };
+        if let Some((load, e)) = on_last_link(bench, rows, &beside_constants)
             && load.mass.value > LEAST_SIGMAS * load.mass.std
-            && (speaks(&e) || beside_friction && e.gain >= SPEAKS_BESIDE_FRICTION * whole.gain)
+            && let Some(whole) = evidence_in(&beside_constants, &all)
+            && e.gain >= share * whole.gain
         {
             return Some(told(load.words(bench.robot), load.parameters(), &e));
         }
@@ -135,7 +144,7 @@ pub(super) fn change(
             apart <= LEAST_SIGMAS * after.std(k) + ONE_FACTOR * (factor * prior[k]).abs()
         })
     };
-    if let Some(e) = frozen.evidence(&[frozen.weighted(&scale)], &open)
+    if let Some(e) = frozen.evidence(&[frozen.projected(frozen.weighted(&scale))], &open)
         && speaks(&e)
         && of_one_factor(1.0 + e.gains[0])
     {

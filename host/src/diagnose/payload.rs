@@ -139,7 +139,9 @@ pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
     for _ in 0..ROUNDS {
         let columns =
             kilogram(place, &bench.robot.last_link).map(|body| column_of(bench, rows, &body));
-        let weighted: Vec<Vec<f64>> = columns.iter().map(|c| frozen.weighted(c)).collect();
+        let weighted: Vec<Vec<f64>> = (columns.iter())
+            .map(|c| frozen.projected(frozen.weighted(c)))
+            .collect();
         let told = told(&weighted);
         if told.first() != Some(&0) {
             return None;
@@ -220,7 +222,7 @@ fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) ->
     let mut squares = vec![0.0; size];
     for j in 0..rows.joints() {
         let own = (0..rows.joints()).map(|k| stated[k].clone().filter(|_| k == j));
-        let own = frozen.weighted(&own.collect());
+        let own = frozen.projected(frozen.weighted(&own.collect()));
         let right = DVector::from_iterator(size, columns.iter().map(|c| dot(c, &own)));
         for (sum, x) in squares.iter_mut().zip(gram.solve(&right).iter()) {
             *sum += (LINK * x).powi(2);

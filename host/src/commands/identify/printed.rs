@@ -5,7 +5,7 @@ use crate::identify::{Estimator, Identification, NotExcited, StandardSet};
 use crate::report::{format_interval, format_value};
 
 /// Share of rows from which on a figure is over as good as all of them.
-const ALL_BUT_A_FEW: f64 = 0.99;
+const ALL_BUT_A_FEW: f64 = 0.985;
 
 /// The result at a glance.
 pub(super) fn print(ui: &Ui, result: &Identification) {

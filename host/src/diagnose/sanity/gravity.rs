@@ -12,7 +12,6 @@ use super::model::{GOOD, Judge};
 use super::rows::Rows;
 use super::senses::friction;
 use super::trial::Suspicion;
-use super::undo::Undo;
 use crate::report::format_significant;
 use crate::robot::JointKind;
 
@@ -94,24 +93,23 @@ impl Judge<'_> {
         }
         let name = &joint.name;
         let [strength, stated] = [strength, stated].map(|x| format_significant(x, 3));
-        let (undo, text) = if upright {
-            let text = format!(
+        let text = if upright {
+            format!(
                 "Gravity acts on joint {name} by up to {strength} N·m, as on an axis that lies level; by the description its axis stands upright and gravity does {stated} N·m at most: is its `alpha` right (in a URDF its `axis` and the `rpy` of its origin), and `gravity`?"
-            );
-            (None, text)
+            )
         } else {
             let theta = joint.theta + off;
-            let text = format!(
+            format!(
                 "Gravity on joint {name} is strongest at q1 = {} rad, where the description has {} rad: the joint's zero in this recording (`--home`), or the base, is turned by about {:.0} degrees against the description. With theta near {} it fits (in a URDF turn the joint's origin by its `rpy`).",
                 hundredths(strongest[0]),
                 hundredths(strongest[1]),
                 off.to_degrees(),
                 hundredths((theta + PI).rem_euclid(TAU) - PI),
-            );
-            (Some(Undo::Zero(0, off)), text)
+            )
         };
         let fault = self.say("gravity", About::Recording, 0, text);
-        Ok(Some(Suspicion { fault, undo }))
+        // The wave's own direction shows it; no trial of masses does.
+        Ok(Some(Suspicion { fault, undo: None }))
     }
 
     /// Gravity as strong as described along the direction that the torques show (in frame 0), where that is far from the described

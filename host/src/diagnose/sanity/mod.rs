@@ -36,7 +36,7 @@ use super::outcome::{About, DataFault};
 use super::runs::runs_of_blocks;
 use super::{DiagnoseError, Run};
 use crate::data::Source;
-use crate::prepare::{LowPass, PrepareError};
+use crate::prepare::{LowPass, PrepareError, Recording, Resampled};
 use crate::robot::Robot;
 
 /// Cut-off of the positions that are judged, Hz.
@@ -94,24 +94,26 @@ pub fn faults_at_start(
 ) -> Result<Vec<DataFault>, DiagnoseError> {
     let sampling = source.sampling();
     let rate = 1.0 / sampling.period;
-    // Irregular rows have no derivative before they are resampled.
-    let Some(low_pass) =
-        LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate).filter(|_| !sampling.irregular)
-    else {
+    let Some(low_pass) = LowPass::butterworth(4, f64::min(BAND, 0.2 * rate), rate) else {
         return Ok(Vec::new());
     };
-    let mut left = rows;
-    let blocks = source.blocks(rows).map_while(|block| {
-        if left == 0 {
-            return None;
+    // Uneven rows have no derivative before they are brought to an even step.
+    let even = Resampled::new(source, sampling.period);
+    let recording: &dyn Recording = if sampling.irregular { &even } else { source };
+    let (mut left, mut blocks) = (rows, Vec::new());
+    let read = recording.each_block(rows, &mut |block| {
+        left = left.saturating_sub(block.len());
+        blocks.push(Ok(block));
+        match left {
+            0 => Err(PrepareError::Stopped("enough".to_owned())),
+            _ => Ok(()),
         }
-        if let Ok(block) = &block {
-            left = left.saturating_sub(block.len());
-        }
-        Some(block.map_err(|error| PrepareError::Read(error.to_string()).into()))
     });
+    if left > 0 {
+        read?;
+    }
     let label = source.path().display().to_string();
-    let runs = runs_of_blocks(blocks, &label, 0, rate, &low_pass)?;
+    let runs = runs_of_blocks(blocks.into_iter(), &label, 0, rate, &low_pass)?;
     let own: Vec<&Run> = runs.iter().collect();
     if own.is_empty() || columns::too_short(&own).is_some() {
         return Ok(Vec::new());

@@ -23,8 +23,6 @@ pub(super) enum Undo {
     Joints(Pair),
     /// A joint's torque that many rows earlier.
     Earlier(usize, i64),
-    /// A joint's position moved by this, rad or m.
-    Zero(usize, f64),
     /// Seconds that each unit of the clock lasts.
     Clock(f64),
     /// Gravity of another direction, m/s² in frame 0.
@@ -66,7 +64,6 @@ impl Undo {
                     *to = tau[(k as i64 + by).clamp(0, last) as usize];
                 }
             }
-            Self::Zero(j, by) => rows.q[j].iter_mut().for_each(|q| *q += by),
             Self::Clock(unit) => {
                 rows.period *= unit;
                 rows.qd.iter_mut().for_each(|x| scale(x, 1.0 / unit));
