@@ -71,6 +71,7 @@ pub(super) fn nnls(
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
 

@@ -440,7 +440,7 @@ impl Problem {
         // Mean and standard deviation of what is known of a coefficient, and the least that it can be.
         let known = |k: usize| -> Option<(f64, f64, f64)> {
             let stated =
-                |value: f64| (value > 0.0).then(|| (value, share * value, LIGHTEST * value));
+                |value: f64| (value > 0.0).then_some((value, share * value, LIGHTEST * value));
             if k < n + points && !physical.described {
                 None
             } else if k < n {
