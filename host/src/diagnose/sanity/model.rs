@@ -8,7 +8,6 @@ use super::columns::fault;
 use super::fit::{Fit, Measured};
 use super::names;
 use super::rows::{Form, Rows};
-use super::senses::{Described, columns};
 use super::trial::Suspicion;
 use super::undo::Undo;
 use crate::identify::preference;
@@ -129,7 +128,7 @@ impl<'a> Judge<'a> {
         let (swapped, turned): (Vec<_>, Vec<_>) =
             (self.mixed()?.into_iter()).partition(|found| found.is_of_two());
         all.extend(swapped.iter().filter_map(|found| self.said(found)));
-        all.extend((0..n).filter_map(|j| self.shifted(j, described)));
+        all.extend((0..n).filter_map(|j| self.shifted(j)));
         all.extend(self.positions()?);
         all.extend(self.thousandfold(described));
         all.extend(self.single_zero()?);
@@ -200,19 +199,9 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// A torque that belongs to another time than the motion, by a fit of its own or by what the description says of it: of a slow
-    /// motion of few harmonics many parameters take up any shift.
-    fn shifted(&self, j: usize, described: Option<&Described>) -> Option<Suspicion> {
-        let stated = described.and_then(|described| {
-            let x = columns(&self.rows, j, described);
-            Fit::of(&x, &self.rows.tau[j], &(0..x.ncols()).collect::<Vec<_>>())
-        });
-        let own = self.fits[j].as_ref();
-        (own.into_iter().chain(&stated)).find_map(|fit| self.shifted_by(j, fit))
-    }
-
-    /// The same by one fit.
-    fn shifted_by(&self, j: usize, fit: &Fit) -> Option<Suspicion> {
+    /// A torque that belongs to another time than the motion.
+    fn shifted(&self, j: usize) -> Option<Suspicion> {
+        let fit = self.fits[j].as_ref()?;
         let poor = self.poor();
         if fit.unexplained() < poor {
             return None;
