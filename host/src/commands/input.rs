@@ -13,7 +13,7 @@ use crate::data::{
 };
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
-use crate::report::{Finding, format_significant, one_a_kind};
+use crate::report::{Finding, format_significant, one_a_kind, worst_first};
 use crate::robot::{Description, Joint, JointKind, Robot};
 
 /// The robot description.
@@ -272,7 +272,10 @@ impl Inputs {
                 KEPT_WARNINGS.. => "at least ",
                 _ => "",
             };
-            for (worst, more) in Warning::worst_of_each_kind(&heard) {
+            let mut kinds = worst_first(heard.iter(), |warning| warning.rank());
+            kinds.sort_by_key(|own| own[0].rank().0);
+            for own in kinds {
+                let (worst, more) = (own[0], own.len() - 1);
                 all.push(match more {
                     0 => format!("{path}: {worst}"),
                     _ => format!("{path}: {worst}; {at_least}{more} more of this kind, none worse"),

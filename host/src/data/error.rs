@@ -189,27 +189,8 @@ pub enum Warning {
 }
 
 impl Warning {
-    /// Of each kind the worst, and how many more there are of it: gaps first, then uneven steps, stamps off the grid, columns.
-    pub fn worst_of_each_kind(list: &[Self]) -> Vec<(&Self, usize)> {
-        let mut kinds: Vec<(&Self, usize)> = Vec::new();
-        for warning in list {
-            let same = |known: &&mut (&Self, usize)| known.0.rank().0 == warning.rank().0;
-            match kinds.iter_mut().find(same) {
-                Some(known) => {
-                    known.1 += 1;
-                    if warning.rank().1 > known.0.rank().1 {
-                        known.0 = warning;
-                    }
-                }
-                None => kinds.push((warning, 0)),
-            }
-        }
-        kinds.sort_by_key(|(worst, _)| worst.rank().0);
-        kinds
-    }
-
-    /// Place of its kind, and how bad it is among that.
-    fn rank(&self) -> (usize, f64) {
+    /// Place of its kind, the gravest first, and how bad it is among that.
+    pub fn rank(&self) -> (usize, f64) {
         match self {
             Self::Gap { lost, .. } => (0, *lost),
             Self::Uneven { step, period, .. } => (1, (step / period).ln().abs()),

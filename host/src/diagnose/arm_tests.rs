@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use nalgebra::{Isometry3, Vector3};
 use rig_shared::effects::Kind;
 use rig_shared::multibody::column;
 
@@ -14,7 +15,7 @@ use super::{Diagnosis, Options, diagnose};
 use crate::data::{Source, data_dir};
 use crate::identify::least_eigenvalue;
 use crate::prepare::Recording;
-use crate::robot::Robot;
+use crate::robot::{JointFriction, Origin, Robot};
 
 fn asked(scenario: &ArmScenario) -> (Diagnosis, Robot) {
     let recordings = scenario.make().unwrap();
@@ -130,6 +131,44 @@ fn a_payload_on_an_arm_is_told_with_mass_and_place() {
         let value = &step.parameters[name];
         assert!((value.value - truth).abs() < 4.0 * value.std, "{value:?}");
     }
+}
+
+/// A URDF states neither friction nor constants, and its last link has a frame of its own: friction and constants that are fitted
+/// beside the payload do not bend it, and its place is in that frame.
+#[test]
+fn a_payload_beside_friction_that_nothing_states_is_not_bent() {
+    let (mass, place) = (1.2, [0.08, -0.05, 0.1]);
+    let [x, y, z] = place;
+    let fault = Some((5, Fault::Payload([mass, x, y, z])));
+    let recordings = ArmScenario::new(Arm::Six, fault, 1).make().unwrap();
+    let mut robot = recordings.robot.clone();
+    robot.origin = Origin::Urdf;
+    robot.last_link = Isometry3::new(
+        Vector3::new(0.02, -0.01, 0.05),
+        Vector3::new(0.4, 1.1, -0.7),
+    );
+    for joint in &mut robot.joints {
+        joint.friction = Some(JointFriction::default());
+    }
+    let training: Vec<&dyn Recording> = (recordings.train.iter())
+        .map(|r| r as &dyn Recording)
+        .collect();
+    let options = Options {
+        no_offsets: true,
+        ..Options::default()
+    };
+    let held = [&recordings.holdout as &dyn Recording];
+    let (diagnosis, _) = diagnose(&robot, &training, &held, &options, &mut |_| ()).unwrap();
+    told("payload on a URDF", &diagnosis);
+    let payload = (diagnosis.steps.iter()).find(|step| step.effect == "payload");
+    let parameters = &payload.unwrap().parameters;
+    let own = robot.last_link.inverse_transform_point(&place.into());
+    for (name, truth) in [("mass", mass), ("x", own.x), ("y", own.y), ("z", own.z)] {
+        let value = &parameters[name];
+        let off = (value.value - truth).abs();
+        assert!(off < 3.0 * value.std, "{name}: {value:?}, truth {truth}");
+    }
+    assert!(parameters["mass"].std < 0.05 * mass);
 }
 
 /// A URDF states no constant torque; of a joint that stands throughout none can be fitted.

@@ -373,8 +373,6 @@ pub enum About {
     Motion,
     /// A joint's torque.
     Torque,
-    /// How large a torque is, of which only the description tells.
-    TorqueScale,
 }
 
 /// RMS of the residual from model to model down to the floor, one joint.

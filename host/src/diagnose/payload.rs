@@ -9,18 +9,19 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use rig_shared::multibody::{COLUMNS, column};
 
 use super::bench::Bench;
 use super::change::LEAST_SIGMAS;
-use super::fit::{Evidence, Fit};
+use super::fit::{Evidence, Fit, dot};
 use super::outcome::Value;
 use super::rows::{Column, Rows, combined};
 use super::solve::Solution;
 use super::type_b::LINK;
+use crate::identify::independent_columns;
 use crate::report::{format_significant, format_value};
-use crate::robot::{JointKind, Robot};
+use crate::robot::{Inertial, JointKind, Robot};
 
 /// Rounds of the fit; each takes the place from the one before, and the place settles within three or four.
 const ROUNDS: usize = 12;
@@ -28,7 +29,8 @@ const ROUNDS: usize = 12;
 const SETTLED: f64 = 1e-6;
 /// Share of a column that has to be left beside the others for the motion to tell its parameter.
 const TOLD: f64 = 1e-3;
-/// Farthest place of a payload, m: a mass on a link lies within some metres of its axis.
+/// Nearest and farthest place of a payload, m: a mass on a link lies within some metres of its axis, and on it adds no inertia.
+const NEAREST: f64 = 0.01;
 const FARTHEST: f64 = 3.0;
 /// Share of the largest torque that a payload makes at a joint, from which on the joint is told.
 const SHOWN: f64 = 0.02;
@@ -84,32 +86,30 @@ impl Load {
     }
 }
 
+fn value(value: f64, std: f64, unit: &str) -> Value {
+    Value {
+        value,
+        std,
+        unit: unit.into(),
+    }
+}
+
 /// Inertial parameters of one kilogram at a place of the last link's own frame, and their derivatives with respect to its first
 /// moment along that frame's axes, kg·m; the parameters in the frame of the last joint.
 fn kilogram(place: Vector3<f64>, link: &Isometry3<f64>) -> [[f64; 10]; 4] {
-    let p = link * Point3::from(place);
-    let p = p.coords;
-    let inertia = |m: Matrix3<f64>| {
-        [
-            m[(0, 0)],
-            m[(0, 1)],
-            m[(0, 2)],
-            m[(1, 1)],
-            m[(1, 2)],
-            m[(2, 2)],
-        ]
-    };
-    let body = |mass: f64, moment: Vector3<f64>, own: Matrix3<f64>| {
-        let [xx, xy, xz, yy, yz, zz] = inertia(own);
-        [mass, moment.x, moment.y, moment.z, xx, xy, xz, yy, yz, zz]
-    };
-    let about =
-        |a: Vector3<f64>, b: Vector3<f64>| Matrix3::identity() * a.dot(&b) - b * a.transpose();
+    let p = (link * Point3::from(place)).coords;
+    let point = |at: Vector3<f64>| Inertial::point(at.into()).parameters();
     let along = |axis: usize| {
         let unit = link.rotation * Vector3::ith(axis, 1.0);
-        body(0.0, unit, about(p, unit) + about(unit, p))
+        let [both, one, other] = [p + unit, p, unit].map(point);
+        // Inertia is quadratic in the place: its slope is what both together have beyond each.
+        std::array::from_fn(|k| match k {
+            0 => 0.0,
+            1..=3 => unit[k - 1],
+            _ => both[k] - one[k] - other[k],
+        })
     };
-    [body(1.0, p, about(p, p)), along(0), along(1), along(2)]
+    [point(p), along(0), along(1), along(2)]
 }
 
 /// The torque of a change of the last link's inertial parameters.
@@ -142,7 +142,10 @@ pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
         let weighted: Vec<Vec<f64>> = (columns.iter())
             .map(|c| frozen.projected(frozen.weighted(c)))
             .collect();
-        let told = told(&weighted);
+        let all: Vec<DVector<f64>> = (weighted.iter())
+            .map(|c| DVector::from_column_slice(c))
+            .collect();
+        let told = independent_columns(&DMatrix::from_columns(&all), &[0, 1, 2, 3], TOLD).kept;
         if told.first() != Some(&0) {
             return None;
         }
@@ -165,11 +168,6 @@ pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
         if moved < SETTLED {
             let off = systematic(bench, rows, frozen, &picked)?;
             let std = |k: usize| evidence.stds[k].hypot(off[k]);
-            let value = |value: f64, std: f64, unit: &str| Value {
-                value,
-                std,
-                unit: unit.into(),
-            };
             let mut at = [None, None, None];
             for (k, axis) in told.iter().enumerate().skip(1) {
                 at[axis - 1] = Some(value(place[axis - 1], std(k) / mass, "m"));
@@ -190,29 +188,9 @@ pub(super) fn on_last_link(bench: &Bench, rows: &Rows, frozen: &Fit) -> Option<(
     None
 }
 
-/// Columns that are told apart from those before them.
-fn told(columns: &[Vec<f64>]) -> Vec<usize> {
-    let mut basis: Vec<DVector<f64>> = Vec::new();
-    let mut told = Vec::new();
-    for (k, column) in columns.iter().enumerate() {
-        let whole = DVector::from_column_slice(column);
-        let mut rest = whole.clone();
-        for b in &basis {
-            rest.axpy(-b.dot(&whole), b, 1.0);
-        }
-        let size = rest.norm();
-        if size > TOLD * whole.norm() && size > 0.0 {
-            basis.push(rest / size);
-            told.push(k);
-        }
-    }
-    told
-}
-
 /// What coefficients of these columns would be off by where each joint's described torque is off by [`LINK`].
 fn systematic(bench: &Bench, rows: &Rows, frozen: &Fit, columns: &[Vec<f64>]) -> Option<Vec<f64>> {
     let size = columns.len();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let gram = DMatrix::from_fn(size, size, |r, c| dot(&columns[r], &columns[c])).cholesky()?;
     let anchor = &bench.anchor;
     let stated = combined(
@@ -272,11 +250,6 @@ pub(super) fn on_single_link(
             .max(0.0)
             .sqrt()
     };
-    let value = |value: f64, std: f64, unit: &str| Value {
-        value,
-        std,
-        unit: unit.into(),
-    };
     let parameters = BTreeMap::from([
         (
             "mass".to_owned(),
@@ -287,8 +260,7 @@ pub(super) fn on_single_link(
             value(distance, spread(-dj / (dm * dm), 1.0 / dm), "m"),
         ),
     ]);
-    // A mass on a link lies within some metres of its axis.
-    (0.01..3.0)
+    (NEAREST..FARTHEST)
         .contains(&distance)
         .then_some((parameters, [inertia, moment]))
 }

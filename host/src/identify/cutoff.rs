@@ -20,10 +20,9 @@ use super::factor::TriangularFactor;
 use super::linear::by_noise;
 use super::model::{Plan, Rows, each_rows};
 use super::{IdentifyError, ModelKind, Options};
-use crate::data::Block;
 use crate::prepare::{
-    Choice, CutoffTrial, HIGHEST, PrepareError, PrepareOptions, Recording, Survey, Treatment,
-    each_of, stretch, threads, trimmed_rows,
+    Beginning, Choice, CutoffTrial, HIGHEST, PrepareOptions, Recording, Survey, Treatment, each_of,
+    threads, trimmed_rows,
 };
 use crate::report::format_significant;
 use crate::robot::Robot;
@@ -378,34 +377,4 @@ fn relative_errors(factors: &[TriangularFactor]) -> Vec<f64> {
     (factors.iter())
         .map(|f| rms(f.residual_squares(&beta), f) / rms(f.right_side_squares(), f))
         .collect()
-}
-
-/// The first rows of a recording.
-pub(super) struct Beginning<'a> {
-    recording: &'a dyn Recording,
-    rows: usize,
-}
-
-impl Recording for Beginning<'_> {
-    fn label(&self) -> String {
-        self.recording.label()
-    }
-
-    fn each_block(
-        &self,
-        rows: usize,
-        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
-    ) -> Result<(), PrepareError> {
-        let (mut left, mut enough) = (self.rows, false);
-        let read = self.recording.each_block(rows, &mut |block| {
-            if block.len() < left {
-                left -= block.len();
-                return take(block);
-            }
-            take(stretch(&block, 0, left))?;
-            enough = true;
-            Err(PrepareError::Stopped("enough".to_owned()))
-        });
-        if enough { Ok(()) } else { read }
-    }
 }

@@ -46,6 +46,36 @@ pub(crate) fn first_block(
     }
 }
 
+/// The first `rows` rows of a recording.
+pub(crate) struct Beginning<'a> {
+    pub(crate) recording: &'a dyn Recording,
+    pub(crate) rows: usize,
+}
+
+impl Recording for Beginning<'_> {
+    fn label(&self) -> String {
+        self.recording.label()
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        let (mut left, mut enough) = (self.rows, false);
+        let read = self.recording.each_block(rows, &mut |block| {
+            if block.len() < left {
+                left -= block.len();
+                return take(block);
+            }
+            take(stretch(&block, 0, left))?;
+            enough = true;
+            Err(PrepareError::Stopped("enough".to_owned()))
+        });
+        if enough { Ok(()) } else { read }
+    }
+}
+
 /// A recording held in memory.
 #[derive(Clone, Debug, Default)]
 pub struct InMemory {

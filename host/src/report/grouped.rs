@@ -13,17 +13,30 @@ pub struct Finding {
     pub short: String,
 }
 
-/// One line a kind: the sentence of the worst of it, then whom else it holds for. The kinds keep the order of their first finding.
-pub fn one_a_kind(findings: Vec<Finding>) -> Vec<String> {
-    let mut kinds: Vec<(&str, Vec<Finding>)> = Vec::new();
-    for finding in findings {
-        match kinds.iter_mut().find(|(kind, _)| *kind == finding.kind) {
-            Some((_, own)) => own.push(finding),
-            None => kinds.push((finding.kind, vec![finding])),
+/// Things of one kind together, the worst of each kind first; `rank` gives the kind and how bad a thing is. The kinds keep the
+/// order of their first.
+pub fn worst_first<T, K: PartialEq>(
+    things: impl IntoIterator<Item = T>,
+    rank: impl Fn(&T) -> (K, f64),
+) -> Vec<Vec<T>> {
+    let mut kinds: Vec<(K, Vec<T>)> = Vec::new();
+    for thing in things {
+        let (kind, _) = rank(&thing);
+        match kinds.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, own)) => own.push(thing),
+            None => kinds.push((kind, vec![thing])),
         }
     }
-    let line = |mut own: Vec<Finding>| {
-        own.sort_by(|a, b| b.size.total_cmp(&a.size));
+    let sorted = |(_, mut own): (K, Vec<T>)| {
+        own.sort_by(|a, b| rank(b).1.total_cmp(&rank(a).1));
+        own
+    };
+    kinds.into_iter().map(sorted).collect()
+}
+
+/// One line a kind: the sentence of the worst of it, then whom else it holds for.
+pub fn one_a_kind(findings: Vec<Finding>) -> Vec<String> {
+    let line = |own: Vec<Finding>| {
         let mut own = own.into_iter();
         let worst = own.next().map_or_else(String::new, |worst| worst.sentence);
         let others: Vec<String> = own.map(|other| other.short).collect();
@@ -32,7 +45,8 @@ pub fn one_a_kind(findings: Vec<Finding>) -> Vec<String> {
             _ => format!("{worst} The same holds for {}.", others.join(", ")),
         }
     };
-    kinds.into_iter().map(|(_, own)| line(own)).collect()
+    let kinds = worst_first(findings, |finding| (finding.kind, finding.size));
+    kinds.into_iter().map(line).collect()
 }
 
 #[cfg(test)]

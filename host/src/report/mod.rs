@@ -24,7 +24,7 @@ use crate::files::write_whole;
 
 pub use document::{Alignment, Block, Column, Document, Fact, NoteKind, Section, Table, Tone};
 pub use format::{format_interval, format_p_value, format_significant, format_unit, format_value};
-pub use grouped::{Finding, one_a_kind};
+pub use grouped::{Finding, one_a_kind, worst_first};
 pub use html::render;
 pub use plot::{Axis, Direction, Marker, Plot, Role, Series, Style};
 pub use svg::svg;

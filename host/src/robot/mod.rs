@@ -178,6 +178,25 @@ pub struct Inertial {
     pub inertia: [f64; 6],
 }
 
+impl Inertial {
+    /// One kilogram at a point, m.
+    pub fn point([x, y, z]: [f64; 3]) -> Self {
+        let [xx, yy, zz] = [y * y + z * z, x * x + z * z, x * x + y * y];
+        Self {
+            mass: 1.0,
+            first_moment: [x, y, z],
+            inertia: [xx, -x * y, -x * z, yy, -y * z, zz],
+        }
+    }
+
+    /// Mass, first moment and inertia in the order of the standard parameters.
+    pub fn parameters(&self) -> [f64; 10] {
+        let [x, y, z] = self.first_moment;
+        let [xx, xy, xz, yy, yz, zz] = self.inertia;
+        [self.mass, x, y, z, xx, xy, xz, yy, yz, zz]
+    }
+}
+
 /// Limits of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

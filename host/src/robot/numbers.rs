@@ -34,9 +34,7 @@ impl Robot {
         let joint = |joint: &super::Joint| {
             let mut row = [0.0; COLUMNS];
             if let Some(inertial) = &joint.inertial {
-                row[column::MASS] = inertial.mass;
-                row[column::FIRST_MOMENT..column::INERTIA].copy_from_slice(&inertial.first_moment);
-                row[column::INERTIA..column::DRIVE_INERTIA].copy_from_slice(&inertial.inertia);
+                row[..column::DRIVE_INERTIA].copy_from_slice(&inertial.parameters());
             }
             if let Some(friction) = &joint.friction {
                 row[column::VISCOUS] = friction.viscous;

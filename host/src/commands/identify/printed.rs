@@ -25,16 +25,19 @@ pub(super) fn print(ui: &Ui, result: &Identification) {
         ));
     }
     for joint in &result.joints {
-        let held = (joint.holdout_relative_error.zip(joint.holdout_rows_share))
-            .zip(joint.holdout_relative_error_all_rows);
+        let held = (
+            joint.holdout_relative_error,
+            joint.holdout_rows_share,
+            joint.holdout_relative_error_all_rows,
+        );
         let holdout = match held {
-            None => String::new(),
-            Some(((error, _), _)) if error.is_nan() => {
+            (Some(error), ..) if error.is_nan() => {
                 ", no row of the hold-out left to judge by".to_owned()
             }
-            Some(((error, share), all)) => {
+            (Some(error), Some(share), Some(all)) => {
                 format!(", on the hold-out {}", left(error, share, all))
             }
+            _ => String::new(),
         };
         if joint.train_residual_rms.is_nan() {
             ui.say(&format!(

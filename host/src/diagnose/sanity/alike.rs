@@ -90,7 +90,7 @@ impl Judge<'_> {
         Ok(alike.then(|| {
             let fault = self.say(
                 "ratio",
-                About::TorqueScale,
+                About::Torque,
                 j,
                 format!(
                     "tau{} is {} times what the description's weight, viscous friction and dry friction need alike ({}, {} and {} times), which no change of the robot makes; check the gear ratio and the torque constant.",

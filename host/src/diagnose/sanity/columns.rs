@@ -223,7 +223,7 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
                 | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
                 Implausible::EffortTooLarge { joint, .. }
                 | Implausible::EffortTooSmall { joint, .. }
-                | Implausible::NoEffort { joint } => (*joint, About::TorqueScale),
+                | Implausible::NoEffort { joint } => (*joint, About::Torque),
                 Implausible::Spike { joint, .. } => (*joint, About::Torque),
                 Implausible::NotSeconds { .. } | Implausible::ReferenceScale { .. } => continue,
             };

@@ -33,10 +33,10 @@ mod tests;
 pub(super) use columns::{moves, too_short_to_judge, too_short_to_learn};
 
 use super::outcome::{About, DataFault};
-use super::runs::runs_of_blocks;
+use super::runs::runs_of;
 use super::{DiagnoseError, Run};
 use crate::data::Source;
-use crate::prepare::{LowPass, PrepareError, Recording, Resampled};
+use crate::prepare::{Beginning, LowPass, Recording, Resampled};
 use crate::robot::Robot;
 
 /// Cut-off of the positions that are judged, Hz.
@@ -100,20 +100,7 @@ pub fn faults_at_start(
     // Uneven rows have no derivative before they are brought to an even step.
     let even = Resampled::new(source, sampling.period);
     let recording: &dyn Recording = if sampling.irregular { &even } else { source };
-    let (mut left, mut blocks) = (rows, Vec::new());
-    let read = recording.each_block(rows, &mut |block| {
-        left = left.saturating_sub(block.len());
-        blocks.push(Ok(block));
-        match left {
-            0 => Err(PrepareError::Stopped("enough".to_owned())),
-            _ => Ok(()),
-        }
-    });
-    if left > 0 {
-        read?;
-    }
-    let label = source.path().display().to_string();
-    let runs = runs_of_blocks(blocks.into_iter(), &label, 0, rate, &low_pass)?;
+    let runs = runs_of(&Beginning { recording, rows }, 0, rate, &low_pass)?;
     let own: Vec<&Run> = runs.iter().collect();
     if own.is_empty() || columns::too_short(&own).is_some() {
         return Ok(Vec::new());
@@ -142,7 +129,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         // What a wrong unit of one joint does to the others is its consequence, as is what a wrong position makes of the
         // torque.
         let own = |f: &DataFault| units.iter().find(|(_, fault)| fault.joint == f.joint);
-        let of_torque = |f: &DataFault| matches!(f.about, About::Torque | About::TorqueScale);
+        let of_torque = |f: &DataFault| f.about == About::Torque;
         judged.retain(|f| own(f).is_some_and(|(_, unit)| of_torque(unit) || !of_torque(f)));
     }
     // The model says more closely what the limits only notice.

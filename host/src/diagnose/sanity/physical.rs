@@ -15,7 +15,7 @@ use super::super::DiagnoseError;
 use super::fit::about_mean;
 use super::nnls::nnls;
 use super::rows::{Form, Rows};
-use crate::robot::{DESCRIBED as WORTH, Robot};
+use crate::robot::{self, Inertial, Robot};
 
 /// Stretches of time that are left out in turn.
 pub(super) const BLOCKS: usize = 8;
@@ -156,12 +156,6 @@ fn grid(half: f64, full: bool) -> Vec<[f64; 3]> {
         }
     }
     all
-}
-
-/// The ten inertial parameters of one kilogram there.
-fn point([x, y, z]: [f64; 3]) -> [f64; 10] {
-    let [xx, yy, zz] = [y * y + z * z, x * x + z * z, x * x + y * y];
-    [1.0, x, y, z, xx, -x * y, -x * z, yy, -y * z, zz]
 }
 
 impl Physical {
@@ -372,7 +366,7 @@ fn bodies(parameters: &[[f64; COLUMNS]], points: &Points) -> DMatrix<f64> {
             map[(link * COLUMNS + k, link)] = *value;
         }
         for place in places {
-            for (k, value) in point(*place).iter().enumerate() {
+            for (k, value) in Inertial::point(*place).parameters().iter().enumerate() {
                 map[(link * COLUMNS + k, at)] = *value;
             }
             at += 1;
@@ -435,7 +429,7 @@ impl Problem {
         let strongest = physical.strongest();
         let share = match belief {
             Belief::Described | Belief::Loaded => DESCRIBED,
-            Belief::Free => WORTH,
+            Belief::Free => robot::DESCRIBED,
         };
         // Mean and standard deviation of what is known of a coefficient, and the least that it can be.
         let known = |k: usize| -> Option<(f64, f64, f64)> {

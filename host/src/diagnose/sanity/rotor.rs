@@ -47,7 +47,7 @@ impl Judge<'_> {
         };
         let fault = self.say(
             "ratio",
-            About::TorqueScale,
+            About::Torque,
             j,
             format!(
                 "The description makes the rotor of joint {} alone {} {unit} at the joint, by the square of the gear ratio {}; all that moves there was seen to have {} {unit}. Check the gear ratio, the rotor's inertia and the torque constant.",

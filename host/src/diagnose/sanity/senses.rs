@@ -346,7 +346,7 @@ impl Judge<'_> {
                 let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
                 let fault = self.say(
                     kind,
-                    About::TorqueScale,
+                    About::Torque,
                     j,
                     format!(
                         "tau{n} is {} times what the description's {of} needs, {tool}{what}.",

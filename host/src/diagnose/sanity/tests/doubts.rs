@@ -66,6 +66,36 @@ fn a_recording_cut_in_two_is_no_fault() {
     assert_eq!(faults(&robot, &both).unwrap(), []);
 }
 
+/// Rows at steps of 8 to 16 ms were not judged at all.
+#[test]
+fn uneven_rows_are_judged_like_even_ones() {
+    let (robot, runs) = emulated();
+    let folder = tempfile::tempdir().unwrap();
+    for sense in [1.0, -1.0] {
+        let run = &runs[0];
+        let mut text = String::from("t,q1,tau1\n");
+        let mut k = 0;
+        for row in 0.. {
+            if k >= run.len() {
+                break;
+            }
+            let joint = &run.joints[0];
+            text += &format!("{},{},{}\n", run.t[k], joint.q_raw[k], sense * joint.tau[k]);
+            k += [8, 13, 16, 9, 11, 15, 10][row % 7];
+        }
+        let path = folder.path().join("uneven.csv");
+        std::fs::write(&path, text).unwrap();
+        let source = Source::open_with(&path, &robot, EffortNeed::Optional).unwrap();
+        assert!(source.sampling().irregular);
+        let found = faults_at_start(&robot, &source, 100_000).unwrap();
+        let kinds: Vec<(&str, bool)> = (found.iter())
+            .map(|f| (f.kind.as_str(), f.certain))
+            .collect();
+        let wanted: &[(&str, bool)] = if sense > 0.0 { &[] } else { &[("sign", true)] };
+        assert_eq!(kinds, wanted, "{found:?}");
+    }
+}
+
 /// It was called a reversed sense, a delay and a wrong scale.
 #[test]
 fn a_torque_that_lost_its_sign_is_named_as_that() {

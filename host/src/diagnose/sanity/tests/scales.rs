@@ -22,7 +22,6 @@ fn torques_that_are_all_a_thousand_times_too_large_or_small_are_refused_at_once(
             let found = faults(&robot, &other).unwrap();
             assert_eq!(found.len(), 1, "{found:?}");
             println!("{}", found[0].text);
-            // What is of the torque's scale alone is a doubt and is fitted.
             assert_eq!(
                 (found[0].kind.as_str(), found[0].about),
                 ("unit", About::Torque)
