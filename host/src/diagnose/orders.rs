@@ -71,11 +71,15 @@ impl Orders {
 /// The speed that half of the samples of a joint exceed; none where it stands.
 fn median_speed(runs: &[Run], joint: usize) -> Option<f64> {
     let speeds = (runs.iter()).flat_map(|run| run.joints[joint].qd.iter().map(|v| v.abs()));
-    let mut speeds: Vec<f64> = speeds.collect();
-    let middle = speeds.len() / 2;
-    (speeds.len() > 1)
-        .then(|| *speeds.select_nth_unstable_by(middle, f64::total_cmp).1)
-        .filter(|speed| *speed > 0.0)
+    median(speeds.collect())
+}
+
+/// What half of the values exceed; none where that is nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (values.len() > 1)
+        .then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+        .filter(|value| *value > 0.0)
 }
 
 /// Samples of a run at more than a speed, the torque less its mean over a window.
@@ -100,7 +104,7 @@ fn moving(run: &Run, joint: usize, ratio: f64, least: f64, window: usize) -> Vec
 }
 
 /// Power of the orders from `first` to `last` in samples.
-fn spectrum(samples: &[Sample], first: usize, last: usize) -> Vec<f64> {
+pub(super) fn spectrum(samples: &[Sample], first: usize, last: usize) -> Vec<f64> {
     let mut sums = vec![[0.0; 2]; last + 1 - first];
     for (angle, torque) in samples {
         let (sine, cosine) = angle.sin_cos();

@@ -26,6 +26,7 @@ mod senses;
 mod swaps;
 mod trial;
 mod undo;
+mod wave;
 
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,8 @@ use crate::robot::{JointKind, Robot};
 
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
 pub(super) const POOR: f64 = 0.1;
-/// The same of a single joint, whose model has few parameters to make up for a wrong unit or time with.
+/// The same of a single joint, whose model has few parameters to make up for a wrong unit or time with; and of a shift in time at
+/// any robot, of which the many parameters of a slow arm leave little.
 const POOR_ALONE: f64 = 0.01;
 /// … and a trial is believed that leaves less than this share of what was left, and less than [`GOOD`] in all.
 const BETTER: f64 = 0.35;
@@ -202,15 +203,14 @@ impl<'a> Judge<'a> {
     /// A torque that belongs to another time than the motion.
     fn shifted(&self, j: usize) -> Option<Suspicion> {
         let fit = self.fits[j].as_ref()?;
-        let poor = self.poor();
-        if fit.unexplained() < poor {
+        if fit.unexplained() < POOR_ALONE {
             return None;
         }
         let time = self.rows.len() as f64 * self.rows.period;
         let reach = (FARTHEST.min(0.25 * time) / self.rows.period) as usize;
         let left = fit.unexplained_moved(&self.rows.tau[j], reach)?;
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        if left[reach] < poor || least > LESS * left[reach] {
+        if left[reach] < POOR_ALONE || least > LESS * left[reach] {
             return None;
         }
         // Of a periodic motion the nearest period.
@@ -232,7 +232,7 @@ impl<'a> Judge<'a> {
                 About::Torque,
                 j,
                 format!(
-                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.0} % of its variance, as recorded {:.0} %; give both by one clock.",
+                    "tau{} is {:.2} s {word} q{}: moved that much {mend}, the model leaves {:.1} % of its variance, as recorded {:.1} %; give both by one clock.",
                     j + 1,
                     shift.abs(),
                     j + 1,

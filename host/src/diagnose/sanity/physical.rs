@@ -2,19 +2,21 @@
 //!
 //! A link is what the description says of it times a number, and point masses about its frame, none of them negative: every such
 //! sum is a body that there can be, and every such body is near one. Friction may be viscous, dry, fall with speed (Stribeck),
-//! rise with its root or its square, go with the load, and differ between the directions; beside it a constant and a spring. So
-//! the data are explained by least squares with coefficients that cannot be negative, over the whole robot at once.
+//! rise with its root or its square, go with the load, and differ between the directions; beside it a constant, a spring, and one
+//! wave over the motor's turn ([`super::wave`]), as cogging, ripple and eccentric gears make it. So the data are explained by
+//! least squares with coefficients that cannot be negative, over the whole robot at once.
 //!
-//! Leaves out: elastic joints, play, cogging, and bodies wider than the box of their points.
+//! Leaves out: elastic joints, play, further waves, and bodies wider than the box of their points.
 
 use nalgebra::{DMatrix, DVector};
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
 
 use super::super::DiagnoseError;
-use super::fit::about_mean;
+use super::fit::{Fit, about_mean};
 use super::nnls::nnls;
 use super::rows::{Form, Rows};
+use super::wave;
 use crate::robot::{self, Inertial, Robot};
 
 /// Stretches of time that are left out in turn.
@@ -38,11 +40,13 @@ const LOAD_BOX: (f64, f64) = (0.4, 0.1);
 /// Speeds, as shares of the RMS, at which friction may have fallen.
 const STRIBECK: [f64; 2] = [0.1, 0.4];
 /// Columns of one joint's drive: those that may have either sign first.
-const OWN: usize = 11;
+const OWN: usize = 13;
 /// How many of them.
-const EITHER: usize = 3;
-/// Place of the drive's inertia among them.
-const INERTIA: usize = 3;
+const EITHER: usize = 5;
+/// Place of the wave's two among them.
+const WAVE: usize = 3;
+/// Place of the drive's inertia.
+const INERTIA: usize = 5;
 
 /// What is known beside the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,6 +183,7 @@ impl Physical {
         let map = bodies(&parameters, &points);
         let coupled = form.width() - n * COLUMNS;
         let shared = map.ncols() + coupled;
+        let order: Vec<usize> = (0..shared + OWN).collect();
         let matrices = (0..n)
             .map(|j| {
                 let regressor = &regressors[j];
@@ -196,6 +201,19 @@ impl Physical {
                 for mut column in matrix.column_iter_mut() {
                     if column.iter().any(|x| !x.is_finite()) {
                         column.fill(0.0);
+                    }
+                }
+                let turn: Vec<f64> = rows.q[j]
+                    .iter()
+                    .map(|q| q * robot.joints[j].gear_ratio())
+                    .collect();
+                let fit = Fit::of(&matrix, &rows.tau[j], &order);
+                let found = fit.and_then(|fit| wave::loudest(&turn, fit.residual.as_slice()));
+                if let Some(order) = found {
+                    for (row, angle) in turn.iter().enumerate() {
+                        let (sine, cosine) = (order * angle).sin_cos();
+                        matrix[(row, shared + WAVE)] = cosine;
+                        matrix[(row, shared + WAVE + 1)] = sine;
                     }
                 }
                 matrix
@@ -375,8 +393,8 @@ fn bodies(parameters: &[[f64; COLUMNS]], points: &Points) -> DMatrix<f64> {
     map
 }
 
-/// Columns of one joint's drive: constant, difference between the directions, spring; inertia, viscous, dry, then what the
-/// library has of friction beside them, each with a sign that takes.
+/// Columns of one joint's drive: constant, difference between the directions, spring, room for a wave; inertia, viscous, dry,
+/// then what the library has of friction beside them, each with a sign that takes.
 fn own(q: &[f64], qd: &[f64], qdd: &[f64], weight: &[f64]) -> DMatrix<f64> {
     let count = qd.len().max(1) as f64;
     let rms = (qd.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
@@ -387,13 +405,14 @@ fn own(q: &[f64], qd: &[f64], qdd: &[f64], weight: &[f64]) -> DMatrix<f64> {
             0 => 1.0,
             1 => v.abs(),
             2 => q[k],
+            WAVE..INERTIA => 0.0,
             INERTIA => qdd[k],
-            4 => v,
-            5 => sense,
-            6 => fallen(STRIBECK[0]),
-            7 => fallen(STRIBECK[1]),
-            8 => sense * v.abs().sqrt(),
-            9 => v * v.abs(),
+            6 => v,
+            7 => sense,
+            8 => fallen(STRIBECK[0]),
+            9 => fallen(STRIBECK[1]),
+            10 => sense * v.abs().sqrt(),
+            11 => v * v.abs(),
             _ => sense * weight[k].abs(),
         }
     })

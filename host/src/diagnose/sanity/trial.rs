@@ -128,8 +128,8 @@ fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
 /// Whether the description without the fault, `own`, explains decisively more of what the description as `recorded` does not than
 /// free parameters explain beyond it, and predicts no worse: one fault is likelier than that every link is other than described.
 fn explains(own: &Score, recorded: &Score, free: &Score) -> bool {
-    let gained = recorded.cost - own.cost;
-    gained > ODDS && gained > own.cost - free.cost && gain(own, recorded).value > 0.0
+    let (gained, beyond) = (recorded.cost - own.cost, own.cost - free.cost);
+    gained - beyond > ODDS && gain(own, recorded).value > 0.0
 }
 
 /// What came of a suspicion.
@@ -165,6 +165,8 @@ fn outcome(undo: &Undo, without: &Reading, recorded: &Reading) -> Outcome {
         stated.filter(shown),
     ) {
         (Some(own), _) | (_, Some(own)) => Outcome::Certain(own.clone()),
+        // What predicts worse and is less likely tells nobody anything, by however little.
+        _ if gain(own, other).value < 0.0 && odds(own, other) < 0.0 => Outcome::Refuted,
         _ if beats(other, own) => Outcome::Refuted,
         _ => Outcome::Open,
     }

@@ -1,7 +1,15 @@
 //! What looks like a fault and is none, and faults that look like others.
 
+use rig_shared::trajectory::{SlowReversals, Trajectory};
+use rig_shared::wire::message::RequestBody;
+
 use super::windows::changed_wrist;
 use super::*;
+use crate::demo::Run as Recorded;
+use crate::emulated::{EmulatedRig, Nameplate};
+use crate::link::{EmulatedPort, Session, SessionSettings};
+use crate::plant::PlantConfig;
+use crate::plant::effect::cogging::Cogging;
 
 /// A mass at a place of the last link that the description knows nothing of.
 fn loaded(robot: &mut Robot, mass: f64, [x, y, z]: [f64; 3]) {
@@ -113,4 +121,34 @@ fn a_torque_that_lost_its_sign_is_named_as_that() {
         run.joints[0].tau.iter_mut().for_each(|v| *v = v.abs());
     });
     only(&robot, &lost, "magnitude", 0, "never negative");
+}
+
+/// Cogging that the description does not have waves in torque and acceleration, and a shift lets the one stand in for the other.
+#[test]
+fn hidden_cogging_at_slow_reversals_is_no_late_torque() {
+    let robot = text("one-link.toml", template("one-link").unwrap());
+    for seed in 60..64 {
+        let mut plant = PlantConfig::laboratory(seed);
+        plant.motor.cogging = Some(Cogging {
+            amplitude: 0.006,
+            order: 12.0,
+            phase: 0.7,
+        });
+        let at = plant.initial_position as f32;
+        let rig = EmulatedRig::new(&Nameplate::from_robot(&robot).unwrap(), plant, seed).unwrap();
+        let mut line = Session::open(EmulatedPort::new(rig), SessionSettings::default()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slow.csv");
+        let slow = SlowReversals::new(0.1, 0.1, &[0.15, 0.1], 1).unwrap();
+        let told = vec![RequestBody::SetPosition(at)];
+        Recorded::record(
+            &mut line,
+            told,
+            &Trajectory::SlowReversals(slow),
+            0.2,
+            &path,
+        )
+        .unwrap();
+        assert_eq!(certain(&robot, &read(&robot, &path, 0)), [""; 0], "{seed}");
+    }
 }
