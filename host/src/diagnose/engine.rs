@@ -12,7 +12,7 @@ mod unbelieved;
 
 use rig_shared::effects::Kind;
 
-use self::even::{Uneven, borrowed};
+use self::even::Uneven;
 pub(super) use self::follow::Follower;
 use self::intake::{Intake, Material, intake, without};
 use self::pass::Pass;
@@ -45,7 +45,7 @@ use super::waves::is_of_the_motor;
 use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
 use super::zeros::{another_zero, another_zero_held};
 use super::{DiagnoseError, Options};
-use crate::prepare::Recording;
+use crate::prepare::{Recording, as_recordings};
 use crate::robot::Robot;
 
 /// Finds what the model lacks. The second result is the description with the effects and the parameters identified
@@ -74,7 +74,7 @@ pub fn diagnose(
     loop {
         // Each time around more of the description's effects are held or its limits left out, or another recording is brought to an even step.
         let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
-        let [training, holdout] = [&training, &holdout].map(|recordings| borrowed(recordings));
+        let [training, holdout] = [&training, &holdout].map(|recordings| as_recordings(recordings));
         match attempt(robot, &stated, &training, &holdout, options, progress) {
             Ok(Attempt::Done(mut result)) => {
                 result.0.words.extend(uneven.told());

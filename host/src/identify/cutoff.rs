@@ -61,16 +61,13 @@ pub(crate) struct Equations<'a> {
 /// Decides how `recordings` of `robot` are treated where nothing is identified; see [`decided`].
 ///
 /// # Errors
-/// As [`decided`]; recordings that cannot be surveyed; a geometry that is none.
+/// As [`decided`]; a geometry that is none.
 pub(crate) fn treatment_for(
     robot: &Robot,
     recordings: &[&dyn Recording],
+    surveys: Vec<Survey>,
     options: &PrepareOptions,
 ) -> Result<(Vec<Survey>, Treatment), IdentifyError> {
-    let joints = robot.joints.len();
-    let surveys = (recordings.iter())
-        .map(|r| Survey::take(*r, joints))
-        .collect::<Result<Vec<_>, _>>()?;
     let (chain, transmission) = (chain_of(robot)?, transmission_of(robot)?);
     let base = Base::structural(robot, ModelKind::Differential, Options::default().seed)?;
     let equations = Equations {

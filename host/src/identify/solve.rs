@@ -28,7 +28,9 @@ use super::{
     Options,
 };
 use crate::effects::Effects;
-use crate::prepare::{Choice, PrepareError, Recording, Spooled, Survey, Treatment, surveyed};
+use crate::prepare::{
+    Choice, PrepareError, Recording, Spooled, Survey, Treatment, as_recordings, surveyed,
+};
 use crate::robot::Robot;
 
 /// Kept rows, over all joints of the shortest recording, for each parameter: so many a narrower band must leave.
@@ -96,11 +98,11 @@ fn solve(
     // What is spooled has no references any more.
     let sources = training;
     let (training, holdout) = (Spooled::all(training), Spooled::all(holdout));
-    let (surveys, training) = surveyed(&training, joints)?;
+    let (surveys, training) = surveyed(&as_recordings(&training), joints)?;
     if surveys.is_empty() {
         return Err(IdentifyError::NoRecording);
     }
-    let (holdout_surveys, holdout) = surveyed(&holdout, joints)?;
+    let (holdout_surveys, holdout) = surveyed(&as_recordings(&holdout), joints)?;
     let (training, holdout) = (as_recordings(&training), as_recordings(&holdout));
     let (training, holdout) = (training.as_slice(), holdout.as_slice());
     // References do not line up with rows that were interpolated: what needs them then says that they are missing.
@@ -428,8 +430,4 @@ fn each_planned<'a>(list: &[&'a dyn Recording], plans: &'a [Plan<'a>]) -> Vec<Pl
     pairs
         .map(|(&recording, plan)| Planned { recording, plan })
         .collect()
-}
-
-fn as_recordings<'a>(list: &'a [Box<dyn Recording + 'a>]) -> Vec<&'a dyn Recording> {
-    list.iter().map(AsRef::as_ref).collect()
 }

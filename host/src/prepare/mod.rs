@@ -10,6 +10,7 @@
 //! Leaves out: correction of a delay between torque and position.
 
 mod decimate;
+mod even;
 mod filter;
 mod motion;
 mod pieces;
@@ -23,6 +24,8 @@ mod treatment;
 mod workers;
 
 pub use decimate::{Decimator, Stream};
+pub(crate) use even::interpolation;
+pub use even::{Evened, as_recordings, surveyed};
 pub use filter::{LowPass, central_difference, decimator_edge, second_difference};
 pub(crate) use motion::later;
 pub use motion::{JointMotion, Motion, each_motion, worked_motion};
@@ -30,10 +33,9 @@ pub(crate) use pieces::{Beginning, first_block, stretch};
 pub use pieces::{InMemory, Piece, Recording, each_piece};
 pub(crate) use rate::same_rate;
 pub(crate) use rate::trimmed_rows;
-pub(crate) use resample::{LONGEST_STEP, Resampled};
+pub use resample::Resampled;
 pub use spectrum::{NOISE_SHARE, PositionSpectrum, Welch};
-pub(crate) use spool::interpolated;
-pub use spool::{Spooled, surveyed};
+pub use spool::Spooled;
 pub use survey::{JointSurvey, Survey};
 pub(crate) use treatment::HIGHEST;
 pub use treatment::{Choice, CutoffTrial, Masked, PrepareOptions, Treatment};
@@ -73,15 +75,13 @@ pub enum PrepareError {
     },
     /// The rows are not evenly spaced in time.
     #[error(
-        "{label} is not evenly sampled: near line {line} the time advances by {step:.6} s where {mean:.6} s is usual (the longest step is {longest:.6} s); rows that vary that much are not interpolated, so record or resample it at a constant rate."
+        "{label} is not evenly sampled: near line {line} its steps in time are unlike the usual {mean:.6} s, the longest is {longest:.6} s; rows more than 2.5 usual steps apart are not interpolated, so record or resample it at a constant rate."
     )]
     Irregular {
         /// The recording.
         label: String,
         /// Line of the file.
         line: u64,
-        /// Step found, s.
-        step: f64,
         /// Usual step, s.
         mean: f64,
         /// Longest step, s.

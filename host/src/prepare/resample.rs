@@ -12,9 +12,10 @@ pub(crate) const LONGEST_STEP: f64 = 2.5;
 ///
 /// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
 /// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
-/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Time, position, torque,
-/// measured derivatives, reference, voltage, temperature and the link's position are kept, other columns left out.
-pub(crate) struct Resampled<'a> {
+/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Columns that belong to no joint are
+/// interpolated by a line, and between two whole numbers, which may be a mode or a flag, taken from the nearer row. What the
+/// controller took for the effects is left out.
+pub struct Resampled<'a> {
     source: &'a dyn Recording,
     period: f64,
 }
@@ -52,9 +53,9 @@ fn signals_mut(joint: &mut JointColumns) -> impl Iterator<Item = &mut Vec<f64>> 
 }
 
 /// No rows of the same columns.
-fn empty_as(joints: &[JointColumns]) -> Vec<JointColumns> {
+fn empty_as(block: &Block) -> Block {
     let none = |column: &Option<Vec<f64>>| column.as_ref().map(|_| Vec::new());
-    (joints.iter())
+    let joints = (block.joints.iter())
         .map(|j| JointColumns {
             qd: none(&j.qd),
             qdd: none(&j.qdd),
@@ -64,7 +65,16 @@ fn empty_as(joints: &[JointColumns]) -> Vec<JointColumns> {
             link: none(&j.link),
             ..JointColumns::default()
         })
-        .collect()
+        .collect();
+    let extra = block
+        .extra
+        .iter()
+        .map(|(name, _)| (name.clone(), Vec::new()));
+    Block {
+        joints,
+        extra: extra.collect(),
+        ..Block::default()
+    }
 }
 
 /// One row: time, line, values of all signals.
@@ -73,6 +83,17 @@ struct Row {
     t: f64,
     line: u64,
     values: Vec<f64>,
+    /// Columns that belong to no joint.
+    extra: Vec<f64>,
+}
+
+/// The value at a share `u` of the way from a row to the next.
+fn between(a: f64, b: f64, u: f64) -> f64 {
+    match a.fract() == 0.0 && b.fract() == 0.0 {
+        true if u < 0.5 => a,
+        true => b,
+        false => a + u * (b - a),
+    }
 }
 
 /// Slope of the parabola through three points at the one of them with number `at`.
@@ -148,6 +169,12 @@ impl Grid {
                     list.push(value);
                 }
             }
+            let u = (t - self.rows[from].t) / (end - self.rows[from].t);
+            let (before, after) = (&self.rows[from].extra, &self.rows[from + 1].extra);
+            let ends = before.iter().zip(after);
+            for ((_, column), (a, b)) in self.out.extra.iter_mut().zip(ends) {
+                column.push(between(*a, *b, u));
+            }
             self.out.t.push(t);
             self.next += 1;
         }
@@ -179,9 +206,8 @@ impl Grid {
     /// What is ready, as a block.
     fn take(&mut self) -> Block {
         let empty = Block {
-            joints: empty_as(&self.out.joints),
             continues: true,
-            ..Default::default()
+            ..empty_as(&self.out)
         };
         std::mem::replace(&mut self.out, empty)
     }
@@ -222,10 +248,7 @@ impl Recording for Resampled<'_> {
             if !block.continues || !started {
                 grid.end();
                 give(&mut grid)?;
-                grid.out = Block {
-                    joints: empty_as(&block.joints),
-                    ..Default::default()
-                };
+                grid.out = empty_as(&block);
                 started = true;
             }
             for (k, t) in block.t.iter().enumerate() {
@@ -238,6 +261,7 @@ impl Recording for Resampled<'_> {
                         .flat_map(signals)
                         .map(|list| list[k])
                         .collect(),
+                    extra: block.extra.iter().map(|(_, list)| list[k]).collect(),
                 });
                 if grid.out.len() >= rows {
                     give(&mut grid)?;
@@ -288,6 +312,13 @@ mod tests {
                     qd: Some(t.iter().map(|t| 3.0 * (3.0 * t).cos()).collect()),
                     ..Default::default()
                 }],
+                extra: vec![
+                    ("added1".into(), t.iter().map(|t| 0.1 + 2.0 * t).collect()),
+                    (
+                        "mode".into(),
+                        (from..to).map(|k| (k / 7 % 3) as f64).collect(),
+                    ),
+                ],
                 first_line: from as u64 + 2,
                 continues,
                 t,
@@ -323,6 +354,9 @@ mod tests {
                     // A parabola comes back as it is.
                     assert!((joint.tau[k] - (1.0 - 2.0 * t + 0.5 * t * t)).abs() < 1e-12);
                     assert!((joint.qd.as_ref().unwrap()[k] - 3.0 * (3.0 * t).cos()).abs() < 1e-3);
+                    // A line, and modes never in between.
+                    assert!((block.extra[0].1[k] - (0.1 + 2.0 * t)).abs() < 1e-12);
+                    assert!([0.0, 1.0, 2.0].contains(&block.extra[1].1[k]));
                 }
             }
         }

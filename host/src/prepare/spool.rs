@@ -7,8 +7,6 @@ use std::sync::{Mutex, PoisonError};
 use super::PrepareError;
 use super::pieces::{Recording, stretch};
 use super::record::{self, Record, begin, put_count, put_numbers, unusable};
-use super::resample::{LONGEST_STEP, Resampled};
-use super::survey::Survey;
 use crate::data::{Block, JointColumns};
 
 /// A recording whose time, position, torque, measured derivatives and temperature are written to a temporary file while they
@@ -76,66 +74,6 @@ impl Recording for Spooled<'_> {
         })?;
         *kept = Some((file, all));
         Ok(())
-    }
-}
-
-/// What is said of a recording whose rows were interpolated to an even step.
-pub(crate) fn interpolated(label: &str, longest: f64, mean: f64) -> String {
-    format!(
-        "{label}: the rows come at uneven steps (up to {longest:.6} s, {mean:.6} s on average); they were interpolated to an even step, their time stamps believed."
-    )
-}
-
-/// Surveys of recordings, and the recordings as they are to be used: each read from its source once, and
-/// interpolated to an even step where its rows come at steps that differ from their mean by more than a fifth but
-/// never by more than two and a half times of it. Its survey then says so in [`Survey::note`].
-///
-/// # Errors
-/// As [`Survey::take`].
-pub fn surveyed<'a>(
-    spooled: &'a [Spooled<'a>],
-    joints: usize,
-) -> Result<(Vec<Survey>, Vec<Box<dyn Recording + 'a>>), PrepareError> {
-    let mut surveys = Vec::with_capacity(spooled.len());
-    let mut usable: Vec<Box<dyn Recording + 'a>> = Vec::with_capacity(spooled.len());
-    for recording in spooled {
-        match Survey::take(recording, joints) {
-            Ok(survey) => {
-                surveys.push(survey);
-                usable.push(Box::new(Even(recording)));
-            }
-            Err(PrepareError::Irregular { mean, longest, .. })
-                if longest <= LONGEST_STEP * mean =>
-            {
-                let even = Resampled::new(recording, mean);
-                let mut survey = Survey::take(&even, joints)?;
-                survey.note = Some(interpolated(&recording.label(), longest, mean));
-                surveys.push(survey);
-                usable.push(Box::new(even));
-            }
-            Err(other) => return Err(other),
-        }
-    }
-    Ok((surveys, usable))
-}
-
-/// A recording as it is.
-struct Even<'a>(&'a Spooled<'a>);
-
-impl Recording for Even<'_> {
-    fn label(&self) -> String {
-        self.0.label()
-    }
-
-    fn unburdened(&self) -> bool {
-        self.0.unburdened()
-    }
-    fn each_block(
-        &self,
-        rows: usize,
-        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
-    ) -> Result<(), PrepareError> {
-        self.0.each_block(rows, take)
     }
 }
 

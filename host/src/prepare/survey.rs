@@ -270,7 +270,6 @@ impl Survey {
                 return Err(PrepareError::Irregular {
                     label: recording.label(),
                     line,
-                    step,
                     mean,
                     longest: longest_step,
                 });

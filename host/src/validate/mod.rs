@@ -33,7 +33,9 @@ use crate::effects::Compensated;
 use crate::identify::{
     IdentifyError, Plan, Planned, ResidualReport, chain_of, torque_residuals, treatment_for,
 };
-use crate::prepare::{Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment};
+use crate::prepare::{
+    Choice, PrepareError, PrepareOptions, Recording, Survey, Treatment, as_recordings, surveyed,
+};
 use crate::report::{Finding, one_a_kind};
 use crate::robot::Robot;
 use crate::simulate::{Model, SimulateError};
@@ -254,7 +256,11 @@ pub fn validate(
         });
     }
     let joints = robot.joints.len();
-    let (surveys, treatment, note) = treatment(robot, recordings, options)?;
+    let (surveys, even) = surveyed(recordings, joints)?;
+    let interpolated: Vec<String> = surveys.iter().filter_map(|s| s.note.clone()).collect();
+    let even = as_recordings(&even);
+    let recordings = even.as_slice();
+    let (surveys, treatment, note) = treatment(robot, recordings, surveys, options)?;
     let transmission = crate::identify::transmission_of(robot)?;
     let plan = Plan {
         chain: &chain,
@@ -268,6 +274,7 @@ pub fn validate(
         cache: crate::identify::RowCache::default(),
     };
     let mut warnings = prior_warnings(robot, &columns);
+    warnings.extend(interpolated);
     warnings.extend(note);
     let [taken, left] = model.effects.uncompensated();
     warnings.extend(left);
@@ -379,18 +386,16 @@ fn unexplained(recording: &str, torque: &[TorqueCheck]) -> Vec<Finding> {
 fn treatment(
     robot: &Robot,
     recordings: &[&dyn Recording],
+    surveys: Vec<Survey>,
     options: &Options,
 ) -> Result<(Vec<Survey>, Treatment, Option<String>), ValidateError> {
-    let chosen = |note| {
-        let (surveys, treatment) = treatment_for(robot, recordings, &options.prepare)?;
+    let chosen = |surveys, note| {
+        let (surveys, treatment) = treatment_for(robot, recordings, surveys, &options.prepare)?;
         Ok((surveys, treatment, note))
     };
     let Some(band) = &robot.identified else {
-        return chosen(None);
+        return chosen(surveys, None);
     };
-    let surveys = (recordings.iter())
-        .map(|r| Survey::take(*r, robot.joints.len()))
-        .collect::<Result<Vec<_>, _>>()?;
     let mut prepare = options.prepare.clone();
     let stated = "as the description was identified.";
     if prepare.cutoff == Choice::Auto {
@@ -408,7 +413,7 @@ fn treatment(
             "These recordings cannot be judged in the band that the description was identified in (cut-off {} Hz, {} rows per second), so one was chosen from them: the errors are not those of the identification's hold-out.",
             band.cutoff, band.rate
         );
-        return chosen(Some(note));
+        return chosen(surveys, Some(note));
     };
     if options.prepare.cutoff == Choice::Auto {
         treatment.cutoff_reason = format!("{} Hz, {stated}", band.cutoff);

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use rand::{RngExt, SeedableRng};
+
 use super::*;
 use crate::data::Block;
 use crate::excite::{Noise, SampledReference, replay};
@@ -76,6 +78,24 @@ fn simulated(robot: &Robot, added: f64) -> Block {
     block
 }
 
+/// The rows with the numbers that `at` gives.
+fn stretched(block: &Block, at: impl Fn(usize) -> usize) -> Block {
+    let rows: Vec<usize> = (0..).map(at).take_while(|k| *k < block.len()).collect();
+    let of = |column: &Vec<f64>| rows.iter().map(|k| column[*k]).collect::<Vec<f64>>();
+    let mut few = block.clone();
+    few.t = of(&block.t);
+    for (to, from) in few.joints.iter_mut().zip(&block.joints) {
+        to.q = of(&from.q);
+        to.tau = of(&from.tau);
+        to.qd = from.qd.as_ref().map(of);
+        to.reference = from.reference.as_ref().map(of);
+    }
+    for ((_, to), (_, from)) in few.extra.iter_mut().zip(&block.extra) {
+        *to = of(from);
+    }
+    few
+}
+
 fn run(robot: &Robot, block: Block) -> Validation {
     let recording = InMemory {
         label: "made".into(),
@@ -107,6 +127,40 @@ fn a_recording_of_the_description_itself_leaves_nothing() {
         );
         assert!(motion.torque_relative_error < 1e-3, "{motion:?}");
     }
+}
+
+/// Rows 8 to 16 ms apart, as a loaded PC writes them: the same errors as of even rows, the torque that was added among them.
+#[test]
+fn uneven_rows_are_judged_as_even_ones_are() {
+    let robot = pendulum();
+    let mut block = simulated(&robot, 0.4);
+    let even = run(&robot, stretched(&block, |k| 12 * k));
+    let mut lots = rand_pcg::Pcg64::seed_from_u64(5);
+    let (mut at, mut k) = (Vec::new(), 0);
+    while k < block.len() {
+        at.push(k);
+        k += lots.random_range(8..=16);
+    }
+    let rows = at.len();
+    block = stretched(&block, |k| at.get(k).copied().unwrap_or(usize::MAX));
+    assert_eq!(block.len(), rows);
+    let uneven = run(&robot, block);
+    assert!(
+        uneven.warnings.iter().any(|w| w.contains("uneven steps")),
+        "{:?}",
+        uneven.warnings
+    );
+    let error = |found: &Validation| found.recordings[0].torque[0].residual.rms;
+    let motion = |found: &Validation| motion_of(found).position_rms_error;
+    println!(
+        "{:e} {:e} N·m, {:e} {:e} rad",
+        error(&even),
+        error(&uneven),
+        motion(&even),
+        motion(&uneven)
+    );
+    assert!(error(&uneven) < 1.5 * error(&even) + 1e-3);
+    assert!(motion(&uneven) < 1.5 * motion(&even) + 1e-4);
 }
 
 #[test]

@@ -156,13 +156,13 @@ pub fn friction_map(
             joint + 1
         ))
     })?;
-    let spooled = [Spooled::new(recording)];
-    let (surveys, even) = surveyed(&spooled, robot.joints.len())?;
+    let spooled = Spooled::new(recording);
+    let (surveys, even) = surveyed(&[&spooled], robot.joints.len())?;
     let (Some(survey), Some(even)) = (surveys.first(), even.first()) else {
         return Err(IdentifyError::NoRecording);
     };
     let treatment = treatment_of(&identification.details.treatment, survey);
-    let rows = rows_of(robot, identification, even.as_ref(), joint, &treatment)?;
+    let rows = rows_of(robot, identification, even, joint, &treatment)?;
     let reference = reference_of(recording, joint)?;
     let planned = reference.passes_of_reference(&options);
     let from_reference = both_ways(planned.iter().map(|s| s.speed));
