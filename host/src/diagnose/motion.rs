@@ -328,6 +328,7 @@ pub(crate) fn replayed(
             q: &first(|joint| &joint.q),
             v: &first(|joint| &joint.qd),
             substeps,
+            held: true,
         },
         &since,
         |_| (),

@@ -188,6 +188,7 @@ fn recorded(robot: &Robot) -> InMemory {
         q: &[-1.0],
         v: &[0.0],
         substeps: 8,
+        held: true,
     };
     let controllers = [robot.joints[0].controller.clone().unwrap()];
     let motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();

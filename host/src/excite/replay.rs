@@ -42,10 +42,10 @@ pub struct Replay {
 
 /// Simulates the robot of a description following `reference`, which is at rest where it begins.
 ///
-/// The recording begins when the model has stood at the first reference for one second. The controller holds its
-/// torque from each sample to the next; the recorded one is the mean of those held before and after the sample, which
-/// belongs to the same instant as position and velocity. The held one alone lies half a sample late, which at 1 kHz
-/// made the viscous friction identified from a run 1 % too small. `progress` is told how many samples are done, and of how many.
+/// The recording begins when the model has stood at the first reference for one second. The controllers run at every step of the
+/// simulation, [`STEP`] at most, whatever the rate of the recording: a loop that runs once a recorded sample, at 250 Hz, was not
+/// stable in all poses of an arm and made bursts of torque from limit to limit. `progress` is told how many samples are done, and of
+/// how many.
 ///
 /// # Errors
 /// [`ExciteError`]: noise that is not 0 or more, a robot without inertial parameters, gains that do not fit it.
@@ -76,14 +76,14 @@ pub fn replay(
         .map(|q| q.first().copied().unwrap_or(0.0))
         .collect();
     let (controllers, stand_ins) = controllers(robot, &model, &start)?;
-    let mut notes: Vec<String> = stand_ins
-        .iter()
-        .map(|joint| {
-            format!(
-                "Joint \"{joint}\" has no [joint.controller]; a stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth ran it."
-            )
-        })
-        .collect();
+    let mut notes = Vec::new();
+    if !stand_ins.is_empty() {
+        notes.push(format!(
+            "No [joint.controller] is described for {}; a stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth ran {}.",
+            stand_ins.join(", "),
+            if stand_ins.len() == 1 { "it" } else { "each" }
+        ));
+    }
     notes.extend(model.effects.unsimulated());
     let settling = (SETTLING / reference.period).ceil() as usize;
     let with_rest: Vec<Vec<f64>> = reference
@@ -103,6 +103,7 @@ pub fn replay(
         q: &start,
         v: &vec![0.0; start.len()],
         substeps: (reference.period / STEP).ceil().max(1.0) as u32,
+        held: false,
     };
     let mut motion = closed_loop(robot, &model, &controllers, &inputs, |done| {
         progress(done as u64, total);
@@ -110,14 +111,9 @@ pub fn replay(
     for (joint, cut) in robot.joints.iter().zip(&motion.saturated) {
         if *cut > 0 {
             notes.push(format!(
-                "The torque limit of joint \"{}\" cut in at {cut} of {total} samples.",
+                "The torque limit of joint \"{}\" cut in at {cut} of {total} samples; there the motion is not the reference's.",
                 joint.name
             ));
-        }
-    }
-    for held in &mut motion.tau {
-        for k in (1..held.len()).rev() {
-            held[k] = 0.5 * (held[k - 1] + held[k]);
         }
     }
     let mut random = rand_pcg::Pcg64::seed_from_u64(seed);

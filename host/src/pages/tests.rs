@@ -37,6 +37,7 @@ fn recording(robot: &Robot) -> InMemory {
         q: &[0.0],
         v: &[0.0],
         substeps: 4,
+        held: true,
     };
     let mut motion = closed_loop(robot, &model, &controllers, &inputs, |_| ()).unwrap();
     for (k, tau) in motion.tau[0].iter_mut().enumerate() {

@@ -294,7 +294,7 @@ fn massless(mass: &[f64], n: usize) -> Option<usize> {
 
 /// What drives a simulation, sample by sample.
 pub struct Inputs<'a> {
-    /// Sample period, s. The controllers run at this rate, their torque held in between.
+    /// Sample period, s.
     pub period: f64,
     /// Reference positions: one slice a joint, one value a sample.
     pub reference: &'a [Vec<f64>],
@@ -306,6 +306,23 @@ pub struct Inputs<'a> {
     pub v: &'a [f64],
     /// Steps within one sample.
     pub substeps: u32,
+    /// Whether the controllers run once a sample and hold their torque in between; else they answer at every step, to a
+    /// reference that goes straight from sample to sample, as a drive's own loop does that is faster than its recorder.
+    pub held: bool,
+}
+
+impl Inputs<'_> {
+    /// Reference of joint `i` so far beyond sample `k`, in samples; after the last it stays.
+    fn reference_at(&self, i: usize, k: usize, beyond: f64) -> f64 {
+        let (now, next) = (self.reference[i][k], self.reference[i].get(k + 1));
+        now + beyond * (next.unwrap_or(&now) - now)
+    }
+}
+
+/// Torque that a controller asks for, of position and velocity as read.
+fn wish(controller: &Controller, reference: f64, [q, v]: [f64; 2]) -> f64 {
+    let speed = controller.position_gain * (reference - q);
+    controller.torque_gain * controller.velocity_gain * (speed - v)
 }
 
 /// A simulated motion: per joint one value a sample.
@@ -315,7 +332,8 @@ pub struct Motion {
     pub q: Vec<Vec<f64>>,
     /// Velocities, likewise.
     pub qd: Vec<Vec<f64>>,
-    /// Torques of the controllers (without `Inputs::added`), as the sensors read them.
+    /// Torques of the controllers (without `Inputs::added`), as the sensors read them; where they are not held, the mean of
+    /// those before and after the sample, which belongs to its instant.
     pub tau: Vec<Vec<f64>>,
     /// Samples at which a joint's torque limit cut the controller's wish.
     pub saturated: Vec<usize>,
@@ -396,42 +414,41 @@ pub(crate) fn closed_loop_since(
         saturated: vec![0; n],
     };
     let (mut q, mut v) = (inputs.q.to_vec(), inputs.v.to_vec());
+    let mut applied = vec![0.0; n];
     let mut torque = vec![0.0; n];
     let mut errors = vec![[0.0; 2]; n];
-    let dt = inputs.period / f64::from(inputs.substeps.max(1));
+    let substeps = inputs.substeps.max(1);
+    let dt = inputs.period / f64::from(substeps);
     for k in 0..samples {
-        model.effects.position_errors(&q, &v, &mut errors)?;
-        for i in 0..n {
-            let c = &controllers[i];
-            let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
-            let wish = c.torque_gain
-                * c.velocity_gain
-                * (c.position_gain * (inputs.reference[i][k] - read[0]) - read[1]);
-            let limit = robot.joints[i]
-                .limits
-                .as_ref()
-                .and_then(|l| l.torque)
-                .unwrap_or(f64::INFINITY);
-            let applied = wish.max(-limit).min(limit);
-            motion.saturated[i] += usize::from(applied != wish);
-            motion.q[i].push(read[0]);
-            motion.qd[i].push(read[1]);
-            motion.tau[i].push(applied);
-            torque[i] = applied
-                + inputs
-                    .added
-                    .get(i)
-                    .and_then(|a| a.get(k))
-                    .copied()
-                    .unwrap_or(0.0);
-            if !(q[i].is_finite() && v[i].is_finite() && applied.is_finite()) {
-                return Err(SimulateError::Diverged {
-                    joint: robot.joints[i].name.clone(),
-                    time: k as f64 * inputs.period,
-                });
+        for step in 0..substeps {
+            if step == 0 || !inputs.held {
+                model.effects.position_errors(&q, &v, &mut errors)?;
             }
-        }
-        for _ in 0..inputs.substeps.max(1) {
+            for i in (0..n).filter(|_| step == 0 || !inputs.held) {
+                let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
+                let reference = inputs.reference_at(i, k, f64::from(step) / f64::from(substeps));
+                let wish = wish(&controllers[i], reference, read);
+                let limits = robot.joints[i].limits.as_ref();
+                let limit = limits.and_then(|l| l.torque).unwrap_or(f64::INFINITY);
+                let before = std::mem::replace(&mut applied[i], wish.max(-limit).min(limit));
+                if step == 0 {
+                    motion.saturated[i] += usize::from(applied[i] != wish);
+                    motion.q[i].push(read[0]);
+                    motion.qd[i].push(read[1]);
+                    motion.tau[i].push(match inputs.held || k == 0 {
+                        true => applied[i],
+                        false => 0.5 * (before + applied[i]),
+                    });
+                }
+                let added = inputs.added.get(i).and_then(|a| a.get(k));
+                torque[i] = applied[i] + added.copied().unwrap_or(0.0);
+                if !(q[i].is_finite() && v[i].is_finite() && applied[i].is_finite()) {
+                    return Err(SimulateError::Diverged {
+                        joint: robot.joints[i].name.clone(),
+                        time: k as f64 * inputs.period,
+                    });
+                }
+            }
             stepper.step(&mut q, &mut v, &torque, dt)?;
         }
         progress(k + 1);

@@ -148,6 +148,7 @@ fn the_stand_in_controller_tracks_a_slow_sine() {
         q: &[0.0],
         v: &[0.0],
         substeps: 4,
+        held: true,
     };
     let motion = closed_loop(&robot, &model, &controllers, &inputs, |_| ()).unwrap();
     // What a cascade without feed-forward leaves: gravity and viscous friction over the stiffness J·ω², and the

@@ -186,6 +186,7 @@ pub(super) fn check(
                     q: &q,
                     v: &v,
                     substeps,
+                    held: true,
                 },
                 |k| {
                     if k.is_multiple_of(1024) {

@@ -64,6 +64,7 @@ fn simulated(robot: &Robot, added: f64) -> Block {
             q: &[0.0],
             v: &[0.0],
             substeps: 16,
+            held: true,
         },
         |_| (),
     )

@@ -41,6 +41,7 @@ fn recorded(robot: &Robot, controllers: &[Controller]) -> Run {
         q: &still,
         v: &still,
         substeps: 4,
+        held: true,
     };
     let motion = closed_loop(robot, &model, controllers, &inputs, |_| ()).unwrap();
     let of_joint = |(j, reference): (usize, Vec<f64>)| JointRun {

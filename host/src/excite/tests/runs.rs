@@ -72,6 +72,60 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
     }
 }
 
+/// A loop that ran once a recorded sample was not stable where an arm stood otherwise than at the start, and made torques from limit
+/// to limit.
+#[test]
+fn the_rate_of_the_recorder_does_not_change_the_motion() {
+    let robot = Robot::from_toml(
+        crate::robot::template("edda").unwrap(),
+        Path::new("edda.toml"),
+    )
+    .unwrap();
+    let run = |rate: f64| {
+        let t = |k: usize| k as f64 / rate;
+        // From stretched to folded and back; the elbow turns twice as fast.
+        let shoulder = |t: f64| 0.8 * (1.0 - (1.5 * t).cos());
+        let elbow = |t: f64| 1.1 * (1.0 - (3.0 * t).cos());
+        let count = (8.0 * rate) as usize + 1;
+        let reference = SampledReference {
+            period: 1.0 / rate,
+            position: vec![
+                (0..count).map(|k| shoulder(t(k))).collect(),
+                (0..count).map(|k| elbow(t(k))).collect(),
+            ],
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+        };
+        let run = replay(&robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
+        assert_eq!(run.motion.saturated, [0, 0]);
+        run.motion
+    };
+    let (coarse, fine) = (run(50.0), run(2000.0));
+    for j in 0..2 {
+        let apart = |a: &[f64], b: &[f64]| {
+            let differences = a
+                .iter()
+                .zip(b.iter().step_by(40))
+                .map(|(a, b)| (a - b).abs());
+            differences.fold(0.0, f64::max)
+        };
+        let torque = fine.tau[j]
+            .iter()
+            .fold(0.0f64, |most, tau| most.max(tau.abs()));
+        let found = [
+            apart(&coarse.q[j], &fine.q[j]),
+            apart(&coarse.tau[j], &fine.tau[j]) / torque,
+        ];
+        println!(
+            "joint {}: {:e} rad, {:.2} % of the torque",
+            j + 1,
+            found[0],
+            100.0 * found[1]
+        );
+        assert!(found[0] < 1e-3 && found[1] < 0.03, "{found:?}");
+    }
+}
+
 #[test]
 fn a_noiseless_run_gives_its_parameters_back() {
     let robot = one_link();

@@ -60,6 +60,7 @@ fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, In
         q: &q,
         v: &v,
         substeps: 2,
+        held: true,
     };
     let mut motion = closed_loop(&robot, &model, &list, &inputs, |_| ()).unwrap();
     let mut disturb = |list: &mut [f64], size: f64| {
