@@ -6,9 +6,9 @@ use super::bodies::Fitting;
 use super::columns::Source;
 use super::floor;
 use super::outcome::Waterfall;
+use super::position_reading::position_reading;
 use super::profile::Profile;
 use super::refit::Refit;
-use super::rounding::rounding;
 use super::search::with;
 use crate::robot::{Robot, title_of};
 
@@ -53,8 +53,8 @@ pub(super) struct Descent {
     pub(super) holdout: Option<Fall>,
     /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
     louder: f64,
-    /// What the steps of the encoders leave in them, joint by joint.
-    rounding: Vec<f64>,
+    /// What the reading of the positions leaves in them, joint by joint.
+    position_reading: Vec<f64>,
     /// Noise of the rows held back by two runs of one motion among them, joint by joint.
     repeated: Vec<Option<f64>>,
 }
@@ -101,8 +101,8 @@ impl Descent {
             }
             holdout = Some(fall);
         }
-        let rounding = match sealed {
-            Some(sealed) => rounding(
+        let position_reading = match sealed {
+            Some(sealed) => position_reading(
                 &bench.source(sealed, &source.values)?,
                 &sealed.rows,
                 &sealed.position_filter()?,
@@ -124,7 +124,7 @@ impl Descent {
             train,
             holdout,
             louder: slower.max(1.0).sqrt(),
-            rounding,
+            position_reading,
             repeated,
         })
     }
@@ -142,19 +142,19 @@ impl Descent {
 
     /// Noise floors of the data that a share of the gap is of, the training's given.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
-        (self.noise(floors).zip(&self.rounding))
-            // Of an unknown floor the steps of an encoder say nothing.
-            .map(|(floor, rounding)| match floor.is_nan() {
+        (self.noise(floors).zip(&self.position_reading))
+            // Of an unknown floor the reading of a position says nothing.
+            .map(|(floor, positions)| match floor.is_nan() {
                 true => floor,
-                false => rounding.max(floor),
+                false => positions.max(floor),
             })
             .collect()
     }
 
-    /// Noise of the data held back with what the steps of the encoders leave besides: less than that is no finding.
+    /// Noise of the data held back with what the reading of the positions leaves besides: less than that is no finding.
     pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
-        (self.noise(floors).zip(&self.rounding))
-            .map(|(floor, rounding)| rounding.hypot(floor))
+        (self.noise(floors).zip(&self.position_reading))
+            .map(|(floor, positions)| positions.hypot(floor))
             .collect()
     }
 

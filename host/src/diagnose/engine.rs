@@ -34,10 +34,10 @@ use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Before, Diagnosis, Residual, Verdict};
+use super::position_reading::position_reading;
 use super::profile::Profile;
 use super::proof::{Proof, unexplained};
 use super::refit::Refit;
-use super::rounding::rounding;
 use super::search::{is_friction, with};
 use super::stated::{Now, Stated};
 use super::treated::treated;
@@ -201,7 +201,11 @@ fn attempt(
         rows: &loaded.rows,
         coordinates: &coordinates,
         pairs: floor::repeats(&loaded.runs),
-        rounding: rounding(&search.source, &loaded.rows, &loaded.position_filter()?)?,
+        position_reading: position_reading(
+            &search.source,
+            &loaded.rows,
+            &loaded.position_filter()?,
+        )?,
         base: &refit.base,
         seed: options.seed,
     };

@@ -6,8 +6,6 @@ use crate::prepare::Welch;
 
 /// Share of the band of thinned rows that the low-pass before the thinning passes.
 const PASSED: f64 = 0.8;
-/// Squares of third differences over those of second ones from which a reading counts as white, where it would be 10/3.
-const STILL_WHITE: f64 = 3.2;
 /// Samples of a segment of a torque's spectrum.
 const SEGMENT: usize = 1024;
 /// Parts, equal in log frequency, of the band in which a torque's noise is looked for.
@@ -168,7 +166,7 @@ pub(super) fn rms(signal: &[f64], keep: &[bool]) -> f64 {
 }
 
 /// RMS on rows `period` s apart of what a joint's torque reading varies by from sample to sample: less noise than that there
-/// cannot be. None where the reading is no longer white, because something has filtered it before.
+/// cannot be. None where the reading is not white.
 ///
 /// By third differences, in which a smooth torque leaves nothing: of white noise they have 20 times its variance, and second
 /// ones 6 times.
@@ -182,8 +180,7 @@ pub(super) fn of_reading(runs: &[Run], joint: usize, period: f64) -> Option<f64>
     }
     let rate = runs.first()?.rate;
     let passed = (PASSED / (period * rate)).min(1.0);
-    let white = all.third > STILL_WHITE * all.second && all.count > 0;
-    white.then(|| (all.variance() * passed).sqrt())
+    all.white().map(|variance| (variance * passed).sqrt())
 }
 
 /// RMS on rows `period` s apart of a torque's noise, by its spectrum beyond the band of the rows. None where that band is less than an
@@ -323,6 +320,8 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
         let filtered = white.windows(4).map(|w| w.iter().sum::<f64>() / 4.0);
         assert_eq!(reading(filtered.collect()), None);
+        let rising = white.windows(2).map(|w| w[1] - w[0]);
+        assert_eq!(reading(rising.collect()), None);
         assert_eq!(reading((0..20_000).map(smooth).collect()), None);
     }
 

@@ -60,7 +60,7 @@ pub(super) struct Judge<'a, 'r> {
     /// Runs that repeat each other.
     pub(super) pairs: Vec<(usize, usize)>,
     /// What the steps of the encoders leave in each joint's torque, which repeats with the motion.
-    pub(super) rounding: Vec<f64>,
+    pub(super) position_reading: Vec<f64>,
     /// The refitted nominal model on them.
     pub(super) base: &'a Fit<'r>,
     /// Of the bootstrap.
@@ -183,7 +183,8 @@ impl Judge<'_, '_> {
                 [None, fit.counts(j)].map(|counts| self.repeated(&residual, counts, j))
             })
             .collect();
-        let noise = |k: usize, j: usize| own[j][k].map(|own| own.noise.max(self.rounding[j]));
+        let noise =
+            |k: usize, j: usize| own[j][k].map(|own| own.noise.max(self.position_reading[j]));
         let (floors, quiet): (Vec<f64>, Vec<f64>) = (0..bursts.len())
             .map(|j| {
                 (
@@ -230,7 +231,10 @@ impl Judge<'_, '_> {
         match repeated {
             Some(noise) => (noise, FloorFrom::RepeatedRuns),
             None => match of_torque(runs, joint, self.rows.period) {
-                Some(noise) => (noise.max(self.rounding[joint]), FloorFrom::TorqueReading),
+                Some(noise) => (
+                    noise.hypot(self.position_reading[joint]),
+                    FloorFrom::TorqueReading,
+                ),
                 None => (f64::NAN, FloorFrom::Unknown),
             },
         }
@@ -385,15 +389,15 @@ impl Judge<'_, '_> {
         besides: f64,
         joint: usize,
     ) -> Option<[f64; 2]> {
-        let rounding = self.rounding[joint];
+        let positions = self.position_reading[joint];
         let beyond = |[rms, noise]: [f64; 2], ratio: f64| {
-            let rounded = noise.powi(2) + (BEYOND_FLOOR * rounding).powi(2);
+            let rounded = noise.powi(2) + (BEYOND_FLOOR * positions).powi(2);
             (rms * rms > (ratio * noise).powi(2).max(rounded) + besides).then_some([rms, noise])
         };
         beyond(all, BEYOND_FLOOR).or_else(|| {
             let Repeated { left, noise, rows } = own?;
             let chance = (1.0 + CHANCE / rows.sqrt()).sqrt();
-            beyond([left, noise.max(rounding)], BEYOND_OWN_FLOOR.max(chance))
+            beyond([left, noise.max(positions)], BEYOND_OWN_FLOOR.max(chance))
         })
     }
 }

@@ -44,6 +44,7 @@ mod pendulum_tests;
 mod pictures;
 #[cfg(test)]
 mod planar_tests;
+mod position_reading;
 mod predicted;
 mod profile;
 mod proof;
@@ -52,7 +53,6 @@ mod quiet;
 #[cfg(test)]
 mod recorded_tests;
 mod refit;
-mod rounding;
 mod rows;
 pub mod runs;
 pub mod sanity;

@@ -45,7 +45,8 @@ pub enum Residual {
 pub enum FloorFrom {
     /// Two runs of one motion: the difference of their residuals.
     RepeatedRuns,
-    /// The torque's own noise beyond the band of the motion. A lower limit: noise of the position is not in it.
+    /// The torque's own noise beyond the band of the motion, with what the steps of the encoders and white noise of the positions leave
+    /// in the torque. A lower limit: noise that is not told from the motion is not in it.
     TorqueReading,
     /// No motion was repeated, and the noise of the torque is not told from its signal.
     Unknown,

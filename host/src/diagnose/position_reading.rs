@@ -1,23 +1,67 @@
-//! Torque that is in the counts of an encoder alone: a position that is read in steps is off by up to half of one, and its second
-//! derivative by more than any noise of the current. It comes back with the motion, so that two runs of it do not tell.
+//! Torque that is in the reading of the positions alone: a position that is read in steps is off by up to half of one, or has noise, and
+//! its second derivative by more than any noise of the current. What the steps make comes back with the motion, so that two runs of it
+//! do not tell.
 //!
-//! Leaves out: steps that are not even; what a controller makes of them, which moves the joint and is in both.
+//! Leaves out: steps that are not even; noise that is not white, or that a recorder has filtered, which is not told from the motion;
+//! what a controller makes of them, which moves the joint and is in both.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::DiagnoseError;
 use super::columns::Source;
 use super::floor;
 use super::predicted::predict;
 use super::rows::Rows;
-use super::runs::resolution;
+use super::runs::{Run, WHITE, resolution};
 use crate::prepare::{LowPass, central_difference, second_difference};
 
-/// RMS on the rows of the first run that the steps of all positions leave in each joint's torque, N·m or N: the filtered motion
-/// read once more in such steps, half a step away, and filtered as it was. What its velocity then says of the direction of
-/// friction is in it.
+/// Of the noise that a position is read with once more.
+const SEED: u64 = 1;
+
+/// What a position's reading has beside the motion.
+#[derive(Clone, Copy)]
+enum Reading {
+    /// Counts of this size, rad or m.
+    Steps(f64),
+    /// White noise of this standard deviation, rad or m.
+    Noise(f64),
+}
+
+impl Reading {
+    /// That of a joint; none of one that is neither in steps nor white. White noise above that of the steps holds theirs.
+    fn of(run: &Run, joint: usize) -> Option<Self> {
+        let step = resolution(std::slice::from_ref(run), joint);
+        match white(&run.joints[joint].q_raw) {
+            Some(noise) if noise > step / 12.0_f64.sqrt() => Some(Self::Noise(noise)),
+            _ => (step > 0.0).then_some(Self::Steps(step)),
+        }
+    }
+}
+
+/// Standard deviation of white noise of a position; none where it is not white. A motion leaves less in differences of the fourth
+/// and fifth order than in lower ones.
+fn white(position: &[f64]) -> Option<f64> {
+    let differences = |x: &[f64]| -> Vec<f64> { x.windows(2).map(|w| w[1] - w[0]).collect() };
+    let square = |x: &[f64]| x.iter().map(|d| d * d).sum::<f64>() / x.len().max(1) as f64;
+    let fourth = (0..4).fold(position.to_vec(), |x, _| differences(&x));
+    // Squares of the binomial coefficients of either order.
+    let variances = [
+        square(&fourth) / 70.0,
+        square(&differences(&fourth)) / 252.0,
+    ];
+    WHITE
+        .contains(&(variances[1] / variances[0]))
+        .then(|| variances[1].sqrt())
+}
+
+/// RMS on the rows of the first run that the reading of all positions leaves in each joint's torque, N·m or N: the filtered motion
+/// read once more in their steps, half a step away, or with their noise, and filtered as it was. What its velocity then says of the
+/// direction of friction is in it.
 ///
 /// # Errors
 /// [`DiagnoseError::Model`].
-pub(super) fn rounding(
+pub(super) fn position_reading(
     source: &Source,
     rows: &Rows,
     filter: &LowPass,
@@ -27,22 +71,28 @@ pub(super) fn rounding(
         return Ok(vec![0.0; joints]);
     };
     // The motion passes the filter twice either way: what that takes off it is not of the steps.
-    let filtered = |read: &dyn Fn(f64, f64) -> f64| {
+    let filtered = |read: &mut dyn FnMut(f64, Reading) -> f64| {
         let mut again = run.clone();
         for (joint, own) in again.joints.iter_mut().enumerate() {
-            let step = resolution(std::slice::from_ref(run), joint);
-            if step == 0.0 {
+            let Some(reading) = Reading::of(run, joint) else {
                 continue;
-            }
-            let positions: Vec<f64> = own.q.iter().map(|q| read(*q, step)).collect();
+            };
+            let positions: Vec<f64> = own.q.iter().map(|q| read(*q, reading)).collect();
             own.q = filter.zero_phase(&positions);
             own.qd = central_difference(&own.q, 1.0 / run.rate);
             own.qdd = second_difference(&own.q, 1.0 / run.rate);
         }
         again
     };
-    let smooth = filtered(&|q, _| q);
-    let read = filtered(&|q, step| step * ((q / step).floor() + 0.5));
+    let smooth = filtered(&mut |q, _| q);
+    let mut random = rand_pcg::Pcg64::seed_from_u64(SEED);
+    let read = filtered(&mut |q, reading| match reading {
+        Reading::Steps(step) => step * ((q / step).floor() + 0.5),
+        Reading::Noise(std) => {
+            let unit: f64 = StandardNormal.sample(&mut random);
+            q + std * unit
+        }
+    });
     // The source's own prediction may hold effects.
     let [before, after] =
         [&smooth, &read].map(|run| predict(source.nominal, source.robot, &source.values, run));
@@ -56,4 +106,31 @@ pub(super) fn rounding(
             floor::rms(&thin, keep)
         })
         .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Noise of 10 µrad beside motions that second differences tell from nothing; a count in its place, and a filtered noise.
+    #[test]
+    fn noise_of_a_position_is_told_from_its_motion() {
+        let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+        let mut noise: Vec<f64> = (0..20_000)
+            .map(|_| StandardNormal.sample(&mut random))
+            .collect();
+        noise.iter_mut().for_each(|x| *x *= 1e-5);
+        for rate in [250.0, 1000.0] {
+            let motion = |k: usize| 1.2 * (5.0 * k as f64 / rate).sin();
+            let read: Vec<f64> = noise
+                .iter()
+                .enumerate()
+                .map(|(k, x)| motion(k) + x)
+                .collect();
+            let found = white(&read).unwrap_or(f64::NAN);
+            assert!((found / 1e-5 - 1.0).abs() < 0.03, "{rate} Hz: {found:e}");
+            let filtered: Vec<f64> = read.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+            assert_eq!(white(&filtered), None);
+        }
+    }
 }

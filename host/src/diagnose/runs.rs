@@ -10,6 +10,11 @@ use super::past::Past;
 use crate::data::Block;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 
+/// Variance of a reading by its differences of one order over that by those of the order before, between which it counts as white: of
+/// white noise they are equal. Less has a reading that was filtered; more has one that rises with the frequency, such as a controller's
+/// answer to the noise of a position, and then less of it lies in the rows' band than of white noise.
+pub(super) const WHITE: std::ops::Range<f64> = 0.96..1.04;
+
 /// One joint over a stretch, at the recording's own rate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointRun {
@@ -64,6 +69,14 @@ impl Differences {
             sums.count += 1;
         }
         sums
+    }
+
+    /// [`Self::variance`] of a reading whose noise is white; none of another.
+    pub fn white(&self) -> Option<f64> {
+        let before = self.second / 6.0 / self.count.max(1) as f64;
+        WHITE
+            .contains(&(self.variance() / before))
+            .then(|| self.variance())
     }
 
     /// Variance of what a sample's reading has by itself, of the signal's unit squared: a smooth signal leaves nothing in third

@@ -442,7 +442,7 @@ pub(super) fn floor_how(found: &Found, pairs: &[(usize, usize)]) -> String {
             )
         }
         None => format!(
-            "No motion was recorded twice, so the floor is the noise of the torque's reading beyond the band of the motion, a lower limit: {}. It is not known where that noise is not told from the signal.",
+            "No motion was recorded twice, so the floor is the noise of the torque's reading beyond the band of the motion with that of the positions' reading, a lower limit: {}. It is not known where that noise is not told from the signal.",
             figures.join(", ")
         ),
     }

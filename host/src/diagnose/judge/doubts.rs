@@ -128,7 +128,8 @@ impl Judge<'_, '_> {
         } else {
             TIMES_READING
         };
-        let own = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
+        let torque = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
+        let own = torque.hypot(self.position_reading[joint]);
         let rms = fit.even_rms(joint);
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         (rms > far * own).then(|| Remainder {
@@ -137,7 +138,7 @@ impl Judge<'_, '_> {
             rms: (rms * rms - own * own).sqrt(),
             ratio: rms / own,
             text: format!(
-                "Of joint {name} {} {} are left, {} times what its reading varies by from sample to sample. No motion was recorded twice, so nobody knows how much of that is noise: record the training motion again and give both.",
+                "Of joint {name} {} {} are left, {} times what torque and positions vary by from sample to sample. No motion was recorded twice, so nobody knows how much of that is noise: record the training motion again and give both.",
                 format_significant(rms, 3),
                 format_unit(kind.units().1),
                 format_significant(rms / own, 2)

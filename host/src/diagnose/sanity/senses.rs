@@ -157,8 +157,9 @@ impl Judge<'_> {
             About::Torque,
             j,
             format!(
-                "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {:.3} W and the inertia is {:.4}, where friction takes and inertia is positive; {which}.",
-                -loss.value, inertia.value
+                "tau{n} and q{n} are counted in opposite senses, so one has the wrong sign: as recorded friction gives {} W and the inertia is {}, where friction takes and inertia is positive; {which}.",
+                format_significant(-loss.value, 2),
+                format_significant(inertia.value, 2)
             ),
         );
         Ok(Some(Suspicion::new(fault, undo)))

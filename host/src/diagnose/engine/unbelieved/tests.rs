@@ -63,7 +63,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
             rows: &loaded.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
-            rounding: vec![0.0],
+            position_reading: vec![0.0],
             base: &refit.base,
             seed: 1,
         };
@@ -165,7 +165,7 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
         rows: &loaded.rows,
         coordinates: &[Vec::new(), Vec::new()],
         pairs: Vec::new(),
-        rounding: vec![0.0; 2],
+        position_reading: vec![0.0; 2],
         base: &refit.base,
         seed: 1,
     };
@@ -223,7 +223,7 @@ fn a_gap_that_may_be_none_is_none() {
             rows: &loaded.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
-            rounding: vec![0.0],
+            position_reading: vec![0.0],
             base: &refit.base,
             seed: 1,
         };
