@@ -11,7 +11,8 @@ use crate::excite::{Noise, load_reference, replay};
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
 ///
 /// Writes a recording with the columns t, q, qd, tau and ref per joint, which the other commands read like one of the
-/// real robot. The same seed gives the same file.
+/// real robot. The same seed gives the same file. The controllers answer at every step of the simulation, 0.25 ms at most, whatever
+/// the rate of the recording.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Robot description (.toml or .urdf) with inertia and friction

@@ -13,9 +13,10 @@ use super::scenario::{Arm, ArmScenario, Fault};
 use super::waves::is_of_the_motor;
 use super::{Diagnosis, Options, diagnose};
 use crate::data::{Source, data_dir};
+use crate::excite::{Noise, SampledReference, replay};
 use crate::identify::least_eigenvalue;
-use crate::prepare::Recording;
-use crate::robot::{JointFriction, Origin, Robot};
+use crate::prepare::{InMemory, Recording};
+use crate::robot::{JointFriction, Origin, Robot, template};
 
 fn asked(scenario: &ArmScenario) -> (Diagnosis, Robot) {
     let recordings = scenario.make().unwrap();
@@ -94,6 +95,47 @@ fn told(what: &str, diagnosis: &Diagnosis) {
             "    tried {} on {}: gain {:.4} ({:.1} sigmas) p {:.1e} {}",
             t.effect, t.joint, t.gain, t.gain_sigmas, t.p_value, t.refused
         );
+    }
+}
+
+/// What the program itself simulates by a description has nothing that the description lacks, and what is left is what was put in:
+/// a direct-drive arm whose noise is that of its positions, and the IRp-6 with its coupled motors.
+#[test]
+fn an_arm_simulated_by_its_description_lacks_nothing() {
+    for (name, torque) in [("edda", 0.05), ("irp6", 0.5)] {
+        let toml = template(name).unwrap();
+        let robot = Robot::from_toml(toml, Path::new("arm.toml")).unwrap();
+        let run = |seed: u64| {
+            let phase =
+                |j: usize, h: u32| (seed + 3) as f64 * (7 * j + 3 * h as usize) as f64 * 0.86;
+            let reference =
+                SampledReference::eased_sines(&robot, [1e-3, 25.0], (4, 0.25, 6.3), phase);
+            let noise = Noise {
+                position: 1e-5,
+                velocity: 0.0,
+                torque,
+            };
+            let made = replay(&robot, &reference, noise, seed, |_, _| ()).unwrap();
+            InMemory {
+                label: format!("{name} {seed}"),
+                blocks: vec![made.motion.recorded(made.period, &made.reference)],
+            }
+        };
+        let (train, held) = (run(1), run(2));
+        let (found, _) = diagnose(
+            &robot,
+            &[&train],
+            &[&held],
+            &Options::default(),
+            &mut |_| (),
+        )
+        .unwrap();
+        told(name, &found);
+        assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.words);
+        for left in &found.left {
+            println!("  {}: {} over {}", left.joint, left.after, left.floor);
+            assert!((0.9..1.25).contains(&(left.after / left.floor)), "{left:?}");
+        }
     }
 }
 

@@ -53,14 +53,16 @@ pub(super) struct Descent {
     pub(super) holdout: Option<Fall>,
     /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
     louder: f64,
-    /// What the reading of the positions leaves in them, joint by joint.
-    position_reading: Vec<f64>,
+    /// What the reading of the positions leaves in the training data, where its floor has that added, and in the rows held back, joint
+    /// by joint. It goes by the inertia of the poses.
+    position_reading: [Vec<f64>; 2],
     /// Noise of the rows held back by two runs of one motion among them, joint by joint.
     repeated: Vec<Option<f64>>,
 }
 
 impl Descent {
-    /// Through the effects in the order that they were found in; the first `described` are the description's.
+    /// Through the effects in the order that they were found in; the first `described` are the description's. `added` is what the
+    /// training's floor has of the reading of its positions, joint by joint.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
@@ -72,6 +74,7 @@ impl Descent {
         loaded: &Loaded,
         sealed: Option<&Loaded>,
         source: &Source,
+        added: Vec<f64>,
     ) -> Result<Self, DiagnoseError> {
         let bench = fitting.bench;
         let n = bench.robot.joints.len();
@@ -107,7 +110,7 @@ impl Descent {
                 &sealed.rows,
                 &sealed.position_filter()?,
             )?,
-            None => vec![0.0; n],
+            None => added.clone(),
         };
         let mut repeated = vec![None; n];
         if let Some(sealed) = sealed {
@@ -124,7 +127,7 @@ impl Descent {
             train,
             holdout,
             louder: slower.max(1.0).sqrt(),
-            position_reading,
+            position_reading: [added, position_reading],
             repeated,
         })
     }
@@ -142,19 +145,30 @@ impl Descent {
 
     /// Noise floors of the data that a share of the gap is of, the training's given.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
-        (self.noise(floors).zip(&self.position_reading))
-            // Of an unknown floor the reading of a position says nothing.
-            .map(|(floor, positions)| match floor.is_nan() {
-                true => floor,
-                false => positions.max(floor),
-            })
-            .collect()
+        // Of an unknown floor the reading of a position says nothing; in that of two runs of one motion its noise is.
+        self.with_positions(floors, |floor, positions| match floor.is_nan() {
+            true => floor,
+            false => positions.max(floor),
+        })
     }
 
     /// Noise of the data held back with what the reading of the positions leaves besides: less than that is no finding.
     pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
-        (self.noise(floors).zip(&self.position_reading))
-            .map(|(floor, positions)| positions.hypot(floor))
+        self.with_positions(floors, f64::hypot)
+    }
+
+    /// Noise of the data held back with what the reading of their positions leaves: in its place where the training's floor has that
+    /// added, else as `both` says.
+    fn with_positions(&self, floors: &[f64], both: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let [added, held] = &self.position_reading;
+        (self.noise(floors).enumerate())
+            .map(|(j, floor)| {
+                let added = self.louder * added[j];
+                match self.repeated[j].is_none() && floor > added && added > 0.0 {
+                    true => (floor * floor - added * added).sqrt().hypot(held[j]),
+                    false => both(floor, held[j]),
+                }
+            })
             .collect()
     }
 

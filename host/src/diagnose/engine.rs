@@ -265,6 +265,7 @@ fn attempt(
         loaded,
         sealed.as_ref(),
         &search.source,
+        judge.added(&judged.from),
     )?;
     if let (None, Some(held)) = (&judged.left, &descent.holdout) {
         let mut named: Vec<(usize, [f64; 2])> = (judged.chosen[described..].iter())

@@ -240,6 +240,15 @@ impl Judge<'_, '_> {
         }
     }
 
+    /// What the floors have of the reading of the positions, joint by joint: nothing where they rest on something else.
+    pub(super) fn added(&self, from: &[FloorFrom]) -> Vec<f64> {
+        let own = |(positions, from): (&f64, &FloorFrom)| match from {
+            FloorFrom::TorqueReading => *positions,
+            _ => 0.0,
+        };
+        self.position_reading.iter().zip(from).map(own).collect()
+    }
+
     /// Where the residual of the refitted description sits, `base`; `described` are its effects.
     pub(super) fn places(&self, base: &Fit, floors: &[f64], described: &[Profile]) -> Vec<Place> {
         let fit = with(base, described, None);
