@@ -322,7 +322,6 @@ mod tests {
                 first_line: from as u64 + 2,
                 continues,
                 t,
-                ..Default::default()
             }
         };
         let source = InMemory {
