@@ -13,11 +13,15 @@ use super::columns::Source;
 use super::floor;
 use super::predicted::predict;
 use super::rows::Rows;
-use super::runs::{Run, WHITE, resolution};
+use super::runs::{Run, resolution};
 use crate::prepare::{LowPass, central_difference, second_difference};
 
 /// Of the noise that a position is read with once more.
 const SEED: u64 = 1;
+
+/// Variance of a position's noise by differences of the fifth order over that by those of the fourth, between which it counts as white:
+/// of white noise they are equal. Less has a reading that was filtered, more one whose noise rises with the frequency.
+const WHITE: std::ops::Range<f64> = 0.96..1.04;
 
 /// What a position's reading has beside the motion.
 #[derive(Clone, Copy)]

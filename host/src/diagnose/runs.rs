@@ -10,10 +10,10 @@ use super::past::Past;
 use crate::data::Block;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 
-/// Variance of a reading by its differences of one order over that by those of the order before, between which it counts as white: of
-/// white noise they are equal. Less has a reading that was filtered; more has one that rises with the frequency, such as a controller's
-/// answer to the noise of a position, and then less of it lies in the rows' band than of white noise.
-pub(super) const WHITE: std::ops::Range<f64> = 0.96..1.04;
+/// Variance of a torque's reading by its third differences over that by its second ones from which it counts as white: of white noise
+/// they are equal, and a filter makes it less. Noise that rises with the frequency, as a controller answers that of a position, counts as
+/// white, too, and then what is said to lie in the rows' band is more than does.
+const STILL_WHITE: f64 = 0.96;
 
 /// One joint over a stretch, at the recording's own rate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,12 +71,10 @@ impl Differences {
         sums
     }
 
-    /// [`Self::variance`] of a reading whose noise is white; none of another.
+    /// [`Self::variance`] of a reading that nothing has filtered; none of another.
     pub fn white(&self) -> Option<f64> {
         let before = self.second / 6.0 / self.count.max(1) as f64;
-        WHITE
-            .contains(&(self.variance() / before))
-            .then(|| self.variance())
+        (self.variance() > STILL_WHITE * before && self.count > 0).then(|| self.variance())
     }
 
     /// Variance of what a sample's reading has by itself, of the signal's unit squared: a smooth signal leaves nothing in third
