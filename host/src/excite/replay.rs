@@ -43,7 +43,7 @@ pub struct Replay {
 /// Simulates the robot of a description following `reference`, which is at rest where it begins.
 ///
 /// The recording begins when the model has stood at the first reference for one second. The controllers run at every step of the
-/// simulation, [`STEP`] at most, whatever the rate of the recording: a loop that runs once a recorded sample, at 250 Hz, was not
+/// simulation, 0.25 ms at most, whatever the rate of the recording: a loop that runs once a recorded sample, at 250 Hz, was not
 /// stable in all poses of an arm and made bursts of torque from limit to limit. `progress` is told how many samples are done, and of
 /// how many.
 ///
