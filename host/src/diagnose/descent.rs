@@ -6,7 +6,7 @@ use super::bodies::Fitting;
 use super::columns::Source;
 use super::floor;
 use super::outcome::Waterfall;
-use super::position_reading::position_reading;
+use super::position_reading::PositionReading;
 use super::profile::Profile;
 use super::refit::Refit;
 use super::search::with;
@@ -53,9 +53,10 @@ pub(super) struct Descent {
     pub(super) holdout: Option<Fall>,
     /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
     louder: f64,
-    /// What the reading of the positions leaves in the training data, where its floor has that added, and in the rows held back, joint
-    /// by joint. It goes by the inertia of the poses.
-    position_reading: [Vec<f64>; 2],
+    /// What the floor of the training data has of the reading of its positions, joint by joint, which goes by the inertia of the poses.
+    added: Vec<f64>,
+    /// What that of the rows held back leaves in them.
+    position_reading: PositionReading,
     /// Noise of the rows held back by two runs of one motion among them, joint by joint.
     repeated: Vec<Option<f64>>,
 }
@@ -105,12 +106,12 @@ impl Descent {
             holdout = Some(fall);
         }
         let position_reading = match sealed {
-            Some(sealed) => position_reading(
+            Some(sealed) => PositionReading::of(
                 &bench.source(sealed, &source.values)?,
                 &sealed.rows,
                 &sealed.position_filter()?,
             )?,
-            None => added.clone(),
+            None => PositionReading::of_noise(added.clone()),
         };
         let mut repeated = vec![None; n];
         if let Some(sealed) = sealed {
@@ -127,7 +128,8 @@ impl Descent {
             train,
             holdout,
             louder: slower.max(1.0).sqrt(),
-            position_reading: [added, position_reading],
+            added,
+            position_reading,
             repeated,
         })
     }
@@ -145,10 +147,10 @@ impl Descent {
 
     /// Noise floors of the data that a share of the gap is of, the training's given.
     pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
-        // Of an unknown floor the reading of a position says nothing; in that of two runs of one motion its noise is.
-        self.with_positions(floors, |floor, positions| match floor.is_nan() {
+        // Of an unknown floor the steps of an encoder say nothing.
+        self.with_positions(floors, |floor, steps| match floor.is_nan() {
             true => floor,
-            false => positions.max(floor),
+            false => steps.max(floor),
         })
     }
 
@@ -158,15 +160,15 @@ impl Descent {
     }
 
     /// Noise of the data held back with what the reading of their positions leaves: in its place where the training's floor has that
-    /// added, else as `both` says.
+    /// added; else their noise is in it, and the steps are taken with it as `both` says.
     fn with_positions(&self, floors: &[f64], both: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-        let [added, held] = &self.position_reading;
+        let (added, held) = (&self.added, &self.position_reading);
         (self.noise(floors).enumerate())
             .map(|(j, floor)| {
                 let added = self.louder * added[j];
                 match self.repeated[j].is_none() && floor > added && added > 0.0 {
-                    true => (floor * floor - added * added).sqrt().hypot(held[j]),
-                    false => both(floor, held[j]),
+                    true => (floor * floor - added * added).sqrt().hypot(held.whole(j)),
+                    false => both(floor, held.steps[j]),
                 }
             })
             .collect()

@@ -34,7 +34,7 @@ use super::lead::{differ, leads, moved};
 use super::locate::coordinates;
 use super::motion::Replay;
 use super::outcome::{Before, Diagnosis, Residual, Verdict};
-use super::position_reading::position_reading;
+use super::position_reading::PositionReading;
 use super::profile::Profile;
 use super::proof::{Proof, unexplained};
 use super::refit::Refit;
@@ -201,7 +201,7 @@ fn attempt(
         rows: &loaded.rows,
         coordinates: &coordinates,
         pairs: floor::repeats(&loaded.runs),
-        position_reading: position_reading(
+        position_reading: PositionReading::of(
             &search.source,
             &loaded.rows,
             &loaded.position_filter()?,

@@ -17,6 +17,7 @@ use super::fit::Fit;
 use super::floor::{self, Repeated};
 use super::locate::{Coordinate, Known, Refitted, locate};
 use super::outcome::{FloorFrom, Place, Remainder};
+use super::position_reading::PositionReading;
 use super::profile::{Profile, SIGNIFICANT};
 use super::proof::of_torque;
 use super::rows::Rows;
@@ -59,8 +60,8 @@ pub(super) struct Judge<'a, 'r> {
     pub(super) coordinates: &'a [Vec<Coordinate>],
     /// Runs that repeat each other.
     pub(super) pairs: Vec<(usize, usize)>,
-    /// What the steps of the encoders leave in each joint's torque, which repeats with the motion.
-    pub(super) position_reading: Vec<f64>,
+    /// What the reading of the positions leaves in each joint's torque.
+    pub(super) position_reading: PositionReading,
     /// The refitted nominal model on them.
     pub(super) base: &'a Fit<'r>,
     /// Of the bootstrap.
@@ -184,7 +185,7 @@ impl Judge<'_, '_> {
             })
             .collect();
         let noise =
-            |k: usize, j: usize| own[j][k].map(|own| own.noise.max(self.position_reading[j]));
+            |k: usize, j: usize| own[j][k].map(|own| own.noise.max(self.position_reading.steps[j]));
         let (floors, quiet): (Vec<f64>, Vec<f64>) = (0..bursts.len())
             .map(|j| {
                 (
@@ -232,7 +233,7 @@ impl Judge<'_, '_> {
             Some(noise) => (noise, FloorFrom::RepeatedRuns),
             None => match of_torque(runs, joint, self.rows.period) {
                 Some(noise) => (
-                    noise.hypot(self.position_reading[joint]),
+                    noise.hypot(self.position_reading.whole(joint)),
                     FloorFrom::TorqueReading,
                 ),
                 None => (f64::NAN, FloorFrom::Unknown),
@@ -242,11 +243,11 @@ impl Judge<'_, '_> {
 
     /// What the floors have of the reading of the positions, joint by joint: nothing where they rest on something else.
     pub(super) fn added(&self, from: &[FloorFrom]) -> Vec<f64> {
-        let own = |(positions, from): (&f64, &FloorFrom)| match from {
-            FloorFrom::TorqueReading => *positions,
+        let own = |(joint, from): (usize, &FloorFrom)| match from {
+            FloorFrom::TorqueReading => self.position_reading.whole(joint),
             _ => 0.0,
         };
-        self.position_reading.iter().zip(from).map(own).collect()
+        from.iter().enumerate().map(own).collect()
     }
 
     /// Where the residual of the refitted description sits, `base`; `described` are its effects.
@@ -398,15 +399,15 @@ impl Judge<'_, '_> {
         besides: f64,
         joint: usize,
     ) -> Option<[f64; 2]> {
-        let positions = self.position_reading[joint];
+        let steps = self.position_reading.steps[joint];
         let beyond = |[rms, noise]: [f64; 2], ratio: f64| {
-            let rounded = noise.powi(2) + (BEYOND_FLOOR * positions).powi(2);
+            let rounded = noise.powi(2) + (BEYOND_FLOOR * steps).powi(2);
             (rms * rms > (ratio * noise).powi(2).max(rounded) + besides).then_some([rms, noise])
         };
         beyond(all, BEYOND_FLOOR).or_else(|| {
             let Repeated { left, noise, rows } = own?;
             let chance = (1.0 + CHANCE / rows.sqrt()).sqrt();
-            beyond([left, noise.max(positions)], BEYOND_OWN_FLOOR.max(chance))
+            beyond([left, noise.max(steps)], BEYOND_OWN_FLOOR.max(chance))
         })
     }
 }

@@ -59,28 +59,70 @@ fn white(position: &[f64]) -> Option<f64> {
         .then(|| variances[1].sqrt())
 }
 
-/// RMS on the rows of the first run that the reading of all positions leaves in each joint's torque, N·m or N: the filtered motion
-/// read once more in their steps, half a step away, or with their noise, and filtered as it was. What its velocity then says of the
-/// direction of friction is in it.
-///
-/// # Errors
-/// [`DiagnoseError::Model`].
-pub(super) fn position_reading(
+/// RMS that the reading of the positions leaves in each joint's torque, N·m or N.
+pub(super) struct PositionReading {
+    /// By the steps of encoders, which comes back with the motion.
+    pub(super) steps: Vec<f64>,
+    /// By white noise, which does not.
+    pub(super) noise: Vec<f64>,
+}
+
+impl PositionReading {
+    /// By white noise alone, or by nothing.
+    pub(super) fn of_noise(noise: Vec<f64>) -> Self {
+        Self {
+            steps: vec![0.0; noise.len()],
+            noise,
+        }
+    }
+
+    /// On the rows of the first run: the filtered motion read once more in the steps, half a step away, or with the noise of the
+    /// positions, and filtered as it was. What its velocity then says of the direction of friction is in it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn of(
+        source: &Source,
+        rows: &Rows,
+        filter: &LowPass,
+    ) -> Result<Self, DiagnoseError> {
+        let joints = rows.joints();
+        let Some(run) = source.runs.first() else {
+            return Ok(Self::of_noise(vec![0.0; joints]));
+        };
+        let all: Vec<Option<Reading>> = (0..joints).map(|j| Reading::of(run, j)).collect();
+        let part = |noisy: bool| -> Vec<Option<Reading>> {
+            let own = |reading: &Reading| matches!(reading, Reading::Noise(_)) == noisy;
+            all.iter().map(|reading| reading.filter(own)).collect()
+        };
+        let [steps, noise] = [false, true].map(|noisy| left(source, rows, filter, &part(noisy)));
+        Ok(Self {
+            steps: steps?,
+            noise: noise?,
+        })
+    }
+
+    /// By both, of one joint.
+    pub(super) fn whole(&self, joint: usize) -> f64 {
+        self.steps[joint].hypot(self.noise[joint])
+    }
+}
+
+/// What such readings leave in each joint's torque.
+fn left(
     source: &Source,
     rows: &Rows,
     filter: &LowPass,
+    readings: &[Option<Reading>],
 ) -> Result<Vec<f64>, DiagnoseError> {
-    let joints = rows.joints();
-    let Some(run) = source.runs.first() else {
-        return Ok(vec![0.0; joints]);
+    let (Some(run), true) = (source.runs.first(), readings.iter().any(Option::is_some)) else {
+        return Ok(vec![0.0; readings.len()]);
     };
-    // The motion passes the filter twice either way: what that takes off it is not of the steps.
+    // The motion passes the filter twice either way: what that takes off it is not of the reading.
     let filtered = |read: &mut dyn FnMut(f64, Reading) -> f64| {
         let mut again = run.clone();
-        for (joint, own) in again.joints.iter_mut().enumerate() {
-            let Some(reading) = Reading::of(run, joint) else {
-                continue;
-            };
+        for (own, reading) in again.joints.iter_mut().zip(readings) {
+            let Some(reading) = *reading else { continue };
             let positions: Vec<f64> = own.q.iter().map(|q| read(*q, reading)).collect();
             own.q = filter.zero_phase(&positions);
             own.qd = central_difference(&own.q, 1.0 / run.rate);

@@ -75,7 +75,8 @@ pub enum PrepareError {
     },
     /// The rows are not evenly spaced in time.
     #[error(
-        "{label} is not evenly sampled: near line {line} its steps in time are unlike the usual {mean:.6} s, the longest is {longest:.6} s; rows more than 2.5 usual steps apart are not interpolated, so record or resample it at a constant rate."
+        "{label} is not evenly sampled: near line {line} its steps in time are unlike the usual {mean:.6} s, the longest is {longest:.6} s; rows more than {} usual steps apart are not interpolated, so record or resample it at a constant rate.",
+        resample::LONGEST_STEP
     )]
     Irregular {
         /// The recording.

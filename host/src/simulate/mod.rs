@@ -335,7 +335,7 @@ pub struct Motion {
     /// Torques of the controllers (without `Inputs::added`), as the sensors read them; where they are not held, the mean of
     /// those before and after the sample, which belongs to its instant.
     pub tau: Vec<Vec<f64>>,
-    /// Samples at which a joint's torque limit cut the controller's wish.
+    /// Samples at or after which, up to the next, a joint's torque limit cut the controller's wish.
     pub saturated: Vec<usize>,
 }
 
@@ -416,23 +416,27 @@ pub(crate) fn closed_loop_since(
     let (mut q, mut v) = (inputs.q.to_vec(), inputs.v.to_vec());
     let mut applied = vec![0.0; n];
     let mut torque = vec![0.0; n];
+    let mut cut = vec![false; n];
     let mut errors = vec![[0.0; 2]; n];
     let substeps = inputs.substeps.max(1);
     let dt = inputs.period / f64::from(substeps);
+    // Answers of the controllers within one sample, and steps to each.
+    let (answers, steps) = match inputs.held {
+        true => (1, substeps),
+        false => (substeps, 1),
+    };
     for k in 0..samples {
-        for step in 0..substeps {
-            if step == 0 || !inputs.held {
-                model.effects.position_errors(&q, &v, &mut errors)?;
-            }
-            for i in (0..n).filter(|_| step == 0 || !inputs.held) {
+        for answer in 0..answers {
+            model.effects.position_errors(&q, &v, &mut errors)?;
+            for i in 0..n {
                 let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
-                let reference = inputs.reference_at(i, k, f64::from(step) / f64::from(substeps));
+                let reference = inputs.reference_at(i, k, f64::from(answer) / f64::from(answers));
                 let wish = wish(&controllers[i], reference, read);
                 let limits = robot.joints[i].limits.as_ref();
                 let limit = limits.and_then(|l| l.torque).unwrap_or(f64::INFINITY);
                 let before = std::mem::replace(&mut applied[i], wish.max(-limit).min(limit));
-                if step == 0 {
-                    motion.saturated[i] += usize::from(applied[i] != wish);
+                cut[i] |= applied[i] != wish;
+                if answer == 0 {
                     motion.q[i].push(read[0]);
                     motion.qd[i].push(read[1]);
                     motion.tau[i].push(match inputs.held || k == 0 {
@@ -449,7 +453,12 @@ pub(crate) fn closed_loop_since(
                     });
                 }
             }
-            stepper.step(&mut q, &mut v, &torque, dt)?;
+            for _ in 0..steps {
+                stepper.step(&mut q, &mut v, &torque, dt)?;
+            }
+        }
+        for (count, cut) in motion.saturated.iter_mut().zip(&mut cut) {
+            *count += usize::from(std::mem::take(cut));
         }
         progress(k + 1);
     }

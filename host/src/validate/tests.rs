@@ -80,7 +80,7 @@ fn simulated(robot: &Robot, added: f64) -> Block {
 }
 
 /// The rows with the numbers that `at` gives.
-fn stretched(block: &Block, at: impl Fn(usize) -> usize) -> Block {
+fn picked(block: &Block, at: impl Fn(usize) -> usize) -> Block {
     let rows: Vec<usize> = (0..).map(at).take_while(|k| *k < block.len()).collect();
     let of = |column: &Vec<f64>| rows.iter().map(|k| column[*k]).collect::<Vec<f64>>();
     let mut few = block.clone();
@@ -135,7 +135,7 @@ fn a_recording_of_the_description_itself_leaves_nothing() {
 fn uneven_rows_are_judged_as_even_ones_are() {
     let robot = pendulum();
     let mut block = simulated(&robot, 0.4);
-    let even = run(&robot, stretched(&block, |k| 12 * k));
+    let even = run(&robot, picked(&block, |k| 12 * k));
     let mut lots = rand_pcg::Pcg64::seed_from_u64(5);
     let (mut at, mut k) = (Vec::new(), 0);
     while k < block.len() {
@@ -143,7 +143,7 @@ fn uneven_rows_are_judged_as_even_ones_are() {
         k += lots.random_range(8..=16);
     }
     let rows = at.len();
-    block = stretched(&block, |k| at.get(k).copied().unwrap_or(usize::MAX));
+    block = picked(&block, |k| at.get(k).copied().unwrap_or(usize::MAX));
     assert_eq!(block.len(), rows);
     let uneven = run(&robot, block);
     assert!(

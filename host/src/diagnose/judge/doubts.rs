@@ -129,7 +129,7 @@ impl Judge<'_, '_> {
             TIMES_READING
         };
         let torque = floor::of_reading(self.search.source.runs, joint, self.rows.period)?;
-        let own = torque.hypot(self.position_reading[joint]);
+        let own = torque.hypot(self.position_reading.whole(joint));
         let rms = fit.even_rms(joint);
         let Joint { name, kind, .. } = &self.robot.joints[joint];
         (rms > far * own).then(|| Remainder {

@@ -11,6 +11,7 @@ use crate::diagnose::columns::Candidate;
 use crate::diagnose::engine::Follower;
 use crate::diagnose::fit::Evidence;
 use crate::diagnose::outcome::{Tried, Verdict};
+use crate::diagnose::position_reading::PositionReading;
 use crate::diagnose::scenario::{Arm, ArmScenario, Effect, Scenario};
 use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
@@ -63,7 +64,7 @@ fn said(stiffness: f64, times: f64) -> Option<&'static str> {
             rows: &loaded.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
-            position_reading: vec![0.0],
+            position_reading: PositionReading::of_noise(vec![0.0]),
             base: &refit.base,
             seed: 1,
         };
@@ -165,7 +166,7 @@ fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'st
         rows: &loaded.rows,
         coordinates: &[Vec::new(), Vec::new()],
         pairs: Vec::new(),
-        position_reading: vec![0.0; 2],
+        position_reading: PositionReading::of_noise(vec![0.0; 2]),
         base: &refit.base,
         seed: 1,
     };
@@ -223,7 +224,7 @@ fn a_gap_that_may_be_none_is_none() {
             rows: &loaded.rows,
             coordinates: &[Vec::new()],
             pairs: Vec::new(),
-            position_reading: vec![0.0],
+            position_reading: PositionReading::of_noise(vec![0.0]),
             base: &refit.base,
             seed: 1,
         };
