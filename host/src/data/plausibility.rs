@@ -441,8 +441,13 @@ fn check_effort(
         .filter(|c| *c > 0.0);
     let too_small = match (coulomb, limit) {
         (Some(c), _) if highest < 0.01 * c => Some(("Coulomb friction", c)),
-        // A limit that stands for "none" says nothing of what moves the joint.
-        (None, Some(l)) if highest < 5e-4 * l && !is_placeholder(l, 1e3) => Some(("limit", l)),
+        // A limit that stands for "none" says nothing of what moves the joint, and where the link is described, that says more than
+        // any limit: a wrist in a table of equal limits may well need a thousandth of its own.
+        (None, Some(l))
+            if joint.inertial.is_none() && highest < 5e-4 * l && !is_placeholder(l, 1e3) =>
+        {
+            Some(("limit", l))
+        }
         _ => None,
     };
     if let Some((of, expected)) = too_small {

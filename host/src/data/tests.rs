@@ -556,12 +556,17 @@ fn wrong_units_are_named_and_right_ones_are_not() {
     // A limit that stands for none is no measure of the torque.
     let mut open = rig();
     open.joints[0].friction = None;
+    open.joints[0].inertial = None;
     for (limit, found) in [(900.0, 1), (1e3, 0), (1e4, 0), (99999.0, 0), (3e6, 0)] {
         open.joints[0].limits.as_mut().unwrap().torque = Some(limit);
         let mut b = block.clone();
         let peak = b.joints[0].tau.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         all(&mut b.joints[0].tau, 0.1 / peak);
         assert_eq!(plausibility(&b, &open).len(), found, "{limit}");
+        // Nor is any limit where the link is described: what that says of the torque is for the comparison of models.
+        let mut described = open.clone();
+        described.joints[0].inertial = rig().joints[0].inertial.clone();
+        assert_eq!(plausibility(&b, &described), [], "{limit}");
     }
     for (factor, unit) in [
         (1e3, "milliseconds"),

@@ -71,7 +71,9 @@ pub(super) fn not_testable(found: &Found) -> Result<Vec<NotTestable>, DiagnoseEr
                 }
                 tried = true;
                 if !distinct {
-                    let columns = found.search.cached(c, &found.search.grid(candidate))?;
+                    let columns = found
+                        .search
+                        .cached(c, &found.search.grid_within(candidate)?)?;
                     distinct = (places(kind)).any(|k| last.distinct(&columns[k]).is_some());
                 }
             }
@@ -131,7 +133,7 @@ pub(super) fn detectable(
             continue;
         }
         let mut sizes: Vec<(f64, usize)> = Vec::new();
-        let points = found.search.grid(candidate);
+        let points = found.search.grid_within(candidate)?;
         let columns = found.search.cached(c, &points)?;
         for place in places(candidate.kind) {
             if !found.search.shows(candidate, &points[place]) {

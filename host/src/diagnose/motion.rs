@@ -324,6 +324,7 @@ pub(crate) fn replayed(
         &Inputs {
             period,
             reference: &reference,
+            feed_forward: &[],
             added: &added,
             q: &first(|joint| &joint.q),
             v: &first(|joint| &joint.qd),

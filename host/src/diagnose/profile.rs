@@ -251,7 +251,7 @@ impl Search<'_> {
         let kind = self.library[c].kind;
         let fixed = self.fixed(&self.library[c]);
         let start = fixed.or(start);
-        let points = self.grid(&self.library[c]);
+        let points = self.grid_within(&self.library[c])?;
         let mut best: Option<Best> = None;
         let gear = is_gear(kind);
         let mut followed: Vec<Best> = Vec::new();
@@ -378,13 +378,13 @@ impl Search<'_> {
         best: &mut Best,
     ) -> Result<(), DiagnoseError> {
         let scales = self.library[c].kind.about().shapes;
-        let least = self.least(&self.library[c])?;
+        let [least, most] = self.ends(&self.library[c])?;
         let mut simplices: Vec<Simplex> = (starts.iter())
             .map(|(_, shapes, _)| {
                 // Where a bound lets it move.
-                let inside = |(value, least): (&f64, &f64)| value.max(2.0 * least);
-                let at: Vec<f64> = (scales.iter().zip(shapes.iter().zip(&least)))
-                    .map(|(shape, at)| coordinate(shape, inside(at)))
+                let inside = |place: usize| shapes[place].max(2.0 * least[place]).min(most[place]);
+                let at: Vec<f64> = (scales.iter().zip(0..))
+                    .map(|(shape, place)| coordinate(shape, inside(place)))
                     .collect();
                 // Away from a bound.
                 let away = |shape: &Parameter, x: f64| {
@@ -404,7 +404,7 @@ impl Search<'_> {
                     let x = simplex.asks()?;
                     let mut shapes = [0.0; SHAPES];
                     for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
-                        shapes[place] = value_at(shape, x).max(least[place]);
+                        shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
                     }
                     Some((k, shapes))
                 })
@@ -439,7 +439,7 @@ impl Search<'_> {
         start: &[f64; SHAPES],
     ) -> Result<([f64; SHAPES], Vec<Column>), DiagnoseError> {
         let scales = candidate.kind.about().shapes;
-        let least = self.least(candidate)?;
+        let [least, most] = self.ends(candidate)?;
         let at: Vec<f64> = (scales.iter().zip(start))
             .map(|(shape, value)| coordinate(shape, *value))
             .collect();
@@ -455,7 +455,7 @@ impl Search<'_> {
         while let Some(x) = simplex.asks() {
             let mut shapes = [0.0; SHAPES];
             for (place, (shape, x)) in scales.iter().zip(x).enumerate() {
-                shapes[place] = value_at(shape, x).max(least[place]);
+                shapes[place] = value_at(shape, x).max(least[place]).min(most[place]);
             }
             let columns = source.columns_by(self.threads, candidate, &shapes)?;
             let mut left = fit.clone();

@@ -114,6 +114,11 @@ impl Thinning {
         })
     }
 
+    /// Time from row to row of a run of that sample rate, s.
+    pub(super) fn period(&self, rate: f64) -> f64 {
+        self.step as f64 / rate
+    }
+
     /// Cut-off of the position that columns of the links are formed of, Hz, where that is not the filtered one.
     pub(super) fn links_cutoff(&self) -> Option<f64> {
         self.wide.as_ref().map(|(cutoff, _)| *cutoff)

@@ -184,6 +184,7 @@ fn recorded(robot: &Robot) -> InMemory {
     let inputs = Inputs {
         period,
         reference: std::slice::from_ref(&reference),
+        feed_forward: &[],
         added: &[],
         q: &[-1.0],
         v: &[0.0],

@@ -33,6 +33,9 @@ pub(super) struct Bounds {
     pub velocity: f64,
     pub acceleration: Option<f64>,
     pub torque: Option<f64>,
+    /// Velocity and acceleration that the torque limit allows the joint as it is described, where it has no acceleration limit; infinite
+    /// where that is not known.
+    pub driven: [f64; 2],
 }
 
 impl Bounds {
@@ -73,21 +76,31 @@ pub(super) struct Frame {
 /// Highest velocity that a motion is sized by, rad/s or m/s: beyond what the joint of any robot does.
 const FASTEST: f64 = 1e4;
 
+/// Shortest period that is chosen, s. Limits that stand for "none" would have a motion of a fraction of a second, in which nothing
+/// settles and of which no recording is long enough.
+const SHORTEST: f64 = 1.0;
+
 /// A period whose harmonics can use the limits: the fundamental slow enough to sweep the position range at the
-/// velocity limit, and the fastest harmonic no faster than where velocity and acceleration limits meet; the longest
-/// over the joints, rounded up to 0.1 s.
+/// highest velocity, and the fastest harmonic no faster than where highest velocity and acceleration meet; the longest
+/// over the joints, rounded up to 0.1 s, and 1 s at least. The highest are the limits; without an acceleration limit, what the
+/// torque limit allows the joint with the inertia and viscous friction that are described.
 pub fn default_period(robot: &Robot, harmonics: usize) -> Result<f64, ExciteError> {
     period_within(&bounds_of(robot, Room::ALL, None)?.0, harmonics)
 }
 
 fn period_within(bounds: &[Bounds], harmonics: usize) -> Result<f64, ExciteError> {
     use core::f64::consts::TAU;
-    let mut period = 0.1_f64;
+    let mut period = SHORTEST;
     for bounds in bounds {
-        period = period.max(TAU * bounds.half() / bounds.velocity);
-        if let Some(acceleration) = bounds.acceleration {
-            period = period.max(TAU * harmonics as f64 * bounds.velocity / acceleration);
-        }
+        let [velocity, acceleration] = bounds.driven;
+        let acceleration = bounds
+            .acceleration
+            .map_or(acceleration, |a| a.min(acceleration));
+        let within = (acceleration * (bounds.high - bounds.low)).sqrt();
+        let velocity = velocity.min(bounds.velocity).min(within);
+        period = period
+            .max(TAU * bounds.half() / velocity)
+            .max(TAU * harmonics as f64 * velocity / acceleration);
     }
     // Rounding must not lift an exact tenth to the next.
     Ok((period * 10.0 - 1e-9).ceil() / 10.0)
@@ -206,6 +219,7 @@ pub(super) fn bounds_of(
             velocity,
             acceleration,
             torque: limits.torque.filter(reachable),
+            driven: [f64::INFINITY; 2],
         });
     }
     if !limitless.is_empty() {
@@ -217,7 +231,31 @@ pub(super) fn bounds_of(
             named(&boundless)
         ));
     }
+    drive(robot, &mut list)?;
     Ok((list, notes))
+}
+
+/// Fills in what the torque limits allow in the middle of the ranges, where bodies are described and acceleration limits are not.
+fn drive(robot: &Robot, list: &mut [Bounds]) -> Result<(), ExciteError> {
+    let model = Model::from_robot(robot)?;
+    if prior(robot, &model).is_err() {
+        return Ok(());
+    }
+    let middle: Vec<f64> = list.iter().map(Bounds::middle).collect();
+    let mut mass = vec![0.0; middle.len().pow(2)];
+    model.inertia_matrix(&middle, &mut mass)?;
+    for (j, bounds) in list.iter_mut().enumerate() {
+        if bounds.acceleration.is_some() {
+            continue;
+        }
+        let viscous = model.parameters[j][column::VISCOUS];
+        let reach = |per: f64| match bounds.torque {
+            Some(torque) if per > 0.0 => torque / per,
+            _ => f64::INFINITY,
+        };
+        bounds.driven = [reach(viscous), reach(mass[j * (middle.len() + 1)])];
+    }
+    Ok(())
 }
 
 /// "joint \"a\"", "joints \"a\", \"b\"".

@@ -33,6 +33,7 @@ fn recording(robot: &Robot) -> InMemory {
     let inputs = Inputs {
         period: 1e-3,
         reference: std::slice::from_ref(&reference),
+        feed_forward: &[],
         added: &[],
         q: &[0.0],
         v: &[0.0],

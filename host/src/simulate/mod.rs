@@ -236,7 +236,8 @@ impl Motors {
 /// The controllers of a robot; a stand-in where the description has none, and for which joints that was so.
 ///
 /// The stand-in is the cascade that places both poles of the joint's own inertia at
-/// [`STAND_IN_BANDWIDTH`], critically damped.
+/// [`STAND_IN_BANDWIDTH`], critically damped. What a motion needs beyond that, as friction, is for a feed-forward
+/// ([`Inputs::feed_forward`]): dry friction on a light link holds it against such a feedback.
 ///
 /// # Errors
 /// [`SimulateError::NoInertia`] where there is nothing to design it for.
@@ -298,6 +299,8 @@ pub struct Inputs<'a> {
     pub period: f64,
     /// Reference positions: one slice a joint, one value a sample.
     pub reference: &'a [Vec<f64>],
+    /// Torques that the controllers add to their answers, within the torque limit, same shape; empty for none.
+    pub feed_forward: &'a [Vec<f64>],
     /// Torques added to the controllers' (disturbances), same shape; empty for none.
     pub added: &'a [Vec<f64>],
     /// Initial positions.
@@ -312,10 +315,16 @@ pub struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    /// Reference of joint `i` so far beyond sample `k`, in samples; after the last it stays.
-    fn reference_at(&self, i: usize, k: usize, beyond: f64) -> f64 {
-        let (now, next) = (self.reference[i][k], self.reference[i].get(k + 1));
-        now + beyond * (next.unwrap_or(&now) - now)
+    /// Reference and feed-forward of joint `i` so far beyond sample `k`, in samples; after the last they stay.
+    fn asked(&self, i: usize, k: usize, beyond: f64) -> [f64; 2] {
+        [self.reference, self.feed_forward].map(|series| {
+            let values = series.get(i).and_then(|list| list.get(k..));
+            match values {
+                Some([now, next, ..]) => now + beyond * (next - now),
+                Some([now]) => *now,
+                _ => 0.0,
+            }
+        })
     }
 }
 
@@ -430,8 +439,8 @@ pub(crate) fn closed_loop_since(
             model.effects.position_errors(&q, &v, &mut errors)?;
             for i in 0..n {
                 let read = [q[i] + errors[i][0], v[i] + errors[i][1]];
-                let reference = inputs.reference_at(i, k, f64::from(answer) / f64::from(answers));
-                let wish = wish(&controllers[i], reference, read);
+                let [reference, known] = inputs.asked(i, k, f64::from(answer) / f64::from(answers));
+                let wish = known + wish(&controllers[i], reference, read);
                 let limits = robot.joints[i].limits.as_ref();
                 let limit = limits.and_then(|l| l.torque).unwrap_or(f64::INFINITY);
                 let before = std::mem::replace(&mut applied[i], wish.max(-limit).min(limit));

@@ -144,6 +144,7 @@ fn the_stand_in_controller_tracks_a_slow_sine() {
     let inputs = Inputs {
         period: 1e-3,
         reference: &[reference],
+        feed_forward: &[],
         added: &[],
         q: &[0.0],
         v: &[0.0],

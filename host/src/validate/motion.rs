@@ -182,6 +182,7 @@ pub(super) fn check(
                 &Inputs {
                     period,
                     reference: &reference,
+                    feed_forward: &[],
                     added: &[],
                     q: &q,
                     v: &v,

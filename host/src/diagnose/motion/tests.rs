@@ -37,6 +37,7 @@ fn recorded(robot: &Robot, controllers: &[Controller]) -> Run {
     let inputs = Inputs {
         period: 1.0 / RATE,
         reference: &references,
+        feed_forward: &[],
         added: &[],
         q: &still,
         v: &still,

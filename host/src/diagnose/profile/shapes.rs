@@ -214,21 +214,45 @@ pub(super) fn spacing(shape: &Parameter, count: usize) -> [f64; 2] {
 }
 
 impl Search<'_> {
-    /// The least that a candidate's shapes may be where that depends on the rig.
+    /// The least and the most that a candidate's shapes may be where that depends on the rig.
+    ///
+    /// A gear whose link would swing on it at more than half the rate of the rows is not believed (`engine::unbelieved`): up to that
+    /// rate and its critical damping it is searched, and no further, where each sample would take many steps.
     ///
     /// # Errors
     /// [`DiagnoseError::Model`].
-    pub(super) fn least(&self, candidate: &Candidate) -> Result<[f64; SHAPES], DiagnoseError> {
-        let mut least = [f64::NEG_INFINITY; SHAPES];
-        if candidate.kind == Kind::Backlash {
-            let mass = self.source.mass(candidate.joint, 0)?;
-            let shapes = candidate.kind.about().shapes.iter();
-            for (least, shape) in least.iter_mut().zip(shapes) {
-                if shape.name == "stiffness" {
-                    *least = (TAU * SLOWEST_TEETH).powi(2) * mass;
-                }
+    pub(super) fn ends(&self, candidate: &Candidate) -> Result<[[f64; SHAPES]; 2], DiagnoseError> {
+        let [mut least, mut most] = [[f64::NEG_INFINITY; SHAPES], [f64::INFINITY; SHAPES]];
+        let (true, Some(run)) = (is_gear(candidate.kind), self.source.runs.first()) else {
+            return Ok([least, most]);
+        };
+        let mass = self.source.mass(candidate.joint, 0)?;
+        let slowest = TAU * SLOWEST_TEETH;
+        let fastest = (TAU / self.source.thinning.period(run.rate)).max(2.0 * slowest);
+        for (place, shape) in candidate.kind.about().shapes.iter().enumerate() {
+            if candidate.kind == Kind::Backlash && shape.name == "stiffness" {
+                least[place] = slowest.powi(2) * mass;
+            }
+            match shape.name {
+                "stiffness" if mass > 0.0 => most[place] = fastest.powi(2) * mass,
+                "damping" if mass > 0.0 => most[place] = 2.0 * fastest * mass,
+                _ => {}
             }
         }
-        Ok(least)
+        Ok([least, most])
+    }
+
+    /// A candidate's grid within its [`Self::ends`].
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(in crate::diagnose) fn grid_within(
+        &self,
+        candidate: &Candidate,
+    ) -> Result<Vec<[f64; SHAPES]>, DiagnoseError> {
+        let [_, most] = self.ends(candidate)?;
+        let within =
+            |point: [f64; SHAPES]| std::array::from_fn(|place| point[place].min(most[place]));
+        Ok(self.grid(candidate).into_iter().map(within).collect())
     }
 }

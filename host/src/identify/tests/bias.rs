@@ -56,6 +56,7 @@ fn driven(mut robot: Robot, seed: u64, position: f64, torque: f64) -> (Robot, In
     let inputs = Inputs {
         period: 1.0 / LENGTH.1,
         reference: &reference,
+        feed_forward: &[],
         added: &[],
         q: &q,
         v: &v,
