@@ -69,6 +69,9 @@ pub enum CommandError {
     /// The gap workflow.
     #[error(transparent)]
     Diagnose(#[from] crate::diagnose::DiagnoseError),
+    /// A joint that its voltage drives.
+    #[error(transparent)]
+    Voltage(#[from] crate::diagnose::voltage::DrivenError),
     /// Anything else that has its whole sentence.
     #[error("{0}")]
     Sentence(String),

@@ -174,7 +174,19 @@ impl Inputs {
     /// # Errors
     /// What is wrong, by file and line; all units that look wrong in one sentence.
     pub(crate) fn open(robot: &Robot, paths: &[PathBuf]) -> Result<Self, CommandError> {
-        let inputs = Self::read(robot, paths)?;
+        Self::open_with(robot, paths, EffortNeed::Required)
+    }
+
+    /// As [`Self::open`], saying whether the torque may be missing.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn open_with(
+        robot: &Robot,
+        paths: &[PathBuf],
+        need: EffortNeed,
+    ) -> Result<Self, CommandError> {
+        let inputs = Self::read_with(robot, paths, need)?;
         match inputs.wrong_units(robot)?.into_iter().next() {
             Some(sentence) => Err(CommandError::Implausible(sentence)),
             None => Ok(inputs),
@@ -313,6 +325,11 @@ impl Inputs {
     /// Whether any of them has a torque or a current.
     pub(crate) fn any_effort(&self) -> bool {
         self.sources.iter().any(Source::has_effort)
+    }
+
+    /// Whether any recording has a motor voltage.
+    pub(crate) fn any_voltage(&self) -> bool {
+        self.sources.iter().any(Source::has_voltage)
     }
 
     /// Bytes in all files.

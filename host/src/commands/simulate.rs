@@ -6,9 +6,13 @@ use super::error::CommandError;
 use super::input::{described, real};
 use super::overwrite::refuse_file;
 use super::ui::Ui;
-use crate::excite::{Noise, load_reference, replay};
+use crate::excite::{Noise, load_reference, replay, replay_voltage};
+use crate::robot::Robot;
 
 /// Simulates the robot following a trajectory, with its own friction, drives and controller.
+///
+/// Where the description has one joint with a [joint.voltage_controller], as `rig diagnose` writes it for recordings of a motor
+/// voltage, that controller closes the loop, and the recording has the columns t, q1, qd1, u1, supply and ref1.
 ///
 /// Writes a recording with the columns t, q, qd, tau and ref per joint, which the other commands read like one of the
 /// real robot. The same seed gives the same file. The controllers answer at every step of the simulation, 0.25 ms at most, whatever
@@ -68,6 +72,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         }
     }
     refuse_file(&args.out, args.force)?;
+    if let [joint] = robot.joints.as_slice()
+        && joint.voltage_controller.is_some()
+        && joint.controller.is_none()
+    {
+        return under_voltage(args, ui, &robot);
+    }
     let reference = load_reference(&args.trajectory, &robot, args.rate)?;
     let noise = Noise {
         position: args.noise_position,
@@ -88,6 +98,37 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         "{}: {rows} samples, {:.1} s.",
         args.out.display(),
         rows as f64 * done.period
+    ));
+    Ok(())
+}
+
+/// Simulates a joint that its voltage drives.
+fn under_voltage(args: &Args, ui: &Ui, robot: &Robot) -> Result<(), CommandError> {
+    if args.noise_torque > 0.0 {
+        return Err(CommandError::Sentence(format!(
+            "--noise-torque {} says nothing of joint {}, which is simulated under voltage and has no torque column; leave it out.",
+            args.noise_torque, robot.joints[0].name
+        )));
+    }
+    let noise = Noise {
+        position: args.noise_position,
+        velocity: args.noise_velocity,
+        torque: 0.0,
+    };
+    let done = replay_voltage(robot, &args.trajectory, args.rate, noise, args.seed)?;
+    done.save(&args.out, robot)?;
+    for note in &done.notes {
+        ui.remark(note);
+    }
+    let length = done
+        .t
+        .last()
+        .zip(done.t.first())
+        .map_or(0.0, |(end, begin)| end - begin);
+    ui.say(&format!(
+        "{}: {} samples, {length:.1} s, under voltage in the closed loop of [joint.voltage_controller].",
+        args.out.display(),
+        done.t.len()
     ));
     Ok(())
 }

@@ -1,23 +1,31 @@
 //! `rig validate`: a description against data that it was not made from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
+use serde::Serialize;
 
 use super::error::CommandError;
 use super::input::{Inputs, RobotArg, command_line, recordings};
 use super::overwrite::refuse_folder;
 use super::ui::Ui;
+use crate::data::EffortNeed;
+use crate::diagnose::voltage::{FreeRun, controller_terms};
 use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
-use crate::report::{self, format_significant};
-use crate::validate::{Motion, Options, Validation, validate};
+use crate::report::{self, Document, format_significant};
+use crate::robot::Robot;
+use crate::validate::{Drive, Motion, Options, Validation, validate, validate_voltage};
 
 /// Predicts torque and simulates motion on data not used before.
 ///
 /// Where the description has a [joint.controller] for every joint, the motion is that of the closed loop that follows the
 /// recorded references; else the recorded torque drives the model, and a controller answers what it departs from the recorded
 /// motion by, as in `rig diagnose`.
+///
+/// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs freely
+/// under voltage instead: in the closed loop of the controller that the recording shows, with the supply of the description, or
+/// under the recorded voltage. RMS and mean absolute error of the position are printed.
 ///
 /// Writes validation.json and report.html into the folder given with --out.
 #[derive(Debug, ClapArgs)]
@@ -43,6 +51,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["validation.json", "report.html"])?;
     refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
+    if robot.joints.len() == 1 {
+        let inputs = Inputs::open_with(&robot, &args.data, EffortNeed::Optional)?;
+        if !inputs.any_effort() && inputs.any_voltage() {
+            return under_voltage(args, ui, &robot, &inputs);
+        }
+    }
     let inputs = Inputs::open(&robot, &args.data)?;
     for warning in inputs.warnings() {
         ui.remark(&warning);
@@ -71,13 +85,9 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         warnings: inputs.warnings().collect(),
         ..Context::default()
     };
-    folder(&args.out)?;
-    let json = serde_json::to_string_pretty(&validation).map_err(|error| {
-        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
-    })?;
-    write_whole(&args.out.join("validation.json"), (json + "\n").as_bytes())?;
-    report::write(
-        &args.out.join("report.html"),
+    write(
+        &args.out,
+        &validation,
         &pages::validation(&robot, &validation, &context),
     )?;
     for line in summary(&validation) {
@@ -91,6 +101,81 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         args.out.join("report.html").display()
     ));
     Ok(())
+}
+
+/// Writes the result as JSON and as a page into a folder.
+fn write<T: Serialize>(out: &Path, found: &T, page: &Document) -> Result<(), CommandError> {
+    folder(out)?;
+    let json = serde_json::to_string_pretty(found).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&out.join("validation.json"), (json + "\n").as_bytes())?;
+    report::write(&out.join("report.html"), page)?;
+    Ok(())
+}
+
+/// Validates a joint that is known by its voltage.
+fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result<(), CommandError> {
+    for warning in inputs.warnings() {
+        ui.remark(&warning);
+    }
+    let mut found = validate_voltage(robot, &recordings(&inputs.listened()))?;
+    found.warnings.extend(inputs.heard());
+    let context = Context {
+        command: command_line(),
+        warnings: inputs.warnings().collect(),
+        ..Context::default()
+    };
+    write(
+        &args.out,
+        &found,
+        &pages::validation_voltage(&found, &context),
+    )?;
+    for checked in &found.recordings {
+        ui.say(&format!(
+            "{}, {}: {}",
+            checked.recording,
+            found.joint,
+            moved(&checked.motion, Some(&checked.driven), &found.position_unit)
+        ));
+    }
+    ui.say(&format!(
+        "all recordings, {}: {}",
+        found.joint,
+        moved(&found.motion, None, &found.position_unit)
+    ));
+    for warning in &found.warnings {
+        ui.remark(warning);
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// What became of a free run, with what drove it.
+fn moved(run: &FreeRun, driven: Option<&Drive>, unit: &str) -> String {
+    let how = match driven {
+        Some(Drive::Controller { controller }) => format!(
+            " in the closed loop of the controller that the recording shows ({})",
+            controller_terms(controller, unit)
+        ),
+        Some(Drive::RecordedVoltage) => " under the recorded voltage".to_owned(),
+        None => String::new(),
+    };
+    match run {
+        FreeRun::Followed {
+            rms, mean_absolute, ..
+        } => format!(
+            "position simulated{how} off by {} {unit} rms, {} {unit} mean absolute",
+            format_significant(*rms, 4),
+            format_significant(*mean_absolute, 4)
+        ),
+        FreeRun::Diverged { time, .. } => {
+            format!("the position simulated{how} diverges at {time:.2} s; a remark says why")
+        }
+    }
 }
 
 /// The result at a glance: one line a joint and recording for the torque, one for the motion.

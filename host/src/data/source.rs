@@ -207,6 +207,12 @@ impl Source {
         self.layout.columns.iter().any(|c| effort(c.role))
     }
 
+    /// Whether the joints have a motor voltage: their own, or a duty cycle with its supply.
+    pub fn has_voltage(&self) -> bool {
+        let voltage = |role| matches!(role, Role::Voltage(_) | Role::Duty(..));
+        self.layout.columns.iter().any(|c| voltage(c.role))
+    }
+
     /// Names of the file's columns in their order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.layout.columns.iter().map(|c| c.name.as_str())

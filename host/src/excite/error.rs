@@ -32,6 +32,9 @@ pub enum ExciteError {
         /// What the limits allow, rad/s or m/s.
         velocity: f64,
     },
+    /// A joint that its voltage drives.
+    #[error(transparent)]
+    Voltage(#[from] crate::diagnose::voltage::DrivenError),
     /// An option outside its range.
     #[error("the {name} is {value}, but {right}")]
     Option {

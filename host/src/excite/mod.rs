@@ -32,6 +32,7 @@ mod schedule;
 mod search;
 mod stages;
 mod trajectory_file;
+mod voltage;
 mod workspace;
 
 #[cfg(test)]
@@ -49,6 +50,7 @@ pub use stages::{StagedKind, StagedOptions, staged};
 pub use trajectory_file::{
     DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
 };
+pub use voltage::{VoltageReplay, replay_voltage};
 
 use frame::frame_of;
 use search::search;

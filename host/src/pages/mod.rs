@@ -12,6 +12,7 @@ mod parts;
 #[cfg(test)]
 mod tests;
 mod validation;
+mod validation_voltage;
 
 pub use demo::{
     DemoFigures, DemoParameter, Interval, OnlineEstimates, Tracking, Wire, demo, tracking_plot,
@@ -20,6 +21,7 @@ pub use diagnosis::{PICTURE_NAMES, diagnosis, pictures, verdict};
 pub use friction_map::friction_map;
 pub use identification::identification;
 pub use validation::validation;
+pub use validation_voltage::validation_voltage;
 
 /// What a page says beside its result.
 #[derive(Clone, Debug, Default, PartialEq)]

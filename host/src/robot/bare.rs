@@ -18,6 +18,7 @@ impl Joint {
             friction: None,
             drive: None,
             controller: None,
+            voltage_controller: None,
         }
     }
 }

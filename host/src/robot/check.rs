@@ -10,7 +10,9 @@ use rig_shared::multibody::MAX_JOINTS;
 
 use super::check_drives::{check_drive, check_transmission};
 use super::effects::check_effects;
+use super::inertia::negative_inertia;
 use super::sizes::oversized;
+use super::voltage_controller::check_voltage_controller;
 use super::workspace::check_workspace;
 use super::{Joint, JointKind, JointLimits, Robot};
 
@@ -120,6 +122,10 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
         return Err(fault);
     }
     check_transmission(robot)?;
+    if let Some((i, mut fault)) = negative_inertia(robot) {
+        fault.way.splice(0..0, [Key("joint"), At(i)]);
+        return Err(fault);
+    }
     check_workspace(robot)?;
     if let Some(band) = &robot.identified {
         band.check(robot.joints.len())?;
@@ -325,6 +331,9 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
             NotZero,
             controller.torque_gain,
         )?;
+    }
+    if let Some(controller) = &joint.voltage_controller {
+        check_voltage_controller(joint, controller)?;
     }
     Ok(())
 }

@@ -235,7 +235,8 @@ impl Robot {
                     drive.joint_inertia = kept;
                     drive.rotor_inertia = (rest - kept) / (drive.gear_ratio * drive.gear_ratio);
                 } else {
-                    drive.joint_inertia = without_rounding(rest, row[column::DRIVE_INERTIA]);
+                    let total = at_least_zero("Drive inertia", k, row[column::DRIVE_INERTIA]);
+                    drive.joint_inertia = without_rounding(total - shares[k][0], total);
                     if kinds[k] == DriveKind::Simple {
                         drive.rotor_inertia = 0.0;
                     }

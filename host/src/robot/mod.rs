@@ -18,11 +18,13 @@ mod dh;
 mod drives;
 mod effects;
 mod error;
+mod inertia;
 mod numbers;
 mod screw;
 mod sizes;
 mod text;
 mod urdf;
+mod voltage_controller;
 mod workspace;
 mod worth;
 mod written;
@@ -46,6 +48,8 @@ pub use error::{Place, RobotError};
 pub use screw::Screw;
 pub(crate) use urdf::is_placeholder;
 pub use urdf::{Original, Urdf};
+pub(crate) use voltage_controller::Demand;
+pub use voltage_controller::{AntiWindup, VoltageController};
 pub use workspace::Region;
 pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};
 
@@ -154,6 +158,9 @@ pub struct Joint {
     /// The position controller, for simulation; absent means the recording's torque is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controller: Option<Controller>,
+    /// The position controller of a joint that is known by its motor voltage, and the supply; absent where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voltage_controller: Option<VoltageController>,
 }
 
 impl Joint {
@@ -254,8 +261,8 @@ pub struct Drive {
     /// kg·m², on the motor side
     #[serde(default)]
     pub rotor_inertia: f64,
-    /// Inertia of gear and shaft seen at the joint beside the rotors', kg·m² (kg where prismatic); identified, a small
-    /// one may come out negative.
+    /// Inertia of gear and shaft seen at the joint beside the rotors', kg·m² (kg where prismatic); of a coupled drive less than
+    /// none where the rotors of others count as more at this joint than was found.
     #[serde(default)]
     pub joint_inertia: f64,
     /// Coulomb friction on the motor side, N·m
@@ -337,7 +344,7 @@ impl Robot {
     pub fn from_urdf(text: &str, path: &Path) -> Result<Self, RobotError> {
         let chain = urdf::read(text, path)?;
         let robot = dh::convert(&chain).robot;
-        urdf::check_sizes(&chain, &robot.joints, path)?;
+        urdf::check_sizes(&chain, &robot, path)?;
         Ok(robot)
     }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::effects::{check_effects, write_effect};
 use super::error::RobotError;
-use super::{Drive, Joint, JointKind, Region, Robot, Screw};
+use super::{AntiWindup, Drive, Joint, JointKind, Region, Robot, Screw, VoltageController};
 
 /// Shortest form that reads back to the same number, always with a point or an exponent.
 pub(super) fn float(value: f64) -> String {
@@ -199,6 +199,61 @@ fn write_joint(out: &mut String, joint: &Joint) {
             &format!("{force} per controller output"),
         );
     }
+    if let Some(c) = &joint.voltage_controller {
+        write_voltage_controller(out, c, angle);
+    }
+}
+
+fn write_voltage_controller(out: &mut String, c: &VoltageController, angle: &str) {
+    out.push_str("\n[joint.voltage_controller]\n");
+    line(
+        out,
+        "proportional",
+        &float(c.proportional),
+        &format!("share of the supply per {angle} of reference - position"),
+    );
+    for (key, value, comment) in [
+        (
+            "integral",
+            c.integral,
+            format!("per {angle}*s of its integral"),
+        ),
+        (
+            "derivative",
+            c.derivative,
+            format!("per {angle}/s, taken off"),
+        ),
+        (
+            "velocity_feedforward",
+            c.velocity_feedforward,
+            format!("per {angle}/s of the reference"),
+        ),
+        (
+            "acceleration_feedforward",
+            c.acceleration_feedforward,
+            format!("per {angle}/s^2 of the reference"),
+        ),
+        ("bias", c.bias, "constant share of the supply".to_owned()),
+    ] {
+        if value != 0.0 {
+            line(out, key, &float(value), &comment);
+        }
+    }
+    optional(out, "limit", c.limit, "largest share of the supply");
+    if c.anti_windup == AntiWindup::Clamping {
+        line(
+            out,
+            "anti_windup",
+            &quoted("clamping"),
+            "the integral stands still at the limit; or none",
+        );
+    }
+    line(
+        out,
+        "supply",
+        &list(&c.supply),
+        "V without load, V that a share of one changes it by",
+    );
 }
 
 fn write_drive(out: &mut String, d: &Drive) {

@@ -24,10 +24,12 @@
 mod motion;
 #[cfg(test)]
 mod tests;
+mod voltage;
 
 pub(crate) use motion::added_torque;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
+pub use voltage::{Drive, VoltageChecked, VoltageValidation, validate_voltage};
 
 use crate::effects::Compensated;
 use crate::identify::{

@@ -18,7 +18,7 @@ mod link;
 mod magnitude;
 mod model;
 mod names;
-mod nnls;
+pub(super) mod nnls;
 mod physical;
 mod rotor;
 mod rows;

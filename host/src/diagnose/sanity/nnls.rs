@@ -13,7 +13,7 @@ const FLAT: f64 = 1e-9;
 /// Block principal pivoting (Portugal, Júdice & Vicente 1994; Kim & Park 2011): all that violate change sides at once, and where
 /// that does not lessen the violations for some rounds the last one alone. After `rounds` what is still negative is zero. H is positive definite by its priors;
 /// none where it is not.
-pub(super) fn nnls(
+pub(in crate::diagnose) fn nnls(
     h: &DMatrix<f64>,
     g: &DVector<f64>,
     bounded: &[bool],

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::controllers::{self, Shown};
+use super::free_run::FreeRun;
 use super::plant::{NAMES, NOMINAL, Plant};
 use super::search::{EQUAL, Model, Trial, on_the_voltage};
 use crate::diagnose::judge::closed;
@@ -25,14 +27,12 @@ pub(super) struct Told<'a> {
     pub curves: Vec<Curves>,
     /// rad or m
     pub floor: f64,
-    /// From model to model.
-    pub train: Vec<f64>,
+    /// Free runs over the training recordings, from model to model.
+    pub train: Vec<FreeRun>,
     /// The same on the hold-out; empty without one.
-    pub holdout: Vec<f64>,
-    /// Of the last model, on the recordings that it is judged by, rad or m.
-    pub mean_absolute: f64,
-    /// RMS of the positions of those recordings about their mean.
-    pub spread: f64,
+    pub holdout: Vec<FreeRun>,
+    /// The controllers that the training recordings show.
+    pub controllers: Vec<Shown>,
     pub deviations: Vec<Option<Vec<f64>>>,
     /// The nominal one first.
     pub models: Vec<Model>,
@@ -76,7 +76,7 @@ impl Told<'_> {
         format!("{:.2} m{unit}", 1e3 * error)
     }
 
-    fn judged(&self) -> &[f64] {
+    fn judged(&self) -> &[FreeRun] {
         if self.holdout.is_empty() {
             &self.train
         } else {
@@ -94,9 +94,9 @@ impl Told<'_> {
     /// As `diagnosis.json` has it.
     pub(super) fn diagnosis(&self) -> Diagnosis {
         let judged = self.judged();
-        let (first, last) = (judged[0], judged[judged.len() - 1]);
+        let (first, last) = (&judged[0], &judged[judged.len() - 1]);
         let steps: Vec<Step> = (1..self.models.len()).map(|k| self.step(k)).collect();
-        let left = last > LEFT * self.floor;
+        let left = last.rms().is_none_or(|rms| rms > LEFT * self.floor);
         let verdict = match (left, steps.is_empty()) {
             (true, _) => Verdict::Remainder,
             (false, true) => Verdict::NothingMissing,
@@ -108,12 +108,14 @@ impl Told<'_> {
             "the recordings held back"
         };
         let mut words = vec![format!(
-            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. It is off by {} (RMS; {} in the mean of the absolute error) on {on}, {} before any effect.",
+            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. {}",
             self.driven,
-            self.thousandths(last),
-            self.thousandths(self.mean_absolute),
-            self.thousandths(first)
+            self.on_the_whole(on)
         )];
+        words.extend(controllers::sentences(
+            &self.controllers,
+            self.stated.robot.joints[0].kind.units().0,
+        ));
         if self
             .models
             .iter()
@@ -123,19 +125,17 @@ impl Told<'_> {
             words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
         }
         words.extend(self.rotor_remark());
-        if !last.is_finite() {
-            words.push("With the effects the recordings held back cannot be simulated: they ask more of the drive than the effects were fitted to. Give a recording of such voltages to learn from.".into());
-        }
         let described = self.told();
         words.extend(described.iter().map(|d| d.text.clone()));
+        // A table of numbers has no place for a run that diverged: null stands there.
+        let numbers = |runs: &[FreeRun]| runs.iter().map(FreeRun::number).collect::<Vec<f64>>();
         let remainder = left.then(|| Remainder {
             joint: self.joint(),
-            rms: (last * last - self.floor * self.floor).max(0.0).sqrt(),
+            rms: (last.rms()).map_or(f64::NAN, |rms| {
+                (rms * rms - self.floor * self.floor).max(0.0).sqrt()
+            }),
             unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
-            ratio: match self.diverges() {
-                true => f64::NAN,
-                false => last / self.floor.max(f64::MIN_POSITIVE),
-            },
+            ratio: last.number() / self.floor.max(f64::MIN_POSITIVE),
             places: Vec::new(),
             text: self.left_over(),
             doubt: false,
@@ -157,7 +157,8 @@ impl Told<'_> {
             treatment: None,
             torque_lead: Vec::new(),
             places: Vec::new(),
-            gap_closed: (!steps.is_empty()).then(|| closed([first, last], self.floor)),
+            gap_closed: (first.rms().zip(last.rms()).filter(|_| !steps.is_empty()))
+                .map(|(first, last)| closed([first, last], self.floor)),
             described,
             steps,
             absorbed: self.absorbed(),
@@ -174,8 +175,8 @@ impl Told<'_> {
                 models: std::iter::once("refitted".to_owned())
                     .chain(self.models.last().into_iter().flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k))))
                     .collect(),
-                train: self.train.clone(),
-                holdout: self.holdout.clone(),
+                train: numbers(&self.train),
+                holdout: numbers(&self.holdout),
                 floor: self.floor,
                 holdout_floor: self.floor,
             }],
@@ -185,29 +186,60 @@ impl Told<'_> {
         }
     }
 
-    /// Whether the free run of the last model is further from the recordings than a position that never changes.
-    fn diverges(&self) -> bool {
-        !(self
-            .judged()
-            .last()
-            .is_some_and(|last| *last <= self.spread))
+    /// What became of the free runs of the last model `on` the recordings that it is judged by, a sentence.
+    fn on_the_whole(&self, on: &str) -> String {
+        let judged = self.judged();
+        let (first, last) = (&judged[0], &judged[judged.len() - 1]);
+        match last {
+            FreeRun::Diverged { .. } => self.diverged(last),
+            FreeRun::Followed {
+                rms, mean_absolute, ..
+            } => format!(
+                "On {on} it is off by {} (RMS; {} in the mean of the absolute error); before any effect {}.",
+                self.thousandths(*rms),
+                self.thousandths(*mean_absolute),
+                match first.rms() {
+                    Some(rms) => format!("it was off by {}", self.thousandths(rms)),
+                    None => "the free run diverged".to_owned(),
+                }
+            ),
+        }
+    }
+
+    /// Says of a run that it diverged, where and why; empty where it did not.
+    fn diverged(&self, run: &FreeRun) -> String {
+        let FreeRun::Diverged {
+            recording,
+            time,
+            why,
+        } = run
+        else {
+            return String::new();
+        };
+        let mend = match self.controllers.is_empty() {
+            true => {
+                "Record the reference (ref1) as well, so that the loop can be closed, or give shorter recordings."
+            }
+            false => {
+                "The motion asks more of the drive than the training recordings; give a recording of such a motion to learn from."
+            }
+        };
+        format!(
+            "The free run diverges in {recording} at {time:.2} s: {why}. It says nothing of the model. {mend}"
+        )
     }
 
     /// What the last model leaves, a sentence.
     fn left_over(&self) -> String {
-        let last = self.judged().last().copied().unwrap_or(f64::NAN);
-        if self.diverges() {
-            return format!(
-                "The free run diverges: without a look at the measured motion the simulated position is off by {}, more than the {} by which the position itself varies about its mean. It tells nothing of the model; give recordings of shorter motions, or with the controller's reference, whose loop holds the joint.",
-                self.thousandths(last),
-                self.thousandths(self.spread)
-            );
+        let last = &self.judged()[self.judged().len() - 1];
+        match last.rms() {
+            None => self.diverged(last),
+            Some(rms) => format!(
+                "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+                self.thousandths(rms),
+                rms / self.floor.max(f64::MIN_POSITIVE)
+            ),
         }
-        format!(
-            "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
-            self.thousandths(last),
-            last / self.floor.max(f64::MIN_POSITIVE)
-        )
     }
 
     /// Says that less inertia of the drive was found than the description gives the rotor, where that is so.
@@ -228,7 +260,7 @@ impl Told<'_> {
         let kind = model.effects[place];
         let round = &self.rounds[k - 1];
         let own = round.iter().find(|t| t.kind == kind);
-        let best = own.and_then(|t| t.unseen).unwrap_or(self.train[k]);
+        let best = own.and_then(|t| t.unseen).unwrap_or(self.train[k].number());
         let rival =
             |t: &&Trial| t.kind != kind && t.p_value <= own.map_or(0.0, |o| o.p_value.max(0.05));
         let near = |t: &&Trial| t.unseen.is_some_and(|rms| rms <= (1.0 + EQUAL) * best);
@@ -243,7 +275,7 @@ impl Told<'_> {
         let other = (round.iter().filter(|t| t.kind != kind && !near(t)))
             .filter_map(|t| Some((t, t.unseen?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let pair = |list: &[f64]| [list[k - 1], list[k]];
+        let pair = |list: &[FreeRun]| [list[k - 1].number(), list[k].number()];
         let holdout = (!self.holdout.is_empty()).then(|| pair(&self.holdout));
         let judged = pair(self.judged());
         let last = self.models.len() - 1;
@@ -257,7 +289,7 @@ impl Told<'_> {
             name_probability: f64::NAN,
             runner_up: other.map(|(t, _)| title_of(t.kind)),
             runner_up_gap_closed: other
-                .map(|(_, rms)| closed([self.train[k - 1], rms], self.floor)),
+                .map(|(_, rms)| closed([self.train[k - 1].number(), rms], self.floor)),
             rms_unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
             train_rms: pair(&self.train),
             holdout_rms: holdout,
@@ -354,6 +386,9 @@ impl Told<'_> {
         // Torque and voltage constant of a motor are one number in SI.
         drive.torque_constant = t[2] / plant.ratio.abs();
         drive.resistance = Some(t[2] / t[1]);
+        joint.voltage_controller = (self.controllers.first())
+            .map(|shown| shown.controller)
+            .or(joint.voltage_controller);
         let mut at = NOMINAL;
         for kind in &model.effects {
             let about = kind.about();

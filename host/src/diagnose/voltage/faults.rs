@@ -1,8 +1,10 @@
 //! Recordings of a voltage-driven joint that cannot be what they say.
 
-use super::fit::{WINDOW, start};
+use super::fit::WINDOW;
+use super::free_run::travel;
 use super::log::Log;
 use super::plant::Plant;
+use super::start::start;
 use super::{DiagnoseError, floor};
 use crate::data::{Implausible, JUDGED_ROWS, plausibility};
 use crate::diagnose::outcome::{About, DataFault};
@@ -66,12 +68,8 @@ pub(super) fn faults(
         ));
         return Ok(found);
     }
-    let travel = |log: &Log| {
-        let fold = |pick: fn(f64, f64) -> f64, from| log.q.iter().copied().fold(from, pick);
-        fold(f64::max, f64::NEG_INFINITY) - fold(f64::min, f64::INFINITY)
-    };
     let least = FEWEST_STEPS * 12.0_f64.sqrt() * floor(train);
-    if !train.iter().any(|log| travel(log) > least) {
+    if !(travel(train) > least) {
         found.push(fault(
             "not-moving",
             all(),

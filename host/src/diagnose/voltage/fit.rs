@@ -7,8 +7,9 @@
 use nalgebra::{DMatrix, DVector};
 use rig_shared::effects::Kind;
 
+use super::halt::Halt;
 use super::log::{Log, Segment};
-use super::plant::{NOMINAL, Plant};
+use super::plant::Plant;
 
 /// Length of the windows that a fit begins with, s.
 pub(super) const WINDOW: f64 = 1.0;
@@ -16,6 +17,8 @@ pub(super) const WINDOW: f64 = 1.0;
 const DIFFERENCE: f64 = 1.0e-3;
 /// Steps at most.
 const STEPS: usize = 40;
+/// Steps that each of several starts is given before the best goes on alone.
+const FIRST_STEPS: usize = 6;
 /// A fit has settled when two steps in a row win less than this share of the sum of squares.
 const SETTLED: f64 = 1.0e-4;
 /// Damping beyond which no step is left.
@@ -47,21 +50,22 @@ pub(super) fn segments(
 }
 
 impl Problem<'_> {
-    /// Simulated minus recorded position, row by row; none where the simulation is not possible.
-    pub(super) fn residual(&self, theta: &[f64]) -> Option<Vec<f64>> {
+    /// Simulated minus recorded position, row by row.
+    ///
+    /// # Errors
+    /// [`Halt`] where the simulation is not possible.
+    pub(super) fn residual(&self, theta: &[f64]) -> Result<Vec<f64>, Halt> {
         let rows = self.segments.iter().map(|(_, s)| s.to - s.from).sum();
         let mut out = Vec::with_capacity(rows);
         for (k, segment) in &self.segments {
             let log = &self.logs[*k];
             let start = out.len();
-            if !(self.plant).simulate(self.effects, theta, log, segment, &mut out) {
-                return None;
-            }
+            (self.plant).simulate(self.effects, theta, log, segment, &mut out)?;
             for (simulated, recorded) in out[start..].iter_mut().zip(&log.q[segment.from..]) {
                 *simulated -= recorded;
             }
         }
-        Some(out)
+        Ok(out)
     }
 
     /// RMS of [`Self::residual`]; infinite where there is none.
@@ -82,7 +86,7 @@ impl Problem<'_> {
             for side in [step, -step] {
                 moved[p] = theta[p] + side;
                 if moved[p] <= self.bounds[p][1] && moved[p] >= self.bounds[p][0] {
-                    found = self.residual(&moved).map(|r| (side, r));
+                    found = self.residual(&moved).ok().map(|r| (side, r));
                 }
                 if found.is_some() {
                     break;
@@ -96,40 +100,49 @@ impl Problem<'_> {
         Some(slopes)
     }
 
-    /// Parameters of the least sum of squares near `start`; `start` itself where nothing better is found.
-    pub(super) fn fit(&self, start: &[f64]) -> Vec<f64> {
-        let mut theta = self.within(start);
-        let typical: Vec<f64> = start.iter().map(|x| x.abs().max(1.0e-9)).collect();
-        let Some(mut residual) = self.residual(&theta) else {
-            return theta;
-        };
-        let (mut cost, mut damping, mut quiet) = (square(&residual), 1.0e-2, 0);
-        for _ in 0..STEPS {
-            let Some(slopes) = self.slopes(&theta, &residual, &typical) else {
-                return theta;
-            };
-            let normal = slopes.tr_mul(&slopes);
-            let gradient = slopes.tr_mul(&DVector::from_column_slice(&residual));
-            let mut won = 0.0;
-            while damping < STIFFEST {
-                let Some(trial) = self.step(&theta, &normal, &gradient, damping) else {
-                    break;
-                };
-                let found = self.residual(&trial).map(|r| (square(&r), r));
-                if let Some((less, r)) = found.filter(|(less, _)| *less < cost) {
-                    won = 1.0 - less / cost;
-                    (theta, residual, cost) = (trial, r, less);
-                    damping = (0.2 * damping).max(1.0e-9);
-                    break;
-                }
-                damping *= 5.0;
-            }
-            quiet = if won < SETTLED { quiet + 1 } else { 0 };
-            if quiet > 1 || damping >= STIFFEST {
+    /// Parameters of the least sum of squares near the best of `starts`; that start itself where nothing better is found.
+    pub(super) fn fit(&self, starts: &[&[f64]]) -> Vec<f64> {
+        if let [start] = starts {
+            return self.descend(Descent::from(self, start), STEPS).theta;
+        }
+        let tried =
+            (starts.iter()).map(|start| self.descend(Descent::from(self, start), FIRST_STEPS));
+        let best = tried.reduce(|a, b| if b.cost < a.cost { b } else { a });
+        best.map_or_else(Vec::new, |best| {
+            self.descend(best, STEPS - FIRST_STEPS).theta
+        })
+    }
+
+    /// Goes on with a fit by at most `steps` steps.
+    fn descend(&self, mut at: Descent, steps: usize) -> Descent {
+        for _ in 0..steps {
+            if at.settled {
                 break;
             }
+            let Some(slopes) = self.slopes(&at.theta, &at.residual, &at.typical) else {
+                at.settled = true;
+                break;
+            };
+            let normal = slopes.tr_mul(&slopes);
+            let gradient = slopes.tr_mul(&DVector::from_column_slice(&at.residual));
+            let mut won = 0.0;
+            while at.damping < STIFFEST {
+                let Some(trial) = self.step(&at.theta, &normal, &gradient, at.damping) else {
+                    break;
+                };
+                let found = self.residual(&trial).ok().map(|r| (square(&r), r));
+                if let Some((less, r)) = found.filter(|(less, _)| *less < at.cost) {
+                    won = 1.0 - less / at.cost;
+                    (at.theta, at.residual, at.cost) = (trial, r, less);
+                    at.damping = (0.2 * at.damping).max(1.0e-9);
+                    break;
+                }
+                at.damping *= 5.0;
+            }
+            at.quiet = if won < SETTLED { at.quiet + 1 } else { 0 };
+            at.settled = at.quiet > 1 || at.damping >= STIFFEST;
         }
-        theta
+        at
     }
 
     /// One damped step; parameters at a bound that they press against stay there.
@@ -173,7 +186,7 @@ impl Problem<'_> {
 
     /// Standard deviations of the free parameters, blocks of whole segments taken as independent (sandwich, White 1982).
     pub(super) fn deviations(&self, theta: &[f64]) -> Option<Vec<f64>> {
-        let residual = self.residual(theta)?;
+        let residual = self.residual(theta).ok()?;
         let typical: Vec<f64> = theta.iter().map(|x| x.abs().max(1.0e-9)).collect();
         let slopes = self.slopes(theta, &residual, &typical)?;
         let normal = slopes.tr_mul(&slopes);
@@ -193,59 +206,36 @@ impl Problem<'_> {
     }
 }
 
-fn square(list: &[f64]) -> f64 {
-    list.iter().map(|x| x * x).sum()
+/// A fit on its way.
+struct Descent {
+    theta: Vec<f64>,
+    /// Scale of each parameter.
+    typical: Vec<f64>,
+    residual: Vec<f64>,
+    /// Sum of squares; infinite where the start cannot be simulated.
+    cost: f64,
+    damping: f64,
+    /// Steps in a row that won next to nothing.
+    quiet: usize,
+    settled: bool,
 }
 
-/// Nominal parameters by least squares on the equation of motion where the joint moves: a start, not a result.
-pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
-    let moving = |log: &Log| -> Vec<[f64; 4]> {
-        (0..log.t.len())
-            .map(|k| {
-                let [v, a] = log.slope(k);
-                [k as f64, log.q[k], v, a]
-            })
-            .collect()
-    };
-    let states: Vec<Vec<[f64; 4]>> = logs.iter().map(moving).collect();
-    let all = states.iter().flatten();
-    let count = states.iter().map(Vec::len).sum::<usize>().max(1);
-    let typical = (all.map(|s| s[2] * s[2]).sum::<f64>() / count as f64).sqrt();
-    let mut normal = DMatrix::<f64>::zeros(NOMINAL, NOMINAL);
-    let mut right = DVector::<f64>::zeros(NOMINAL);
-    for (log, states) in logs.iter().zip(&states) {
-        for (k, [_, q, v, a]) in states.iter().enumerate() {
-            if v.abs() < 0.2 * typical {
-                continue;
-            }
-            let on = f64::from(u8::from(log.on[k]));
-            let fv = if viscous { -v } else { 0.0 };
-            let row = [-a, on * log.u[k], -on * v, -v.signum(), fv, -1.0];
-            let known = plant.inertia * a + plant.weight(*q);
-            for i in 0..NOMINAL {
-                right[i] += row[i] * known;
-                for j in 0..NOMINAL {
-                    normal[(i, j)] += row[i] * row[j];
-                }
-            }
+impl Descent {
+    fn from(problem: &Problem<'_>, start: &[f64]) -> Self {
+        let theta = problem.within(start);
+        let residual = problem.residual(&theta);
+        Self {
+            typical: start.iter().map(|x| x.abs().max(1.0e-9)).collect(),
+            theta,
+            cost: residual.as_ref().map_or(f64::INFINITY, |r| square(r)),
+            settled: residual.is_err(),
+            residual: residual.unwrap_or_default(),
+            damping: 1.0e-2,
+            quiet: 0,
         }
     }
-    for i in 0..NOMINAL {
-        normal[(i, i)] += 1.0e-12 + 1.0e-9 * normal[(i, i)];
-    }
-    let x = normal.cholesky()?.solve(&right);
-    let weight = plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
-    let gain = if x[1] > 0.0 { x[1] } else { return None };
-    Some(vec![
-        x[0].max(0.05 * plant.inertia),
-        gain,
-        (x[2] / gain).max(1.0e-3),
-        x[3].max(0.01 * weight),
-        if viscous {
-            x[4].max(1.0e-3 * weight)
-        } else {
-            0.0
-        },
-        x[5],
-    ])
+}
+
+fn square(list: &[f64]) -> f64 {
+    list.iter().map(|x| x * x).sum()
 }

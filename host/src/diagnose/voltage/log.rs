@@ -3,9 +3,12 @@
 use super::law::Law;
 use crate::diagnose::DiagnoseError;
 use crate::prepare::Recording;
+use crate::robot::VoltageController;
 
 /// Rows on each side that the velocity at a row is taken from: a parabola through eleven rows.
 const SIDE: usize = 5;
+/// The same for a reference, which has no noise: a parabola through five rows.
+const REFERENCE_SIDE: usize = 2;
 /// A voltage is known well enough between rows this many periods apart; farther apart there is a gap.
 const GAP: f64 = 5.0;
 /// Column that says whether the drive is on.
@@ -28,8 +31,14 @@ pub(super) struct Log {
     pub reference: Vec<f64>,
     /// V; 1 where it was not recorded.
     pub supply: Vec<f64>,
-    /// The controller, where the recording shows it.
-    pub law: Option<Law>,
+    /// Velocity of the reference, rad/s or m/s; empty where none was recorded.
+    pub reference_velocity: Vec<f64>,
+    /// Acceleration of the reference, rad/s² or m/s²; empty where none was recorded.
+    pub reference_acceleration: Vec<f64>,
+    /// The controller that closes the loop; none where the recorded voltage drives.
+    pub law: Option<VoltageController>,
+    /// Integral of the position error as its controller had it at each row, rad·s or m·s; empty where that has none.
+    pub integral: Vec<f64>,
     /// Whether the drive is on; an idle bridge lets no current flow, so that nothing brakes.
     pub on: Vec<bool>,
 }
@@ -45,25 +54,25 @@ impl Log {
 
     /// Velocity and acceleration at a row by a parabola through its neighbours.
     pub(super) fn slope(&self, row: usize) -> [f64; 2] {
-        let last = self.t.len().saturating_sub(1);
-        let (low, high) = (row.saturating_sub(SIDE), (row + SIDE).min(last));
-        let mut s = [0.0; 5];
-        let mut b = [0.0; 3];
-        for k in low..=high {
-            let (x, y) = (self.t[k] - self.t[row], self.q[k] - self.q[row]);
-            let mut power = 1.0;
-            for (n, sum) in s.iter_mut().enumerate() {
-                *sum += power;
-                if n < 3 {
-                    b[n] += power * y;
-                }
-                power *= x;
-            }
+        slope(&self.t, &self.q, row, SIDE)
+    }
+
+    /// Takes the slopes of the reference from its rows.
+    pub(super) fn read_slopes(&mut self) {
+        if self.reference.len() == self.t.len() {
+            let slopes =
+                (0..self.t.len()).map(|k| slope(&self.t, &self.reference, k, REFERENCE_SIDE));
+            (self.reference_velocity, self.reference_acceleration) =
+                slopes.map(|[v, a]| (v, a)).unzip();
         }
-        let a = nalgebra::Matrix3::new(s[0], s[1], s[2], s[1], s[2], s[3], s[2], s[3], s[4]);
-        a.lu()
-            .solve(&nalgebra::Vector3::from(b))
-            .map_or([0.0; 2], |c| [c[1], 2.0 * c[2]])
+    }
+
+    /// Takes the controller from the rows.
+    pub(super) fn read_controller(&mut self) {
+        self.read_slopes();
+        if let Some(law) = Law::of(self) {
+            (self.law, self.integral) = (Some(law.controller), law.integral);
+        }
     }
 
     /// Pieces of about `length` seconds; the whole where it is infinite.
@@ -86,6 +95,29 @@ impl Log {
         }
         list
     }
+}
+
+/// First and second derivative of a column at a row by a parabola through `side` rows on each side.
+fn slope(t: &[f64], column: &[f64], row: usize, side: usize) -> [f64; 2] {
+    let last = t.len().saturating_sub(1);
+    let (low, high) = (row.saturating_sub(side), (row + side).min(last));
+    let mut s = [0.0; 5];
+    let mut b = [0.0; 3];
+    for k in low..=high {
+        let (x, y) = (t[k] - t[row], column[k] - column[row]);
+        let mut power = 1.0;
+        for (n, sum) in s.iter_mut().enumerate() {
+            *sum += power;
+            if n < 3 {
+                b[n] += power * y;
+            }
+            power *= x;
+        }
+    }
+    let a = nalgebra::Matrix3::new(s[0], s[1], s[2], s[1], s[2], s[3], s[2], s[3], s[4]);
+    a.lu()
+        .solve(&nalgebra::Vector3::from(b))
+        .map_or([0.0; 2], |c| [c[1], 2.0 * c[2]])
 }
 
 /// Rows of a log that are simulated from the recorded state of the first.
@@ -148,7 +180,7 @@ pub(super) fn logs(recordings: &[&dyn Recording]) -> Result<Vec<Log>, DiagnoseEr
     // Shorter than two parabolas there is nothing to simulate.
     list.retain(|log| log.t.len() > 4 * SIDE);
     for log in &mut list {
-        log.law = Law::of(log);
+        log.read_controller();
     }
     // What is found must not hang on the order of the files, and folds dealt in this order have weak and strong motions each.
     let strength = |log: &Log| log.u.iter().map(|u| u * u).sum::<f64>() / log.u.len() as f64;

@@ -11,22 +11,40 @@
 //! Where the recording's references and voltage show the controller, the loop is closed (`law`) and no recorded voltage drives.
 //! Held-back recordings have a say: an effect that makes their motion worse does not stand.
 //!
-//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; integral action
-//! and feed-forward of the controller, which then is in the recorded voltage.
+//! A fit begins with the equation of motion on short pieces (`start`), goes on with windows of one second and ends with whole
+//! recordings. A free run that leaves the recorded motion has diverged ([`FreeRun`]), and its errors are no residual.
+//!
+//! Leaves out: several joints; effects between motor and link and on the encoder; periodic torques; warming; filters and delays of
+//! the controller.
 
+#[cfg(test)]
+mod closed_loop_tests;
+mod controllers;
 mod describe;
+mod driven;
 mod faults;
 mod fit;
+mod free_run;
+mod halt;
 mod law;
 mod log;
 mod plant;
 mod search;
 #[cfg(test)]
+mod servo;
+mod start;
+mod stepper;
+#[cfg(test)]
 mod tests;
 
 use rig_shared::multibody::{COLUMNS, Chain, column, gravity_vector};
 
+pub(crate) use self::controllers::terms as controller_terms;
 use self::describe::Told;
+pub use self::driven::DrivenError;
+pub(crate) use self::driven::{Followed, Reference, VoltageModel, reference_of};
+pub use self::free_run::FreeRun;
+use self::law::Supply;
 use self::log::{Log, logs};
 use self::plant::Plant;
 use self::search::{Model, Search, library};
@@ -62,8 +80,11 @@ pub fn diagnose_voltage(
     }
     let mut stated = Stated::of(robot);
     let plant = plant(&stated.robot)?;
-    let train = logs(training)?;
-    let sealed = logs(holdout)?;
+    let mut train = logs(training)?;
+    let mut sealed = logs(holdout)?;
+    let supply = Supply::of(&train);
+    supply.give(&mut train);
+    supply.give(&mut sealed);
     let wrong = faults::faults(robot, &plant, &[training, holdout], &[&train, &sealed])?;
     if !options.fits(&wrong) {
         return Ok((faulty(robot, wrong), robot.clone()));
@@ -95,7 +116,7 @@ pub fn diagnose_voltage(
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
     let judge = search(&sealed);
-    let mut holdout: Vec<f64> = if sealed.is_empty() {
+    let mut holdout: Vec<FreeRun> = if sealed.is_empty() {
         Vec::new()
     } else {
         models.iter().map(|m| judge.freely(m)).collect()
@@ -121,8 +142,7 @@ pub fn diagnose_voltage(
         floor: floor(&train),
         train: models.iter().map(|m| bench.freely(m)).collect(),
         holdout,
-        mean_absolute: models.last().map_or(f64::NAN, |m| drawn.mean_absolute(m)),
-        spread: spread(drawn.logs),
+        controllers: controllers::shown(&train),
         deviations: models.iter().map(|m| bench.deviations(m)).collect(),
         models,
         rounds,
@@ -136,15 +156,17 @@ pub fn diagnose_voltage(
 }
 
 /// The last of the models, each with one effect more, that does not spoil a motion it was not fitted to: an effect may make
-/// that worse where the next one mends it. `holdout` has the RMS of each.
-fn standing(holdout: &[f64]) -> usize {
-    let mut least = f64::INFINITY;
+/// that worse where the next one mends it. `holdout` has what became of the free runs of each.
+fn standing(holdout: &[FreeRun]) -> usize {
+    let mut least: Option<&FreeRun> = None;
     let mut last = 0;
-    for (k, rms) in holdout.iter().enumerate() {
-        if *rms <= (1.0 + WORSE) * least {
+    for (k, run) in holdout.iter().enumerate() {
+        if least.is_none_or(|least| run.is_within(WORSE, least)) {
             last = k;
         }
-        least = least.min(*rms);
+        if least.is_none_or(|least| run.is_within(0.0, least)) {
+            least = Some(run);
+        }
     }
     last
 }
@@ -190,7 +212,7 @@ fn driven(train: &[Log], sealed: &[Log]) -> String {
         .chain(sealed)
         .filter(|log| log.law.is_some())
         .count();
-    let law = "given by the controller that each recording shows (proportional to the position error, within the supply)";
+    let law = "given by the controller that each recording shows, within the supply";
     match closed {
         0 => "as it was recorded".into(),
         _ if closed == all => law.into(),
@@ -242,17 +264,6 @@ fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
         per_moment: weight(unit)?,
         ratio: joint.drive.as_ref().map_or(1.0, |drive| drive.gear_ratio),
     })
-}
-
-/// RMS of the positions about the mean of their recording.
-fn spread(logs: &[Log]) -> f64 {
-    let (mut squares, mut rows) = (0.0, 0);
-    for log in logs {
-        let mean = log.q.iter().sum::<f64>() / log.q.len().max(1) as f64;
-        squares += log.q.iter().map(|q| (q - mean).powi(2)).sum::<f64>();
-        rows += log.q.len();
-    }
-    (squares / rows.max(1) as f64).sqrt()
 }
 
 /// What the encoder's steps leave of any position: the smallest over √12.

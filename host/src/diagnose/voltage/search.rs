@@ -4,9 +4,12 @@
 use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
 
 use super::LONGEST;
-use super::fit::{Problem, WINDOW, segments, start};
+use super::fit::{Problem, WINDOW, segments};
+use super::free_run::{FreeRun, travel};
+use super::halt::Cause;
 use super::log::{Log, Segment};
 use super::plant::{NOMINAL, Plant};
+use super::start::start;
 use crate::prepare::each_of;
 use crate::robot::Robot;
 
@@ -17,13 +20,17 @@ const BLOCKS: usize = 8;
 /// Length of the pieces whose errors are compared, s.
 const PIECE: f64 = 2.0;
 /// Share of the error on recordings not fitted to that an effect has to take away.
-const LEAST_GAIN: f64 = 0.03;
+pub(super) const LEAST_GAIN: f64 = 0.03;
 /// Level of the signed-rank test over the pieces.
-const LEVEL: f64 = 0.05;
+pub(super) const LEVEL: f64 = 0.05;
 /// Candidates within this share of the best on recordings not fitted to are as good.
 pub(super) const EQUAL: f64 = 0.03;
 /// Candidates of a round that go to the cross-validation, the best by training error first.
 const SHORT_LIST: usize = 3;
+/// Times at most that a model that came in is fitted again.
+const POLISHES: usize = 5;
+/// Share of the RMS that another fit has to win to be followed by one more.
+const POLISHED: f64 = 1.0e-5;
 /// Effects at most.
 const MOST: usize = 5;
 
@@ -106,19 +113,26 @@ impl Search<'_> {
         self.problem(model, self.blocks()).rms(&model.theta)
     }
 
-    /// RMS of the free-running position over whole recordings.
-    pub(super) fn freely(&self, model: &Model) -> f64 {
-        let whole = segments(self.logs, |_| true, LONGEST);
-        self.problem(model, whole).rms(&model.theta)
-    }
-
-    /// Mean absolute error of the free-running position over whole recordings; infinite where they cannot be simulated.
-    pub(super) fn mean_absolute(&self, model: &Model) -> f64 {
-        let whole = segments(self.logs, |_| true, LONGEST);
-        let error = self.problem(model, whole).residual(&model.theta);
-        error.map_or(f64::INFINITY, |error| {
-            error.iter().map(|e| e.abs()).sum::<f64>() / error.len().max(1) as f64
-        })
+    /// What becomes of the free runs over whole recordings.
+    pub(super) fn freely(&self, model: &Model) -> FreeRun {
+        let travel = travel(self.logs);
+        let mut errors = Vec::new();
+        for (k, segment) in segments(self.logs, |_| true, LONGEST) {
+            let log = &self.logs[k];
+            let run = match self
+                .problem(model, vec![(k, segment)])
+                .residual(&model.theta)
+            {
+                Ok(run) => run,
+                Err(halt) => return FreeRun::diverged(&log.label, halt.time, halt.cause),
+            };
+            if let Some(row) = run.iter().position(|error| !(error.abs() <= travel)) {
+                let time = log.t[segment.from + row];
+                return FreeRun::diverged(&log.label, time, Cause::LeftTravel);
+            }
+            errors.extend(run);
+        }
+        FreeRun::followed(&errors)
     }
 
     /// Simulated positions of one recording; empty where it cannot be simulated.
@@ -134,50 +148,65 @@ impl Search<'_> {
         self.problem(model, self.blocks()).deviations(&model.theta)
     }
 
-    fn fitted(&self, model: &Model, list: Vec<(usize, Segment)>) -> Model {
-        let theta = self.problem(model, list).fit(&model.theta);
+    /// `starts`, which differ in their parameters alone, fitted to pieces of the recordings from the best of them.
+    fn fitted(&self, starts: &[&Model], list: Vec<(usize, Segment)>) -> Model {
+        let thetas: Vec<&[f64]> = starts.iter().map(|model| model.theta.as_slice()).collect();
+        let theta = self.problem(starts[0], list).fit(&thetas);
         Model {
             theta,
-            ..model.clone()
+            ..starts[0].clone()
         }
+    }
+
+    /// A model fitted to whole recordings from several starts. Whole recordings alone end in the nearest of many valleys, windows
+    /// alone weigh what windows show: each start is taken as it is and fitted to windows.
+    fn settled(&self, starts: &[Model]) -> Model {
+        let windows = || segments(self.logs, |_| true, WINDOW);
+        let near: Vec<Model> = starts
+            .iter()
+            .map(|start| self.fitted(&[start], windows()))
+            .collect();
+        let all: Vec<&Model> = starts.iter().chain(&near).collect();
+        self.fitted(&all, self.blocks())
+    }
+
+    /// A model fitted again from where its fit ended, until that wins nothing: a fit ends early where joints stick.
+    fn polished(&self, mut model: Model) -> Model {
+        for _ in 0..POLISHES {
+            let before = self.rms(&model);
+            model = self.fitted(&[&model], self.blocks());
+            if !(self.rms(&model) < (1.0 - POLISHED) * before) {
+                break;
+            }
+        }
+        model
     }
 
     /// The nominal model, from several starts; none where the motion does not excite it.
     pub(super) fn nominal(&self) -> Option<Model> {
         let viscous = (self.logs.iter()).any(|log| log.on.iter().any(|on| !on));
-        let first = start(self.plant, self.logs, viscous)?;
-        let free = |c: f64| [0.0, c];
+        let theta = start(self.plant, self.logs, viscous)?;
         let infinity = f64::INFINITY;
         let model = Model {
             effects: Vec::new(),
-            theta: first.clone(),
+            theta,
             bounds: vec![
-                free(infinity),
+                [0.0, infinity],
                 [1.0e-9, infinity],
-                free(infinity),
-                free(infinity),
-                free(infinity),
+                [0.0, infinity],
+                [0.0, infinity],
+                [0.0, infinity],
                 [-infinity, infinity],
             ],
             // With the drive always on, viscous friction and back-EMF are one.
             free: (0..NOMINAL).filter(|p| viscous || *p != 4).collect(),
         };
-        let mut starts: Vec<Model> = [1.0, 0.5, 2.0]
-            .into_iter()
-            .map(|factor| {
-                let mut one = model.clone();
-                one.theta[3] *= factor;
-                one
-            })
-            .collect();
-        each_of(self.threads, &mut starts, &|_, one| {
-            let near = self.fitted(one, segments(self.logs, |_| true, WINDOW));
-            *one = self.better(
-                self.fitted(&near, self.blocks()),
-                self.fitted(one, self.blocks()),
-            );
+        let starts = [1.0, 0.5, 2.0].map(|factor| {
+            let mut one = model.clone();
+            one.theta[3] *= factor;
+            one
         });
-        starts.into_iter().reduce(|a, b| self.better(a, b))
+        Some(self.polished(self.settled(&starts)))
     }
 
     /// `nominal` with the effects of a description, those that are marked fitted again; none where that cannot be simulated.
@@ -216,53 +245,63 @@ impl Search<'_> {
             model.theta[..NOMINAL].copy_from_slice(&own);
             starts.push(model);
         }
-        let fitted = starts.into_iter().map(|start| {
-            let near = self.fitted(&start, segments(self.logs, |_| true, WINDOW));
-            self.better(
-                self.fitted(&start, self.blocks()),
-                self.fitted(&near, self.blocks()),
-            )
-        });
-        (fitted.reduce(|a, b| self.better(a, b))).filter(|model| self.rms(model).is_finite())
+        Some(self.settled(&starts)).filter(|model| self.rms(model).is_finite())
     }
 
-    fn better(&self, a: Model, b: Model) -> Model {
-        if self.rms(&b) < self.rms(&a) { b } else { a }
-    }
-
-    /// Sum of squares and number of rows of every piece of the recordings, of a model fitted to other blocks; infinite where
-    /// that cannot be simulated.
-    fn unseen(&self, model: &Model) -> Vec<[f64; 2]> {
+    /// Of each model the sum of squares and number of rows of every piece of the recordings, of the model fitted to other blocks;
+    /// infinite where that cannot be simulated.
+    fn unseen(&self, models: &[&Model]) -> Vec<Vec<[f64; 2]>> {
         let blocks = self.blocks();
         let folds = FOLDS.min(blocks.len()).max(1);
-        let mut pieces = vec![Vec::new(); blocks.len()];
-        for fold in 0..folds {
-            let kept = |at: &usize| at % folds == fold;
-            let rest = (0..blocks.len()).filter(|at| !kept(at));
-            let fitted = self.fitted(model, rest.map(|at| blocks[at]).collect());
-            for at in (0..blocks.len()).filter(kept) {
+        let mut tasks: Vec<(usize, usize, Vec<(usize, Vec<[f64; 2]>)>)> = (0..models.len() * folds)
+            .map(|k| (k / folds, k % folds, Vec::new()))
+            .collect();
+        each_of(self.threads, &mut tasks, &|_, (model, fold, found)| {
+            *found = self.left_out(models[*model], &blocks, [*fold, folds]);
+        });
+        let mut all = vec![vec![Vec::new(); blocks.len()]; models.len()];
+        for (model, _, found) in tasks {
+            for (at, sums) in found {
+                all[model][at] = sums;
+            }
+        }
+        all.into_iter().map(|pieces| pieces.concat()).collect()
+    }
+
+    /// The pieces of the blocks of one fold, for a model fitted to the blocks of the others: the number of each block with the
+    /// sums of its pieces.
+    fn left_out(
+        &self,
+        model: &Model,
+        blocks: &[(usize, Segment)],
+        [fold, folds]: [usize; 2],
+    ) -> Vec<(usize, Vec<[f64; 2]>)> {
+        let kept = |at: &usize| at % folds == fold;
+        let rest = (0..blocks.len()).filter(|at| !kept(at));
+        let fitted = self.fitted(&[model], rest.map(|at| blocks[at]).collect());
+        (0..blocks.len())
+            .filter(kept)
+            .map(|at| {
                 let (log, segment) = blocks[at];
                 let t = &self.logs[log].t[segment.from..segment.to];
                 let residual = self
                     .problem(model, vec![blocks[at]])
                     .residual(&fitted.theta);
                 let place = |k: usize| ((t[k] - t[0]) / PIECE) as usize;
-                let count = place(t.len() - 1) + 1;
-                let mut sums = vec![[0.0; 2]; count];
+                let mut sums = vec![[0.0; 2]; place(t.len() - 1) + 1];
                 for k in 0..t.len() {
                     let error = residual.as_ref().map_or(f64::INFINITY, |r| r[k]);
                     let sum = &mut sums[place(k)];
                     *sum = [sum[0] + error * error, sum[1] + 1.0];
                 }
-                pieces[at] = sums;
-            }
-        }
-        pieces.into_iter().flatten().collect()
+                (at, sums)
+            })
+            .collect()
     }
 
     /// `model` with one more effect, fitted to all recordings from several starts.
     fn with(&self, model: &Model, kind: Kind) -> Option<Model> {
-        let mut found: Option<Model> = None;
+        let mut starts = Vec::new();
         for share in [0.25, 0.75] {
             let mut more = model.clone();
             more.effects.push(kind);
@@ -271,8 +310,8 @@ impl Search<'_> {
                 more.theta.push(self.first_gain(gain, model));
                 more.bounds.push(gain.bounds);
             }
-            let mut shaped = false;
             more.free.extend(model.theta.len()..more.theta.len());
+            let mut shaped = false;
             for shape in about.shapes {
                 let [low, high] = shape.range;
                 // How friction parts between the sides of a gear is more than such a motion tells.
@@ -290,23 +329,12 @@ impl Search<'_> {
                 // What is far outside of what rigs have is another effect.
                 more.bounds.push([0.1 * low, 10.0 * high]);
             }
-            // Whole recordings alone end in the nearest of many valleys; windows alone weigh what windows show.
-            let near = self.fitted(&more, segments(self.logs, |_| true, WINDOW));
-            let fitted = self.better(
-                self.fitted(&more, self.blocks()),
-                self.fitted(&near, self.blocks()),
-            );
-            if self.rms(&fitted).is_finite() {
-                found = Some(match found {
-                    Some(other) => self.better(other, fitted),
-                    None => fitted,
-                });
-            }
+            starts.push(more);
             if !shaped {
                 break;
             }
         }
-        found
+        Some(self.settled(&starts)).filter(|found| self.rms(found).is_finite())
     }
 
     /// A small size for this joint, by the unit.
@@ -340,54 +368,9 @@ impl Search<'_> {
             let Some(model) = models.last().cloned() else {
                 break;
             };
-            let mut trials: Vec<Trial> = (self.library.iter())
-                .filter(|kind| {
-                    !model
-                        .effects
-                        .iter()
-                        .any(|e| e.about().name == kind.about().name)
-                })
-                .map(|kind| Trial {
-                    kind: *kind,
-                    model: None,
-                    train: f64::INFINITY,
-                    unseen: None,
-                    p_value: 1.0,
-                    refused: "cannot be simulated with these parameters".into(),
-                })
-                .collect();
-            each_of(self.threads, &mut trials, &|_, trial| {
-                trial.model = self.with(&model, trial.kind);
-                if let Some(found) = &trial.model {
-                    trial.train = self.rms(found);
-                    trial.refused = "others take away more".into();
-                }
-            });
-            trials.sort_by(|a, b| a.train.total_cmp(&b.train));
-            let before = self.unseen(&model);
-            let whole = pooled(&before);
+            let mut trials = self.trials(&model);
+            let whole = self.judge(&model, &mut trials);
             let count = SHORT_LIST.min(trials.len());
-            each_of(self.threads, &mut trials[..count], &|_, trial| {
-                let Some(found) = &trial.model else { return };
-                let after = self.unseen(found);
-                let rms = pooled(&after);
-                trial.unseen = Some(rms);
-                let gains: Vec<f64> = (before.iter().zip(&after))
-                    .map(|(b, a)| (b[0] / a[0]).ln())
-                    .collect();
-                let wins = gains.iter().filter(|g| **g > 0.0).count();
-                trial.p_value = signed_rank(&gains);
-                trial.refused = if trial.p_value > LEVEL {
-                    format!(
-                        "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
-                        gains.len()
-                    )
-                } else if !(rms <= (1.0 - LEAST_GAIN) * whole) {
-                    "takes less than 3 % off the motion of recordings it was not fitted to".into()
-                } else {
-                    String::new()
-                };
-            });
             in_sequence(&mut trials[..count]);
             let best = taken(&trials);
             for (k, trial) in trials.iter_mut().enumerate() {
@@ -397,11 +380,71 @@ impl Search<'_> {
             }
             report(models.len() - 1, whole, &trials);
             match best.and_then(|k| trials.swap_remove(k).model) {
-                Some(next) => models.push(next),
+                Some(next) => models.push(self.polished(next)),
                 None => break,
             }
         }
         models
+    }
+
+    /// Every effect that `model` does not have, fitted to all recordings, the best first.
+    fn trials(&self, model: &Model) -> Vec<Trial> {
+        let has = |kind: &Kind| {
+            let same = |e: &Kind| e.about().name == kind.about().name;
+            model.effects.iter().any(same)
+        };
+        let mut trials: Vec<Trial> = (self.library.iter())
+            .filter(|kind| !has(kind))
+            .map(|kind| Trial {
+                kind: *kind,
+                model: None,
+                train: f64::INFINITY,
+                unseen: None,
+                p_value: 1.0,
+                refused: "cannot be simulated with these parameters".into(),
+            })
+            .collect();
+        each_of(self.threads, &mut trials, &|_, trial| {
+            trial.model = self.with(model, trial.kind);
+            if let Some(found) = &trial.model {
+                trial.train = self.rms(found);
+                trial.refused = "others take away more".into();
+            }
+        });
+        trials.sort_by(|a, b| a.train.total_cmp(&b.train));
+        trials
+    }
+
+    /// Judges the trials that fit best by recordings left out of the fit, and gives the error of `model` on those.
+    fn judge(&self, model: &Model, trials: &mut [Trial]) -> f64 {
+        let short: Vec<usize> = (0..SHORT_LIST.min(trials.len()))
+            .filter(|k| trials[*k].model.is_some())
+            .collect();
+        let tried = short.iter().filter_map(|k| trials[*k].model.as_ref());
+        let unseen = self.unseen(&std::iter::once(model).chain(tried).collect::<Vec<_>>());
+        let before = &unseen[0];
+        let whole = pooled(before);
+        for (k, after) in short.into_iter().zip(&unseen[1..]) {
+            let trial = &mut trials[k];
+            let rms = pooled(after);
+            let gains: Vec<f64> = (before.iter().zip(after))
+                .map(|(b, a)| (b[0] / a[0]).ln())
+                .collect();
+            let wins = gains.iter().filter(|g| **g > 0.0).count();
+            trial.unseen = Some(rms);
+            trial.p_value = signed_rank(&gains);
+            trial.refused = if trial.p_value > LEVEL {
+                format!(
+                    "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
+                    gains.len()
+                )
+            } else if !(rms <= (1.0 - LEAST_GAIN) * whole) {
+                "takes less than 3 % off the motion of recordings it was not fitted to".into()
+            } else {
+                String::new()
+            };
+        }
+        whole
     }
 }
 

@@ -83,6 +83,7 @@ fn arm() -> Robot {
                 }),
                 drive: None,
                 controller: None,
+                voltage_controller: None,
             }
         })
         .collect();

@@ -1,7 +1,7 @@
 //! What the missing effects had done to the parameters, and what is left without a name.
 
 use super::{gap, parts, words};
-use crate::diagnose::outcome::{Absorbed, Before, Diagnosis, FloorFrom};
+use crate::diagnose::outcome::{Absorbed, Before, Diagnosis, FloorFrom, Remainder};
 use crate::report::{Block, Column, Section, Table, format_significant, format_value};
 
 /// From so many standard deviations on a parameter counts as having been wrong.
@@ -190,8 +190,28 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
         "What is left without a name",
         "No effect that is known here explains this part of the gap. It is described instead of being given the name that fits least badly.",
     )
-    .with(parts::warning(remainder.text.clone()))
-    .with(Block::Text(format!(
+    .with(parts::warning(remainder.text.clone()));
+    // A free run that diverged has no residual.
+    if !remainder.rms.is_nan() {
+        section = section.with(Block::Text(unnamed(remainder, &shown)));
+    }
+    let texts = gap::texts(&remainder.places, false);
+    if !texts.is_empty() {
+        section = section.with(Block::List(texts));
+    }
+    if !remainder.places.is_empty() {
+        section = section.with(gap::table(
+            "What the remainder depends on",
+            &remainder.places,
+        ));
+    }
+    section.blocks.extend(maps);
+    Some(section)
+}
+
+/// The remainder of a joint in numbers.
+fn unnamed(remainder: &Remainder, shown: &words::Shown) -> String {
+    format!(
         "Joint {}: {} RMS without a name{}.",
         remainder.joint,
         shown.value(remainder.rms),
@@ -206,17 +226,5 @@ pub(super) fn remainder(found: &Diagnosis) -> Option<Section> {
                 format_significant(remainder.ratio, 3)
             ),
         }
-    )));
-    let texts = gap::texts(&remainder.places, false);
-    if !texts.is_empty() {
-        section = section.with(Block::List(texts));
-    }
-    if !remainder.places.is_empty() {
-        section = section.with(gap::table(
-            "What the remainder depends on",
-            &remainder.places,
-        ));
-    }
-    section.blocks.extend(maps);
-    Some(section)
+    )
 }

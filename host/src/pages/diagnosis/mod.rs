@@ -60,7 +60,8 @@ fn left_over(found: &Diagnosis) -> Option<f64> {
         .iter()
         .filter_map(|w| {
             let rms = w.holdout.last().or(w.train.last())?;
-            (w.floor > 0.0).then(|| rms / w.judged_floor())
+            // A run that diverged has no residual.
+            (w.floor > 0.0 && !rms.is_nan()).then(|| rms / w.judged_floor())
         })
         .reduce(f64::max)
 }

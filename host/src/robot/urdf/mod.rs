@@ -18,8 +18,9 @@ use std::path::Path;
 use nalgebra::{Isometry3, Vector3};
 
 use super::error::{Place, RobotError};
+use super::inertia::negative_inertia;
 use super::sizes::oversized;
-use super::{Joint, JointFriction, JointKind, JointLimits};
+use super::{JointFriction, JointKind, JointLimits, Robot};
 use reader::{Reader, parsed};
 
 pub use original::Original;
@@ -74,8 +75,8 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
 }
 
 /// Refuses a chain whose links, as `joints` describe them, no robot has.
-pub(super) fn check_sizes(chain: &Chain, joints: &[Joint], path: &Path) -> Result<(), RobotError> {
-    match oversized(joints) {
+pub(super) fn check_sizes(chain: &Chain, robot: &Robot, path: &Path) -> Result<(), RobotError> {
+    match oversized(&robot.joints).or_else(|| negative_inertia(robot)) {
         None => Ok(()),
         Some((k, fault)) => Err(RobotError::Value {
             path: path.into(),

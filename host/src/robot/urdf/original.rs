@@ -44,7 +44,7 @@ impl Original {
     pub fn read(text: String, path: &Path) -> Result<Self, RobotError> {
         let mut chain = super::read(&text, path)?;
         let converted = convert(&chain);
-        super::check_sizes(&chain, &converted.robot.joints, path)?;
+        super::check_sizes(&chain, &converted.robot, path)?;
         chain.remarks.extend(converted.remarks);
         Ok(Self {
             text,

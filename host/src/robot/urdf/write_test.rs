@@ -77,6 +77,7 @@ fn random(rng: &mut Pcg64) -> Robot {
             }),
             drive: None,
             controller: None,
+            voltage_controller: None,
         })
         .collect();
     let direction: [f64; 3] = if rng.random_bool(0.3) {

@@ -1,0 +1,52 @@
+//! Why a simulation under voltage cannot go on.
+
+/// The end of a simulation before the end of its rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Halt {
+    /// Time of the recording, s.
+    pub(crate) time: f64,
+    /// Why.
+    pub(crate) cause: Cause,
+}
+
+/// Why a free run cannot be compared with its recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cause {
+    /// The simulated position is further from the recorded one than the joint travels in the recordings.
+    LeftTravel,
+    /// Position or velocity grows without bounds.
+    Unbounded,
+    /// The friction with its effects would drive the joint.
+    DrivingFriction,
+}
+
+impl Cause {
+    /// The cause as a clause.
+    pub(super) fn clause(self) -> &'static str {
+        match self {
+            Self::LeftTravel => {
+                "the simulated position is further from the recorded one than the joint travels in the recordings"
+            }
+            Self::Unbounded => "the simulated motion grows without bounds",
+            Self::DrivingFriction => "the friction with its effects would drive the joint",
+        }
+    }
+}
+
+impl Halt {
+    /// Friction that would drive the joint at `time`, s.
+    pub(super) fn driving(time: f64) -> Self {
+        Self {
+            time,
+            cause: Cause::DrivingFriction,
+        }
+    }
+
+    /// A motion without bounds at `time`, s.
+    pub(super) fn unbounded(time: f64) -> Self {
+        Self {
+            time,
+            cause: Cause::Unbounded,
+        }
+    }
+}
