@@ -234,7 +234,7 @@ fn a_description_takes_its_own_parameters_back() {
             row[column::VISCOUS] += 1.5;
             // More than the other motors put there, or less.
             let more = if t.has_joint_inertia(k) {
-                0.7 - 0.3 * k as f64
+                f64::max(0.7 - 0.3 * k as f64, -0.5 * row[column::DRIVE_INERTIA])
             } else {
                 0.0
             };

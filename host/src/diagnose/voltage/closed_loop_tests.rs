@@ -54,8 +54,9 @@ fn the_terms_of_a_pid_controller_with_feed_forward_are_recovered() {
                 c.velocity_feedforward,
                 c.acceleration_feedforward,
             ];
-            // The derivative is filtered by 10 ms, which no term of the model is.
-            for ((read, gain), share) in read.iter().zip(gains).zip([0.08, 0.2, 0.25, 0.25, 0.3]) {
+            // The derivative is filtered by 10 ms, which counts with the acceleration.
+            for ((read, gain), share) in read.iter().zip(gains).zip([0.02, 0.05, 0.05, 0.05, 0.15])
+            {
                 assert!(
                     (read - gain).abs() < share * gain,
                     "{read} for {gain}: {c:?}"
@@ -135,7 +136,8 @@ fn a_model_is_read_back_and_validates_as_it_was_diagnosed() {
     let rms = validation.motion.rms().unwrap();
     let last = *diagnosis.waterfall[0].holdout.last().unwrap();
     println!("{rms} {last}");
-    assert!((rms - last).abs() < 1e-9 * last, "{rms} {last}");
+    // The steps of the simulation are chosen by the recordings at hand.
+    assert!((rms - last).abs() < 0.1 * last, "{rms} {last}");
 }
 
 #[test]
@@ -221,7 +223,7 @@ fn a_start_on_short_pieces_stands_a_coarse_encoder() {
         servo.coulomb,
     ];
     for (found, truth) in found.iter().zip(truth) {
-        assert!((found - truth).abs() < 0.3 * truth, "{found} for {truth}");
+        assert!((found - truth).abs() < 0.05 * truth, "{found} for {truth}");
     }
 }
 

@@ -127,19 +127,7 @@ impl Told<'_> {
         words.extend(self.rotor_remark());
         let described = self.told();
         words.extend(described.iter().map(|d| d.text.clone()));
-        // A table of numbers has no place for a run that diverged: null stands there.
         let numbers = |runs: &[FreeRun]| runs.iter().map(FreeRun::number).collect::<Vec<f64>>();
-        let remainder = left.then(|| Remainder {
-            joint: self.joint(),
-            rms: (last.rms()).map_or(f64::NAN, |rms| {
-                (rms * rms - self.floor * self.floor).max(0.0).sqrt()
-            }),
-            unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
-            ratio: last.number() / self.floor.max(f64::MIN_POSITIVE),
-            places: Vec::new(),
-            text: self.left_over(),
-            doubt: false,
-        });
         Diagnosis {
             schema: "rig-diagnosis/1".into(),
             robot: self.stated.robot.name.clone(),
@@ -167,7 +155,7 @@ impl Told<'_> {
             not_testable: Vec::new(),
             detectable: Vec::new(),
             next_experiment: None,
-            remainder,
+            remainder: left.then(|| self.remainder()),
             data_faults: Vec::new(),
             waterfall: vec![Waterfall {
                 joint: self.joint(),
@@ -227,6 +215,21 @@ impl Told<'_> {
         format!(
             "The free run diverges in {recording} at {time:.2} s: {why}. It says nothing of the model. {mend}"
         )
+    }
+
+    /// What the last model leaves; a run that diverged leaves no number.
+    fn remainder(&self) -> Remainder {
+        let last = &self.judged()[self.judged().len() - 1];
+        let excess = |rms: f64| (rms * rms - self.floor * self.floor).max(0.0).sqrt();
+        Remainder {
+            joint: self.joint(),
+            rms: last.rms().map_or(f64::NAN, excess),
+            unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
+            ratio: last.number() / self.floor.max(f64::MIN_POSITIVE),
+            places: Vec::new(),
+            text: self.left_over(),
+            doubt: false,
+        }
     }
 
     /// What the last model leaves, a sentence.

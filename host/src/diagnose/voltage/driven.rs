@@ -5,7 +5,7 @@ use super::halt::{Cause, Halt};
 use super::law::Supply;
 use super::log::{Log, Segment, logs};
 use super::plant::Plant;
-use super::search::library;
+use super::search::{in_fine_steps, library};
 use super::stepper::State;
 use super::{LONGEST, plant};
 use crate::diagnose::DiagnoseError;
@@ -13,6 +13,9 @@ use crate::diagnose::stated::Stated;
 use crate::prepare::Recording;
 use crate::robot::{Robot, VoltageController};
 use rig_shared::effects::Kind;
+
+/// Times that the longest step is halved where there is no residual to compare the steps with: below 0.4 ms.
+const REPLAY_HALVINGS: i32 = 4;
 
 /// A joint that its voltage drives, with the parameters of a description.
 pub(crate) struct VoltageModel {
@@ -142,7 +145,10 @@ impl VoltageModel {
             .map_or(supply, |line| supply.with_line(line))
             .give(&mut logs);
         let travel = travel(&logs);
-        let list: Vec<Followed> = logs.iter().map(|log| self.over(log, travel)).collect();
+        let plant = in_fine_steps(&self.plant, &logs, &self.effects, &self.theta);
+        let list: Vec<Followed> = (logs.iter())
+            .map(|log| self.over(&plant, log, travel))
+            .collect();
         let diverged = list.iter().find(|one| one.run.rms().is_none());
         let errors = list
             .iter()
@@ -152,12 +158,11 @@ impl VoltageModel {
         Ok((list, all))
     }
 
-    fn over(&self, log: &Log, travel: f64) -> Followed {
+    fn over(&self, plant: &Plant, log: &Log, travel: f64) -> Followed {
         let mut simulated = Vec::with_capacity(log.t.len());
         let mut halt = None;
         for segment in log.windows(LONGEST) {
-            let run =
-                (self.plant).simulate(&self.effects, &self.theta, log, &segment, &mut simulated);
+            let run = plant.simulate(&self.effects, &self.theta, log, &segment, &mut simulated);
             if let Err(end) = run {
                 halt = Some(end);
                 break;
@@ -210,7 +215,12 @@ impl VoltageModel {
             velocity: reference.start[1],
         };
         let mut states = Vec::with_capacity(rows);
-        (self.plant)
+        // There is no residual that they could be compared with.
+        let plant = Plant {
+            halvings: REPLAY_HALVINGS,
+            ..self.plant
+        };
+        plant
             .run(&self.effects, &self.theta, &log, &whole, &mut |state| {
                 states.push(*state)
             })

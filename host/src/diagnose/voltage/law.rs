@@ -260,6 +260,57 @@ impl Shares {
     }
 }
 
+/// A recording with everything that a controller may answer.
+struct Rows<'a> {
+    log: &'a Log,
+    shares: Shares,
+    /// Integral of the position error at each row without and with clamping.
+    integrals: [Vec<f64>; 2],
+}
+
+impl<'a> Rows<'a> {
+    fn of(log: &'a Log) -> Self {
+        let shares = Shares::of(log);
+        let integrals = [false, true].map(|clamped| shares.integral(log, clamped));
+        Self {
+            log,
+            shares,
+            integrals,
+        }
+    }
+
+    /// The columns at row `k`.
+    fn columns(&self, k: usize) -> [f64; COLUMNS] {
+        let log = self.log;
+        let (error, velocity) = (log.reference[k] - log.q[k], log.slope(k)[0]);
+        let [free, clamped] = [self.integrals[0][k], self.integrals[1][k]];
+        let [speed, acceleration] = [log.reference_velocity[k], log.reference_acceleration[k]];
+        [error, -velocity, speed, acceleration, 1.0, free, clamped]
+    }
+
+    /// The largest share where it is a limit: the gains ask there for more by more than they are off elsewhere, `scatter`. The
+    /// whole supply where it is none and the supply is known, because a bridge gives no more; none where it is not.
+    fn limit(&self, gains: &DVector<f64>, scatter: f64) -> Option<f64> {
+        let Shares { share, on, largest } = &self.shares;
+        let limited: Vec<usize> = (on.iter().copied())
+            .filter(|k| self.shares.limited(*k))
+            .collect();
+        let beyond = |k: &usize| {
+            let wish: f64 = (self.columns(*k).iter().zip(gains.iter()))
+                .map(|(x, gain)| x * gain)
+                .sum();
+            wish * share[*k].signum() - largest
+        };
+        let mean = limited.iter().map(beyond).sum::<f64>() / limited.len().max(1) as f64;
+        let supplied = self.log.supply.iter().any(|supply| *supply != 1.0);
+        match (limited.len() >= AT_LIMIT && mean > scatter, supplied) {
+            (true, _) => Some(*largest),
+            (false, true) => Some(largest.max(1.0)),
+            (false, false) => None,
+        }
+    }
+}
+
 impl Law {
     /// What the rows of a recording with the drive on and off its limit follow; none where they follow no such law.
     pub(super) fn of(log: &Log) -> Option<Self> {
@@ -267,25 +318,18 @@ impl Law {
         if log.reference.len() != rows || log.u.len() != rows {
             return None;
         }
-        let shares = Shares::of(log);
-        let used: Vec<usize> = (shares.on.iter().copied())
-            .filter(|k| !shares.limited(*k))
+        let rows = Rows::of(log);
+        let used: Vec<usize> = (rows.shares.on.iter().copied())
+            .filter(|k| !rows.shares.limited(*k))
             .collect();
         if used.len() < FEWEST {
             return None;
         }
-        let integrals = [false, true].map(|clamped| shares.integral(log, clamped));
-        let row = |k: usize| {
-            let (error, velocity) = (log.reference[k] - log.q[k], log.slope(k)[0]);
-            let [free, clamped] = [integrals[0][k], integrals[1][k]];
-            let [speed, acceleration] = [log.reference_velocity[k], log.reference_acceleration[k]];
-            [error, -velocity, speed, acceleration, 1.0, free, clamped]
-        };
         let mut pieces = vec![Normal::new(); PIECES];
         for (n, &k) in used.iter().enumerate() {
-            pieces[n * PIECES / used.len()].push(&row(k), shares.share[k]);
+            pieces[n * PIECES / used.len()].push(&rows.columns(k), rows.shares.share[k]);
         }
-        let resolution = Resolution::of(log, &shares.share);
+        let resolution = Resolution::of(log, &rows.shares.share);
         let columns = chosen(&pieces, &resolution)?;
         let whole = Normal::sum(pieces.iter());
         let mut gains = whole.solve(&columns)?;
@@ -300,20 +344,8 @@ impl Law {
             }
         }
         let clamped = columns.contains(&CLAMPED);
-        // Where the law asks for more than the largest share by more than it is off elsewhere, that share is a limit.
-        let limited = || shares.on.iter().copied().filter(|k| shares.limited(*k));
-        let wish = |k: usize| {
-            (row(k).iter().zip(gains.iter()))
-                .map(|(x, g)| x * g)
-                .sum::<f64>()
-        };
-        let beyond: f64 = limited()
-            .map(|k| wish(k) * shares.share[k].signum() - shares.largest)
-            .sum();
-        let count = limited().count();
-        let is_limit =
-            count >= AT_LIMIT && beyond / count as f64 > (left / used.len() as f64).sqrt();
-        let supplied = log.supply.iter().any(|supply| *supply != 1.0);
+        let limit = rows.limit(&gains, (left / used.len() as f64).sqrt());
+        let [free, stopped] = rows.integrals;
         Some(Self {
             controller: VoltageController {
                 proportional: gains[0],
@@ -322,12 +354,7 @@ impl Law {
                 velocity_feedforward: gains[2],
                 acceleration_feedforward: gains[3],
                 bias: gains[4],
-                limit: match (is_limit, supplied) {
-                    (true, _) => Some(shares.largest),
-                    // A bridge gives no more than the supply.
-                    (false, true) => Some(shares.largest.max(1.0)),
-                    (false, false) => None,
-                },
+                limit,
                 anti_windup: match clamped {
                     true => AntiWindup::Clamping,
                     false => AntiWindup::None,
@@ -336,8 +363,8 @@ impl Law {
                 supply: [1.0, 0.0],
             },
             integral: match (columns.contains(&5), clamped) {
-                (true, _) => integrals[0].clone(),
-                (_, true) => integrals[1].clone(),
+                (true, _) => free,
+                (_, true) => stopped,
                 _ => Vec::new(),
             },
         })

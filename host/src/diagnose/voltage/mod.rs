@@ -89,24 +89,15 @@ pub fn diagnose_voltage(
     if !options.fits(&wrong) {
         return Ok((faulty(robot, wrong), robot.clone()));
     }
-    let search = |logs| Search {
-        plant: &plant,
+    let search = |plant, logs| Search {
+        plant,
         logs,
         library: library(&options.without, train.iter().any(|log| log.law.is_some())),
         threads: crate::prepare::threads(options.threads),
     };
-    let bench = search(&train);
-    let parts = stated.driven(&bench.library);
-    let nominal = bench.nominal().ok_or_else(|| {
-        DiagnoseError::Model(
-            "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion.".into(),
-        )
-    })?;
-    let nominal = bench.with_described(nominal, &parts, &stated.robot).ok_or_else(|| {
-        DiagnoseError::Model(
-            "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables.".into(),
-        )
-    })?;
+    let plant = search(&plant, &train).in_fine_steps();
+    let bench = search(&plant, &train);
+    let nominal = nominal(&bench, &mut stated)?;
     progress(0.2);
     let mut rounds = Vec::new();
     let mut unseen = Vec::new();
@@ -115,26 +106,13 @@ pub fn diagnose_voltage(
         rounds.push(trials.to_vec());
         progress(0.2 + 0.7 * (1.0 - 0.6_f64.powi(round as i32 + 1)));
     });
-    let judge = search(&sealed);
+    let judge = search(&plant, &sealed);
     let mut holdout: Vec<FreeRun> = if sealed.is_empty() {
         Vec::new()
     } else {
         models.iter().map(|m| judge.freely(m)).collect()
     };
-    let standing = standing(&holdout);
-    if standing + 1 < holdout.len() {
-        holdout.truncate(standing + 1);
-        let taken = models
-            .drain(standing + 1..)
-            .next()
-            .and_then(|m| m.effects.last().copied());
-        rounds.truncate(standing + 1);
-        for trial in rounds.iter_mut().flatten() {
-            if trial.refused.is_empty() && Some(trial.kind) == taken {
-                trial.refused = "makes the motion of the recordings held back worse".into();
-            }
-        }
-    }
+    keep_standing(&mut models, &mut holdout, &mut rounds);
     let drawn = if sealed.is_empty() { &bench } else { &judge };
     let found = Told {
         curves: curves(&robot.joints[0].name, drawn, &models),
@@ -153,6 +131,42 @@ pub fn diagnose_voltage(
     result.0.data_faults = wrong;
     progress(1.0);
     Ok(result)
+}
+
+/// The model of the description's structure, fitted, with the description's effects.
+fn nominal(bench: &Search<'_>, stated: &mut Stated) -> Result<Model, DiagnoseError> {
+    let parts = stated.driven(&bench.library);
+    let nominal = bench.nominal().ok_or_else(|| {
+        DiagnoseError::Model(
+            "the voltage does not move this joint as a motor's would; check the sign of the voltage, or record a livelier motion.".into(),
+        )
+    })?;
+    let whole = bench.with_described(nominal, &parts, &stated.robot);
+    whole.ok_or_else(|| {
+        DiagnoseError::Model(
+            "with its effects the description cannot be simulated under these voltages; look at the values of its [[effect]] tables.".into(),
+        )
+    })
+}
+
+/// Takes back the effects that spoil the motion of the hold-out, and says so of the one that was taken first.
+fn keep_standing(
+    models: &mut Vec<Model>,
+    holdout: &mut Vec<FreeRun>,
+    rounds: &mut Vec<Vec<search::Trial>>,
+) {
+    let standing = standing(holdout);
+    if standing + 1 >= holdout.len() {
+        return;
+    }
+    holdout.truncate(standing + 1);
+    let taken = (models.drain(standing + 1..).next()).and_then(|m| m.effects.last().copied());
+    rounds.truncate(standing + 1);
+    for trial in rounds.iter_mut().flatten() {
+        if trial.refused.is_empty() && Some(trial.kind) == taken {
+            trial.refused = "makes the motion of the recordings held back worse".into();
+        }
+    }
 }
 
 /// The last of the models, each with one effect more, that does not spoil a motion it was not fitted to: an effect may make
@@ -263,6 +277,7 @@ fn plant(robot: &Robot) -> Result<Plant, DiagnoseError> {
         gravity: weight(row)?,
         per_moment: weight(unit)?,
         ratio: joint.drive.as_ref().map_or(1.0, |drive| drive.gear_ratio),
+        halvings: 0,
     })
 }
 

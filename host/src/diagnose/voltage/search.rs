@@ -31,6 +31,10 @@ const SHORT_LIST: usize = 3;
 const POLISHES: usize = 5;
 /// Share of the RMS that another fit has to win to be followed by one more.
 const POLISHED: f64 = 1.0e-5;
+/// Share of the RMS residual by which steps half as long may change the positions.
+const STEP_SHARE: f64 = 0.1;
+/// Times at most that steps are halved.
+const HALVINGS: usize = 5;
 /// Effects at most.
 const MOST: usize = 5;
 
@@ -111,6 +115,15 @@ impl Search<'_> {
     /// RMS of the free-running position over the blocks.
     pub(super) fn rms(&self, model: &Model) -> f64 {
         self.problem(model, self.blocks()).rms(&model.theta)
+    }
+
+    /// The plant with steps so fine that halving them changes the positions of the nominal model by less than a tenth of their
+    /// residual: where the residual is near the encoder's steps, those of the simulation must not look like an effect.
+    pub(super) fn in_fine_steps(&self) -> Plant {
+        match self.nominal() {
+            Some(model) => in_fine_steps(self.plant, self.logs, &model.effects, &model.theta),
+            None => *self.plant,
+        }
     }
 
     /// What becomes of the free runs over whole recordings.
@@ -446,6 +459,36 @@ impl Search<'_> {
         }
         whole
     }
+}
+
+/// A plant with steps so fine that halving them changes the positions of a model by less than [`STEP_SHARE`] of their residual.
+pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta: &[f64]) -> Plant {
+    let run = |plant: &Plant| {
+        let problem = Problem {
+            plant,
+            logs,
+            segments: segments(logs, |_| true, LONGEST),
+            effects,
+            free: &[],
+            bounds: &[],
+        };
+        problem.residual(theta)
+    };
+    let squares = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
+    let mut plant = *plant;
+    let Ok(mut coarse) = run(&plant) else {
+        return plant;
+    };
+    for _ in 0..HALVINGS {
+        let finer = plant.finer();
+        let Ok(fine) = run(&finer) else { break };
+        let change = squares(&mut fine.iter().zip(&coarse).map(|(a, b)| a - b));
+        if change <= STEP_SHARE.powi(2) * squares(&mut fine.iter().copied()) {
+            break;
+        }
+        (plant, coarse) = (finer, fine);
+    }
+    plant
 }
 
 /// Each candidate is tested at the full level as long as all before it, which fit better, have passed: so the chance of any
