@@ -41,7 +41,8 @@ const REPORT: &str = "report.html";
 /// experiment that would show it.
 ///
 /// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs
-/// freely on that voltage and its position is compared instead.
+/// freely under that voltage and its position is compared instead. Where the recording has ref1 and shows its controller (PID with
+/// feed-forward, within the supply), the loop is closed; model.toml has the controller and the supply.
 ///
 /// The description should be what is believed of the robot: its values are fitted again, and are compared with what they
 /// were.

@@ -15,7 +15,7 @@ use crate::files::{can_take, folder, write_whole};
 use crate::pages::{self, Context};
 use crate::report::{self, Document, format_significant};
 use crate::robot::Robot;
-use crate::validate::{Drive, Motion, Options, Validation, validate, validate_voltage};
+use crate::validate::{DrivenBy, Motion, Options, Validation, validate, validate_voltage};
 
 /// Predicts torque and simulates motion on data not used before.
 ///
@@ -155,13 +155,13 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result
 }
 
 /// What became of a free run, with what drove it.
-fn moved(run: &FreeRun, driven: Option<&Drive>, unit: &str) -> String {
+fn moved(run: &FreeRun, driven: Option<&DrivenBy>, unit: &str) -> String {
     let how = match driven {
-        Some(Drive::Controller { controller }) => format!(
+        Some(DrivenBy::Controller { controller }) => format!(
             " in the closed loop of the controller that the recording shows ({})",
             controller_terms(controller, unit)
         ),
-        Some(Drive::RecordedVoltage) => " under the recorded voltage".to_owned(),
+        Some(DrivenBy::RecordedVoltage) => " under the recorded voltage".to_owned(),
         None => String::new(),
     };
     match run {

@@ -5,7 +5,7 @@ use crate::diagnose::voltage::FreeRun;
 use crate::report::{
     Axis, Block, Column, Document, Fact, Plot, Role, Section, Series, Table, Tone,
 };
-use crate::validate::{Drive, VoltageChecked, VoltageValidation};
+use crate::validate::{DrivenBy, VoltageChecked, VoltageValidation};
 
 /// The page.
 pub fn validation_voltage(found: &VoltageValidation, context: &Context) -> Document {
@@ -64,7 +64,7 @@ fn summary(found: &VoltageValidation) -> Vec<Fact> {
         ],
     };
     let closed = (found.recordings.iter())
-        .filter(|checked| matches!(checked.driven, Drive::Controller { .. }))
+        .filter(|checked| matches!(checked.driven, DrivenBy::Controller { .. }))
         .count();
     let all = found.recordings.len();
     let loops = Fact::new("Closed loop", format!("{closed} of {all}"))
@@ -77,8 +77,8 @@ fn overview(found: &VoltageValidation) -> Section {
         .map(|checked| {
             let [rms, mean, max] = errors(&checked.motion, &found.position_unit);
             let driven = match &checked.driven {
-                Drive::Controller { .. } => "controller",
-                Drive::RecordedVoltage => "recorded voltage",
+                DrivenBy::Controller { .. } => "controller",
+                DrivenBy::RecordedVoltage => "recorded voltage",
             };
             vec![checked.recording.clone(), driven.to_owned(), rms, mean, max]
         })

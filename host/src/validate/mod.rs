@@ -29,7 +29,7 @@ mod voltage;
 pub(crate) use motion::added_torque;
 use rig_shared::multibody::COLUMNS;
 use serde::Serialize;
-pub use voltage::{Drive, VoltageChecked, VoltageValidation, validate_voltage};
+pub use voltage::{DrivenBy, VoltageChecked, VoltageValidation, validate_voltage};
 
 use crate::effects::Compensated;
 use crate::identify::{

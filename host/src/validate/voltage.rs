@@ -13,7 +13,7 @@ use crate::robot::{Robot, VoltageController};
 /// What drives the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
-pub enum Drive {
+pub enum DrivenBy {
     /// The controller that the recording shows, in the closed loop.
     Controller {
         /// The controller.
@@ -31,7 +31,7 @@ pub struct VoltageChecked {
     /// Rows.
     pub rows: usize,
     /// What drives the model.
-    pub driven: Drive,
+    pub driven: DrivenBy,
     /// What became of the free run, and its position errors.
     pub motion: FreeRun,
     /// s
@@ -70,8 +70,8 @@ impl From<Followed> for VoltageChecked {
             recording: followed.recording,
             rows: followed.t.len(),
             driven: match followed.controller {
-                Some(controller) => Drive::Controller { controller },
-                None => Drive::RecordedVoltage,
+                Some(controller) => DrivenBy::Controller { controller },
+                None => DrivenBy::RecordedVoltage,
             },
             motion: followed.run,
             t: followed.t,
