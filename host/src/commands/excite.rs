@@ -119,7 +119,7 @@ pub(crate) struct Args {
     /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
     #[arg(long)]
     pub(crate) harmonics: Option<usize>,
-    /// Period of the slowest harmonic, s [default: from the limits] (fourier)
+    /// Period of the slowest harmonic, s [default: from the limits, 1 s at least] (fourier)
     #[arg(long)]
     pub(crate) period: Option<f64>,
     /// Rise from rest to full amplitude and fall back to rest, each, s [default: one period] (fourier)

@@ -3,6 +3,7 @@
 use rig_shared::trajectory::Trajectory;
 
 use super::*;
+use crate::robot::JointFriction;
 
 /// What of its limits a motion reaches.
 fn reached(robot: &Robot, file: &TrajectoryFile) -> [f64; 4] {
@@ -153,4 +154,31 @@ fn a_sweep_spans_speeds_from_creeping_to_near_the_limit() {
     let (slow, fast) = (motion.speed(0).unwrap(), motion.speed(11).unwrap());
     assert!(slow < 0.005 * limit && fast > 0.3 * limit, "{slow} {fast}");
     assert!((fast / slow / 200.0 - 1.0).abs() < 1e-3, "{slow} {fast}");
+}
+
+/// Many files state 10 000 rad/s and no acceleration limit: what the drive can do is then in its torque and in what it has to move.
+#[test]
+fn without_an_acceleration_limit_the_period_is_what_the_torque_allows() {
+    let mut robot = one_link();
+    let period = |robot: &Robot| default_period(robot, 5).unwrap();
+    let joint = &mut robot.joints[0];
+    joint.friction = Some(JointFriction {
+        coulomb: 0.0,
+        viscous: 0.2,
+        offset: 0.0,
+    });
+    let limits = joint.limits.as_mut().unwrap();
+    (limits.position, limits.soft_position) = ([-1.5, 1.5], None);
+    (limits.velocity, limits.acceleration, limits.torque) = (9000.0, None, Some(0.5));
+    // 0.5 N·m against 0.2 N·m·s/rad are 2.5 rad/s, and 1.5 rad at that speed are a period of 3.77 s at least.
+    let slow = period(&robot);
+    assert!((3.8..10.0).contains(&slow), "{slow}");
+    robot.joints[0].limits.as_mut().unwrap().torque = Some(9e3);
+    assert_eq!(period(&robot), 1.0);
+    robot.joints[0].inertial = None;
+    assert_eq!(period(&robot), 1.0);
+    // A limit that is stated counts alone.
+    let limits = robot.joints[0].limits.as_mut().unwrap();
+    (limits.velocity, limits.acceleration) = (3.0, Some(20.0));
+    assert_eq!(period(&robot), 4.8);
 }

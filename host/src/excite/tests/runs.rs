@@ -191,3 +191,45 @@ fn noise_has_its_deviation_and_its_seed_and_saturation_is_said() {
     );
     assert!(cut.motion.tau[0].iter().all(|t| t.abs() <= 2.5));
 }
+
+/// A wrist that is light beside its dry friction, as most URDFs describe one: feedback by its inertia alone leaves it where it is.
+#[test]
+fn a_light_link_with_much_dry_friction_follows_and_what_does_not_is_said() {
+    let mut robot = one_link();
+    let joint = &mut robot.joints[0];
+    joint.controller = None;
+    joint.drive = None;
+    joint.friction = Some(JointFriction {
+        coulomb: 1.0,
+        viscous: 1.0,
+        offset: 0.0,
+    });
+    let inertial = joint.inertial.as_mut().unwrap();
+    for value in [&mut inertial.mass]
+        .into_iter()
+        .chain(&mut inertial.first_moment)
+        .chain(&mut inertial.inertia)
+    {
+        *value *= 1e-2;
+    }
+    let reference = SampledReference::about_middle(&robot, 1e-3, 6.0, |_, t| 0.5 * t.sin().powi(2));
+    let run = |robot: &Robot| replay(robot, &reference, Noise::default(), 1, |_, _| ()).unwrap();
+    let free = run(&robot);
+    let off = free.motion.q[0].iter().zip(&free.reference[0]);
+    let off = off.map(|(q, r)| (q - r).abs()).fold(0.0, f64::max);
+    println!("off by {off}");
+    assert!(off < 0.05, "{off}");
+    assert!(
+        free.notes.iter().all(|n| !n.contains("off its reference")),
+        "{:?}",
+        free.notes
+    );
+    // Less torque than friction takes: it stays, and that is said.
+    robot.joints[0].limits.as_mut().unwrap().torque = Some(0.9);
+    let held = run(&robot);
+    assert!(
+        held.notes.iter().any(|n| n.contains("off its reference")),
+        "{:?}",
+        held.notes
+    );
+}
