@@ -83,9 +83,10 @@ fn the_rate_of_the_recorder_does_not_change_the_motion() {
     .unwrap();
     let run = |rate: f64| {
         let t = |k: usize| k as f64 / rate;
-        // From stretched to folded and back; the elbow turns twice as fast.
-        let shoulder = |t: f64| 0.8 * (1.0 - (1.5 * t).cos());
-        let elbow = |t: f64| 1.1 * (1.0 - (3.0 * t).cos());
+        // From stretched to folded and back, from rest to rest; the elbow turns twice as fast.
+        let turn = core::f64::consts::FRAC_PI_2;
+        let shoulder = |t: f64| 0.8 * (1.0 - (turn * t).cos());
+        let elbow = |t: f64| 1.1 * (1.0 - (2.0 * turn * t).cos());
         let count = (8.0 * rate) as usize + 1;
         let reference = SampledReference {
             period: 1.0 / rate,
