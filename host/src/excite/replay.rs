@@ -190,7 +190,7 @@ fn cells(period: f64) -> (f64, usize) {
 }
 
 /// The series with `cells` values a sample, on the cubics through the samples whose slopes are those of their neighbours (Catmull and
-/// Rom 1974); it is at rest before it begins and goes straight on where it ends.
+/// Rom 1974); it is at rest before it begins, and where it ends its second difference stays.
 fn refined(list: &[f64], cells: usize) -> Vec<f64> {
     let count = list.len().saturating_sub(1) * cells + list.len().min(1);
     let value = |cell: usize| {
@@ -205,8 +205,8 @@ fn refined(list: &[f64], cells: usize) -> Vec<f64> {
 fn around(list: &[f64], k: usize) -> [f64; 4] {
     let (before, now) = (list[k.saturating_sub(1)], list[k]);
     let next = list.get(k + 1).copied().unwrap_or(now);
-    let last = list.get(k + 2).copied().unwrap_or(2.0 * next - now);
-    [before, now, next, last]
+    let last = before + 3.0 * (next - now);
+    [before, now, next, list.get(k + 2).copied().unwrap_or(last)]
 }
 
 /// Torques that `model` needs for its reference, and what the speed of the reference makes of each `gain` that the controller has on
