@@ -327,6 +327,11 @@ impl Inputs {
         self.sources.iter().any(Source::has_effort)
     }
 
+    /// Whether every recording has torque or current.
+    pub(crate) fn all_effort(&self) -> bool {
+        self.sources.iter().all(Source::has_effort)
+    }
+
     /// Whether any recording has a motor voltage.
     pub(crate) fn any_voltage(&self) -> bool {
         self.sources.iter().any(Source::has_voltage)

@@ -51,15 +51,12 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     can_take(&args.out, &["validation.json", "report.html"])?;
     refuse_folder(&args.out, &[], args.force)?;
     let robot = args.robot.load(ui)?;
-    if robot.joints.len() == 1 {
-        let inputs = Inputs::open_with(&robot, &args.data, EffortNeed::Optional)?;
-        if !inputs.any_effort() && inputs.any_voltage() {
-            return under_voltage(args, ui, &robot, &inputs);
-        }
-    }
-    let inputs = Inputs::open(&robot, &args.data)?;
+    let (inputs, voltage) = opened(&robot, &args.data)?;
     for warning in inputs.warnings() {
         ui.remark(&warning);
+    }
+    if voltage {
+        return under_voltage(args, ui, &robot, &inputs);
     }
     if let Some(fuller) = args.robot.fuller() {
         ui.remark(&fuller);
@@ -90,17 +87,38 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &validation,
         &pages::validation(&robot, &validation, &context),
     )?;
-    for line in summary(&validation) {
-        ui.say(&line);
+    say(args, ui, &summary(&validation), &validation.warnings);
+    Ok(())
+}
+
+/// The recordings, and whether the voltage is all that they know of what drives the joint: of a robot of one joint alone.
+fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandError> {
+    if robot.joints.len() != 1 {
+        return Ok((Inputs::open(robot, paths)?, false));
     }
-    for warning in &validation.warnings {
+    let inputs = Inputs::open_with(robot, paths, EffortNeed::Optional)?;
+    if inputs.all_effort() {
+        return Ok((inputs, false));
+    }
+    match !inputs.any_effort() && inputs.any_voltage() {
+        true => Ok((inputs, true)),
+        // It says what is missing, and where.
+        false => Ok((Inputs::open(robot, paths)?, false)),
+    }
+}
+
+/// The answer, the warnings and where the report is.
+fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
+    for line in answer {
+        ui.say(line);
+    }
+    for warning in warnings {
         ui.remark(warning);
     }
     ui.say(&format!(
         "report: {}",
         args.out.join("report.html").display()
     ));
-    Ok(())
 }
 
 /// Writes the result as JSON and as a page into a folder.
@@ -116,9 +134,6 @@ fn write<T: Serialize>(out: &Path, found: &T, page: &Document) -> Result<(), Com
 
 /// Validates a joint that is known by its voltage.
 fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result<(), CommandError> {
-    for warning in inputs.warnings() {
-        ui.remark(&warning);
-    }
     let mut found = validate_voltage(robot, &recordings(&inputs.listened()))?;
     found.warnings.extend(inputs.heard());
     let context = Context {
@@ -131,26 +146,14 @@ fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result
         &found,
         &pages::validation_voltage(&found, &context),
     )?;
-    for checked in &found.recordings {
-        ui.say(&format!(
-            "{}, {}: {}",
-            checked.recording,
-            found.joint,
-            moved(&checked.motion, Some(&checked.driven), &found.position_unit)
-        ));
-    }
-    ui.say(&format!(
-        "all recordings, {}: {}",
-        found.joint,
-        moved(&found.motion, None, &found.position_unit)
-    ));
-    for warning in &found.warnings {
-        ui.remark(warning);
-    }
-    ui.say(&format!(
-        "report: {}",
-        args.out.join("report.html").display()
-    ));
+    let each = found.recordings.iter().map(|checked| {
+        let moved = moved(&checked.motion, Some(&checked.driven), &found.position_unit);
+        format!("{}, {}: {moved}", checked.recording, found.joint)
+    });
+    let all = moved(&found.motion, None, &found.position_unit);
+    let all = format!("all recordings, {}: {all}", found.joint);
+    let answer: Vec<String> = each.chain([all]).collect();
+    say(args, ui, &answer, &found.warnings);
     Ok(())
 }
 

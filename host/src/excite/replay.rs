@@ -5,6 +5,7 @@ use std::path::Path;
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 
 use super::{ExciteError, SampledReference};
 use crate::data::{Column, RecordingWriter};
@@ -12,7 +13,7 @@ use crate::robot::Robot;
 use crate::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
 
 /// The model stands in its controller for so long before the recording begins that gravity has found its balance, s.
-const SETTLING: f64 = 1.0;
+pub(super) const SETTLING: f64 = 1.0;
 /// Time constant of the stand-in's feedback, s.
 const TIME_CONSTANT: f64 = 1.0 / (core::f64::consts::TAU * STAND_IN_BANDWIDTH);
 /// Share of a joint's motion by which it may be off its reference, RMS, before that is said.
@@ -149,13 +150,11 @@ pub fn replay(
             *list = list.iter().skip(settling).step_by(cells).copied().collect();
         }
     }
-    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+    let mut random = Pcg64::seed_from_u64(seed);
     let mut disturb = |series: &mut Vec<Vec<f64>>, deviation: f64| {
         for list in series {
             for value in list.iter_mut() {
-                // Drawn also where the deviation is 0: one noise must not change the other's numbers.
-                let unit: f64 = StandardNormal.sample(&mut random);
-                *value += deviation * unit;
+                *value += drawn(&mut random, deviation);
             }
         }
     };
@@ -168,6 +167,12 @@ pub fn replay(
         motion,
         notes,
     })
+}
+
+/// Noise of a deviation. Drawn also where that is 0: one noise must not change the other's numbers.
+pub(super) fn drawn(random: &mut Pcg64, deviation: f64) -> f64 {
+    let unit: f64 = StandardNormal.sample(random);
+    deviation * unit
 }
 
 /// RMS of what a joint was off by, and of what it was asked to move about its mean.

@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 
+use super::replay::{SETTLING, drawn};
 use super::{ExciteError, Noise, load_reference};
 use crate::data::{Column, EffortNeed, RecordingWriter, Source};
 use crate::diagnose::voltage::{Reference, VoltageModel, reference_of};
 use crate::robot::Robot;
-
-/// The model stands in its controller for so long before a designed trajectory begins, s.
-const SETTLING: f64 = 1.0;
 
 /// What the simulated joint did.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,12 +47,8 @@ pub fn replay_voltage(
     let model = VoltageModel::of(robot)?;
     let (reference, settling) = reference(robot, path, rate)?;
     let states = model.replay(&robot.joints[0].name, &reference)?;
-    let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
-    let mut disturbed = |value: f64, deviation: f64| {
-        // Drawn also where the deviation is 0: one noise must not change the other's numbers.
-        let unit: f64 = StandardNormal.sample(&mut random);
-        value + deviation * unit
-    };
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut disturbed = |value: f64, deviation: f64| value + drawn(&mut random, deviation);
     let mut done = VoltageReplay {
         notes: model.remarks,
         ..VoltageReplay::default()

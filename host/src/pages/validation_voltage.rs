@@ -9,18 +9,9 @@ use crate::validate::{DrivenBy, VoltageChecked, VoltageValidation};
 
 /// The page.
 pub fn validation_voltage(found: &VoltageValidation, context: &Context) -> Document {
-    let mut sections = Vec::new();
-    let warnings: Vec<String> = (context.warnings.iter().chain(&found.warnings))
-        .cloned()
+    let mut sections: Vec<Section> = parts::warnings(&[&context.warnings, &found.warnings])
+        .into_iter()
         .collect();
-    if !warnings.is_empty() {
-        let section = Section::new("warnings", "Warnings", "");
-        sections.push(
-            warnings
-                .into_iter()
-                .fold(section, |section, text| section.with(parts::warning(text))),
-        );
-    }
     sections.push(overview(found));
     for (k, checked) in found.recordings.iter().enumerate() {
         sections.push(motion(found, checked, k));

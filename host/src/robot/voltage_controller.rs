@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Joint;
 use super::check::{Fault, Must, Step, number};
-use super::{Joint, JointKind};
 
 /// What the integral of the position error does while the output is at its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -88,9 +88,7 @@ impl VoltageController {
         let share = wish.clamp(-limit, limit);
         share * (self.supply[0] + self.supply[1] * share.abs())
     }
-}
 
-impl VoltageController {
     /// Supply while it gives a voltage, V: where share·(supply\[0\] + supply\[1\]·|share|) is that voltage.
     pub(crate) fn supply_at(&self, voltage: f64) -> f64 {
         let [none, slope] = self.supply;
@@ -105,10 +103,7 @@ impl VoltageController {
 pub(super) fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> Result<(), Fault> {
     use Must::{Finite, NotNegative, Positive};
     let way = |key| [Step::Key("voltage_controller"), Step::Key(key)];
-    let unit = match joint.kind {
-        JointKind::Revolute => "rad",
-        JointKind::Prismatic => "m",
-    };
+    let unit = joint.kind.units().0;
     for (key, what, per, must, value) in [
         (
             "proportional",
@@ -147,30 +142,16 @@ pub(super) fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> 
             limit,
         )?;
     }
-    let supply = [
-        Step::Key("voltage_controller"),
-        Step::Key("supply"),
-        Step::At(0),
-    ];
-    number(
-        joint,
-        &supply,
-        "supply without load",
-        "V",
-        Positive,
-        c.supply[0],
-    )?;
-    let sag = [
-        Step::Key("voltage_controller"),
-        Step::Key("supply"),
-        Step::At(1),
-    ];
-    number(
-        joint,
-        &sag,
-        "change of the supply",
-        "V",
-        Finite,
-        c.supply[1],
-    )
+    for (place, what, must) in [
+        (0, "supply without load", Positive),
+        (1, "change of the supply", Finite),
+    ] {
+        let way = [
+            Step::Key("voltage_controller"),
+            Step::Key("supply"),
+            Step::At(place),
+        ];
+        number(joint, &way, what, "V", must, c.supply[place])?;
+    }
+    Ok(())
 }

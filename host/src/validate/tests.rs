@@ -268,8 +268,9 @@ fn what_the_stand_in_made_it_makes_again() {
     for joint in judged(&robot) {
         println!(
             "{} {} {}",
-            joint.joint, joint.tracking_relative_error, joint.torque_relative_error
+            joint.joint, joint.position_relative_error, joint.torque_relative_error
         );
+        // The stand-in is hardly off its reference, so that this is measured by the way the joint goes.
         assert!(joint.position_relative_error < 1e-4, "{joint:?}");
     }
     let mut other = robot.clone();
@@ -279,7 +280,7 @@ fn what_the_stand_in_made_it_makes_again() {
         }
     }
     for joint in judged(&other) {
-        assert!(joint.tracking_relative_error > 0.02, "{joint:?}");
+        assert!(joint.position_relative_error > 2.5e-3, "{joint:?}");
     }
 }
 

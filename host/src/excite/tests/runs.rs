@@ -46,13 +46,14 @@ fn the_simulated_run_conserves_energy_and_reads_back() {
         (put_in - lost - gained).abs() < 2e-3 * put_in,
         "{put_in} {lost} {gained}"
     );
-    // It follows its reference as well as a cascade without feed-forward can.
+    // It follows its reference.
     let worst = motion.q[0]
         .iter()
         .zip(&run.reference[0])
         .map(|(q, r)| (q - r).abs())
         .fold(0.0, f64::max);
-    assert!(worst < 0.6, "{worst}");
+    println!("off by {worst} rad at most");
+    assert!(worst < 0.1, "{worst}");
     let folder = tempfile::tempdir().unwrap();
     for name in ["run.csv", "run.mcap"] {
         let path = folder.path().join(name);
@@ -83,10 +84,9 @@ fn the_rate_of_the_recorder_does_not_change_the_motion() {
     .unwrap();
     let run = |rate: f64| {
         let t = |k: usize| k as f64 / rate;
-        // From stretched to folded and back, from rest to rest; the elbow turns twice as fast.
-        let turn = core::f64::consts::FRAC_PI_2;
-        let shoulder = |t: f64| 0.8 * (1.0 - (turn * t).cos());
-        let elbow = |t: f64| 1.1 * (1.0 - (2.0 * turn * t).cos());
+        // From stretched to folded and back; the elbow turns twice as fast.
+        let shoulder = |t: f64| 0.8 * (1.0 - (1.5 * t).cos());
+        let elbow = |t: f64| 1.1 * (1.0 - (3.0 * t).cos());
         let count = (8.0 * rate) as usize + 1;
         let reference = SampledReference {
             period: 1.0 / rate,
