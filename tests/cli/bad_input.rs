@@ -347,3 +347,36 @@ fn options_that_contradict_each_other_are_refused() {
         &["0.1", "ols", "--estimator ridge"],
     );
 }
+
+/// Files as other programs write them get a sentence that says what to do, whatever they are called.
+#[test]
+fn files_of_other_programs_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording.csv");
+    for (bytes, words) in [
+        (
+            b"#ROSBAG V2.0\n".as_slice(),
+            ["a ROS 1 bag", "mcap convert"],
+        ),
+        (b"SQLite format 3\0", ["SQLite", "ros2 bag convert"]),
+        (b"\x1f\x8b\x08", ["gzip", "decompress"]),
+        (b"PAR1\x15", ["Parquet", "to_csv"]),
+    ] {
+        fs::write(&path, bytes).unwrap();
+        names(&sentence(&path), &["recording.csv", words[0], words[1]]);
+    }
+}
+
+/// A number that no measurement has is named by line and column, in few digits.
+#[test]
+fn impossible_numbers_are_named_by_line_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = recording(folder.path(), |k, row| {
+        if k == 700 {
+            row[1] = "1.04e224".into();
+        }
+    });
+    let said = sentence(&path);
+    names(&said, &["recording.csv:702", "`q1`", "no position"]);
+    assert!(!said.contains("0000000"), "{said}");
+}

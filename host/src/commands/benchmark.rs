@@ -15,7 +15,7 @@ use crate::diagnose::benchmark::{
 };
 use crate::diagnose::scenario::{Effect, Noise, Size, Truth};
 use crate::files::{folder, write_whole};
-use crate::report::format_significant;
+use crate::report::{format_short, format_significant};
 
 /// Which method is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -198,7 +198,8 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for (flag, seconds) in [("--train", args.train), ("--holdout", args.holdout)] {
         if !(20.0..=3600.0).contains(&seconds) {
             return Err(CommandError::Sentence(format!(
-                "{flag} is {seconds} s; give 20 to 3600 s, so that every kind of motion fits in."
+                "{flag} is {} s; give 20 to 3600 s, so that every kind of motion fits in.",
+                format_short(seconds)
             )));
         }
     }

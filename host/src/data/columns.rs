@@ -5,6 +5,8 @@ use std::path::Path;
 
 use super::error::{DataError, Warning};
 use super::motors::MotorSide;
+use super::place::Place;
+use super::source::Header;
 use crate::robot::Robot;
 
 /// Whether every joint must come with its torque.
@@ -45,11 +47,59 @@ pub(super) enum Role {
 #[derive(Clone, Debug)]
 pub(super) struct FileColumn {
     pub name: String,
+    /// What messages call it: the name in the file.
+    pub label: String,
     pub role: Role,
     /// Place in [`super::Block::extra`], if it is kept by name.
     pub extra: Option<usize>,
     /// Whether every value must be a finite number.
     pub strict: bool,
+}
+
+/// Magnitude that no value of a column in SI units has, whatever unit it was mistaken for: 10⁶ rad, N·m, A or V, a million
+/// times too large in a smaller unit.
+const NO_MEASUREMENT: f64 = 1e12;
+
+/// The same for time: nanoseconds since 1970, which are told as such, are 1.8·10¹⁸.
+const NO_TIME: f64 = 1e21;
+
+impl FileColumn {
+    /// Largest magnitude that is taken for a measurement.
+    pub(super) fn largest(&self) -> f64 {
+        match self.role {
+            Role::Time => NO_TIME,
+            _ => NO_MEASUREMENT,
+        }
+    }
+
+    /// What the column measures.
+    fn quantity(&self) -> &'static str {
+        match (self.role, split(&self.name)) {
+            (Role::Time, _) => "time",
+            (_, Some(("i", _))) => "motor current",
+            (_, Some(("taum", _))) => "motor torque",
+            (_, Some(("tau", _))) => "torque or force",
+            (_, Some(("q" | "qm" | "ql", _))) => "position",
+            (_, Some(("qd", _))) => "velocity",
+            (_, Some(("qdd", _))) => "acceleration",
+            (_, Some(("ref", _))) => "reference position",
+            (_, Some(("u", _))) => "voltage",
+            (_, Some(("duty", _))) => "duty cycle",
+            (_, Some(("temp", _))) => "temperature",
+            _ => "measurement",
+        }
+    }
+
+    /// That this value is beyond [`FileColumn::largest`].
+    pub(super) fn out_of_range(&self, path: &Path, place: Place, value: f64) -> DataError {
+        DataError::OutOfRange {
+            path: path.into(),
+            place,
+            column: self.label.clone(),
+            value,
+            quantity: self.quantity(),
+        }
+    }
 }
 
 /// All columns of the file in their order.
@@ -61,6 +111,8 @@ pub(super) struct Layout {
     pub extras: usize,
     /// What is turned from the motors to the joints; none where nothing is.
     pub motors: Option<MotorSide>,
+    /// Per joint, the motors whose columns make its position or torque where it is turned from the motors.
+    pub movers: Vec<Vec<usize>>,
     pub warnings: Vec<Warning>,
 }
 
@@ -97,21 +149,21 @@ fn shown(names: &[String]) -> String {
 
 pub(super) fn layout(
     path: &Path,
-    names: &[String],
+    described: &Header,
     robot: &Robot,
     need: EffortNeed,
 ) -> Result<Layout, DataError> {
     let header = |message: String| DataError::Header {
         path: path.into(),
+        place: described.line.map(Place::Line),
         message,
     };
+    let names = described.names.as_slice();
     let joints = robot.joints.len();
     let find = |name: &str| names.iter().position(|n| n == name);
     let Some(time) = find("t") else {
         let only = names.first().map_or("", String::as_str);
-        let hint = if names.len() == 1 && (only.contains(';') || only.contains('\t')) {
-            "; columns must be separated by commas"
-        } else if only.parse::<f64>().is_ok() {
+        let hint = if only.parse::<f64>().is_ok() {
             "; the first line must name the columns"
         } else {
             ""
@@ -125,7 +177,7 @@ pub(super) fn layout(
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
             return Err(header(format!(
-                "column {} has no name; every column needs one (is there a comma too many?)",
+                "column {} has no name; every column needs one (is there a separator too many?)",
                 i + 1
             )));
         }
@@ -157,10 +209,13 @@ pub(super) fn layout(
     let mut warnings = Vec::new();
     let supply = find("supply");
     let from_motors = motor_positions(names, robot, joints).map_err(header)?;
+    if let (Some(why), EffortNeed::Required) = (&described.without_effort, need) {
+        return Err(header(why.clone()));
+    }
     let efforts = efforts(names, robot, need).map_err(header)?;
     let mut extras = 0;
     let mut columns = Vec::with_capacity(names.len());
-    for name in names {
+    for (name, label) in names.iter().zip(&described.labels) {
         let (role, keep) = match split(name) {
             _ if name == "t" => (Role::Time, false),
             None => (Role::None, true),
@@ -200,12 +255,15 @@ pub(super) fn layout(
             role != Role::None || split(name).is_some() || NUMERIC_EXTRAS.contains(&name.as_str());
         columns.push(FileColumn {
             name: name.clone(),
+            label: label.clone(),
             role,
             extra: keep.then_some(extras),
             strict,
         });
         extras += usize::from(keep);
     }
+    let movers = |j: usize| (0..joints).filter(|m| robot.moves(*m, j)).collect();
+    let movers = (0..joints).map(movers).collect();
     let motors = if from_motors || efforts.turned.contains(&true) {
         let side = MotorSide::new(robot, from_motors, efforts.turned).map_err(|e| {
             header(format!(
@@ -223,6 +281,7 @@ pub(super) fn layout(
         joints,
         extras,
         motors,
+        movers,
         warnings,
     })
 }

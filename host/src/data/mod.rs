@@ -3,21 +3,42 @@
 //! [`Source`] reads CSV and MCAP alike, as many passes as asked; [`RecordingWriter`] writes both;
 //! [`plausibility`] notices wrong units before they become wrong parameters.
 
+mod bursts;
 mod columns;
 mod csv;
+mod csv_header;
 mod error;
+mod foreign;
+mod held;
+mod joint_states;
+mod json_samples;
 mod jump;
+mod mcap_records;
 mod mcap_rows;
 mod motors;
+mod number;
+mod place;
 mod plausibility;
+mod quantity;
+mod rate_spike;
+mod reference;
+mod remark;
+mod ros_layout;
+mod ros_message;
 mod source;
 mod spike;
+mod unsigned;
 mod writer;
 
 pub use columns::EffortNeed;
 pub use error::{DataError, Warning};
-pub use plausibility::{Implausible, plausibility, strange_references};
+pub use foreign::ForeignFormat;
+pub use place::Place;
+pub use plausibility::{Implausible, plausibility, strange_rates};
 pub(crate) use plausibility::{reference_scale, unit_of_steps, velocity_scale};
+pub use quantity::Quantity;
+pub use reference::{StrangeReference, strange_references};
+pub use remark::Remark;
 pub use source::{Blocks, KEPT_WARNINGS, Sampling, Source};
 pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
@@ -97,6 +118,10 @@ pub fn data_dir() -> Option<std::path::PathBuf> {
     folders.find_map(|f| Some(f.join("shared/data")).filter(|p| p.is_dir()))
 }
 
+#[cfg(test)]
+mod csv_test;
+#[cfg(test)]
+mod mcap_test;
 #[cfg(test)]
 mod motors_test;
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{DataError, EffortNeed, Source, data_dir};
+use super::{DataError, EffortNeed, Place, Source, data_dir};
 use crate::robot::{IRP6_TEMPLATE, Robot, TX40};
 
 fn robot(text: &str) -> Robot {
@@ -121,7 +121,13 @@ fn what_the_drives_cannot_turn_is_named_by_line_and_column() {
     }
     let path = file(&dir, &text);
     let error = Source::open(&path, &robot).unwrap().read_all().unwrap_err();
-    assert!(matches!(error, DataError::Motors { line: 22, .. }));
+    assert!(matches!(
+        error,
+        DataError::Motors {
+            place: Place::Line(22),
+            ..
+        }
+    ));
     let said = error.to_string();
     assert!(
         said.contains("data.csv:22: ") && said.contains("screw of drive 2"),
@@ -198,4 +204,23 @@ fn the_published_recording_of_the_tx40_is_read_as_its_authors_read_it() {
         }
     }
     assert!(lines.next().is_none());
+}
+
+#[test]
+fn coupled_motors_are_named_with_the_column_they_make() {
+    let robot = robot(IRP6_TEMPLATE);
+    let dir = tempfile::tempdir().unwrap();
+    let mut text = header(&["qm", "taum"]);
+    for (k, values) in irp6_motion(&robot, 20).into_iter().enumerate() {
+        let [_, _, psi, tau_motor] = values;
+        row(&mut text, k, &[psi, tau_motor]);
+    }
+    let source = Source::open(&file(&dir, &text), &robot).unwrap();
+    let names = |joint| source.column_name(joint, super::Quantity::Effort);
+    assert_eq!(names(0), "taum1");
+    assert!(
+        (1..5).any(|joint| names(joint).contains(&format!("tau{} (from taum", joint + 1))),
+        "{:?}",
+        (0..5).map(names).collect::<Vec<_>>()
+    );
 }

@@ -4,9 +4,13 @@
 //! factors of unit mistakes are 57 (degrees) and 1000 (milli). Without limits in the robot's description
 //! only what the columns say about each other is checked.
 
+use super::held::held;
 use super::jump::jump;
+use super::rate_spike::rate_spike;
 use super::spike::spike;
+use super::unsigned::{Unsigned, unsigned};
 use super::{Block, JointColumns};
+use crate::report::{format_significant, format_trimmed, listed};
 use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 
 /// A column that cannot be in the unit of the contract.
@@ -14,7 +18,7 @@ use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 pub enum Implausible {
     /// Position of a revolute joint in degrees.
     #[error(
-        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad"
+        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad{or}"
     )]
     Degrees {
         /// Joint, 1-based.
@@ -25,10 +29,12 @@ pub enum Implausible {
         highest: f64,
         /// Farthest position limit, rad.
         limit: f64,
+        /// What else it may be, with a comma before it; empty where it is nothing else.
+        or: String,
     },
     /// Position far outside the limits.
     #[error(
-        "q{joint} lies far outside the joint's range ({lowest:.4} to {highest:.4}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits"
+        "q{joint} lies far outside the joint's range ({lowest:.4} to {highest:.4}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits{or}"
     )]
     Position {
         /// Joint, 1-based.
@@ -43,6 +49,8 @@ pub enum Implausible {
         upper: f64,
         /// rad or m.
         unit: &'static str,
+        /// What else it may be, with a comma before it; empty where it is nothing else.
+        or: String,
     },
     /// Faster than ten times the limit.
     #[error(
@@ -122,6 +130,78 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
+    /// A position that keeps each value for several rows.
+    #[error(
+        "{} only in every {}: a topic of {slow} Hz in a recording of {fast} Hz. Velocity and acceleration of such stairs are wrong; record the position at the rate of the rows, or keep only the rows in which it changes", changes("q", joints), nth(*rows)
+    )]
+    HeldPosition {
+        /// Joints, 1-based.
+        joints: Vec<usize>,
+        /// Rows for which a value stays.
+        rows: usize,
+        /// Rate of the values, Hz.
+        slow: String,
+        /// Rate of the rows, Hz.
+        fast: String,
+    },
+    /// An effort that keeps each value for several rows.
+    #[error(
+        "{} only in every {}: values of {slow} Hz in a recording of {fast} Hz. A measured torque is then late by {late} ms on average, and inertia and friction are biased: record it at the rate of the rows. A command that the drive holds for that long is right as it stands", changes("tau", joints), nth(*rows)
+    )]
+    HeldEffort {
+        /// Joints, 1-based.
+        joints: Vec<usize>,
+        /// Rows for which a value stays.
+        rows: usize,
+        /// Rate of the values, Hz.
+        slow: String,
+        /// Rate of the rows, Hz.
+        fast: String,
+        /// Mean delay, ms.
+        late: String,
+    },
+    /// A column whose negative values were read as large positive ones.
+    #[error(
+        "{column}{joint} is never negative, but in {share} % of the rows it is far above all others, as a negative number is that was read as an unsigned one ({how}); read the register as a signed number"
+    )]
+    Unsigned {
+        /// Name of the column without its number.
+        column: &'static str,
+        /// Joint, 1-based.
+        joint: usize,
+        /// Share of the rows, %.
+        share: String,
+        /// What was lost.
+        how: String,
+    },
+    /// A measured velocity or acceleration that is zero throughout.
+    #[error(
+        "{column}{joint} is 0 in every row while the joint moves; check that the column was recorded, or leave it out"
+    )]
+    NoRate {
+        /// Name of the column without its number.
+        column: &'static str,
+        /// Joint, 1-based.
+        joint: usize,
+    },
+    /// Rows of a measured velocity that the position does not have.
+    #[error(
+        "qd{joint} is {value} {unit}/s in the row at t = {at} s{more}, where q{joint} changes by {speed} {unit}/s; such rows are no velocity: look for a wrapped counter or a lost sample, or leave qd{joint} out"
+    )]
+    RateSpike {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the largest, s.
+        at: String,
+        /// What stands there.
+        value: String,
+        /// What the position does there.
+        speed: String,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// rad or m.
+        unit: &'static str,
+    },
     /// Effort far above the limit.
     #[error(
         "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
@@ -176,14 +256,64 @@ impl Implausible {
             | Self::Position { joint, .. }
             | Self::Jump { joint, .. }
             | Self::Velocity { joint, .. } => format!("q{joint}"),
-            Self::VelocityScale { joint, .. } => format!("qd{joint}"),
+            Self::VelocityScale { joint, .. } | Self::RateSpike { joint, .. } => {
+                format!("qd{joint}")
+            }
+            Self::Unsigned { column, joint, .. } | Self::NoRate { column, joint } => {
+                format!("{column}{joint}")
+            }
             Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
             Self::EffortTooLarge { joint, .. }
             | Self::EffortTooSmall { joint, .. }
             | Self::NoEffort { joint }
             | Self::Spike { joint, .. } => format!("tau{joint}"),
+            Self::HeldPosition { joints, .. } => columns_of("q", joints),
+            Self::HeldEffort { joints, .. } => columns_of("tau", joints),
             Self::NotSeconds { .. } => "t".into(),
         }
+    }
+}
+
+impl Implausible {
+    /// Whether the column may be right all the same, so that it is said and not refused.
+    pub fn is_doubt(&self) -> bool {
+        matches!(self, Self::HeldEffort { .. })
+    }
+
+    /// Whether nothing can be said of the motion or the torque before it is mended.
+    pub fn spoils(&self) -> bool {
+        matches!(
+            self,
+            Self::Jump { .. }
+                | Self::Spike { .. }
+                | Self::HeldPosition { .. }
+                | Self::Unsigned { .. }
+        )
+    }
+}
+
+/// Columns of these joints: `q1, q2 and q3`.
+fn columns_of(column: &str, joints: &[usize]) -> String {
+    let all: Vec<String> = joints.iter().map(|k| format!("{column}{k}")).collect();
+    listed(&all)
+}
+
+/// The same with their verb.
+fn changes(column: &str, joints: &[usize]) -> String {
+    let verb = if joints.len() == 1 {
+        "changes"
+    } else {
+        "change"
+    };
+    format!("{} {verb}", columns_of(column, joints))
+}
+
+/// "second row", "third row", "10th row".
+fn nth(rows: usize) -> String {
+    match rows {
+        2 => "second row".to_owned(),
+        3 => "third row".to_owned(),
+        n => format!("{n}th row"),
     }
 }
 
@@ -206,7 +336,46 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
         check_joint(k, &block.t, columns, joint, &mut found);
     }
+    found.extend(repeated(block));
     found
+}
+
+/// Positions and efforts that keep each value for several rows, joints of one rate together.
+fn repeated(block: &Block) -> Vec<Implausible> {
+    let together = |of: fn(&JointColumns) -> &[f64]| {
+        let mut found: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (k, columns) in (1..).zip(&block.joints) {
+            let Some(rows) = held(of(columns)) else {
+                continue;
+            };
+            match found.iter_mut().find(|(own, _)| *own == rows) {
+                Some((_, joints)) => joints.push(k),
+                None => found.push((rows, vec![k])),
+            }
+        }
+        found
+    };
+    let rate = rate(&block.t);
+    let slow = |rows: usize| format_trimmed(rate / rows as f64, 4);
+    let fast = format_trimmed(rate, 4);
+    let positions = together(|columns| &columns.q)
+        .into_iter()
+        .map(|(rows, joints)| Implausible::HeldPosition {
+            joints,
+            rows,
+            slow: slow(rows),
+            fast: fast.clone(),
+        });
+    let efforts = together(|columns| &columns.tau)
+        .into_iter()
+        .map(|(rows, joints)| Implausible::HeldEffort {
+            joints,
+            rows,
+            slow: slow(rows),
+            fast: fast.clone(),
+            late: format_trimmed(500.0 * (rows as f64 - 1.0) / rate, 2),
+        });
+    positions.chain(efforts).collect()
 }
 
 /// The unit of time that steps of this size look like, where they are too long for seconds: rows come at between 5 and
@@ -250,7 +419,9 @@ fn check_joint(
     if columns.q.is_empty() {
         return;
     }
-    if let Some(jump) = jump(t, &columns.q) {
+    if let Some(lost) = unsigned(&columns.q) {
+        found.push(lost_sign("q", k, lost));
+    } else if let Some(jump) = jump(t, &columns.q) {
         found.push(Implausible::Jump {
             joint: k,
             at: t[jump.row],
@@ -268,6 +439,7 @@ fn check_joint(
         let [lower, upper] = limits.position;
         let reach = lower.abs().max(upper.abs());
         let farthest = lowest.abs().max(highest.abs());
+        let or = motor_angle(joint, farthest / reach);
         let degrees = farthest.to_radians() <= 1.2 * reach;
         if reach.is_finite() && farthest > 5.0 * reach {
             found.push(if joint.kind == JointKind::Revolute && degrees {
@@ -276,6 +448,7 @@ fn check_joint(
                     lowest,
                     highest,
                     limit: reach,
+                    or,
                 }
             } else {
                 Implausible::Position {
@@ -285,6 +458,7 @@ fn check_joint(
                     lower,
                     upper,
                     unit,
+                    or,
                 }
             });
         } else if let Some(speed) = highest_speed(t, &columns.q)
@@ -313,6 +487,82 @@ fn check_joint(
         }
     }
     check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
+}
+
+/// Rows a second.
+fn rate(t: &[f64]) -> f64 {
+    let (Some(first), Some(last)) = (t.first(), t.last()) else {
+        return 0.0;
+    };
+    (t.len() - 1) as f64 / (last - first).max(f64::MIN_POSITIVE)
+}
+
+fn lost_sign(column: &'static str, joint: usize, lost: Unsigned) -> Implausible {
+    let offset = format_significant(lost.offset, 4);
+    Implausible::Unsigned {
+        column,
+        joint,
+        share: format_significant(100.0 * lost.share, 2),
+        how: match lost.sign_bit {
+            true => format!("−x reads as {offset} + x: its highest bit is the sign"),
+            false => format!("−x reads as {offset} − x: two's complement"),
+        },
+    }
+}
+
+/// That a position beyond its limits by this factor may be the motor's, with a comma before it.
+fn motor_angle(joint: &Joint, beyond: f64) -> String {
+    let Some(ratio) = joint.drive.as_ref().map(|drive| drive.gear_ratio.abs()) else {
+        return String::new();
+    };
+    let number = |x: f64| format_trimmed(x, 4);
+    if ratio > 1.0 && beyond / ratio <= 1.2 {
+        let ratio = number(ratio);
+        format!(
+            ", or the angle of the motor: divided by the gear ratio {ratio} it would fit as well; name it qm"
+        )
+    } else if ratio < 1.0 && beyond * ratio * ratio <= 1.2 {
+        format!(
+            ", or the gear ratio stands upside down: gear_ratio is {}, and motor turns per joint turn are wanted ({} would fit)",
+            number(ratio),
+            number(1.0 / ratio)
+        )
+    } else {
+        String::new()
+    }
+}
+
+/// What is wrong with measured velocities and accelerations, which concerns who uses them.
+pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let mut found = Vec::new();
+    for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
+        let (lowest, highest) = range(&columns.q);
+        // 0.05 rad or 5 cm: less may be the noise of a joint that stands.
+        if highest - lowest < 0.05 || columns.q.is_empty() {
+            continue;
+        }
+        for (column, rates) in [("qd", &columns.qd), ("qdd", &columns.qdd)] {
+            if rates
+                .as_ref()
+                .is_some_and(|own| own.iter().all(|v| *v == 0.0))
+            {
+                found.push(Implausible::NoRate { column, joint: k });
+            }
+        }
+        let spike = (columns.qd.as_ref()).and_then(|qd| rate_spike(&block.t, &columns.q, qd));
+        if let Some(spike) = spike {
+            let number = |x: f64| format_significant(x, 4);
+            found.push(Implausible::RateSpike {
+                joint: k,
+                at: format_significant(block.t[spike.row], 6),
+                value: number(spike.value),
+                speed: number(spike.speed),
+                more: more(spike.count),
+                unit: joint.kind.units().0,
+            });
+        }
+    }
+    found
 }
 
 /// Highest mean speed over ten samples: a single step of a coarse encoder is no speed.
@@ -345,35 +595,39 @@ pub(crate) fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
 }
 
-/// References that are not in the unit or sense of their positions; what uses no references is right without them.
-pub fn strange_references(block: &Block, robot: &Robot) -> Vec<Implausible> {
-    let joints = (1..).zip(block.joints.iter().zip(&robot.joints));
-    joints
-        .filter_map(|(k, (columns, joint))| {
-            let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
-            let (unit, _) = joint.kind.units();
-            // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
-            let hint = match (ratio, unit) {
-                (0.1..10.0, _) => return None,
-                (50.0..65.0, "rad") => ", as degrees would",
-                (0.0154..0.02, "rad") => ", as if turned from degrees to rad twice",
-                (900.0..1100.0, "m") => ", as millimetres would",
-                (r, _) if r < 0.0 => ", the other way",
-                _ => "",
-            };
-            Some(Implausible::ReferenceScale {
-                joint: k,
-                ratio,
-                hint,
-                unit,
-            })
-        })
-        .collect()
+/// A reference that is not in the unit or sense of its position.
+pub(super) fn reference_unit(
+    k: usize,
+    columns: &JointColumns,
+    joint: &Joint,
+) -> Option<Implausible> {
+    let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
+    let (unit, _) = joint.kind.units();
+    // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
+    let hint = match (ratio, unit) {
+        (0.1..10.0, _) => return None,
+        (50.0..65.0, "rad") => ", as degrees would",
+        (0.0154..0.02, "rad") => ", as if turned from degrees to rad twice",
+        (900.0..1100.0, "m") => ", as millimetres would",
+        (r, _) if r < 0.0 => ", the other way",
+        _ => "",
+    };
+    Some(Implausible::ReferenceScale {
+        joint: k,
+        ratio,
+        hint,
+        unit,
+    })
 }
 
 /// Spread of the reference over that of the position, below zero where they run against each other; none where they are
 /// not the same motion.
 pub(crate) fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
+    // The variance of one value is rounding, and so is what goes with it.
+    let stands = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
+    if stands(q) || stands(reference) {
+        return None;
+    }
     let count = q.len().max(1) as f64;
     let (mean_q, mean_ref) = (
         q.iter().sum::<f64>() / count,
@@ -401,6 +655,10 @@ fn check_effort(
     travel: f64,
     found: &mut Vec<Implausible>,
 ) {
+    if let Some(lost) = unsigned(&columns.tau) {
+        found.push(lost_sign("tau", k, lost));
+        return;
+    }
     if let Some(spike) = spike(&columns.tau) {
         found.push(Implausible::Spike {
             joint: k,

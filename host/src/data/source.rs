@@ -4,12 +4,19 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::bursts::bursts;
 use super::columns::{EffortNeed, Layout, Role, layout};
 use super::csv::CsvRows;
 use super::error::{DataError, Warning};
-use super::mcap_rows::{MAGIC, McapRows};
+use super::foreign::{ForeignFormat, HEAD};
+use super::mcap_records::MAGIC;
+use super::mcap_rows::McapRows;
 use super::motors::{MotorPass, MotorSide};
+use super::place::Place;
+use super::quantity::Quantity;
+use super::remark::Remark;
 use super::{Block, JointColumns};
+use crate::report::format_trimmed;
 use crate::robot::Robot;
 
 /// Rows that decide on the sample period.
@@ -79,19 +86,43 @@ impl Sampling {
     }
 
     /// What is said of it.
-    fn parting(&self, line: u64, from: f64, now: f64) -> Warning {
+    fn parting(&self, place: Place, from: f64, now: f64) -> Warning {
         if now - from > self.longest_interval() {
             Warning::Gap {
-                line,
+                place,
                 from,
                 lost: now - from - self.period,
             }
         } else {
             Warning::Uneven {
-                line,
+                place,
                 step: now - from,
                 period: self.period,
             }
+        }
+    }
+}
+
+/// Columns of a file.
+#[derive(Debug, Default)]
+pub(super) struct Header {
+    /// Names by which the columns find their meaning.
+    pub names: Vec<String>,
+    /// What messages call them, one per name.
+    pub labels: Vec<String>,
+    /// Line on which they stand; none where the file has no lines.
+    pub line: Option<u64>,
+    /// Why there is no torque, where the file could have one.
+    pub without_effort: Option<String>,
+}
+
+impl Header {
+    /// Of columns that messages call by their names.
+    pub(super) fn of(names: Vec<String>) -> Self {
+        Self {
+            labels: names.clone(),
+            names,
+            ..Self::default()
         }
     }
 }
@@ -100,23 +131,57 @@ impl Sampling {
 #[derive(Clone, Debug)]
 pub struct Source {
     path: PathBuf,
-    layout: Layout,
+    /// Names of the robot's joints.
+    joints: Vec<String>,
+    pub(super) layout: Layout,
     sampling: Sampling,
     is_mcap: bool,
     bytes: u64,
 }
 
 enum Rows {
-    Csv(CsvRows),
+    Csv(Box<CsvRows>),
     Mcap(Box<McapRows>),
 }
 
 impl Rows {
-    fn open(path: &Path, is_mcap: bool) -> Result<(Self, Vec<String>), DataError> {
+    fn open(path: &Path, is_mcap: bool, joints: &[String]) -> Result<(Self, Header), DataError> {
         if is_mcap {
-            McapRows::open(path).map(|(r, n)| (Self::Mcap(Box::new(r)), n))
+            McapRows::open(path, joints).map(|(r, h)| (Self::Mcap(Box::new(r)), h))
         } else {
-            CsvRows::open(path).map(|(r, n)| (Self::Csv(r), n))
+            CsvRows::open(path).map(|(r, h)| (Self::Csv(Box::new(r)), h))
+        }
+    }
+
+    /// What was assumed and passed over so far.
+    fn remarks(&self) -> Vec<Remark> {
+        match self {
+            Self::Csv(r) => r.remarks().to_vec(),
+            Self::Mcap(r) => r.remarks(),
+        }
+    }
+
+    /// Time that grows from row to row.
+    fn check_growth(
+        &self,
+        path: &Path,
+        row: u64,
+        previous: Option<f64>,
+        now: f64,
+    ) -> Result<(), DataError> {
+        let (place, hint) = match self {
+            Self::Csv(_) => (Place::Line(row), ""),
+            Self::Mcap(r) => (Place::Message(row), r.order_hint()),
+        };
+        match previous {
+            Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
+                path: path.into(),
+                place,
+                previous,
+                now,
+                hint,
+            }),
+            _ => Ok(()),
         }
     }
 
@@ -136,7 +201,7 @@ impl Rows {
 }
 
 impl Source {
-    /// Opens a recording (CSV, or MCAP by its first bytes) in which every joint has its torque.
+    /// Opens a recording (CSV or MCAP, told by its first bytes and not by its name) in which every joint has its torque.
     ///
     /// Reads the header and the first 1001 rows; what is wrong with them is said here, what is wrong
     /// later by [`Blocks`].
@@ -159,26 +224,48 @@ impl Source {
             return Err(DataError::NotAFile { path: path.into() });
         }
         let mut start = Vec::new();
-        let mut head = File::open(path).map_err(failed)?.take(MAGIC.len() as u64);
+        let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
         head.read_to_end(&mut start).map_err(failed)?;
-        let is_mcap = start == MAGIC;
-        let (mut rows, names) = Rows::open(path, is_mcap)?;
-        let layout = layout(path, &names, robot, need)?;
+        // By what it holds: endings are often wrong.
+        let is_mcap = start.starts_with(&MAGIC[..5]);
+        if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
+            return Err(DataError::Foreign {
+                path: path.into(),
+                format,
+            });
+        }
+        let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
+        let (mut rows, header) = Rows::open(path, is_mcap, &joints)?;
+        let mut layout = layout(path, &header, robot, need)?;
         let mut values = vec![0.0; layout.columns.len()];
         let mut times = Vec::new();
         while times.len() < PROBED_ROWS
             && let Some(line) = rows.next_row(&layout, &mut values)?
         {
             let now = values[layout.time];
-            check_growth(path, line, times.last().copied(), now)?;
+            rows.check_growth(path, line, times.last().copied(), now)?;
             times.push(now);
         }
         if times.is_empty() {
             return Err(DataError::NoRows { path: path.into() });
         }
+        if let Some(found) = bursts(&times) {
+            return Err(DataError::Bursts {
+                path: path.into(),
+                rows: found.rows,
+                rate: format_trimmed(found.rate, 4),
+            });
+        }
         let sampling = Sampling::of(&times);
+        // Where the file breaks off is said by the pass that comes to it.
+        let remarks = rows.remarks().into_iter();
+        let said = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
+        layout
+            .warnings
+            .extend(said.map(|remark| Warning::Reading { remark }));
         Ok(Self {
             path: path.into(),
+            joints,
             layout,
             sampling,
             is_mcap,
@@ -213,9 +300,33 @@ impl Source {
         self.layout.columns.iter().any(|c| voltage(c.role))
     }
 
+    /// Joints of the robot that the recording was opened for.
+    pub fn joint_count(&self) -> usize {
+        self.layout.joints
+    }
+
     /// Names of the file's columns in their order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.layout.columns.iter().map(|c| c.name.as_str())
+    }
+
+    /// What the file calls the column that a joint's values come from, without quotation marks around it: `i1` where the
+    /// torque of the first joint is turned from its current, `qm2` where its position is that of its motor,
+    /// `effort of joint "elbow"` in a ROS 2 recording, and `tau2 (from i1, i2)` where several columns make one. The name
+    /// of the contract (`tau1`) where the file has no such column.
+    ///
+    /// `joint` counts from 0. Messages name a column by this, so that it is found in the file.
+    pub fn column_name(&self, joint: usize, quantity: Quantity) -> String {
+        self.layout.column_name(joint, quantity)
+    }
+
+    /// The row with this number as its user finds it: line of a text file, message of an MCAP file.
+    pub fn place(&self, row: u64) -> Place {
+        if self.is_mcap {
+            Place::Message(row)
+        } else {
+            Place::Line(row)
+        }
     }
 
     /// What the header makes worth saying; [`Blocks::warnings`] adds what the rows do.
@@ -253,18 +364,6 @@ impl Source {
         }
         let warnings = [self.warnings(), blocks.warnings()].concat();
         Ok((all, warnings))
-    }
-}
-
-fn check_growth(path: &Path, line: u64, previous: Option<f64>, now: f64) -> Result<(), DataError> {
-    match previous {
-        Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
-            path: path.into(),
-            line,
-            previous,
-            now,
-        }),
-        _ => Ok(()),
     }
 }
 
@@ -308,6 +407,17 @@ impl Blocks<'_> {
     fn warn(&mut self, warning: Warning) {
         if self.warnings.len() < KEPT_WARNINGS {
             self.warnings.push(warning);
+        }
+    }
+
+    /// Warns of what the whole file made worth saying beyond its beginning.
+    fn hear_the_rows(&mut self) {
+        let remarks = self.rows.as_ref().map(Rows::remarks).unwrap_or_default();
+        for remark in remarks {
+            let warning = Warning::Reading { remark };
+            if !self.source.warnings().contains(&warning) {
+                self.warn(warning);
+            }
         }
     }
 
@@ -361,7 +471,7 @@ impl Blocks<'_> {
                     self.named_extras[i] = true;
                     // At most one per column: no cap needed.
                     self.warnings.push(Warning::ExtraNotANumber {
-                        line,
+                        place: source.place(line),
                         column: c.name.clone(),
                     });
                 }
@@ -408,7 +518,7 @@ impl Blocks<'_> {
         };
         motors.turn(side).map_err(|error| DataError::Motors {
             path: source.path.clone(),
-            line,
+            place: source.place(line),
             message: error.to_string(),
         })?;
         for (k, joint) in block.joints.iter_mut().enumerate() {
@@ -453,7 +563,7 @@ impl Blocks<'_> {
         self.pardoned = (then - from - 2.0 * sampling.period).abs() <= UNEVEN * sampling.period;
         if self.pardoned {
             self.warn(Warning::Misplaced {
-                line,
+                place: self.source.place(line),
                 off: now - from - sampling.period,
             });
         }
@@ -463,7 +573,7 @@ impl Blocks<'_> {
     fn next_block(&mut self) -> Result<Option<Block>, DataError> {
         let source = self.source;
         if self.rows.is_none() {
-            self.rows = Some(Rows::open(&source.path, source.is_mcap)?.0);
+            self.rows = Some(Rows::open(&source.path, source.is_mcap, &source.joints)?.0);
         }
         let mut block: Option<Block> = None;
         loop {
@@ -479,10 +589,13 @@ impl Blocks<'_> {
                 None => {
                     let Some(line) = self.fetch()? else {
                         self.finished = true;
+                        self.hear_the_rows();
                         return Ok(block);
                     };
                     let now = self.values[source.layout.time];
-                    check_growth(&source.path, line, self.previous, now)?;
+                    if let Some(rows) = &self.rows {
+                        rows.check_growth(&source.path, line, self.previous, now)?;
+                    }
                     let before = self.previous.replace(now);
                     let pardoned = std::mem::take(&mut self.pardoned);
                     if let Some(from) = before
@@ -491,7 +604,7 @@ impl Blocks<'_> {
                         && !self.misplaced(line, from, now)?
                     {
                         self.gaps += 1;
-                        self.warn(source.sampling.parting(line, from, now));
+                        self.warn(source.sampling.parting(source.place(line), from, now));
                         self.continues = false;
                         if block.is_some() {
                             self.pending = Some(line);

@@ -11,6 +11,7 @@ use tempfile::NamedTempFile;
 use super::error::DataError;
 use super::mcap_rows::TOPIC;
 use crate::files::{persist, temporary};
+use crate::report::format_short;
 
 /// A column to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,6 +70,15 @@ impl RecordingWriter {
         }
     }
 
+    /// The hidden file that is written until [`RecordingWriter::finish`], for whoever must remove it: a program that ends at
+    /// once leaves it behind.
+    pub fn temporary(&self) -> &Path {
+        match self {
+            Self::Csv(w) => &w.rows.hidden,
+            Self::Mcap(w) => &w.rows.hidden,
+        }
+    }
+
     /// Completes the file and gives it its name; without this call nothing is left behind.
     pub fn finish(self) -> Result<(), DataError> {
         match self {
@@ -81,6 +91,8 @@ impl RecordingWriter {
 /// What both formats share: names, the row counter and the checks.
 struct Rows {
     path: PathBuf,
+    /// Where they are written until the file is whole.
+    hidden: PathBuf,
     names: Vec<String>,
     count: u64,
     text: String,
@@ -100,6 +112,7 @@ impl Rows {
         {
             return Err(DataError::Header {
                 path: path.into(),
+                place: None,
                 message: format!(
                     "columns cannot be called {names:?}; the first must be `t`, and all need different names without commas and quotes"
                 ),
@@ -107,6 +120,7 @@ impl Rows {
         }
         Ok(Self {
             path: path.into(),
+            hidden: PathBuf::new(),
             names,
             count: 0,
             text: String::new(),
@@ -129,7 +143,8 @@ impl Rows {
         }
         match self.names.iter().zip(row).find(|(_, v)| !v.is_finite()) {
             Some((name, value)) => Err(bad(format!(
-                "column `{name}` is {value}, but a recording holds finite numbers only"
+                "column `{name}` is {}, but a recording holds finite numbers only",
+                format_short(*value)
             ))),
             None => Ok(()),
         }
@@ -152,8 +167,9 @@ pub struct CsvWriter {
 impl CsvWriter {
     /// Begins the file; see [`RecordingWriter::create`].
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
-        let rows = Rows::new(path, columns)?;
+        let mut rows = Rows::new(path, columns)?;
         let file = temporary(path).map_err(|e| rows.failed(e))?;
+        rows.hidden = file.path().to_path_buf();
         let mut out = BufWriter::with_capacity(1 << 17, file);
         writeln!(out, "{}", rows.names.join(",")).map_err(|e| rows.failed(e))?;
         Ok(Self { rows, out })
@@ -213,8 +229,9 @@ impl McapWriter {
         columns: &[Column],
         metadata: &BTreeMap<String, String>,
     ) -> Result<Self, DataError> {
-        let rows = Rows::new(path, columns)?;
+        let mut rows = Rows::new(path, columns)?;
         let file = temporary(path).map_err(|e| rows.failed(e))?;
+        rows.hidden = file.path().to_path_buf();
         let schema = schema(columns);
         let begin = || -> ::mcap::McapResult<_> {
             let mut out = ::mcap::WriteOptions::new()
@@ -243,7 +260,8 @@ impl McapWriter {
                 path: self.rows.path.clone(),
                 row: self.rows.count,
                 message: format!(
-                    "its time is {t} s, but MCAP counts nanoseconds from 0 upwards; shift the time or write .csv"
+                    "its time is {} s, but MCAP counts nanoseconds from 0 upwards; shift the time or write .csv",
+                    format_short(t)
                 ),
             });
         }

@@ -12,7 +12,7 @@ use super::pull;
 use super::solve::Solution;
 use super::transmission::STRETCH;
 use super::waves::{is_of_the_motor, ratio_is_described};
-use crate::report::{format_significant, format_unit, format_value};
+use crate::report::{format_significant, format_unit, format_value, listed};
 use crate::robot::Joint;
 
 /// From so many standard deviations on a parameter has moved.
@@ -47,15 +47,6 @@ fn number(x: f64) -> String {
 
 fn percent(share: f64) -> String {
     format!("{} %", format_significant(100.0 * share, 3))
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn listed(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 /// The verdict with its figures.

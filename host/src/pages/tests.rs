@@ -70,6 +70,7 @@ fn map() -> FrictionMap {
                 std: 0.01,
                 start: 1.0,
                 duration: 0.4,
+                rows: (0, 0),
             })
             .to_vec(),
         dropped: vec![DroppedPass {
@@ -88,6 +89,7 @@ fn map() -> FrictionMap {
         warranted: true,
         text: "A Stribeck term is warranted by four points.".into(),
         note: None,
+        doubts: Vec::new(),
     }
 }
 

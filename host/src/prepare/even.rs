@@ -15,7 +15,7 @@ pub enum Evened<'a> {
 }
 
 /// How a recording is interpolated that could not be surveyed: at what step, s, and a sentence that says so. None where that is not
-/// what it lacks: rows at steps that differ from their mean by more than a fifth, and never by more than two and a half times of it.
+/// what it lacks: rows at steps that differ from their mean by more than a fifth, and are never longer than five times of it.
 pub(crate) fn interpolation(error: &PrepareError) -> Option<(f64, String)> {
     let PrepareError::Irregular {
         label,

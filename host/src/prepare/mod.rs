@@ -41,6 +41,8 @@ pub(crate) use treatment::HIGHEST;
 pub use treatment::{Choice, CutoffTrial, Masked, PrepareOptions, Treatment};
 pub(crate) use workers::{each_of, threads};
 
+use crate::report::format_short;
+
 /// Why a recording cannot be prepared.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepareError {
@@ -90,7 +92,8 @@ pub enum PrepareError {
     },
     /// Every joint stands still throughout.
     #[error(
-        "Joint {joint} does not move in {label}: its position stays at {position}, and no other joint moves; record a motion."
+        "Joint {joint} does not move in {label}: its position stays at {}, and no other joint moves; record a motion.",
+        format_short(*position)
     )]
     NotMoving {
         /// The recording.
@@ -102,7 +105,9 @@ pub enum PrepareError {
     },
     /// The recordings have different rates.
     #[error(
-        "{label} is sampled at {rate} Hz and the first recording at {first} Hz; recordings that are identified together must have one rate."
+        "{label} is sampled at {} Hz and the first recording at {} Hz; recordings that are identified together must have one rate.",
+        format_short(*rate),
+        format_short(*first)
     )]
     RateMismatch {
         /// The recording.
@@ -138,8 +143,10 @@ pub enum PrepareError {
     },
     /// A cut-off that no filter can have.
     #[error(
-        "A cut-off of {} Hz is not possible at {rate} Hz; it must lie between 0 and {nyquist} Hz.",
-        crate::robot::written(*cutoff)
+        "A cut-off of {} Hz is not possible at {} Hz; it must lie between 0 and {} Hz.",
+        crate::robot::written(*cutoff),
+        format_short(*rate),
+        format_short(*nyquist)
     )]
     Cutoff {
         /// Asked for, Hz.

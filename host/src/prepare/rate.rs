@@ -4,6 +4,7 @@ use super::PrepareError;
 use super::filter::decimator_edge;
 use super::survey::Survey;
 use super::treatment::{HIGHEST, Treatment};
+use crate::report::format_short;
 
 impl Treatment {
     /// The same for a further recording (a hold-out), at that recording's own rate: the band of torque and regressor as near
@@ -36,7 +37,10 @@ impl Treatment {
             (rate / self.kept_rate()).round().max(1.0) as usize
         };
         let (parallel_edge, parallel_filter) = parallel_pass(self.order, cutoff, decimation, rate);
-        let as_fitted = format!("as for the recordings at {} Hz.", self.sample_rate);
+        let as_fitted = format!(
+            "as for the recordings at {} Hz.",
+            format_short(self.sample_rate)
+        );
         Ok(Self {
             sample_rate: rate,
             cutoff,

@@ -4,9 +4,9 @@ use super::PrepareError;
 use super::pieces::Recording;
 use crate::data::{Block, JointColumns};
 
-/// Longest step between neighbouring rows, as a multiple of the even one, over which it is interpolated: one row may
-/// be missing, two may not.
-pub(crate) const LONGEST_STEP: f64 = 2.5;
+/// Longest step between neighbouring rows, as a multiple of the mean one, over which it is interpolated. Reading parts a recording
+/// at five usual steps already, so that recordings of a file are never refused for it.
+pub(crate) const LONGEST_STEP: f64 = 5.0;
 
 /// A recording of which every stretch between gaps is interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …, its time stamps believed.
 ///

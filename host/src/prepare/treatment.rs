@@ -7,6 +7,7 @@ use super::filter::{LowPass, decimator_edge};
 use super::rate::{parallel_pass, same_rate, trimmed_rows};
 use super::spectrum::{NOISE_SHARE, PositionSpectrum};
 use super::survey::Survey;
+use crate::report::format_short;
 
 /// A setting that the data choose or that is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -164,7 +165,7 @@ impl Treatment {
         let motion = spectra.iter().map(|s| s.motion).fold(0.0, f64::max);
         let nyquist = rate / 2.0;
         let (cutoff, cutoff_reason) = match options.cutoff {
-            Choice::Fixed(hz) => (hz, format!("{hz} Hz, as given.")),
+            Choice::Fixed(hz) => (hz, format!("{} Hz, as given.", format_short(hz))),
             Choice::Auto => choose_cutoff(&spectra, motion, nyquist),
         };
         if LowPass::butterworth(options.order, cutoff, rate).is_none() {
@@ -363,7 +364,7 @@ fn choose_speeds(
     choice: Choice<f64>,
 ) -> (Vec<f64>, String) {
     let (mut speeds, reason): (Vec<f64>, String) = match choice {
-        Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{speed}, as given.")),
+        Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{}, as given.", format_short(speed))),
         Choice::Auto => (
             (spectra.iter())
                 .map(|s| (5.0 * s.velocity_noise(cutoff)).max(0.01 * s.velocity_rms()))

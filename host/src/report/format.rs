@@ -73,6 +73,54 @@ pub fn format_significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// [`format_significant`] without zeros at the end: `6` for 6.000.
+#[must_use]
+pub fn format_trimmed(value: f64, digits: usize) -> String {
+    let text = format_significant(value, digits);
+    match text.split_once('·') {
+        Some((mantissa, power)) => format!("{}·{power}", without_zeros(mantissa)),
+        None => without_zeros(&text).to_owned(),
+    }
+}
+
+/// A value as messages have it: at most six significant digits, without trailing zeros: `250`, `0.5`, `1.04·10²²⁴`.
+#[must_use]
+pub fn format_short(value: f64) -> String {
+    match value.is_nan() {
+        true => "NaN".to_owned(),
+        false => format_trimmed(value, 6),
+    }
+}
+
+/// A time stamp in s as messages have it: to the microsecond, as six digits would not find a row in a long recording.
+#[must_use]
+pub fn format_time(seconds: f64) -> String {
+    // Below this, a microsecond is more than the resolution of the number.
+    if seconds.abs() < 4e9 {
+        without_zeros(&fixed(seconds, 6)).to_owned()
+    } else {
+        format_short(seconds)
+    }
+}
+
+/// Items in words: `a`, `a and b`, `a, b and c`.
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// A decimal number without the zeros at its end.
+fn without_zeros(text: &str) -> &str {
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        text
+    }
+}
+
 /// A unit as print has it: `kg*m^2` is `kg·m²`.
 #[must_use]
 pub fn format_unit(ascii: &str) -> String {
@@ -277,5 +325,29 @@ mod tests {
         assert_eq!(format_p_value(0.0312), "0.031");
         assert_eq!(format_p_value(4.2e-12), "4·10⁻¹²");
         assert_eq!(format_p_value(0.0), "< 10⁻³⁰⁰");
+    }
+
+    #[test]
+    fn messages_have_six_digits_without_zeros_behind() {
+        for (value, text) in [
+            (250.000_000_000_000_06, "250"),
+            (0.5, "0.5"),
+            (-12.25, "−12.25"),
+            (1234.5678, "1234.57"),
+            (1.04e224, "1.04·10²²⁴"),
+            (1e-9, "1·10⁻⁹"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(format_short(value), text);
+        }
+        for (seconds, text) in [
+            (0.1, "0.1"),
+            (47.0, "47"),
+            (1_700_000_000.123_456_7, "1700000000.123457"),
+            (1e300, "1·10³⁰⁰"),
+        ] {
+            assert_eq!(format_time(seconds), text);
+        }
     }
 }

@@ -23,7 +23,10 @@ use std::path::{Path, PathBuf};
 use crate::files::write_whole;
 
 pub use document::{Alignment, Block, Column, Document, Fact, NoteKind, Section, Table, Tone};
-pub use format::{format_interval, format_p_value, format_significant, format_unit, format_value};
+pub use format::{
+    format_interval, format_p_value, format_short, format_significant, format_time, format_trimmed,
+    format_unit, format_value, listed,
+};
 pub use grouped::{Finding, one_a_kind, worst_first};
 pub use html::render;
 pub use plot::{Axis, Direction, Marker, Plot, Role, Series, Style};

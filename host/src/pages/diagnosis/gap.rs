@@ -4,7 +4,7 @@ use super::{parts, words};
 use crate::diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
 use crate::diagnose::what_falls;
 use crate::report::{
-    Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
+    self, Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table, format_p_value,
     format_significant,
 };
 
@@ -49,7 +49,7 @@ pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
         section.blocks.push(Block::Details {
             summary: format!(
                 "Joints in which nothing was found: {}",
-                words::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
+                report::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
             ),
             blocks: still
                 .iter()

@@ -2,7 +2,7 @@
 
 use super::{parts, words};
 use crate::diagnose::outcome::{Diagnosis, NotTestable, Residual, Tried};
-use crate::report::{Block, Column, Section, Table, format_p_value, format_significant};
+use crate::report::{self, Block, Column, Section, Table, format_p_value, format_significant};
 
 /// A longer table is folded.
 const LONG: usize = 12;
@@ -19,7 +19,7 @@ pub(super) fn next(found: &Diagnosis) -> Option<Section> {
     match names.as_slice() {
         [] => {}
         [one] => items.push(format!("It makes {one} testable.")),
-        _ => items.push(format!("It separates {}.", words::listed(&names))),
+        _ => items.push(format!("It separates {}.", report::listed(&names))),
     }
     if let Some(separation) = next.separation {
         items.push(format!(

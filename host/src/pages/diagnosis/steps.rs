@@ -3,7 +3,7 @@
 use super::{gap, parts, words};
 use crate::diagnose::outcome::{Diagnosis, Residual, Step};
 use crate::diagnose::values_alike;
-use crate::report::{Block, Column, NoteKind, Section, Table, format_p_value};
+use crate::report::{self, Block, Column, NoteKind, Section, Table, format_p_value};
 
 /// What the figure of a step shows.
 const PICTURE: &str = "The figure shows the mean residual before this step and after it. Where the dots before lie off zero by more than their bars, the model lacked something. The line is the effect's law, fitted to the data. The dots after should lie on zero.";
@@ -166,7 +166,7 @@ fn name(found: &Diagnosis, step: &Step) -> Block {
     }
     parts::warning(format!(
         "These data do not settle the name: {} explain{} them as well as {}. The {} is the same either way, so the model can be used; the name cannot be relied on before an experiment separates them.{runner_up}",
-        words::listed(&rivals),
+        report::listed(&rivals),
         if rivals.len() == 1 { "s" } else { "" },
         words::name(&step.effect),
         match found.residual {

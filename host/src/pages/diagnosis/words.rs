@@ -93,15 +93,6 @@ pub(super) fn several(n: usize, what: &str) -> String {
     format!("{n} {what}{plural}")
 }
 
-/// `a`, `a and b`, `a, b and c`.
-pub(super) fn listed(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
-}
-
 /// A text for a table cell.
 pub(super) fn or_dash(text: &str) -> String {
     if text.is_empty() { "–" } else { text }.into()

@@ -1,0 +1,200 @@
+//! The header of a CSV file and what separates its columns.
+
+use std::path::Path;
+
+use csv_core::{ReaderBuilder, Terminator};
+
+use super::error::DataError;
+use super::number::number;
+use super::remark::Remark;
+
+/// What stands between two columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Separator {
+    Comma,
+    Semicolon,
+    Tab,
+    /// Any number of blanks and tabs.
+    Blank,
+}
+
+impl Separator {
+    pub(super) fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+            Self::Blank => b' ',
+        }
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Comma => "commas",
+            Self::Semicolon => "`;`",
+            Self::Tab => "tabs",
+            Self::Blank => "blanks",
+        }
+    }
+
+    /// The names in a header line.
+    fn split(self, text: &str) -> Vec<String> {
+        let unquoted = |name: &str| {
+            let name = name.trim();
+            let inner = name.strip_prefix('"').and_then(|n| n.strip_suffix('"'));
+            inner.unwrap_or(name).trim().to_owned()
+        };
+        if self == Self::Blank {
+            return text.split_whitespace().map(unquoted).collect();
+        }
+        let mut reader = ReaderBuilder::new();
+        let mut reader = reader
+            .delimiter(self.byte())
+            .terminator(Terminator::Any(b'\n'))
+            .build();
+        let line = format!("{text}\n\n");
+        let mut fields = vec![0; line.len()];
+        let mut ends = vec![0; line.len()];
+        let (_, _, _, count) = reader.read_record(line.as_bytes(), &mut fields, &mut ends);
+        let mut names = Vec::with_capacity(count);
+        let mut start = 0;
+        for end in ends.into_iter().take(count) {
+            let name = fields.get(start..end).unwrap_or_default();
+            names.push(unquoted(&String::from_utf8_lossy(name)));
+            start = end;
+        }
+        names
+    }
+
+    /// The separator of this header line and the names in it: that by which there is a column `t`, or else by which there
+    /// are most columns.
+    fn of(text: &str) -> (Self, Vec<String>) {
+        let all = [Self::Comma, Self::Semicolon, Self::Tab, Self::Blank];
+        let mut tried = all.map(|s| (s, s.split(text)));
+        let has_time = |names: &[String]| names.len() > 1 && names.iter().any(|n| n == "t");
+        let best = (0..tried.len()).find(|k| has_time(&tried[*k].1));
+        let best = best.unwrap_or_else(|| {
+            // The last of those that are equal: the first of them here.
+            let count = |k: &usize| tried[*k].1.len();
+            (0..3).rev().max_by_key(count).unwrap_or(0)
+        });
+        let names = std::mem::take(&mut tried[best].1);
+        (all[best], names)
+    }
+}
+
+/// Lines of a file one by one.
+pub(super) trait Lines {
+    /// Reads the next line; false at the end of the file.
+    fn next_line(&mut self) -> Result<bool, DataError>;
+    /// The line read last, without its end.
+    fn line(&self) -> &[u8];
+    /// Its number, from 1.
+    fn number(&self) -> u64;
+    /// The file.
+    fn path(&self) -> &Path;
+}
+
+/// A header that was found.
+pub(super) struct FoundHeader {
+    pub names: Vec<String>,
+    pub separator: Separator,
+    /// Its line.
+    pub line: u64,
+    /// Whether the line read last is a row: the header was a comment.
+    pub has_row: bool,
+    pub remarks: Vec<Remark>,
+}
+
+/// A line behind the sign of a comment.
+struct Comment {
+    sign: char,
+    line: u64,
+    text: String,
+}
+
+/// Reads up to the header: empty lines, comments and the separator line of spreadsheet programs may stand before it.
+pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataError> {
+    let mut comment: Option<Comment> = None;
+    while lines.next_line()? {
+        let line = lines.number();
+        let bytes = lines.line();
+        let bytes = match line {
+            1 => bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
+            _ => bytes,
+        };
+        let bytes = bytes.trim_ascii();
+        if bytes.is_empty() || (bytes.len() == 5 && bytes.starts_with(b"sep=")) {
+            continue;
+        }
+        let not_text = || DataError::NotText {
+            path: lines.path().into(),
+            line,
+        };
+        let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
+        let text = text.trim();
+        if text.chars().any(|c| c.is_control() && c != '\t') {
+            return Err(not_text());
+        }
+        if let Some(behind) = text.strip_prefix(['#', '%']) {
+            comment = Some(Comment {
+                sign: if text.starts_with('#') { '#' } else { '%' },
+                line,
+                text: behind.trim_start_matches(['#', '%']).trim().to_owned(),
+            });
+            continue;
+        }
+        return Ok(header(text, line, comment));
+    }
+    Err(DataError::Empty {
+        path: lines.path().into(),
+    })
+}
+
+/// The header is this line, or the comment before it where this line is a row that fits it.
+fn header(text: &str, line: u64, comment: Option<Comment>) -> FoundHeader {
+    let (separator, names) = Separator::of(text);
+    let mut remarks = Vec::new();
+    if let Some(comment) = comment {
+        let (by, named) = Separator::of(&comment.text);
+        let row = by.split(text);
+        // A comma may be the decimal comma of a row, not of names.
+        let is_number = |field: &String| {
+            let mark = if field.contains(',') { b',' } else { b'.' };
+            number(field.as_bytes(), mark).is_finite()
+        };
+        let fits = row.len() == named.len() && row.iter().any(is_number);
+        if fits && !names.iter().any(|n| n == "t") && named.iter().any(|n| n == "t") {
+            remarks.push(Remark::CommentedHeader {
+                line: comment.line,
+                sign: comment.sign,
+            });
+            return FoundHeader {
+                names: named,
+                separator: by,
+                line: comment.line,
+                has_row: true,
+                remarks: with_separator(remarks, by),
+            };
+        }
+    }
+    if line > 1 {
+        remarks.push(Remark::Preamble { before: line - 1 });
+    }
+    FoundHeader {
+        names,
+        separator,
+        line,
+        has_row: false,
+        remarks: with_separator(remarks, separator),
+    }
+}
+
+fn with_separator(mut remarks: Vec<Remark>, separator: Separator) -> Vec<Remark> {
+    if separator != Separator::Comma {
+        remarks.push(Remark::Separator {
+            separator: separator.name(),
+        });
+    }
+    remarks
+}

@@ -1,0 +1,142 @@
+//! Files of other programs, known by their first bytes.
+
+/// Bytes from the start of a file by which it is known.
+pub(super) const HEAD: usize = 4096;
+
+/// A format that is not read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ForeignFormat {
+    /// `#ROSBAG`.
+    #[error(
+        "a ROS 1 bag; convert it with `mcap convert in.bag out.mcap` (or `rosbags-convert`) and give the .mcap file"
+    )]
+    RosBag,
+    /// SQLite, as rosbag2 writes by default in older versions.
+    #[error(
+        "an SQLite database, as rosbag2 writes; convert it to MCAP (`ros2 bag convert` with storage_id mcap, or `mcap convert in.db3 out.mcap`) and give the .mcap file"
+    )]
+    Sqlite,
+    /// gzip, xz, bzip2, zstd or lz4 around a whole file.
+    #[error("a file compressed by {0}; decompress it and give the .csv or .mcap file inside")]
+    Compressed(&'static str),
+    /// Office workbook.
+    #[error(
+        "a workbook of a spreadsheet program; save the sheet as \"CSV UTF-8\" and give the .csv file"
+    )]
+    Workbook,
+    /// NumPy arrays.
+    #[error(
+        "a NumPy file; write its columns with `numpy.savetxt(\"out.csv\", table, delimiter=\",\", header=\"t,q1,tau1\", comments=\"\")`"
+    )]
+    NumPy,
+    /// Any other zip archive.
+    #[error("a zip archive; unpack it and give the .csv or .mcap file inside")]
+    Zip,
+    /// MATLAB, any version.
+    #[error(
+        "a MATLAB file; write its columns with `writetable(array2table([t q1 tau1], 'VariableNames', {{'t','q1','tau1'}}), 'out.csv')`"
+    )]
+    Matlab,
+    /// HDF5.
+    #[error(
+        "an HDF5 file; write its columns to CSV, for instance with `pandas.DataFrame.to_csv(\"out.csv\", index=False)`"
+    )]
+    Hdf5,
+    /// Parquet, Feather, Arrow.
+    #[error(
+        "a {0} file; write it to CSV with `pandas.read_{1}(\"in\").to_csv(\"out.csv\", index=False)`"
+    )]
+    Arrow(&'static str, &'static str),
+    /// Pickle.
+    #[error(
+        "a Python pickle; write its columns to CSV, for instance with `pandas.DataFrame.to_csv(\"out.csv\", index=False)`"
+    )]
+    Pickle,
+    /// PX4.
+    #[error(
+        "a PX4 ULog file; convert it with `ulog2csv` and give one .csv file with the columns t, q1, tau1"
+    )]
+    Ulog,
+    /// Measurement data of vehicles and test benches.
+    #[error("{0} file; export its channels on one time base as CSV")]
+    Bench(&'static str),
+    /// UTF-16.
+    #[error(
+        "UTF-16 text, as spreadsheet programs write \"Unicode text\"; save it as UTF-8 (\"CSV UTF-8\")"
+    )]
+    Utf16,
+    /// JSON outside MCAP.
+    #[error("JSON text; write one line per sample as CSV, with a header line such as `t,q1,tau1`")]
+    Json,
+    /// XML or HTML.
+    #[error(
+        "XML or HTML text; give the recording itself (the robot's description goes to --robot)"
+    )]
+    Xml,
+}
+
+impl ForeignFormat {
+    /// What a file that begins with these bytes is, if it is known and not a recording.
+    pub(super) fn of(head: &[u8]) -> Option<Self> {
+        let is = |magic: &[u8]| head.starts_with(magic);
+        let holds = |part: &[u8]| head.windows(part.len()).any(|w| w == part);
+        const MAGICS: [(&[u8], ForeignFormat); 26] = [
+            (b"#ROSBAG", ForeignFormat::RosBag),
+            (b"SQLite format 3\0", ForeignFormat::Sqlite),
+            (b"\x1f\x8b", ForeignFormat::Compressed("gzip")),
+            (b"\xfd7zXZ\0", ForeignFormat::Compressed("xz")),
+            (b"BZh", ForeignFormat::Compressed("bzip2")),
+            (b"\x28\xb5\x2f\xfd", ForeignFormat::Compressed("zstd")),
+            (b"\x04\x22\x4d\x18", ForeignFormat::Compressed("lz4")),
+            (b"7z\xbc\xaf\x27\x1c", ForeignFormat::Compressed("7-Zip")),
+            (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ForeignFormat::Workbook),
+            (b"\x93NUMPY", ForeignFormat::NumPy),
+            (b"MATLAB ", ForeignFormat::Matlab),
+            (b"\x89HDF\r\n\x1a\n", ForeignFormat::Hdf5),
+            (b"PAR1", ForeignFormat::Arrow("Parquet", "parquet")),
+            (b"ARROW1", ForeignFormat::Arrow("Feather", "feather")),
+            (b"FEA1", ForeignFormat::Arrow("Feather", "feather")),
+            (b"\x80\x02", ForeignFormat::Pickle),
+            (b"\x80\x03", ForeignFormat::Pickle),
+            (b"\x80\x04", ForeignFormat::Pickle),
+            (b"\x80\x05", ForeignFormat::Pickle),
+            (b"ULog\x01\x12\x35", ForeignFormat::Ulog),
+            (b"TDSm", ForeignFormat::Bench("a TDMS")),
+            (b"MDF     ", ForeignFormat::Bench("an MDF4")),
+            (b"LOGG", ForeignFormat::Bench("a BLF")),
+            (b"\xff\xfe", ForeignFormat::Utf16),
+            (b"\xfe\xff", ForeignFormat::Utf16),
+            (b"<", ForeignFormat::Xml),
+        ];
+        if is(b"PK\x03\x04") {
+            return Some(if holds(b".npy") {
+                Self::NumPy
+            } else if holds(b"[Content_Types].xml") || holds(b"opendocument.spreadsheet") {
+                Self::Workbook
+            } else {
+                Self::Zip
+            });
+        }
+        let known = MAGICS.iter().find(|(magic, _)| is(magic));
+        let text = head.trim_ascii_start();
+        let begins_json = || {
+            let inner = text.get(1..).map(<[u8]>::trim_ascii_start);
+            let first = inner.and_then(<[u8]>::first);
+            matches!(text.first(), Some(b'{' | b'['))
+                && matches!(
+                    first,
+                    Some(b'"' | b'{' | b'[' | b'}' | b']' | b'-' | b'0'..=b'9')
+                )
+        };
+        // Text without a byte order mark in which every other byte is zero.
+        let wide = |at: usize| {
+            let pairs = head.get(..16).map(|h| h.chunks_exact(2));
+            pairs
+                .is_some_and(|mut p| p.all(|pair| pair[at] == 0 && pair[1 - at].is_ascii_graphic()))
+        };
+        known
+            .map(|(_, format)| *format)
+            .or_else(|| begins_json().then_some(Self::Json))
+            .or_else(|| (wide(0) || wide(1)).then_some(Self::Utf16))
+    }
+}

@@ -1,0 +1,107 @@
+//! A column that keeps each value for several rows: a slow topic that was written into a fast recording.
+//!
+//! The signal then is a staircase. Its derivative is zero but for single rows, and its values are late by half a stair on average.
+//!
+//! A value that repeats is no evidence by itself: a slow joint stays on one count of its encoder, and a torque on one of its
+//! converter. Evidence is a value that repeats between two changes that are each larger than two steps of the sensor.
+//!
+//! Leaves out: a column whose rate is above two thirds of the recording's, where most values stand for one row.
+
+/// Changes on both sides of a repeated value are larger than this many steps of the sensor (its smallest change).
+const CLEAR_CHANGE: f64 = 2.5;
+/// Fewest values between clear changes that are judged.
+const FEWEST: usize = 20;
+
+/// Median number of rows for which `values` keep one value between two clear changes; none where that is one row, or where
+/// there are too few clear changes to tell.
+pub(super) fn held(values: &[f64]) -> Option<usize> {
+    let changes: Vec<(usize, f64)> = (values.windows(2).enumerate())
+        .map(|(row, pair)| (row, (pair[1] - pair[0]).abs()))
+        .filter(|(_, by)| *by > 0.0)
+        .collect();
+    let step = changes
+        .iter()
+        .map(|(_, by)| *by)
+        .fold(f64::INFINITY, f64::min);
+    let clear = |(_, by): &(usize, f64)| *by > CLEAR_CHANGE * step;
+    let mut rows: Vec<usize> = changes
+        .windows(2)
+        .filter(|pair| pair.iter().all(clear))
+        .map(|pair| pair[1].0 - pair[0].0)
+        .collect();
+    if rows.len() < FEWEST {
+        return None;
+    }
+    let middle = rows.len() / 2;
+    let median = *rows.select_nth_unstable(middle).1;
+    (median > 1).then_some(median)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    fn motion(rows: usize, count: f64) -> Vec<f64> {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        (0..rows)
+            .map(|k| {
+                let t = k as f64 * 1e-3;
+                let q = 0.8 * (2.3 * t).sin() + 0.1 * (31.0 * t).sin();
+                let noise = 2e-5 * (rng.random::<f64>() - 0.5);
+                ((q + noise) / count).round() * count
+            })
+            .collect()
+    }
+
+    #[test]
+    fn repeated_samples_are_found_whatever_their_number() {
+        for count in [1e-12, 1e-5, 2e-4] {
+            let clean = motion(12_000, count);
+            assert_eq!(held(&clean), None, "{count}");
+            for n in [2, 3, 4, 5, 10, 20] {
+                let stairs: Vec<f64> = (0..clean.len()).map(|k| clean[k - k % n]).collect();
+                assert_eq!(held(&stairs), Some(n), "{count} {n}");
+            }
+        }
+    }
+
+    /// A log at 1000 Hz of a topic whose rows come irregularly, on average every fourth.
+    #[test]
+    fn irregular_stairs_are_found() {
+        let clean = motion(12_000, 1e-12);
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(6);
+        let (mut stairs, mut last) = (Vec::new(), clean[0]);
+        for value in clean {
+            if rng.random::<f64>() < 0.25 {
+                last = value;
+            }
+            stairs.push(last);
+        }
+        assert!(matches!(held(&stairs), Some(2..=4)), "{:?}", held(&stairs));
+    }
+
+    #[test]
+    fn coarse_encoders_rests_and_coarse_converters_are_no_stairs() {
+        // A count of 5 mrad at 1 kHz: one value stands for many rows, and each change is one count.
+        assert_eq!(held(&motion(12_000, 5e-3)), None);
+        // Steps and rests of a staircase motion, noise of three counts.
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
+        let rests: Vec<f64> = (0..12_000)
+            .map(|k| {
+                let place = 0.1 * f64::from(k / 1000);
+                place + (3e-4 * (rng.random::<f64>() - 0.5) / 1e-4).round() * 1e-4
+            })
+            .collect();
+        assert_eq!(held(&rests), None);
+        // A torque in steps of the converter, noise of two of them.
+        let torque: Vec<f64> = (0..12_000)
+            .map(|k| {
+                let t = f64::from(k) * 1e-3;
+                ((2.0 * (3.0 * t).sin() + 0.08 * (rng.random::<f64>() - 0.5)) / 0.02).round() * 0.02
+            })
+            .collect();
+        assert_eq!(held(&torque), None);
+    }
+}

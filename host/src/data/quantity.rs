@@ -1,0 +1,166 @@
+//! What the columns of a joint measure, and what the file calls them.
+
+use super::columns::{Layout, Role};
+
+/// What a column of a joint measures, as in [`super::JointColumns`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Position, rad or m.
+    Position,
+    /// Torque or force, N·m or N.
+    Effort,
+    /// Measured velocity, rad/s or m/s.
+    Velocity,
+    /// Measured acceleration, rad/s² or m/s².
+    Acceleration,
+    /// Reference position, rad or m.
+    Reference,
+    /// Motor voltage, V.
+    Voltage,
+    /// Temperature, °C.
+    Temperature,
+    /// Position on the link's side of the transmission, rad or m.
+    LinkPosition,
+}
+
+/// Those that messages name.
+const NAMED: [Quantity; 8] = [
+    Quantity::Position,
+    Quantity::Effort,
+    Quantity::Velocity,
+    Quantity::Acceleration,
+    Quantity::Reference,
+    Quantity::Voltage,
+    Quantity::Temperature,
+    Quantity::LinkPosition,
+];
+
+/// `text` with the words in `names` (before, after) exchanged, but for what stands between quotation marks.
+fn renamed(text: &str, names: &[[String; 2]]) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut word = String::new();
+    let mut quoted = false;
+    let end = |word: &mut String, quoted: bool, out: &mut String| {
+        let other = names.iter().find(|[before, _]| !quoted && before == word);
+        out.push_str(other.map_or(word.as_str(), |[_, after]| after));
+        word.clear();
+    };
+    for c in text.chars() {
+        if c.is_alphanumeric() || c == '_' {
+            word.push(c);
+            continue;
+        }
+        end(&mut word, quoted, &mut out);
+        quoted ^= c == '"';
+        out.push(c);
+    }
+    end(&mut word, quoted, &mut out);
+    out
+}
+
+impl super::Source {
+    /// A message about this recording with the file's own names of the columns: in place of the contract's, or beside them where
+    /// the values are not the column's own (`tau1 (from i1)`).
+    pub fn in_its_names(&self, text: &str) -> String {
+        let joints = 0..self.joint_count();
+        let names: Vec<[String; 2]> = joints
+            .flat_map(|j| NAMED.map(|quantity| (j, quantity)))
+            .map(|(j, quantity)| {
+                let before = format!("{}{}", quantity.prefix(), j + 1);
+                let name = self.column_name(j, quantity);
+                let own = !self.layout.is_turned(j, quantity) || name.starts_with(&before);
+                let after = match own {
+                    true => name,
+                    false => format!("{before} (from {name})"),
+                };
+                [before, after]
+            })
+            .filter(|[before, after]| before != after)
+            .collect();
+        renamed(text, &names)
+    }
+}
+
+impl Quantity {
+    /// Name of the column as in the contract, without the joint's number.
+    pub fn prefix(self) -> &'static str {
+        match self {
+            Self::Position => "q",
+            Self::Effort => "tau",
+            Self::Velocity => "qd",
+            Self::Acceleration => "qdd",
+            Self::Reference => "ref",
+            Self::Voltage => "u",
+            Self::Temperature => "temp",
+            Self::LinkPosition => "ql",
+        }
+    }
+
+    /// Whether a column of this role is the joint's own (or its motor's) column of this quantity.
+    fn is_of(self, role: Role, joint: usize) -> bool {
+        let (quantity, k) = match role {
+            Role::Position(k) | Role::MotorPosition(k) => (Self::Position, k),
+            Role::Effort(k, _) | Role::MotorEffort(k, _) => (Self::Effort, k),
+            Role::Velocity(k) => (Self::Velocity, k),
+            Role::Acceleration(k) => (Self::Acceleration, k),
+            Role::Reference(k) => (Self::Reference, k),
+            Role::Voltage(k) | Role::Duty(k, ..) => (Self::Voltage, k),
+            Role::Temperature(k) => (Self::Temperature, k),
+            Role::LinkPosition(k) => (Self::LinkPosition, k),
+            Role::Time | Role::None => return false,
+        };
+        quantity == self && k == joint
+    }
+}
+
+impl Layout {
+    /// Whether a joint's values went through a drive: its ratio or its torque constant.
+    fn is_turned(&self, joint: usize, quantity: Quantity) -> bool {
+        let of_motors = self.motors.as_ref().is_some_and(|m| match quantity {
+            Quantity::Position => m.positions,
+            Quantity::Effort => m.torques.get(joint) == Some(&true),
+            _ => false,
+        });
+        let scaled = |role| matches!(role, Role::Effort(k, factor) if k == joint && factor != 1.0);
+        of_motors || quantity == Quantity::Effort && self.columns.iter().any(|c| scaled(c.role))
+    }
+
+    /// See [`super::Source::column_name`].
+    pub(super) fn column_name(&self, joint: usize, quantity: Quantity) -> String {
+        let derived = format!("{}{}", quantity.prefix(), joint + 1);
+        let label = |k: usize| {
+            let column = self.columns.iter().find(|c| quantity.is_of(c.role, k));
+            column.map(|c| c.label.clone())
+        };
+        let turned = self.motors.as_ref().is_some_and(|m| match quantity {
+            Quantity::Position => m.positions,
+            Quantity::Effort => m.torques.get(joint) == Some(&true),
+            _ => false,
+        });
+        if !turned {
+            return label(joint).unwrap_or(derived);
+        }
+        let motors = self.movers.get(joint).into_iter().flatten();
+        let sources: Vec<String> = motors.filter_map(|m| label(*m)).collect();
+        match sources.as_slice() {
+            [] => derived,
+            [one] => one.clone(),
+            several => format!("{derived} (from {})", several.join(", ")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::renamed;
+
+    #[test]
+    fn whole_words_outside_quotation_marks_are_renamed() {
+        let names = [["tau1", "i1"], ["q1", "qm1"]].map(|pair| pair.map(str::to_owned));
+        let text = "tau1 and tau12 of joint \"q1\": q1, taum1 (tau1)";
+        assert_eq!(
+            renamed(text, &names),
+            "i1 and tau12 of joint \"q1\": qm1, taum1 (i1)"
+        );
+    }
+}

@@ -1,0 +1,244 @@
+//! Layout of a ROS message, from the definition that the recorder stored with it.
+
+use std::collections::BTreeMap;
+
+/// Definitions nested deeper than this are refused: they cannot be those of a message.
+const DEEPEST: usize = 16;
+
+/// `sensor_msgs/JointState` and what it consists of, for recorders that do not store it.
+const KNOWN: [(&str, &str); 3] = [
+    (
+        "sensor_msgs/JointState",
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
+    ),
+    (
+        "std_msgs/Header",
+        "builtin_interfaces/Time stamp\nstring frame_id",
+    ),
+    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
+];
+
+/// `std_msgs/Header` of ROS 1.
+const ROS1_HEADER: &str = "uint32 seq\ntime stamp\nstring frame_id";
+
+/// A number in a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Number {
+    Unsigned(u8),
+    Signed(u8),
+    Float(u8),
+}
+
+impl Number {
+    /// Length, bytes.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Unsigned(n) | Self::Signed(n) | Self::Float(n) => usize::from(n),
+        }
+    }
+}
+
+/// What a field is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Kind {
+    Number(Number),
+    Text,
+    Nested(Vec<Field>),
+}
+
+/// How many there are of a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Count {
+    One,
+    Fixed(usize),
+    /// The message says.
+    Counted,
+}
+
+/// What a field means to a joint state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    None,
+    Seconds,
+    Nanoseconds,
+    Name,
+    Position,
+    Velocity,
+    Effort,
+}
+
+/// One field of a message.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Field {
+    pub kind: Kind,
+    pub count: Count,
+    pub part: Part,
+}
+
+/// The fields of a joint state by its definition: ROS's `.msg` text with the definitions it needs behind it.
+///
+/// # Errors
+/// What cannot be read, one clause.
+pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>, String> {
+    let mut definitions: BTreeMap<String, String> = KNOWN
+        .iter()
+        .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
+        .collect();
+    if is_ros1 {
+        definitions.insert("std_msgs/Header".into(), ROS1_HEADER.into());
+    }
+    let mut name = "sensor_msgs/JointState".to_owned();
+    let mut text = String::new();
+    for line in definition.lines() {
+        if line.starts_with("=====") {
+            store(&mut definitions, &name, &mut text);
+        } else if let Some(other) = line.strip_prefix("MSG:") {
+            name = other.trim().replace("/msg/", "/");
+        } else {
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    store(&mut definitions, &name, &mut text);
+    let fields = fields(&definitions, "sensor_msgs/JointState", "", 0)?;
+    for (part, name) in [(Part::Name, "name"), (Part::Position, "position")] {
+        if !fields.iter().any(|f| f.part == part) {
+            return Err(format!(
+                "the definition of its messages has no field `{name}`"
+            ));
+        }
+    }
+    Ok(fields)
+}
+
+/// Keeps a definition that says something.
+fn store(definitions: &mut BTreeMap<String, String>, name: &str, text: &mut String) {
+    if !text.trim().is_empty() {
+        definitions.insert(name.to_owned(), std::mem::take(text));
+    }
+    text.clear();
+}
+
+fn fields(
+    definitions: &BTreeMap<String, String>,
+    name: &str,
+    path: &str,
+    depth: usize,
+) -> Result<Vec<Field>, String> {
+    if depth > DEEPEST {
+        return Err(format!("the definition of `{name}` contains itself"));
+    }
+    let Some(text) = definitions.get(name) else {
+        return Err(format!(
+            "the file does not define `{name}`, which its messages contain"
+        ));
+    };
+    let mut fields = Vec::new();
+    for line in text.lines() {
+        let Some((ty, field)) = declaration(line) else {
+            continue;
+        };
+        let (base, count) = array(ty).ok_or_else(|| format!("`{ty}` is no type of a field"))?;
+        let path = format!("{path}.{field}");
+        let kind = match primitive(base) {
+            Some(kind) => kind,
+            None if base == "wstring" => {
+                return Err("its messages contain a `wstring`, which cannot be read".into());
+            }
+            None => {
+                let inner = qualified(definitions, base, name);
+                Kind::Nested(self::fields(definitions, &inner, &path, depth + 1)?)
+            }
+        };
+        let kind = if base == "time" && path == ".header.stamp" {
+            seconds(Part::Seconds, Part::Nanoseconds)
+        } else {
+            kind
+        };
+        let part = part(&path, &kind, count);
+        fields.push(Field { kind, count, part });
+    }
+    Ok(fields)
+}
+
+/// Type and name that a line declares; none for a comment, a constant and an empty line.
+fn declaration(line: &str) -> Option<(&str, &str)> {
+    let line = line.split('#').next()?.trim();
+    let (ty, rest) = line.split_once(char::is_whitespace)?;
+    let rest = rest.trim_start();
+    let end = rest.find(|c: char| c.is_whitespace() || c == '=');
+    let (name, behind) = rest.split_at(end.unwrap_or(rest.len()));
+    (!behind.trim_start().starts_with('=')).then_some((ty, name))
+}
+
+/// `float64[<=3]` is `float64` and how many there are.
+fn array(ty: &str) -> Option<(&str, Count)> {
+    let (base, count) = match ty.split_once('[') {
+        None => (ty, Count::One),
+        Some((base, rest)) => match rest.strip_suffix(']')? {
+            "" => (base, Count::Counted),
+            bound if bound.starts_with("<=") => (base, Count::Counted),
+            count => (base, Count::Fixed(count.parse().ok()?)),
+        },
+    };
+    // A text of bounded length is stored as any other.
+    Some((base.split("<=").next()?, count))
+}
+
+fn primitive(base: &str) -> Option<Kind> {
+    let number = match base {
+        "bool" | "byte" | "char" | "uint8" => Number::Unsigned(1),
+        "int8" => Number::Signed(1),
+        "uint16" => Number::Unsigned(2),
+        "int16" => Number::Signed(2),
+        "uint32" => Number::Unsigned(4),
+        "int32" => Number::Signed(4),
+        "uint64" => Number::Unsigned(8),
+        "int64" => Number::Signed(8),
+        "float32" => Number::Float(4),
+        "float64" => Number::Float(8),
+        "string" => return Some(Kind::Text),
+        // Of ROS 1.
+        "time" | "duration" => return Some(seconds(Part::None, Part::None)),
+        _ => return None,
+    };
+    Some(Kind::Number(number))
+}
+
+/// A time of ROS 1: two whole numbers with these meanings.
+fn seconds(whole: Part, nanoseconds: Part) -> Kind {
+    let field = |part| Field {
+        kind: Kind::Number(Number::Unsigned(4)),
+        count: Count::One,
+        part,
+    };
+    Kind::Nested(vec![field(whole), field(nanoseconds)])
+}
+
+/// The name under which a nested type is defined, as used inside `within`.
+fn qualified(definitions: &BTreeMap<String, String>, base: &str, within: &str) -> String {
+    let base = base.replace("/msg/", "/");
+    if base.contains('/') {
+        return base;
+    }
+    let package = within.split('/').next().unwrap_or_default();
+    let own = format!("{package}/{base}");
+    if base == "Header" && !definitions.contains_key(&own) {
+        "std_msgs/Header".into()
+    } else {
+        own
+    }
+}
+
+fn part(path: &str, kind: &Kind, count: Count) -> Part {
+    let numbers = matches!(kind, Kind::Number(Number::Float(_))) && count != Count::One;
+    match (path, kind) {
+        (".header.stamp.sec" | ".header.stamp.secs", Kind::Number(_)) => Part::Seconds,
+        (".header.stamp.nanosec" | ".header.stamp.nsecs", Kind::Number(_)) => Part::Nanoseconds,
+        (".name", Kind::Text) if count != Count::One => Part::Name,
+        (".position", _) if numbers => Part::Position,
+        (".velocity", _) if numbers => Part::Velocity,
+        (".effort", _) if numbers => Part::Effort,
+        _ => Part::None,
+    }
+}

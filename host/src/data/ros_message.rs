@@ -1,0 +1,202 @@
+//! One joint state out of the bytes of a ROS message.
+
+use super::ros_layout::{Count, Field, Kind, Number, Part};
+
+/// How a message is laid out in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// ROS 2: CDR, whose first four bytes say which.
+    Cdr,
+    /// ROS 1: little-endian without gaps.
+    Ros1,
+}
+
+/// A joint state; reused from message to message.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct JointSample {
+    /// Header stamp, whole seconds and nanoseconds.
+    pub seconds: i64,
+    pub nanoseconds: i64,
+    /// The names one after the other, and where each ends.
+    pub names: Vec<u8>,
+    pub ends: Vec<usize>,
+    pub position: Vec<f64>,
+    pub velocity: Vec<f64>,
+    pub effort: Vec<f64>,
+}
+
+impl JointSample {
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// Why it cannot be read, one clause.
+    pub(super) fn read(
+        &mut self,
+        message: &[u8],
+        fields: &[Field],
+        encoding: Encoding,
+    ) -> Result<(), String> {
+        (self.seconds, self.nanoseconds) = (0, 0);
+        self.names.clear();
+        self.ends.clear();
+        for list in [&mut self.position, &mut self.velocity, &mut self.effort] {
+            list.clear();
+        }
+        let mut cursor = Cursor::new(message, encoding)?;
+        self.walk(&mut cursor, fields)
+            .ok_or_else(|| "ends in the middle of a field".to_owned())
+    }
+
+    /// The names in their order.
+    pub(super) fn names(&self) -> impl Iterator<Item = &[u8]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts
+            .zip(&self.ends)
+            .map(|(start, end)| self.names.get(start..*end).unwrap_or_default())
+    }
+
+    /// None where the message is too short.
+    fn walk(&mut self, cursor: &mut Cursor, fields: &[Field]) -> Option<()> {
+        for field in fields {
+            let count = match field.count {
+                Count::One => 1,
+                Count::Fixed(count) => count,
+                Count::Counted => cursor.count()?,
+            };
+            // Nothing takes less than a byte: a damaged count must not go on for ever.
+            if count > cursor.left() {
+                return None;
+            }
+            match &field.kind {
+                Kind::Number(number) if field.part == Part::None => cursor.pass(*number, count)?,
+                Kind::Number(number) => {
+                    for _ in 0..count {
+                        let value = cursor.number(*number)?;
+                        self.keep(field.part, value);
+                    }
+                }
+                Kind::Text => {
+                    for _ in 0..count {
+                        let text = cursor.text()?;
+                        if field.part == Part::Name {
+                            self.names.extend_from_slice(text);
+                            self.ends.push(self.names.len());
+                        }
+                    }
+                }
+                Kind::Nested(inner) => {
+                    for _ in 0..count {
+                        self.walk(cursor, inner)?;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn keep(&mut self, part: Part, value: f64) {
+        match part {
+            // Whole numbers below 2³² are exact.
+            Part::Seconds => self.seconds = value as i64,
+            Part::Nanoseconds => self.nanoseconds = value as i64,
+            Part::Position => self.position.push(value),
+            Part::Velocity => self.velocity.push(value),
+            Part::Effort => self.effort.push(value),
+            Part::None | Part::Name => {}
+        }
+    }
+}
+
+/// A place in a message.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    is_big_endian: bool,
+    /// Largest alignment, bytes.
+    alignment: usize,
+    encoding: Encoding,
+}
+
+impl<'a> Cursor<'a> {
+    fn new(message: &'a [u8], encoding: Encoding) -> Result<Self, String> {
+        let cursor = |bytes, is_big_endian, alignment| Self {
+            bytes,
+            at: 0,
+            is_big_endian,
+            alignment,
+            encoding,
+        };
+        if encoding == Encoding::Ros1 {
+            return Ok(cursor(message, false, 1));
+        }
+        let (Some(kind), Some(bytes)) = (message.first_chunk::<2>(), message.get(4..)) else {
+            return Err("is shorter than the four bytes that CDR begins with".into());
+        };
+        match kind {
+            [0, 0] => Ok(cursor(bytes, true, 8)),
+            [0, 1] => Ok(cursor(bytes, false, 8)),
+            // Version 2 aligns to four bytes at most.
+            [0, 6] => Ok(cursor(bytes, true, 4)),
+            [0, 7] => Ok(cursor(bytes, false, 4)),
+            [a, b] => Err(format!(
+                "is in a form of CDR that cannot be read (0x{a:02x}{b:02x}; plain CDR is 0x0000, 0x0001, 0x0006 and 0x0007)"
+            )),
+        }
+    }
+
+    fn left(&self) -> usize {
+        self.bytes.len().saturating_sub(self.at)
+    }
+
+    fn align(&mut self, size: usize) {
+        self.at = self.at.next_multiple_of(size.min(self.alignment).max(1));
+    }
+
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let end = self.at.checked_add(count)?;
+        let taken = self.bytes.get(self.at..end)?;
+        self.at = end;
+        Some(taken)
+    }
+
+    fn pass(&mut self, number: Number, count: usize) -> Option<()> {
+        if count > 0 {
+            self.align(number.size());
+            self.take(number.size().checked_mul(count)?)?;
+        }
+        Some(())
+    }
+
+    fn number(&mut self, number: Number) -> Option<f64> {
+        let size = number.size();
+        self.align(size);
+        let mut raw = [0; 8];
+        for (k, byte) in self.take(size)?.iter().enumerate() {
+            raw[if self.is_big_endian { size - 1 - k } else { k }] = *byte;
+        }
+        let bits = u64::from_le_bytes(raw);
+        Some(match number {
+            Number::Float(4) => f64::from(f32::from_bits(bits as u32)),
+            Number::Float(_) => f64::from_bits(bits),
+            Number::Unsigned(_) => bits as f64,
+            Number::Signed(_) => {
+                let spare = 64 - 8 * size as u32;
+                ((bits << spare) as i64 >> spare) as f64
+            }
+        })
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        Some(self.number(Number::Unsigned(4))? as usize)
+    }
+
+    fn text(&mut self) -> Option<&'a [u8]> {
+        let count = self.count()?;
+        let text = self.take(count)?;
+        // CDR counts the zero at the end.
+        Some(match (self.encoding, text.split_last()) {
+            (Encoding::Cdr, Some((0, text))) => text,
+            _ => text,
+        })
+    }
+}
