@@ -59,7 +59,7 @@ fn every_motion_comes_with_what_it_is_not_checked_against() {
 }
 
 #[test]
-fn limits_in_degrees_are_remarked_on_before_a_motion_is_sized_by_them() {
+fn no_motion_is_sized_by_limits_in_degrees_unless_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     urdf(
@@ -67,9 +67,13 @@ fn limits_in_degrees_are_remarked_on_before_a_motion_is_sized_by_them() {
         "lower=\"-160\" upper=\"160\" velocity=\"180\" effort=\"40\"",
         "",
     );
+    let refused = excite(&at("deg.urdf"), &["--kind", "sweep"], &at("m.toml"))
+        .output()
+        .unwrap();
+    assert!(!refused.status.success() && !at("m.toml").exists());
     let [_, remarked] = both(&mut excite(
         &at("deg.urdf"),
-        &["--kind", "sweep"],
+        &["--kind", "sweep", "--even-if-wrong"],
         &at("m.toml"),
     ));
     assert!(
@@ -95,8 +99,12 @@ fn a_start_on_a_limit_and_a_period_that_no_motion_has_are_told() {
         "{sentence}"
     );
     let options = ["--start", "-1.5708", "--period", "0.01", "--starts", "1"];
-    let [said, _] = both(&mut excite(&robot("one-link.toml"), &options, &out));
-    assert!(said.contains("poor") && said.contains("--period"), "{said}");
+    let said = refuse(&mut excite(&robot("one-link.toml"), &options, &out));
+    assert!(
+        said.contains("identifies nothing") && said.contains("--period"),
+        "{said}"
+    );
+    assert!(!out.exists());
 }
 
 #[test]

@@ -170,6 +170,9 @@ pub(crate) struct Args {
     /// Replace the file if it exists
     #[arg(long)]
     pub(crate) force: bool,
+    /// Design the motion although the limits look like degrees
+    #[arg(long)]
+    pub(crate) even_if_wrong: bool,
 }
 
 impl Args {
@@ -257,6 +260,12 @@ impl Args {
     }
 }
 
+/// Condition number beyond which a combination of parameters is lost in the rounding of single precision, in which the rig and
+/// many loggers hold torques: 1/2⁻²³.
+const TELLS_NOTHING: f64 = 1.0 / f32::EPSILON as f64;
+/// What mends that.
+const MORE_MOTION: &str = "give a longer --period, more range or more --harmonics";
+
 /// What a motion is not checked against; printed with each.
 const NOT_LOOKED_AT: &str = "Not looked at: self-collision, table and other objects, cables. The limits hold for the reference alone; a controller goes beyond it (--margin and --speed-share leave it room). Watch a first run at low speed, as with --speed-share 0.2, and keep the emergency stop at hand.";
 
@@ -268,6 +277,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     args.refuse_unused()?;
     refuse_file(&args.out, args.force)?;
     let robot = described(&args.robot, ui)?.robot;
+    if !args.even_if_wrong && !robot.limits_in_degrees().is_empty() {
+        return Err(CommandError::Implausible(
+            "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong where they are right.".to_owned(),
+        ));
+    }
     let Some(kind) = args.kind.staged() else {
         return optimal(args, &robot, ui);
     };
@@ -320,10 +334,17 @@ fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
     let mut progress = ui.progress("designing the motion", 1);
     let found = design(robot, &options, |done, total| progress.at_of(done, total))?;
     drop(progress);
-    found.file.save(&args.out, robot, args.rate)?;
     for note in &found.notes {
         ui.remark(note);
     }
+    let condition = found.values.condition_number;
+    if condition > TELLS_NOTHING {
+        return Err(CommandError::Sentence(format!(
+            "This motion identifies nothing: its condition number is {}, so that some combination of parameters moves the torque that many times less than the others. Nothing was written; {MORE_MOTION}.",
+            number(condition)
+        )));
+    }
+    found.file.save(&args.out, robot, args.rate)?;
     for line in summary(&found, robot) {
         ui.say(&line);
     }
@@ -355,7 +376,7 @@ fn verdict(condition: f64) -> String {
         "usable (100 to 1000)".into()
     } else {
         format!(
-            "poor: some combination of parameters moves the torque {condition:.0e} times less than the others and will not be identified; give a longer --period, more range or more --harmonics"
+            "poor: some combination of parameters moves the torque {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
         )
     }
 }

@@ -38,11 +38,12 @@ impl Robot {
             let stated = limits.acceleration.is_none_or(|a| a < least);
             (least > ABRUPT && stated).then(|| {
                 format!(
-                    "Joint \"{}\": to reach its velocity limit of {} rad/s within its range takes at least {} rad/s²; were this deg/s, it would be {} rad/s. Limits are in rad/s.",
+                    "Joint \"{}\": to reach its velocity limit of {} rad/s within its range takes at least {} rad/s²; were this deg/s, it would be {} rad/s, in rpm {}. Limits are in rad/s.",
                     joint.name,
                     number(limits.velocity),
                     number(least),
-                    number(limits.velocity.to_radians())
+                    number(limits.velocity.to_radians()),
+                    number(limits.velocity * std::f64::consts::PI / 30.0)
                 )
             })
         };

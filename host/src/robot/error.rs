@@ -58,12 +58,14 @@ pub enum RobotError {
         path: PathBuf,
     },
     /// The file is not text.
-    #[error("{} is not a text file (byte {offset} is neither UTF-8 nor printable), but a robot description is TOML or URDF text", path.display())]
+    #[error("{}:{line}: this line is not text (byte {offset} of the file is neither UTF-8 nor printable, nor of the encoding that the file declares), but a robot description is TOML or URDF text; save it as UTF-8", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
         /// Offset of the first byte that is not text, counted from 0.
         offset: usize,
+        /// Line, from 1.
+        line: usize,
     },
     /// The file has no content.
     #[error("{} is empty, but a robot description needs at least one joint; `rig init one-link` writes one to start from", path.display())]

@@ -17,12 +17,14 @@ mod degrees;
 mod dh;
 mod drives;
 mod effects;
+mod encoding;
 mod error;
 mod inertia;
 mod numbers;
 mod screw;
 mod sizes;
 mod text;
+mod unlikely;
 mod urdf;
 mod voltage_controller;
 mod workspace;
@@ -44,6 +46,7 @@ pub use check::EFFECT_NAMES;
 pub(crate) use check::{sound, written};
 pub(crate) use effects::sane;
 pub use effects::{Placed, RobotEffect, title_of, unit_of};
+use encoding::{Decoded, decoded};
 pub use error::{Place, RobotError};
 pub use screw::Screw;
 pub(crate) use urdf::is_placeholder;
@@ -376,7 +379,7 @@ impl Description {
     /// # Errors
     /// [`RobotError`]: what is wrong with the file, by line.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
-        let text = read_text(path)?;
+        let (text, from) = read_text(path)?;
         let extension = path
             .extension()
             .and_then(|e| e.to_str())
@@ -390,6 +393,7 @@ impl Description {
             let (robot, mut remarks) = text::read(&text, path)?;
             remarks.extend(robot.implausible_bodies(None));
             remarks.extend(robot.limits_in_degrees());
+            remarks.extend(robot.unlikely_values());
             return Ok(Self {
                 remarks,
                 robot,
@@ -399,8 +403,15 @@ impl Description {
         let original = Original::read(text, path)?;
         let robot = original.robot().clone();
         let mut remarks = original.remarks().to_vec();
+        remarks.extend(from.map(|name| {
+            format!(
+                "{} was read as {name}; a URDF that is written from it is UTF-8.",
+                path.display()
+            )
+        }));
         remarks.extend(robot.implausible_bodies(Some(&original)));
         remarks.extend(robot.limits_in_degrees());
+        remarks.extend(robot.unlikely_values());
         Ok(Self {
             robot,
             urdf: Some(original),
@@ -409,8 +420,9 @@ impl Description {
     }
 }
 
-/// The whole file as text, refusing what cannot be a description before reading it.
-fn read_text(path: &Path) -> Result<String, RobotError> {
+/// The whole file as text and the encoding that it had where that is not UTF-8, refusing what cannot be a description before
+/// reading it.
+fn read_text(path: &Path) -> Result<(String, Option<&'static str>), RobotError> {
     let failed = |source| RobotError::Read {
         path: path.into(),
         source,
@@ -425,27 +437,15 @@ fn read_text(path: &Path) -> Result<String, RobotError> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(RobotError::TooLarge { path: path.into() });
     }
-    let unprintable = bytes
-        .iter()
-        .position(|&b| b < 0x20 && !matches!(b, b'\t' | b'\n' | b'\r'));
-    if let Some(offset) = unprintable {
-        return Err(RobotError::NotText {
-            path: path.into(),
-            offset,
-        });
-    }
-    let text = String::from_utf8(bytes).map_err(|e| RobotError::NotText {
+    let Decoded { text, from } = decoded(&bytes).map_err(|wrong| RobotError::NotText {
         path: path.into(),
-        offset: e.utf8_error().valid_up_to(),
+        offset: wrong.offset,
+        line: wrong.line,
     })?;
-    let text = match text.strip_prefix('\u{feff}') {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    };
     if text.trim().is_empty() {
         return Err(RobotError::Empty { path: path.into() });
     }
-    Ok(text)
+    Ok((text, from))
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod edits;
 mod original;
 mod reader;
 mod remarks;
+mod schema;
 mod spatial;
 mod tree;
 mod values;

@@ -37,6 +37,10 @@ pub(super) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, Rob
             column: e.pos().col as usize,
         },
         message: match &e {
+            _ if text.trim_start().len() < text.len() && text.trim_start().starts_with("<?xml") => {
+                "something stands before <?xml …?>; remove the empty line or the blanks there"
+                    .to_owned()
+            }
             roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
                 format!("this is an element or attribute of xacro, {EXPAND}")
             }
@@ -121,10 +125,18 @@ impl<'a> Reader<'a> {
             _ if text.contains("${") => {
                 Err(self.error(node, format!("{what} is \"{text}\", {EXPAND}")))
             }
-            _ => Err(self.error(
-                node,
-                format!("{what} is \"{text}\", but it must be a finite number"),
-            )),
+            _ => {
+                let endless = match node.tag_name().name() {
+                    "limit" => {
+                        "; a joint that turns without end has type=\"continuous\" and neither `lower` nor `upper`"
+                    }
+                    _ => "",
+                };
+                Err(self.error(
+                    node,
+                    format!("{what} is \"{text}\", but it must be a finite number{endless}"),
+                ))
+            }
         }
     }
 

@@ -93,6 +93,7 @@ impl<'a> Reader<'a> {
             ));
         }
         self.expanded()?;
+        self.as_described()?;
         let links: HashMap<&str, Xml<'a>> = self.named("link")?.into_iter().collect();
         let joints = self.named("joint")?;
         let reductions = self.reductions(&joints)?;

@@ -81,14 +81,29 @@ impl<'a> Reader<'a> {
         let position = if endless {
             [f64::NEG_INFINITY, f64::INFINITY]
         } else {
-            let bound = |key| self.optional_number(node, key).map(|v| v.unwrap_or(0.0));
-            [bound("lower")?, bound("upper")?]
+            let bound = |key| self.optional_number(node, key);
+            let (lower, upper) = (bound("lower")?, bound("upper")?);
+            if lower.is_some() != upper.is_some() {
+                let missing = if lower.is_none() { "lower" } else { "upper" };
+                let place = format!("{}:{}", self.path.display(), self.place(node));
+                self.remarks.borrow_mut().push(format!(
+                    "{place}: <limit> of joint `{name}` has no `{missing}`, which counts as 0."
+                ));
+            }
+            [lower.unwrap_or(0.0), upper.unwrap_or(0.0)]
         };
-        let (velocity, effort) = (self.number(node, "velocity")?, self.number(node, "effort")?);
         let remark = |text: String| {
             let place = format!("{}:{}", self.path.display(), self.place(node));
             self.remarks.borrow_mut().push(format!("{place}: {text}"));
         };
+        let velocity = self.number(node, "velocity")?;
+        let stated = self.optional_number(node, "effort")?;
+        if stated.is_none() {
+            remark(format!(
+                "<limit> of joint `{name}` has no `effort`; its torque limit counts as not known."
+            ));
+        }
+        let effort = stated.unwrap_or(0.0);
         if velocity == 0.0 && effort == 0.0 && position[0] == position[1] {
             // What exporters of CAD programs write where nothing was entered.
             remark(format!(
@@ -106,7 +121,7 @@ impl<'a> Reader<'a> {
             return Err(self.error(node, format!("the effort limit of joint `{name}` is {effort}, but it must be greater than 0, or 0 where it is not known")));
         }
         let placeholder = is_placeholder(effort, UNKNOWN_EFFORT);
-        if placeholder {
+        if placeholder && stated.is_some() {
             remark(format!(
                 "the effort limit {effort} of joint `{name}` looks like a placeholder; its torque limit counts as not known."
             ));
@@ -175,11 +190,12 @@ impl<'a> Reader<'a> {
         &self,
         known: &[(&'a str, Xml<'a>)],
     ) -> Result<HashMap<&'a str, f64>, RobotError> {
-        let mut found = HashMap::new();
+        let mut found: HashMap<&str, (f64, Xml<'a>)> = HashMap::new();
+        // Of ROS 1 and Drake beside the joints, of ROS 2 within <ros2_control>.
         for transmission in self
             .document
             .root_element()
-            .children()
+            .descendants()
             .filter(|n| n.has_tag_name("transmission"))
         {
             let joints: Vec<Xml<'a>> = transmission
@@ -192,30 +208,80 @@ impl<'a> Reader<'a> {
                     return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
                 }
             }
-            let Some(reduction) = transmission
-                .descendants()
-                .find(|n| n.has_tag_name("mechanicalReduction"))
-            else {
+            let Some((reduction, what, text)) = reduction(transmission) else {
                 continue;
             };
-            let value = self.parse_number(
-                reduction,
-                "<mechanicalReduction>",
-                reduction.text().unwrap_or_default(),
-            )?;
+            let value = self.parse_number(reduction, &what, text)?;
             if value == 0.0 {
-                return Err(self.error(reduction, "<mechanicalReduction> is 0, but it must be motor turns per joint turn, different from 0".into()));
+                return Err(self.error(
+                    reduction,
+                    format!(
+                        "{what} is 0, but it must be motor turns per joint turn, different from 0"
+                    ),
+                ));
             }
             match joints.as_slice() {
                 [joint] if value != 1.0 => {
-                    found.insert(self.attribute(*joint, "name")?, value);
+                    let name = self.attribute(*joint, "name")?;
+                    let first = found.insert(name, (value, reduction));
+                    if let Some((other, first)) = first.filter(|(other, _)| *other != value) {
+                        return Err(self.error(
+                            reduction,
+                            format!(
+                                "{what} of joint `{name}` is {value}, and {other} at {}; give one transmission a joint",
+                                self.place(first)
+                            ),
+                        ));
+                    }
                 }
                 [_] => {}
+                // Of ROS 2's controllers, which may couple joints that move by themselves here.
+                _ if transmission.ancestors().any(|n| n.has_tag_name("ros2_control")) => {
+                    let place = format!("{}:{}", self.path.display(), self.place(transmission));
+                    self.remarks.borrow_mut().push(format!(
+                        "{place}: this <transmission> names {} joints; only those of one joint each are read.",
+                        joints.len()
+                    ));
+                }
                 _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
             }
         }
-        Ok(found)
+        Ok(found
+            .into_iter()
+            .map(|(name, (value, _))| (name, value))
+            .collect())
     }
+}
+
+/// The reduction of a transmission: where it stands, what it is called there, and its text. ROS 1 has `<mechanicalReduction>`, ROS 2
+/// `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
+fn reduction<'a>(transmission: Xml<'a>) -> Option<(Xml<'a>, String, &'a str)> {
+    let names = ["mechanicalReduction", "mechanical_reduction"];
+    transmission
+        .descendants()
+        .filter(Xml::is_element)
+        .find_map(|node| {
+            let tag = node.tag_name().name();
+            match tag {
+                _ if names.contains(&tag) => {
+                    Some((node, format!("<{tag}>"), node.text().unwrap_or_default()))
+                }
+                "param"
+                    if node
+                        .attribute("name")
+                        .is_some_and(|name| names.contains(&name)) =>
+                {
+                    let name = node.attribute("name").unwrap_or_default();
+                    Some((node, format!("`{name}`"), node.text().unwrap_or_default()))
+                }
+                "gear_ratio" => Some((
+                    node,
+                    "<drake:gear_ratio>".to_owned(),
+                    node.attribute("value")?,
+                )),
+                _ => None,
+            }
+        })
 }
 
 /// Whether an effort limit stands for "none": 0, powers of ten and rows of nines from `least` (N·m or N) on, and whatever

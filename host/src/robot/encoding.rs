@@ -1,0 +1,121 @@
+//! Text files in the encoding that they declare.
+
+use encoding_rs::{Encoding, UTF_8};
+
+/// What a file holds.
+pub(super) struct Decoded {
+    /// Its text; a declaration of another encoding than UTF-8 says UTF-8 now.
+    pub text: String,
+    /// Name of the encoding where it was not UTF-8.
+    pub from: Option<&'static str>,
+}
+
+/// Bytes that are no text, and where.
+pub(super) struct NoText {
+    /// Bytes before them.
+    pub offset: usize,
+    /// Line, from 1.
+    pub line: usize,
+}
+
+/// Reads bytes by their byte order mark, else by the encoding that an XML declaration states, else as UTF-8.
+pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, NoText> {
+    let marked = Encoding::for_bom(bytes).map(|(encoding, _)| encoding);
+    let stated = stated(bytes).and_then(|label| Encoding::for_label(label.as_bytes()));
+    let encoding = marked.or(stated).unwrap_or(UTF_8);
+    let at = |offset: usize| NoText {
+        offset,
+        line: 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count(),
+    };
+    if encoding == UTF_8 {
+        let text = std::str::from_utf8(bytes).map_err(|error| at(error.valid_up_to()))?;
+        if let Some(offset) = text.bytes().position(unprintable) {
+            return Err(at(offset));
+        }
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text).to_owned();
+        return Ok(Decoded { text, from: None });
+    }
+    let (text, _, wrong) = encoding.decode(bytes);
+    if wrong || text.bytes().any(unprintable) {
+        // Where, in the text as far as it could be read.
+        let end =
+            text.find(|c: char| c == '\u{fffd}' || (c as u32) < 0x20 && !"\t\n\r".contains(c));
+        let end = end.unwrap_or(text.len());
+        return Err(NoText {
+            offset: end,
+            line: 1 + text[..end].matches('\n').count(),
+        });
+    }
+    let mut text = text.into_owned();
+    if let Some(label) = stated_in(&text).map(str::to_owned) {
+        text = text.replacen(&label, "UTF-8", 1);
+    }
+    Ok(Decoded {
+        text,
+        from: Some(encoding.name()),
+    })
+}
+
+fn unprintable(byte: u8) -> bool {
+    byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r')
+}
+
+/// The encoding that an XML declaration of ASCII letters states.
+fn stated(bytes: &[u8]) -> Option<&str> {
+    let end = bytes.iter().position(|b| *b == b'>')?;
+    stated_in(std::str::from_utf8(&bytes[..=end]).ok()?)
+}
+
+fn stated_in(text: &str) -> Option<&str> {
+    let declaration = text.trim_start().strip_prefix("<?xml")?.split_once("?>")?.0;
+    let value = declaration
+        .split_once("encoding")?
+        .1
+        .trim_start()
+        .strip_prefix('=')?
+        .trim_start();
+    let quote = value.chars().next().filter(|c| "\"'".contains(*c))?;
+    value[1..].split_once(quote).map(|(label, _)| label)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use encoding_rs::{EUC_KR, GB18030, SHIFT_JIS, WINDOWS_1252};
+
+    use super::*;
+
+    #[test]
+    fn declared_encodings_are_read_and_declared_anew() {
+        for (encoding, label, name) in [
+            (WINDOWS_1252, "ISO-8859-1", "Präzision"),
+            (SHIFT_JIS, "Shift_JIS", "ロボット"),
+            (GB18030, "GB2312", "机器人"),
+            (EUC_KR, "EUC-KR", "로봇"),
+        ] {
+            let text = format!("<?xml version='1.0' encoding='{label}'?>\n<robot name='{name}'/>");
+            let (bytes, _, _) = encoding.encode(&text);
+            let read = decoded(&bytes).ok().unwrap();
+            assert_eq!(read.text, text.replace(label, "UTF-8"));
+            assert!(read.from.is_some());
+        }
+        let text = "<?xml version='1.0' encoding='UTF-16'?>\n<robot name='ü'/>";
+        let little = text.encode_utf16().flat_map(u16::to_le_bytes);
+        let bytes: Vec<u8> = [0xff, 0xfe].into_iter().chain(little).collect();
+        let read = decoded(&bytes).ok().unwrap();
+        assert_eq!(read.text, text.replace("UTF-16", "UTF-8"));
+        assert_eq!(read.from, Some("UTF-16LE"));
+    }
+
+    #[test]
+    fn bytes_of_another_encoding_are_refused_by_line() {
+        let wrong = decoded(b"<?xml version='1.0'?>\n<robot\nname='\xfc'/>")
+            .err()
+            .unwrap();
+        assert_eq!(wrong.line, 3);
+        let wrong =
+            decoded(b"<?xml version='1.0' encoding='Shift_JIS'?>\n\n\n<robot name='\xff'/>");
+        assert_eq!(wrong.err().unwrap().line, 4);
+        assert!(decoded(b"name = 'r'\x07").is_err());
+    }
+}
