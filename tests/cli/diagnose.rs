@@ -86,10 +86,11 @@ fn a_torque_with_its_sign_swapped_is_a_fault_of_the_data() {
     fault(|q, tau| (q, -tau), "sign", "tau1");
 }
 
-/// Inertia and weight come out 30 times too large, as they were recorded, and that is said.
+/// Inertia and weight come out 200 times too large, as they were recorded, and that is said. (30 times would be the gear ratio of 50
+/// applied twice, as far as a description is worth it.)
 #[test]
 fn a_recording_that_looks_wrong_is_fitted_where_asked_for() {
-    let strong = |q: f64, tau: f64| (q, 30.0 * tau);
+    let strong = |q: f64, tau: f64| (q, 200.0 * tau);
     fault(strong, "unit", "tau1");
     let (found, said) = diagnosed(&["--even-if-wrong"], strong);
     assert_ne!(found["verdict"], "data-fault", "{found}");

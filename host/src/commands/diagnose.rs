@@ -126,6 +126,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     for warning in &warnings {
         ui.remark(warning);
     }
+    for inputs in [&training, &holdout] {
+        for sentence in inputs.strange_references(&robot)? {
+            ui.remark(&format!(
+                "{sentence} References tell which recordings repeat one motion, and under voltage what the controller did."
+            ));
+        }
+    }
     let options = Options {
         even_if_wrong: args.even_if_wrong,
         seed: args.seed,
@@ -150,6 +157,11 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &mut |share| progress.at((1000.0 * share) as u64),
     )?;
     drop(progress);
+    for fault in &mut found.data_faults {
+        for inputs in all {
+            inputs.in_its_names(&fault.recording, &mut fault.text);
+        }
+    }
     let heard: Vec<String> = all.iter().flat_map(|inputs| inputs.heard()).collect();
     for warning in &heard {
         ui.remark(warning);

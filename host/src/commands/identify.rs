@@ -20,7 +20,7 @@ use crate::identify::{
 };
 use crate::pages::{self, Context};
 use crate::prepare::{Choice, PrepareOptions};
-use crate::report;
+use crate::report::{self, format_significant, format_unit, listed};
 use crate::robot::{MOST_LEAD, Robot};
 
 /// Which equations are fitted.
@@ -97,6 +97,10 @@ const COMPARED_BYTES: u64 = 32 << 20;
 /// Half-widths of a 95 % interval by which friction has to lie below zero: five standard deviations. A few seconds of a motion
 /// leave friction and the rest of a joint hard to tell apart, and of many joints one may then come out below zero by chance.
 const CLEARLY: f64 = 2.5;
+/// Standard deviations of half a 95 % interval, about.
+const WIDTH: f64 = 2.0;
+/// Coefficients of a base parameter below this are rounding.
+const ROUNDING: f64 = 1e-9;
 
 impl Compare {
     fn list(self, bytes: u64) -> Vec<Estimator> {
@@ -271,8 +275,13 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     } else {
         for sentence in strange {
             ui.remark(&format!(
-                "{sentence}. They are not used: --estimator iv and the comparison take the smoothed position instead, and only output-error needs them."
+                "{sentence} They are not used: --estimator iv and the comparison take the smoothed position instead, and only output-error needs them."
             ));
+        }
+    }
+    if args.measured_derivatives {
+        for inputs in [&training, &holdout] {
+            wrong.extend(inputs.strange_rates(&robot)?);
         }
     }
     refuse_faults(
@@ -296,9 +305,14 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         identification.warnings.extend(inputs.heard());
         identification.warnings.extend(inputs.outside());
     }
-    if !args.even_if_wrong {
-        refuse_driving_friction(&robot, &identification)?;
+    let (refused, doubtful) = impossible(&robot, &identification);
+    if !args.even_if_wrong && !refused.is_empty() {
+        return Err(CommandError::Implausible(format!(
+            "{} Nothing was written; --even-if-wrong writes all the same.",
+            refused.join(" ")
+        )));
     }
+    (identification.warnings).splice(0..0, refused.into_iter().chain(doubtful));
     folder(&args.out)?;
     let (identified, mut remarks) = identified_robot(&robot, &identification);
     let text = identified.to_toml()?;
@@ -388,25 +402,86 @@ fn chosen(robot: &Robot, found: &Identification) -> Vec<String> {
     kinds.into_iter().filter_map(one).collect()
 }
 
-/// Friction that drives the motion at every speed is no friction: the torque has the wrong sign.
-fn refuse_driving_friction(robot: &Robot, found: &Identification) -> Result<(), CommandError> {
-    for (j, joint) in robot.joints.iter().enumerate() {
-        let below_zero = |place: usize| {
-            let row = found
-                .details
-                .columns
-                .iter()
-                .position(|column| *column == j * COLUMNS + place);
-            row.and_then(|row| found.details.free.get(row))
-                .is_some_and(|[value, _, high]| value + CLEARLY * (high - value) < 0.0)
+/// One sentence for each friction or inertia that lies below zero by many of its standard deviations, which no robot has: those
+/// that no result can stand beside, and those that may be said.
+///
+/// A base parameter that is a sum of masses, moments of inertia and friction with positive factors cannot lie below zero. Inertias of
+/// an arm make up for each other: one below zero may be an error of the model that the others take back.
+fn impossible(robot: &Robot, found: &Identification) -> (Vec<String>, Vec<String>) {
+    let details = &found.details;
+    let below_zero = |row: usize| {
+        let [value, _, high] = details.free[row];
+        value + CLEARLY * (high - value) < 0.0
+    };
+    let positive = [
+        column::MASS,
+        // Ixx, Iyy, Izz of Ixx Ixy Ixz Iyy Iyz Izz.
+        column::INERTIA,
+        column::INERTIA + 3,
+        column::INERTIA + 5,
+        column::DRIVE_INERTIA,
+        column::VISCOUS,
+        column::COULOMB,
+    ];
+    let is_sum = |row: usize| {
+        let own = details.combination.row(row);
+        let may = |(c, x): (usize, &f64)| {
+            x.abs() < ROUNDING || (*x > 0.0 && positive.contains(&(c % COLUMNS)))
         };
-        if below_zero(column::VISCOUS) && below_zero(column::COULOMB) {
-            return Err(CommandError::Implausible(format!(
+        own.iter().enumerate().all(may)
+    };
+    let wrong: Vec<usize> = (0..details.free.len())
+        .filter(|row| below_zero(*row) && is_sum(*row))
+        .collect();
+    let of = |j: usize, place: usize| {
+        let column = j * COLUMNS + place;
+        wrong.iter().any(|row| details.columns[*row] == column)
+    };
+    let driving: Vec<usize> = (0..robot.joints.len())
+        .filter(|j| of(*j, column::VISCOUS) && of(*j, column::COULOMB))
+        .collect();
+    let driven: Vec<String> = (driving.iter())
+        .map(|&j| {
+            format!(
                 "viscous and Coulomb friction of joint \"{}\" both come out below zero, so that friction would drive the motion: the sign of tau{n} or i{n}, of q{n}, or of gear_ratio is wrong.",
-                joint.name,
+                robot.joints[j].name,
                 n = j + 1
-            )));
-        }
+            )
+        })
+        .collect();
+    let alone = |row: &&usize| {
+        let column = details.columns[**row];
+        let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
+        !(friction && driving.contains(&(column / COLUMNS)))
+    };
+    let (mut refused, mut doubtful) = (Vec::new(), Vec::new());
+    for row in wrong.iter().filter(alone) {
+        let [value, _, high] = details.free[*row];
+        let own = &found.base_parameters[*row];
+        let column = details.columns[*row];
+        let friction = [column::VISCOUS, column::COULOMB].contains(&(column % COLUMNS));
+        let list = match friction || robot.joints.len() == 1 {
+            true => &mut refused,
+            false => &mut doubtful,
+        };
+        list.push(format!(
+            "{} of joint \"{}\" at {} {}, by {} of its standard deviations",
+            own.expression,
+            robot.joints[column / COLUMNS].name,
+            format_significant(value, 3),
+            format_unit(&own.unit),
+            format_significant(-value * WIDTH / (high - value), 2),
+        ));
     }
-    Ok(())
+    let said = |list: Vec<String>| match list.is_empty() {
+        true => Vec::new(),
+        false => vec![format!(
+            "Below zero, which no robot has, come out: {}. Look at the columns (unit, sign, time, single rows), at the description and at the cut-off.",
+            listed(&list)
+        )],
+    };
+    (
+        driven.into_iter().chain(said(refused)).collect(),
+        said(doubtful),
+    )
 }

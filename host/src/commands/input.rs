@@ -8,8 +8,8 @@ use clap::Args as ClapArgs;
 use super::error::CommandError;
 use super::ui::{Progress, Ui};
 use crate::data::{
-    Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, Warning, plausibility,
-    strange_references,
+    Block, EffortNeed, Implausible, JUDGED_ROWS, KEPT_WARNINGS, Source, StrangeReference, Warning,
+    plausibility, strange_rates, strange_references,
 };
 use crate::diagnose::sanity::faults_at_start;
 use crate::prepare::{PrepareError, Recording};
@@ -137,6 +137,21 @@ impl Outside {
     }
 }
 
+/// What the beginning of a recording cannot be by itself.
+fn plausible(source: &Source, robot: &Robot) -> Result<Vec<Implausible>, CommandError> {
+    match source.blocks(JUDGED_ROWS).next() {
+        Some(block) => Ok(plausibility(&block?, robot)),
+        None => Ok(Vec::new()),
+    }
+}
+
+/// What is wrong with a recording in one sentence.
+fn sentence(source: &Source, wrong: &[Implausible]) -> String {
+    let all: Vec<String> = wrong.iter().map(ToString::to_string).collect();
+    let text = source.in_its_names(&all.join("; "));
+    format!("{}: {text}.", source.path().display())
+}
+
 impl Inputs {
     /// Opens recordings and checks their columns.
     ///
@@ -187,34 +202,15 @@ impl Inputs {
         need: EffortNeed,
     ) -> Result<Self, CommandError> {
         let inputs = Self::read_with(robot, paths, need)?;
-        match inputs.wrong_units(robot)?.into_iter().next() {
-            Some(sentence) => Err(CommandError::Implausible(sentence)),
-            None => Ok(inputs),
-        }
-    }
-
-    /// One sentence for each recording whose units look wrong.
-    ///
-    /// # Errors
-    /// What is wrong with a file, by line.
-    fn wrong_units(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
-        let mut wrong = Vec::new();
-        for source in &self.sources {
-            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
-                let found: Vec<String> = plausibility(&block?, robot)
-                    .iter()
-                    .map(ToString::to_string)
-                    .collect();
-                if !found.is_empty() {
-                    wrong.push(format!(
-                        "{}: {}.",
-                        source.path().display(),
-                        found.join("; ")
-                    ));
-                }
+        for source in &inputs.sources {
+            let wrong: Vec<Implausible> = (plausible(source, robot)?.into_iter())
+                .filter(|problem| !problem.is_doubt())
+                .collect();
+            if !wrong.is_empty() {
+                return Err(CommandError::Implausible(sentence(source, &wrong)));
             }
         }
-        Ok(wrong)
+        Ok(inputs)
     }
 
     /// One sentence for each recording whose columns cannot be what they say: units, and where those are right signs, ratios,
@@ -224,25 +220,65 @@ impl Inputs {
     /// What is wrong with a file, by line.
     pub(crate) fn faults(&self, robot: &Robot) -> Result<Faults, CommandError> {
         let mut faults = Faults {
-            wrong: self.wrong_units(robot)?,
+            wrong: Vec::new(),
             doubtful: Vec::new(),
         };
-        if !faults.wrong.is_empty() {
-            return Ok(faults);
-        }
         for source in &self.sources {
-            for fault in faults_at_start(robot, source, JUDGED_ROWS)? {
+            let (doubts, wrong): (Vec<_>, Vec<_>) =
+                (plausible(source, robot)?.into_iter()).partition(Implausible::is_doubt);
+            if !doubts.is_empty() {
+                faults.doubtful.push(sentence(source, &doubts));
+            }
+            // The model tells more closely what a unit is, where there is something that it can be held against.
+            let judged = match wrong.iter().any(Implausible::spoils) {
+                true => Vec::new(),
+                false => faults_at_start(robot, source, JUDGED_ROWS)?,
+            };
+            if !wrong.is_empty() && !judged.iter().any(|fault| fault.certain) {
+                faults.wrong.push(sentence(source, &wrong));
+                continue;
+            }
+            for fault in judged {
                 let list = match fault.certain {
                     true => &mut faults.wrong,
                     false => &mut faults.doubtful,
                 };
-                list.push(format!("{}: {}", source.path().display(), fault.text));
+                let text = source.in_its_names(&fault.text);
+                let text = format!("{}: {text}", source.path().display());
+                if !list.contains(&text) {
+                    list.push(text);
+                }
             }
         }
         Ok(faults)
     }
 
-    /// One sentence for each recording whose references are in another unit or sense than its positions.
+    /// Gives a message about the recording of that name the file's own names of the columns; another one stays.
+    pub(crate) fn in_its_names(&self, recording: &str, text: &mut String) {
+        let of = |source: &&Source| source.label() == recording;
+        if let Some(source) = self.sources.iter().find(of) {
+            *text = source.in_its_names(text);
+        }
+    }
+
+    /// One sentence for each recording whose measured velocities or accelerations are none, which concerns who uses them.
+    ///
+    /// # Errors
+    /// What is wrong with a file, by line.
+    pub(crate) fn strange_rates(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
+        let mut strange = Vec::new();
+        for source in &self.sources {
+            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
+                let found = strange_rates(&block?, robot);
+                if !found.is_empty() {
+                    strange.push(sentence(source, &found));
+                }
+            }
+        }
+        Ok(strange)
+    }
+
+    /// One sentence for each recording whose references cannot be those of its positions: another unit, sense, zero, clock or joint.
     ///
     /// # Errors
     /// What is wrong with a file, by line.
@@ -253,12 +289,12 @@ impl Inputs {
                 let found = strange_references(&block?, robot);
                 let mut found = found.iter();
                 let Some(first) = found.next() else { continue };
-                let rest: Vec<String> = found.map(Implausible::column).collect();
+                let rest: Vec<String> = found.map(StrangeReference::column).collect();
                 let rest = match rest.as_slice() {
                     [] => String::new(),
-                    _ => format!("; so do {}", rest.join(", ")),
+                    _ => format!("; wrong as well: {}", rest.join(", ")),
                 };
-                strange.push(format!("{}: {first}{rest}", source.path().display()));
+                strange.push(format!("{}: {first}{rest}.", source.path().display()));
             }
         }
         Ok(strange)

@@ -29,7 +29,7 @@ const VISCOUS: [f64; 2] = [1.2, 0.4];
 const COULOMB: [f64; 2] = [1.5, 0.5];
 
 /// The arm as a URDF with `<dynamics>` of these dampings and frictions, none where there are none.
-fn urdf(dynamics: Option<[[f64; 2]; 2]>) -> Robot {
+pub(super) fn urdf(dynamics: Option<[[f64; 2]; 2]>) -> Robot {
     let link = |k: usize| {
         format!(
             "<link name='l{k}'><inertial><origin xyz='{} 0 0'/><mass value='{}'/><inertia ixx='0.001' iyy='{2}' izz='{2}' ixy='0' ixz='0' iyz='0'/></inertial></link>",
@@ -82,7 +82,7 @@ fn torque(q: [f64; 2], v: [f64; 2], a: [f64; 2]) -> [f64; 2] {
 }
 
 /// A motion of five harmonics, its torque with noise of `noise` N·m and its position with noise of `apart` rad.
-fn recorded(motion: u64, seed: u64, [noise, apart]: [f64; 2]) -> InMemory {
+pub(super) fn recorded(motion: u64, seed: u64, [noise, apart]: [f64; 2]) -> InMemory {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(motion);
     let turn = std::f64::consts::TAU;
     let waves: Vec<[f64; 4]> = (0..10)

@@ -290,6 +290,15 @@ impl Default for Options {
     }
 }
 
+/// What mends a recording of which too few rows are usable, by why the others are not.
+fn what_helps(slow: u64, saturated: u64) -> &'static str {
+    if saturated > slow {
+        "the torque stands at its limit: record a motion that needs less, or without the limit"
+    } else {
+        "record a longer or livelier motion"
+    }
+}
+
 /// Why an identification is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
@@ -318,7 +327,7 @@ pub enum IdentifyError {
     NoRecording,
     /// Everything was masked.
     #[error(
-        "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}); record a longer or livelier motion."
+        "Of all rows only {used} are usable for {unknown} parameters (too slow: {slow}, saturated: {saturated}); {}.", what_helps(*slow, *saturated)
     )]
     NothingLeft {
         /// Rows left.

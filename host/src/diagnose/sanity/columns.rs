@@ -2,11 +2,14 @@
 
 use std::ops::Range;
 
-use super::super::Run;
 use super::super::outcome::{About, DataFault};
 use super::super::runs::{JointRun, resolution};
+use super::super::{DiagnoseError, Run};
 use super::names;
-use crate::data::{Block, Implausible, JointColumns, plausibility, unit_of_steps, velocity_scale};
+use crate::data::{
+    Block, Implausible, JUDGED_ROWS, JointColumns, plausibility, unit_of_steps, velocity_scale,
+};
+use crate::prepare::{Recording, first_block};
 use crate::robot::{JointKind, Robot};
 
 /// Less than this cannot hold a reversal and a repetition of it, s.
@@ -27,8 +30,10 @@ const ABOVE_NOISE: f64 = 8.0;
 /// Within a second, of the steps in which its encoder reads.
 const STEPS: f64 = 3.0;
 
-/// Kind of a position that jumps.
-pub(super) const JUMP: &str = "jump";
+/// Whether a column has no derivative, or no size, that could be held against a model: every joint would look wrong.
+pub(super) fn spoils_the_model(fault: &DataFault) -> bool {
+    fault.certain && ["jump", "held", "unsigned"].contains(&fault.kind.as_str())
+}
 
 /// The name of the recording.
 pub(super) fn label(runs: &[&Run]) -> String {
@@ -197,6 +202,30 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     })
 }
 
+/// Columns of recordings as they are on the disk that have no derivative or no size: of uneven rows nothing else tells, once
+/// they are brought to an even step.
+///
+/// # Errors
+/// What reading gives.
+pub(in crate::diagnose) fn spoilt(
+    robot: &Robot,
+    recordings: &[&dyn Recording],
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let mut found = Vec::new();
+    for recording in recordings {
+        let Some(block) = first_block(*recording, JUDGED_ROWS)? else {
+            continue;
+        };
+        let problems = plausibility(&block, robot).into_iter();
+        found.extend(problems.filter(Implausible::spoils).filter_map(|problem| {
+            let (_, mut fault) = of_column(robot, &problem)?;
+            fault.recording = recording.label();
+            Some(fault)
+        }));
+    }
+    Ok(found)
+}
+
 /// What the plausibility of units says, once a joint.
 pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
     let mut found: Vec<(usize, DataFault)> = Vec::new();
@@ -215,48 +244,58 @@ pub(super) fn units(robot: &Robot, runs: &[&Run]) -> Vec<(usize, DataFault)> {
             ..Block::default()
         };
         for problem in plausibility(&block, robot) {
-            let (joint, about) = match &problem {
-                Implausible::Degrees { joint, .. }
-                | Implausible::Position { joint, .. }
-                | Implausible::Jump { joint, .. }
-                | Implausible::Velocity { joint, .. }
-                | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
-                Implausible::EffortTooLarge { joint, .. }
-                | Implausible::EffortTooSmall { joint, .. }
-                | Implausible::NoEffort { joint } => (*joint, About::Torque),
-                Implausible::Spike { joint, .. } => (*joint, About::Torque),
-                Implausible::NotSeconds { .. } | Implausible::ReferenceScale { .. } => continue,
-            };
-            let joint = joint.saturating_sub(1);
-            if found.iter().any(|(j, _)| *j == joint) {
+            let Some((joint, mut fault)) = of_column(robot, &problem) else {
                 continue;
-            }
-            let name = robot.joints.get(joint).map_or("", |j| j.name.as_str());
-            let kind = match problem {
-                Implausible::Jump { .. } | Implausible::Spike { .. } => JUMP,
-                _ => "unit",
             };
-            let mut text = format!("{problem}.");
-            if let Some(ratio) = motor_angle(robot, run, joint) {
-                text = format!(
-                    "{text} Divided by the gear ratio {ratio} it would fit as well: it may be the motor's angle."
-                );
+            fault.recording = label(runs);
+            let known = |(j, own): &(usize, DataFault)| *j == joint && own.certain == fault.certain;
+            if !found.iter().any(known) {
+                found.push((joint, fault));
             }
-            found.push((joint, fault(runs, kind, about, name, text)));
         }
     }
     found
 }
 
-/// The gear ratio, where the position is beyond the joint's limits by about that much.
-fn motor_angle(robot: &Robot, run: &Run, joint: usize) -> Option<f64> {
-    let own = robot.joints.get(joint)?;
-    let [lower, upper] = own.limits.as_ref()?.position;
-    let reach = lower.abs().max(upper.abs());
-    let ratio = own.drive.as_ref()?.gear_ratio.abs();
-    let q = &run.joints.get(joint)?.q_raw;
-    let farthest = q.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-    (farthest > 5.0 * reach && farthest / ratio <= 1.2 * reach).then_some(ratio)
+/// What is wrong with a joint's position or torque by itself as a fault; none of other columns.
+fn of_column(robot: &Robot, problem: &Implausible) -> Option<(usize, DataFault)> {
+    let (joint, about) = match problem {
+        Implausible::HeldPosition { joints, .. } => (joints[0], About::Motion),
+        Implausible::HeldEffort { joints, .. } => (joints[0], About::Torque),
+        Implausible::Degrees { joint, .. }
+        | Implausible::Position { joint, .. }
+        | Implausible::Jump { joint, .. }
+        | Implausible::Unsigned {
+            column: "q", joint, ..
+        }
+        | Implausible::Velocity { joint, .. }
+        | Implausible::VelocityScale { joint, .. } => (*joint, About::Motion),
+        Implausible::EffortTooLarge { joint, .. }
+        | Implausible::EffortTooSmall { joint, .. }
+        | Implausible::Unsigned { joint, .. }
+        | Implausible::Spike { joint, .. }
+        | Implausible::NoEffort { joint } => (*joint, About::Torque),
+        Implausible::NotSeconds { .. }
+        | Implausible::ReferenceScale { .. }
+        | Implausible::NoRate { .. }
+        | Implausible::RateSpike { .. } => return None,
+    };
+    let joint = joint.saturating_sub(1);
+    let kind = match problem {
+        Implausible::Jump { .. } | Implausible::Spike { .. } => "jump",
+        Implausible::HeldPosition { .. } | Implausible::HeldEffort { .. } => "held",
+        Implausible::Unsigned { .. } => "unsigned",
+        _ => "unit",
+    };
+    let fault = DataFault {
+        kind: kind.to_owned(),
+        about,
+        recording: String::new(),
+        joint: robot.joints.get(joint)?.name.clone(),
+        certain: !problem.is_doubt(),
+        text: format!("{problem}."),
+    };
+    Some((joint, fault))
 }
 
 /// A measured velocity that is not the rate of change of the position.
@@ -285,19 +324,22 @@ pub(super) fn velocity(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFau
             ),
         ));
     }
-    let named = names::of_velocity(joint, factor)
-        .map(|name| format!("qd{n} looks like {name}; give it in {unit}"))
-        .or_else(|| names::of_position(joint, 1.0 / factor).map(|name| format!("of q{n}, {name}")));
-    let what = named.unwrap_or_else(|| {
-        format!(
-            "give it in {unit}, and check the gear ratio, the counts of the encoder and the clock"
+    let of_velocity = names::of_velocity(joint, factor).map(|name| {
+        (
+            "unit",
+            format!("qd{n} looks like {}; give it in {unit}", name.text),
         )
     });
-    let kind = if what.contains("gear") {
-        "ratio"
-    } else {
-        "unit"
+    let of_position = || {
+        let name = names::of_position(joint, 1.0 / factor)?;
+        Some((name.kind(), format!("of q{n}, {}", name.text)))
     };
+    let (kind, what) = of_velocity.or_else(of_position).unwrap_or_else(|| {
+        let unnamed = format!(
+            "give it in {unit}, and check the gear ratio, the counts of the encoder and the clock"
+        );
+        ("ratio", unnamed)
+    });
     Some(fault(
         runs,
         kind,

@@ -34,7 +34,7 @@ pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
         let jumps = |i: &Implausible| matches!(i, Implausible::Jump { joint, .. } if *joint == n);
         if plausibility(&block, robot).iter().any(jumps) {
             return named(
-                columns::JUMP,
+                "jump",
                 format!(
                     "ql{n} jumps from one row to the next, as where counts are lost or an angle begins again after a turn; give it unwrapped."
                 ),
@@ -64,13 +64,13 @@ pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
             format!("ql{n} moves against q{n}; reverse its sense."),
         );
     }
-    let what = names::of_position(joint, 1.0 / factor)
-        .unwrap_or_else(|| format!("give it in {unit} of the joint, and check its counts"));
-    let kind = if what.contains("gear") {
-        "ratio"
-    } else {
-        "unit"
-    };
+    let (kind, what) = names::of_position(joint, 1.0 / factor).map_or_else(
+        || {
+            let unnamed = format!("give it in {unit} of the joint, and check its counts");
+            ("unit", unnamed)
+        },
+        |name| (name.kind(), name.text),
+    );
     named(
         kind,
         format!("ql{n} moves {factor:.4} times as far as q{n}; {what}."),

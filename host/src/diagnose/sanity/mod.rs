@@ -11,19 +11,21 @@
 //! show beyond what its many parameters take up.
 
 mod alike;
+mod candidates;
 mod columns;
 mod fit;
 mod gravity;
 mod link;
 mod magnitude;
 mod model;
-mod names;
+pub(super) mod names;
 pub(super) mod nnls;
+mod order;
 mod physical;
+mod place;
 mod rotor;
 mod rows;
 mod senses;
-mod swaps;
 mod trial;
 mod undo;
 mod wave;
@@ -31,7 +33,7 @@ mod wave;
 #[cfg(test)]
 mod tests;
 
-pub(super) use columns::{moves, too_short_to_judge, too_short_to_learn};
+pub(super) use columns::{moves, spoilt, too_short_to_judge, too_short_to_learn};
 
 use super::outcome::{About, DataFault};
 use super::runs::runs_of;
@@ -84,7 +86,7 @@ pub fn faults(robot: &Robot, runs: &[Run]) -> Result<Vec<DataFault>, DiagnoseErr
 }
 
 /// What is wrong with the beginning of a recording, its first `rows` rows, before it is fitted: signs, units, ratios, clocks
-/// and columns in each other's place. Saturation and rest are for the fit itself, which leaves such rows out.
+/// and columns in each other's place. Saturation is said and no reason to stop: a fit leaves such rows out.
 ///
 /// # Errors
 /// What reading gives, and [`DiagnoseError::Model`].
@@ -107,15 +109,21 @@ pub fn faults_at_start(
         return Ok(Vec::new());
     }
     let mut found = faults(robot, &runs)?;
-    found.retain(|fault| !["saturation", "not-moving", "too-short"].contains(&fault.kind.as_str()));
+    found.retain(|fault| !["not-moving", "too-short"].contains(&fault.kind.as_str()));
+    // The fit leaves rows at a limit out.
+    for fault in found.iter_mut().filter(|fault| fault.kind == "saturation") {
+        fault.certain = false;
+    }
     Ok(found)
 }
 
 fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError> {
     let n = robot.joints.len();
     let units = columns::units(robot, runs);
-    // Velocity and acceleration of a jump are no motion: against the model every joint would look wrong.
-    if units.iter().any(|(_, fault)| fault.kind == columns::JUMP) {
+    if units
+        .iter()
+        .any(|(_, fault)| columns::spoils_the_model(fault))
+    {
         return Ok(units.into_iter().map(|(_, fault)| fault).collect());
     }
     let torque = runs
@@ -126,6 +134,8 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
     } else {
         Vec::new()
     };
+    let (doubts, units): (Vec<_>, Vec<_>) =
+        units.into_iter().partition(|(_, fault)| !fault.certain);
     if !units.is_empty() {
         // What a wrong unit of one joint does to the others is its consequence, as is what a wrong position makes of the
         // torque.
@@ -140,6 +150,7 @@ fn of_one(robot: &Robot, runs: &[&Run]) -> Result<Vec<DataFault>, DiagnoseError>
         .filter(|fault| judged.iter().all(|f| f.joint != fault.joint))
         .collect();
     found.extend(judged);
+    found.extend(doubts.into_iter().map(|(_, fault)| fault));
     for j in 0..n {
         // A wrong position belongs to no measured velocity either; that says nothing new.
         if found.iter().all(|f| f.joint != robot.joints[j].name) {

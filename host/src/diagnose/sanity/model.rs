@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::super::outcome::{About, DataFault};
 use super::super::{DiagnoseError, Run};
+use super::candidates::Found;
 use super::columns::fault;
 use super::fit::{Fit, Measured};
 use super::names;
@@ -11,6 +12,7 @@ use super::rows::{Form, Rows};
 use super::trial::Suspicion;
 use super::undo::Undo;
 use crate::identify::preference;
+use crate::report::format_trimmed;
 use crate::robot::{JointKind, Robot};
 
 /// A model that leaves more than this share of the torque's variance is worth a trial with other units or times.
@@ -23,7 +25,7 @@ const BETTER: f64 = 0.35;
 /// Share of what was left that a shift has to leave at most to be suspected; the trial decides.
 const LESS: f64 = 0.7;
 /// The same for factors that no unit has and for a reversed position, which any model may like better by chance.
-const MUCH_BETTER: f64 = 0.2;
+pub(super) const MUCH_BETTER: f64 = 0.2;
 /// … and for a small misfit.
 const FAR_BETTER: f64 = 0.1;
 pub(super) const GOOD: f64 = 0.2;
@@ -43,8 +45,14 @@ const IN_MOTION: f64 = 0.05;
 const STIRS: f64 = 0.01;
 /// Share of a joint's range by which a position may lie outside it: limits are described with some care.
 const OUTSIDE: f64 = 0.2;
+/// A factor that differs by less from another is the same.
+const SAME: f64 = 0.1;
 /// Rows of one trial of several joints.
 pub(super) const TRIAL: usize = 500;
+/// Rows of one trial of a single joint, of which there are more.
+const TRIAL_ALONE: usize = 2000;
+/// Share of a torque's variance that any rounding leaves.
+const EXACT: f64 = 1e-6;
 
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
@@ -126,11 +134,21 @@ impl<'a> Judge<'a> {
         let mut all: Vec<Suspicion> = (0..n)
             .filter_map(|j| self.magnitude(j, described))
             .collect();
-        let (swapped, turned): (Vec<_>, Vec<_>) =
-            (self.mixed()?.into_iter()).partition(|found| found.is_of_two());
-        all.extend(swapped.iter().filter_map(|found| self.said(found)));
+        // What the torques alone say of a factor, whatever the description.
+        let free = self.positions()?;
+        let known = |found: &Found| {
+            let of_free = |own: &Suspicion| own.undo.as_ref().is_some_and(|undo| found.is_of(undo));
+            free.iter().any(of_free)
+        };
+        let mut transformed = self.transformed()?;
+        transformed.retain(|found| !known(found));
+        all.extend(free);
+        let (turned, others): (Vec<_>, Vec<_>) =
+            transformed.into_iter().partition(|found| found.is_sense());
+        let (zeros, others): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|found| found.is_zero());
+        all.extend(others.iter().filter_map(|found| self.said(found)));
         all.extend((0..n).filter_map(|j| self.shifted(j)));
-        all.extend(self.positions()?);
         all.extend(self.thousandfold(described));
         all.extend(self.single_zero()?);
         for j in (0..n).filter(|j| self.stirs(*j)) {
@@ -142,16 +160,17 @@ impl<'a> Judge<'a> {
             }
             all.extend(self.heavy_rotor(j)?);
         }
-        all.extend(turned.iter().filter_map(|found| self.said(found)));
-        Ok(all)
-    }
-
-    fn poor(&self) -> f64 {
-        if self.robot.joints.len() == 1 {
-            POOR_ALONE
-        } else {
-            POOR
+        // A zero off is less likely than what else explains a recording as well.
+        let last = turned.iter().chain(&zeros);
+        all.extend(last.filter_map(|found| self.said(found)));
+        // What is suspected for two reasons is tried once.
+        let mut once: Vec<Suspicion> = Vec::new();
+        for own in all {
+            if once.iter().all(|other| !other.is_like(&own)) {
+                once.push(own);
+            }
         }
+        Ok(once)
     }
 
     pub(super) fn name(&self, joint: usize) -> &str {
@@ -253,11 +272,12 @@ impl<'a> Judge<'a> {
             .map(|f| f.as_ref().map_or(0.0, Fit::unexplained))
             .collect();
         let mean = |left: &[f64]| left.iter().sum::<f64>() / left.len().max(1) as f64;
-        let poor = self.poor();
+        // Of a single joint, whose gravity has a period, a factor shows in whatever the model leaves.
+        let poor = if n == 1 { EXACT } else { POOR };
         if left.iter().all(|u| *u < poor) {
             return Ok(Vec::new());
         }
-        let rows = self.rows.thinned(if n == 1 { usize::MAX } else { TRIAL });
+        let rows = self.rows.thinned(if n == 1 { TRIAL_ALONE } else { TRIAL });
         let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
             let moved = rows.rescaled(joint, factor);
             let matrices = moved.regressors(&self.form)?;
@@ -288,8 +308,8 @@ impl<'a> Judge<'a> {
                 let far = factor < 0.0 || f64::ln(factor).abs() > f64::ln(1.4);
                 let unit = !(0.4..2.5).contains(&factor) && factor > 0.0;
                 let least = match unit {
-                    _ if left[j] < POOR => FAR_BETTER,
                     true => BETTER,
+                    false if left[j] < POOR => FAR_BETTER,
                     false => MUCH_BETTER,
                 };
                 if far && own < GOOD && own < least * left[j] && mean(&all) < mean(&left) {
@@ -341,7 +361,7 @@ impl<'a> Judge<'a> {
 
     /// Whether a joint could be where it is recorded times a factor. Where it cannot, its torque goes with such a multiple of its
     /// position for another reason: an eccentric gear's once a turn of the motor.
-    fn reaches(&self, j: usize, factor: f64) -> bool {
+    pub(super) fn reaches(&self, j: usize, factor: f64) -> bool {
         let limits = self.robot.joints[j].limits.as_ref();
         limits.map(|l| l.position).is_none_or(|[low, high]| {
             let more = OUTSIDE * (high - low);
@@ -356,11 +376,8 @@ impl<'a> Judge<'a> {
             // In steps of 3 %: closer than gravity's period over a turn needs.
             return (-160..=160).map(|k| 1.03f64.powi(k)).collect();
         }
-        let mut list = vec![-1.0, 1.0 / 57.296, core::f64::consts::TAU, 0.5, 2.0];
-        let drive = self.robot.joints[j].drive.as_ref();
-        if let Some(ratio) = drive.map(|d| d.gear_ratio.abs()).filter(|r| *r > 0.0) {
-            list.extend([ratio, 1.0 / ratio]);
-        }
+        let mut list = names::factors_of_position(&self.robot.joints[j]);
+        list.push(-1.0);
         list
     }
 
@@ -371,9 +388,12 @@ impl<'a> Judge<'a> {
             .find_map(|f| Some((*f, names::of_position(&self.robot.joints[j], *f)?)));
         let best = factors.first().copied().unwrap_or(1.0);
         let (kind, factor, what) = match named {
-            _ if best < 0.0 => ("sign", best, "reverse it".to_owned()),
-            Some((factor, name)) if name.contains("gear") => ("ratio", factor, name),
-            Some((factor, name)) => ("unit", factor, name),
+            Some((_, name)) if best < 0.0 => ("sign", best, format!("reverse it; {}", name.text)),
+            None if (best + 1.0).abs() < SAME => ("sign", best, "reverse it".to_owned()),
+            None if best < 0.0 => {
+                ("sign", best, "reverse it, and check its factor".to_owned())
+            }
+            Some((factor, name)) => (name.kind(), factor, name.text),
             None => (
                 "ratio",
                 best,
@@ -385,8 +405,9 @@ impl<'a> Judge<'a> {
             About::Motion,
             j,
             format!(
-                "q{} fits its torque {factor:.4} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
+                "q{} fits its torque {} times as large (the model then leaves {:.1} % of the torque's variance, as recorded {:.1} %): {what}.",
                 j + 1,
+                format_trimmed(factor, 4),
                 100.0 * after,
                 100.0 * before
             ),

@@ -339,18 +339,19 @@ impl Judge<'_> {
             (name.is_some() || !(0.125..8.0).contains(&factor.abs())).then(|| {
                 // On a light last link a tool weighs many times what the link does.
                 let tool = match factor {
-                    1.0..100.0 => "as a tool or payload that the description does not state would make it, or ",
+                    1.0..100.0 => ", or as a tool or payload that the description does not state would make it",
                     _ => "",
                 };
-                let what = name.unwrap_or_else(|| "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned());
-                let nearest = what.split(", or").next().unwrap_or_default();
-                let kind = if nearest.contains("gear") { "ratio" } else { "unit" };
+                let (kind, what) = name.map_or_else(
+                    || ("unit", "more than a change of the robot makes; check the torque constant, the ratio and the unit (mA for A, or mN·m for N·m, make it a thousand times as large)".to_owned()),
+                    |name| (name.kind(), name.text),
+                );
                 let fault = self.say(
                     kind,
                     About::Torque,
                     j,
                     format!(
-                        "tau{n} is {} times what the description's {of} needs, {tool}{what}.",
+                        "tau{n} is {} times what the description's {of}, {what}{tool}.",
                         format_significant(factor, 4)
                     ),
                 );
@@ -358,9 +359,9 @@ impl Judge<'_> {
             })
         };
         Ok(match (gravity.map(|m| m.value), inertia) {
-            (Some(g), Some(i)) if large(g) && !apart(g, i) => torque(g, "gravity and inertia"),
-            (Some(g), None) if large(g) => torque(g, "gravity"),
-            (None, Some(i)) if large(i) => torque(i, "inertia"),
+            (Some(g), Some(i)) if large(g) && !apart(g, i) => torque(g, "gravity and inertia need"),
+            (Some(g), None) if large(g) => torque(g, "gravity needs"),
+            (None, Some(i)) if large(i) => torque(i, "inertia needs"),
             (Some(g), Some(i)) if !large(g) && !(0.05..20.0).contains(&(i / g).abs()) => {
                 let clock = (i / g).abs().sqrt();
                 let fault = self.say(

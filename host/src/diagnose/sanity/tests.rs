@@ -4,6 +4,7 @@ mod alike;
 mod doubts;
 mod mounts;
 mod scales;
+mod transformed;
 mod windows;
 
 use std::path::{Path, PathBuf};

@@ -49,6 +49,12 @@ impl Suspicion {
             undo: Some(undo),
         }
     }
+
+    /// Whether both take back the same.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let both = self.undo.as_ref().zip(other.undo.as_ref());
+        both.is_some_and(|(own, other)| own.is_like(other))
+    }
 }
 
 /// What one reading of a recording is worth under each belief.
@@ -119,6 +125,11 @@ fn odds(a: &Score, b: &Score) -> f64 {
 /// Whether `a` predicts better than `b`, be it by little.
 fn clearly(a: &Score, b: &Score) -> bool {
     gain(a, b).sigmas() > CLEAR
+}
+
+/// Whether neither predicts better than the other by what a fault is worth, nor clearly; also of one and the same.
+fn equals(a: &Score, b: &Score) -> bool {
+    gain(a, b).value.abs() < WORTH && !clearly(a, b) && !clearly(b, a)
 }
 
 fn best<'a>(scores: impl Iterator<Item = &'a Score>) -> Option<&'a Score> {
@@ -193,21 +204,25 @@ impl Judge<'_> {
         }
         let edge = left.iter().map(|(_, undo)| undo.edge()).max().unwrap_or(0);
         let recorded = self.reading(None, edge)?;
-        let mut certain: Option<(usize, Score)> = None;
-        let mut open = Vec::new();
+        let (mut certain, mut open) = (Vec::new(), Vec::new());
         for (k, (_, undo)) in left.iter().enumerate() {
             match outcome(undo, &self.reading(Some(undo), edge)?, &recorded) {
-                Outcome::Certain(own)
-                    if (certain.as_ref()).is_none_or(|(_, first)| clearly(&own, first)) =>
-                {
-                    certain = Some((k, own));
-                }
+                Outcome::Certain(own) => certain.push((k, own)),
                 Outcome::Open => open.push(k),
-                _ => {}
+                Outcome::Refuted => {}
             }
         }
-        if let Some((k, _)) = certain {
-            let (fault, undo) = left.swap_remove(k);
+        let better =
+            |a: &(usize, Score), b: &(usize, Score)| gain(&a.1, &b.1).value.total_cmp(&0.0);
+        if let Some(best) = certain.iter().max_by(|a, b| better(a, b)) {
+            let mut equal = certain.iter().filter(|one| equals(&one.1, &best.1));
+            // Of equals the one that is suspected first.
+            let first = equal.next().unwrap_or(best);
+            let (mut fault, undo) = left[first.0].clone();
+            if let Some((other, _)) = equal.next() {
+                let other = &left[*other].0.text;
+                fault.text = format!("{} Another explanation fits as well: {other}", fault.text);
+            }
             found.push(fault);
             return Ok((found, Some(undo)));
         }

@@ -3,8 +3,19 @@
 use super::rows::Rows;
 use crate::robot::Robot;
 
-/// Two joints whose columns stand in each other's place.
-type Pair = [usize; 2];
+/// Fitted factors within this ratio are the same.
+const ALIKE: f64 = 1.12;
+
+/// Which columns of the joints stand in another order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Columns {
+    /// The torques alone.
+    Torques,
+    /// The positions alone.
+    Positions,
+    /// All columns of a joint.
+    Joints,
+}
 
 /// A way to take a suspected fault back.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,12 +26,10 @@ pub(super) enum Undo {
     Position(Option<usize>, f64),
     /// Position and torque of a joint both counted the other way round.
     Both(usize),
-    /// Torques of two joints exchanged.
-    Torques(Pair),
-    /// Positions of two joints exchanged.
-    Positions(Pair),
-    /// Both: the joints stand in another order than in the description.
-    Joints(Pair),
+    /// Columns in another order: those of joint j stand in the place of joint `order[j]`.
+    Order(Columns, Vec<usize>),
+    /// A joint's position counted from another zero: the angle to add, rad.
+    Zero(usize, f64),
     /// A joint's torque that many rows earlier.
     Earlier(usize, i64),
     /// Seconds that each unit of the clock lasts.
@@ -37,7 +46,6 @@ impl Undo {
     /// The rows without the fault.
     pub(super) fn applied(&self, robot: &Robot, rows: &Rows) -> Rows {
         let mut rows = rows.clone();
-        let ratio = |[i, j]: Pair| robot.joints[i].gear_ratio() / robot.joints[j].gear_ratio();
         match *self {
             Self::Torque(joint, factor) => {
                 for (j, tau) in rows.tau.iter_mut().enumerate() {
@@ -51,12 +59,8 @@ impl Undo {
                 rows = rows.rescaled(Some(j), -1.0);
                 scale(&mut rows.tau[j], -1.0);
             }
-            Self::Torques(pair) => exchange_torques(&mut rows, pair, ratio(pair)),
-            Self::Positions(pair) => exchange_positions(&mut rows, pair, ratio(pair)),
-            Self::Joints(pair) => {
-                exchange_torques(&mut rows, pair, ratio(pair));
-                exchange_positions(&mut rows, pair, ratio(pair));
-            }
+            Self::Order(which, ref order) => rows = reordered(robot, &rows, which, order),
+            Self::Zero(j, angle) => rows.q[j].iter_mut().for_each(|q| *q += angle),
             Self::Earlier(j, by) => {
                 let tau = rows.tau[j].clone();
                 let last = tau.len() as i64 - 1;
@@ -105,6 +109,16 @@ impl Undo {
         }
     }
 
+    /// Whether both are the same but for a factor that was fitted.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Position(i, a), Self::Position(j, b)) => {
+                i == j && (a / b).ln().abs() < ALIKE.ln()
+            }
+            _ => self == other,
+        }
+    }
+
     /// The joint whose torques are read as a fit to them has it.
     pub(super) fn guessed(&self) -> Option<usize> {
         match self {
@@ -124,16 +138,25 @@ fn scale(column: &mut [f64], factor: f64) {
 }
 
 /// What was measured at the motors went through the ratio of the other joint.
-fn exchange_torques(rows: &mut Rows, [i, j]: Pair, share: f64) {
-    rows.tau.swap(i, j);
-    scale(&mut rows.tau[i], share);
-    scale(&mut rows.tau[j], 1.0 / share);
-}
-
-fn exchange_positions(rows: &mut Rows, [i, j]: Pair, share: f64) {
-    for columns in [&mut rows.q, &mut rows.qd, &mut rows.qdd] {
-        columns.swap(i, j);
-        scale(&mut columns[i], 1.0 / share);
-        scale(&mut columns[j], share);
+fn reordered(robot: &Robot, rows: &Rows, which: Columns, order: &[usize]) -> Rows {
+    let mut own = rows.clone();
+    for (j, &from) in order.iter().enumerate().filter(|(j, from)| j != *from) {
+        let share = robot.joints[j].gear_ratio() / robot.joints[from].gear_ratio();
+        if which != Columns::Positions {
+            own.tau[j].clone_from(&rows.tau[from]);
+            scale(&mut own.tau[j], share);
+        }
+        if which != Columns::Torques {
+            let columns = [
+                (&mut own.q, &rows.q),
+                (&mut own.qd, &rows.qd),
+                (&mut own.qdd, &rows.qdd),
+            ];
+            for (to, all) in columns {
+                to[j].clone_from(&all[from]);
+                scale(&mut to[j], 1.0 / share);
+            }
+        }
     }
+    own
 }

@@ -21,6 +21,11 @@ const MOSTLY_SLOW: f64 = 0.25;
 /// Rounds of the least squares at most, many times what five bounded unknowns need.
 const ROUNDS: usize = 100;
 
+/// Columns of a joint under gravity: inertia, back-EMF, dry friction, a constant, and gravity's two.
+const OF_GRAVITY: usize = 6;
+/// Singular values below this are rounding.
+const TINY: f64 = 1e-12;
+
 /// Drive inertia, torque per volt, its product with the back-EMF, Coulomb and viscous friction: none is negative. The offset may be.
 const NOT_NEGATIVE: usize = 5;
 
@@ -72,6 +77,55 @@ pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f6
     ])
 }
 
+/// Share of the voltage's squares that a joint under gravity leaves, its position `factor` times what was recorded: of the factors
+/// the one whose gravity has the right period leaves least. Inertia, friction, back-EMF and gravity are fitted, whatever the
+/// description says of them.
+pub(super) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
+    let (mut rows, mut right) = (Vec::new(), Vec::new());
+    for log in logs {
+        for [from, to] in pieces(log) {
+            let length = log.t[to - 1] - log.t[from];
+            let (mut row, mut volts) = ([0.0; OF_GRAVITY], 0.0);
+            for k in from..to {
+                let [before, after] = [k.max(from + 1) - 1, (k + 1).min(to - 1)];
+                let width = 0.5 * (log.t[after] - log.t[before]);
+                let [bump, slope, bend] = bump((log.t[k] - log.t[from]) / length, length);
+                let q = log.q[k] - log.q[from];
+                let (sin, cos) = (factor * log.q[k]).sin_cos();
+                let own = [
+                    bend * q,
+                    -slope * q,
+                    bump * log.slope(k)[0].signum(),
+                    bump,
+                    bump * cos,
+                    bump * sin,
+                ];
+                for (to, x) in row.iter_mut().zip(own) {
+                    *to += width * x;
+                }
+                volts += width * bump * f64::from(u8::from(log.on[k])) * log.u[k];
+            }
+            rows.extend(row);
+            right.push(volts);
+        }
+    }
+    let squares: f64 = right.iter().map(|v| v * v).sum();
+    let x = DMatrix::from_row_slice(right.len(), OF_GRAVITY, &rows);
+    let y = DVector::from_vec(right);
+    let fit = x.clone().svd(true, true).solve(&y, TINY).ok()?;
+    (squares > 0.0).then(|| (y - x * fit).norm_squared() / squares)
+}
+
+/// x³(1 − x)³ at a share of a piece, and its derivatives by time, of a piece of that length, s.
+fn bump(x: f64, length: f64) -> [f64; 3] {
+    let rest = 1.0 - x;
+    [
+        (x * rest).powi(3),
+        3.0 * (x * rest).powi(2) * (rest - x) / length,
+        6.0 * x * rest * (1.0 - 5.0 * x * rest) / (length * length),
+    ]
+}
+
 /// Rows of overlapping pieces, the last one past the end.
 fn pieces(log: &Log) -> Vec<[usize; 2]> {
     let mut list = Vec::new();
@@ -99,12 +153,8 @@ fn equation(
     for k in from..to {
         let [before, after] = [k.max(from + 1) - 1, (k + 1).min(to - 1)];
         let width = 0.5 * (log.t[after] - log.t[before]);
-        let x = (log.t[k] - log.t[from]) / length;
-        let (rest, q) = (1.0 - x, log.q[k] - log.q[from]);
-        // x³(1 − x)³ and its derivatives by time.
-        let bump = (x * rest).powi(3);
-        let slope = 3.0 * (x * rest).powi(2) * (rest - x) / length;
-        let bend = 6.0 * x * rest * (1.0 - 5.0 * x * rest) / (length * length);
+        let [bump, slope, bend] = bump((log.t[k] - log.t[from]) / length, length);
+        let q = log.q[k] - log.q[from];
         let on = f64::from(u8::from(log.on[k]));
         let [acceleration, speed] = [bend * q, -slope * q];
         row[0] -= width * acceleration;

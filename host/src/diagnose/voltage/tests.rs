@@ -286,3 +286,41 @@ fn a_voltage_against_the_motion_is_a_fault_of_the_data() {
     let kinds: Vec<&str> = found.data_faults.iter().map(|f| f.kind.as_str()).collect();
     assert_eq!(kinds, ["sign"], "{found:?}");
 }
+
+/// What is said to be wrong with a pendulum whose columns were changed.
+fn fault_of(change: impl Fn(&mut JointColumns)) -> String {
+    let mut runs: Vec<InMemory> = (0..4).map(|k| pendulum(k, 0.0)).collect();
+    for run in &mut runs {
+        change(&mut run.blocks[0].joints[0]);
+    }
+    let (found, _) = found(&list(&runs[..3]), &list(&runs[3..]));
+    let [fault] = &found.data_faults[..] else {
+        panic!("{:?}", found.data_faults)
+    };
+    println!("{}", fault.text);
+    assert!(fault.certain);
+    fault.text.clone()
+}
+
+#[test]
+fn voltages_that_are_none_and_units_are_told() {
+    let volts = |joint: &mut JointColumns, change: &dyn Fn(f64) -> f64| {
+        let u = joint.voltage.as_mut().unwrap();
+        u.iter_mut().for_each(|u| *u = change(*u));
+    };
+    let zero = fault_of(|joint| volts(joint, &|_| 0.0));
+    assert!(zero.contains("u1 is 0 in every row"), "{zero}");
+    for level in [12.0, -5.0] {
+        let supply = fault_of(|joint| volts(joint, &|_| level));
+        assert!(supply.contains("it looks like the supply"), "{supply}");
+    }
+    let millivolts = fault_of(|joint| volts(joint, &|u| 1000.0 * u));
+    assert!(millivolts.contains("u1 looks like mV"), "{millivolts}");
+    for (factor, words) in [
+        (1.0 / std::f64::consts::TAU, "it looks like turns"),
+        (0.5, "it is half what it should be"),
+    ] {
+        let scaled = fault_of(|joint| joint.q.iter_mut().for_each(|q| *q *= factor));
+        assert!(scaled.contains(words), "{scaled}");
+    }
+}
