@@ -240,3 +240,156 @@ fn a_sweep_is_judged_as_any_recording_and_what_is_left_out_is_listed() {
     }
     assert_eq!(said.matches("left out:").count(), dropped.len(), "{said}");
 }
+
+/// The same recording with one column changed from row to row: `change` is given time and value.
+fn altered(from: &Path, to: &Path, column: &str, change: impl Fn(usize, &[f64]) -> f64) {
+    let text = fs::read_to_string(from).unwrap();
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let place = header.split(',').position(|name| name == column).unwrap();
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.split(',').map(|v| v.parse().unwrap()).collect())
+        .collect();
+    let values: Vec<f64> = rows.iter().map(|row| row[place]).collect();
+    let mut out = format!("{header}\n");
+    for (k, row) in rows.iter().enumerate() {
+        let mut row = row.clone();
+        row[place] = change(k, &values);
+        let words: Vec<String> = row.iter().map(|v| format!("{v:.9}")).collect();
+        out.push_str(&words.join(","));
+        out.push('\n');
+    }
+    fs::write(to, out).unwrap();
+}
+
+/// Time stamps that jitter, rates that differ, rows that are missing: the same numbers, as the sweep's own stamps count.
+#[test]
+fn a_sweep_is_read_by_its_own_time_stamps() {
+    let made = Made::new();
+    for rate in [1000.0, 500.0, 200.0] {
+        made.sweep("even.csv", rate, |tau| tau, false);
+        let (even, _) = made.map("train-1000.csv", "even.csv");
+        let mut random = noise(7);
+        let jitter: Vec<f64> = (0..200_000)
+            .map(|_| 2e-4 * random().clamp(-2.0, 2.0))
+            .collect();
+        altered(&made.at("even.csv"), &made.at("jitter.csv"), "t", |k, t| {
+            t[k] + jitter[k]
+        });
+        let (map, said) = made.map("train-1000.csv", "jitter.csv");
+        for name in ["coulomb", "viscous"] {
+            let (a, b) = (
+                number(&even["stribeck"][name]),
+                number(&map["stribeck"][name]),
+            );
+            assert!((a - b).abs() < 0.02, "{rate} Hz, {name}: {a} {b} {said}");
+        }
+    }
+}
+
+/// A fault of the sweep or of both recordings is refused with its cause, and drawn all the same where that is wanted.
+#[test]
+fn a_sweep_of_another_clock_or_scale_is_refused_with_the_cause() {
+    let made = Made::new();
+    made.sweep("sound.csv", 1000.0, |tau| tau, true);
+    let (sound, _) = made.map("train-1000.csv", "sound.csv");
+    assert_eq!(sound["doubts"].as_array().unwrap().len(), 0, "{sound:#}");
+    fs::remove_dir_all(made.at("map")).unwrap();
+    let refused = |column: &str, change: &dyn Fn(usize, &[f64]) -> f64| {
+        altered(&made.at("sound.csv"), &made.at("wrong.csv"), column, change);
+        let sentence = refuse(&mut made.command("train-1000.csv", "wrong.csv"));
+        assert!(!made.at("map").exists(), "{sentence}");
+        assert!(sentence.contains("--even-if-wrong"), "{sentence}");
+        sentence
+    };
+    // 15, 60 and 120 ms late, 40 ms early.
+    for (rows, word) in [
+        (15, "behind"),
+        (60, "behind"),
+        (120, "behind"),
+        (-40, "ahead of"),
+    ] {
+        let sentence = refused("tau1", &|k, tau: &[f64]| {
+            tau[(k as i64 - rows).clamp(0, tau.len() as i64 - 1) as usize]
+        });
+        assert!(
+            sentence.contains(&format!("s {word} q1")) && sentence.contains("one clock"),
+            "{rows}: {sentence}"
+        );
+    }
+    for factor in [0.4, 0.7, 1.5] {
+        let sentence = refused("tau1", &|k, tau: &[f64]| factor * tau[k]);
+        let told = sentence.split("changes with q1 ").nth(1).unwrap();
+        let told: f64 = told.split(' ').next().unwrap().parse().unwrap();
+        // What the fit makes of weakening friction bends the weight that it is compared with.
+        assert!((told / factor - 1.0).abs() < 0.05, "{factor}: {sentence}");
+    }
+    let magnitude = refused("tau1", &|k, tau: &[f64]| tau[k].abs());
+    assert!(
+        magnitude.contains("tau1") && magnitude.contains("sign"),
+        "{magnitude}"
+    );
+    let half = refused("q1", &|k, q: &[f64]| 0.5 * q[k]);
+    assert!(half.contains("q1"), "{half}");
+    let motor = refused("q1", &|k, q: &[f64]| 50.0 * q[k]);
+    assert!(motor.contains("q1"), "{motor}");
+    let reversed = refused("ref1", &|k, reference: &[f64]| -reference[k]);
+    assert!(
+        reversed.contains("ref1") && reversed.contains("the other way"),
+        "{reversed}"
+    );
+    // What is asked for is drawn, with the reason on the page and in the file.
+    altered(
+        &made.at("sound.csv"),
+        &made.at("wrong.csv"),
+        "tau1",
+        |k, tau| tau[k.saturating_sub(60)],
+    );
+    let mut command = made.command("train-1000.csv", "wrong.csv");
+    let output = command.arg("--even-if-wrong").output().unwrap();
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("behind q1"));
+    let map: Value =
+        serde_json::from_str(&fs::read_to_string(made.at("map/friction-map.json")).unwrap())
+            .unwrap();
+    assert_eq!(map["doubts"].as_array().unwrap().len(), 1);
+}
+
+/// A joint about a vertical axis has no gravity that could show: that is no reason to doubt its sweep.
+#[test]
+fn a_sweep_of_a_joint_without_gravity_is_not_doubted() {
+    let made = Made::new();
+    made.sweep("sloping.csv", 500.0, |tau| tau, true);
+    let level = |from: &str, to: &str| {
+        let text = fs::read_to_string(made.at(from)).unwrap();
+        let mut lines = text.lines();
+        let mut out = format!("{}\n", lines.next().unwrap());
+        for line in lines {
+            let row: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+            let tau = row[2] - GRAVITY * row[1].cos();
+            let _ = writeln!(out, "{:.6},{:.9},{tau:.6},{:.9}", row[0], row[1], row[3]);
+        }
+        fs::write(made.at(to), out).unwrap();
+    };
+    level("sloping.csv", "level.csv");
+    level("train-1000.csv", "train-level.csv");
+    let text = fs::read_to_string(robot("one-link.toml")).unwrap();
+    let vertical = text.replace("alpha = 1.5707963267948966", "alpha = 0.0");
+    assert_ne!(text, vertical);
+    fs::write(made.at("vertical.toml"), vertical).unwrap();
+    succeed(
+        rig()
+            .args(["friction-map", "--robot"])
+            .arg(made.at("vertical.toml"))
+            .arg("--data")
+            .arg(made.at("train-level.csv"))
+            .arg("--sweep")
+            .arg(made.at("level.csv"))
+            .arg("--out")
+            .arg(made.at("map")),
+    );
+    let text = fs::read_to_string(made.at("map/friction-map.json")).unwrap();
+    let map: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(map["doubts"].as_array().unwrap().len(), 0, "{map:#}");
+    assert!((number(&map["stribeck"]["viscous"]) - VISCOUS).abs() < 0.03);
+}

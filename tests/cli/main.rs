@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod benchmark;
+mod cases;
 mod diagnose;
 mod excite;
 mod friction_map;

@@ -16,7 +16,9 @@ use super::ui::Ui;
 use crate::data::{Column, CsvWriter};
 use crate::link::experiment::when_calibrated;
 use crate::link::serial::DEFAULT_BAUD;
-use crate::link::{EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings};
+use crate::link::{
+    EmulatedPort, LinkError, Port, SerialLine, Session, SessionSettings, describe_fault,
+};
 
 /// Health comes once a second.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(3);
@@ -170,11 +172,8 @@ fn act<P: Port>(port: P, args: &Args, sent: Vec<RequestBody>, ui: &Ui) -> Result
                 return Ok(());
             };
             ui.say(&format!(
-                "{:?} ({}) at tick {}, {:.4} s after the rig started. docs/firmware.md says of each fault what to do; `rig board clear` forgets it.",
-                record.fault,
-                record.value,
-                record.tick,
-                record.tick as f64 / f64::from(session.greeting().control_rate_hz),
+                "{} docs/firmware.md says more of each fault; `rig board clear` forgets it.",
+                describe_fault(&record, f64::from(session.greeting().control_rate_hz)),
             ));
             if let Some(out) = out {
                 write(session.greeting(), &kept.ticks, out)?;

@@ -1,6 +1,6 @@
 //! `rig friction-map`: friction over speed, from a sweep of constant speeds.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
     refuse_faults(
         &robot,
         &[&training, &sweep],
-        Vec::new(),
+        sweep.strange_references(&robot)?,
         args.even_if_wrong,
         ui,
     )?;
@@ -91,38 +91,32 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         &Options::default(),
     )?;
     for source in recordings(&sweep.listened()) {
-        let map = friction_map(
+        let drawn = friction_map(
             &robot,
             &identification,
             source,
             joint,
             FrictionMapOptions::default(),
-        )?;
-        let mut heard = [training.heard(), sweep.heard()].concat();
+        );
+        if drawn.is_err() {
+            // Rows that are missing may be why.
+            sweep.heard().iter().for_each(|warning| ui.remark(warning));
+        }
+        let map = drawn?;
+        if !map.doubts.is_empty() && !args.even_if_wrong {
+            return Err(CommandError::Implausible(format!(
+                "{} Nothing was written; --even-if-wrong draws the map all the same.",
+                map.doubts.join(" ")
+            )));
+        }
+        let mut heard = [training.heard(), sweep.heard(), map.doubts.clone()].concat();
         heard.extend([training.outside(), sweep.outside()].concat());
         heard.extend(map.note.clone());
         for warning in &heard {
             ui.remark(warning);
         }
-        let context = Context {
-            command: command_line(),
-            warnings: (training.warnings().chain(sweep.warnings()))
-                .chain(heard)
-                .collect(),
-            ..Context::default()
-        };
-        folder(&args.out)?;
-        let json = serde_json::to_string_pretty(&map).map_err(|error| {
-            CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
-        })?;
-        write_whole(
-            &args.out.join("friction-map.json"),
-            (json + "\n").as_bytes(),
-        )?;
-        report::write(
-            &args.out.join("report.html"),
-            &pages::friction_map(&robot, &map, &context),
-        )?;
+        let warnings = training.warnings().chain(sweep.warnings()).chain(heard);
+        write(&args.out, &robot, &map, warnings.collect())?;
         for line in lines(&map, robot.joints[joint].kind) {
             ui.say(&line);
         }
@@ -131,6 +125,33 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         "report: {}",
         args.out.join("report.html").display()
     ));
+    Ok(())
+}
+
+/// Writes the map as JSON and as a page into a folder.
+///
+/// # Errors
+/// What the system says of a file.
+fn write(
+    out: &Path,
+    robot: &Robot,
+    map: &FrictionMap,
+    warnings: Vec<String>,
+) -> Result<(), CommandError> {
+    let context = Context {
+        command: command_line(),
+        warnings,
+        ..Context::default()
+    };
+    folder(out)?;
+    let json = serde_json::to_string_pretty(map).map_err(|error| {
+        CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&out.join("friction-map.json"), (json + "\n").as_bytes())?;
+    report::write(
+        &out.join("report.html"),
+        &pages::friction_map(robot, map, &context),
+    )?;
     Ok(())
 }
 

@@ -12,6 +12,7 @@ mod friction_map;
 mod identify;
 mod init;
 mod input;
+mod interrupts;
 mod overwrite;
 mod pictures;
 mod record;

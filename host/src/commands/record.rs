@@ -4,26 +4,24 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{ArgGroup, Args as ClapArgs};
-use rig_shared::safety::{Limit, Mode};
-use rig_shared::trajectory::Trajectory;
+use rig_shared::safety::{FaultRecord, Limit, Mode};
 use rig_shared::wire::message::RequestBody;
 
 use super::error::CommandError;
 use super::input::described;
+use super::interrupts;
 use super::overwrite::refuse_file;
 use super::ui::Ui;
 use crate::data::{Column, RecordingWriter};
-use crate::emulated::{EmulatedRig, Nameplate, upload};
-use crate::excite::TrajectoryFile;
+use crate::emulated::{EmulatedRig, Nameplate, hardware_of, other_link, shortfalls, upload};
+use crate::excite::{JointTrajectory, TrajectoryFile};
 use crate::link::experiment::{Experiment, run as run_experiment};
 use crate::link::serial::DEFAULT_BAUD;
 use crate::link::{
     COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session,
-    SessionSettings, UNITS,
+    SessionSettings, UNITS, describe_fault,
 };
 use crate::plant::PlantConfig;
 use crate::robot::{ONE_LINK_TEMPLATE, Robot};
@@ -106,26 +104,32 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         rest: args.seconds,
         ..Experiment::default()
     };
+    let mut motion = None;
     if let Some(path) = &args.trajectory {
         let file = TrajectoryFile::load(path)?;
         if let Some(robot) = &robot {
             file.fits(robot, path)?;
         }
-        experiment.trajectory = Some(single(&file, path, args.home)?);
+        let joint = single(&file, path, args.home)?;
+        experiment.trajectory = Some(joint.trajectory.to_f32());
         experiment.drive_off = file.drive_off;
+        motion = Some(joint.clone());
     }
     let losses = if let Some(name) = &args.port {
         record(
             SerialLine::open(name, args.baud)?,
             &experiment,
             &args.out,
+            ON_BOARD,
             ui,
         )?
     } else if args.probe {
-        record(open_probe()?, &experiment, &args.out, ui)?
+        record(open_probe()?, &experiment, &args.out, ON_BOARD, ui)?
     } else {
-        let rig = emulated_at(robot, [args.seed, args.run.into()], args.home)?;
-        record(EmulatedPort::new(rig), &experiment, &args.out, ui)?
+        let robot = described_or_template(robot)?;
+        let rig = emulated_at(&robot, [args.seed, args.run.into()], args.home)?;
+        doubt(&rig, &robot, motion.as_ref(), ui)?;
+        record(EmulatedPort::new(rig), &experiment, &args.out, "", ui)?
     };
     ui.say(&format!("{}: {losses}", args.out.display()));
     Ok(())
@@ -144,23 +148,29 @@ pub(crate) fn uploaded(
     Ok(upload.requests)
 }
 
-/// The emulated rig: a laboratory's, with the nameplate of this description or of the template.
+/// The emulated rig: a laboratory's, with drive, encoder and nameplate of this description or of the template.
 pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, CommandError> {
-    emulated_at(robot, [seed, 1], None)
+    emulated_at(&described_or_template(robot)?, [seed, 1], None)
+}
+
+fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
+    match robot {
+        Some(robot) => Ok(robot),
+        None => Ok(Robot::from_toml(
+            ONE_LINK_TEMPLATE,
+            Path::new("one-link.toml"),
+        )?),
+    }
 }
 
 /// The same in one of its recordings (counted from 1), its link held where it is said to stand, if that is not where it hangs.
 fn emulated_at(
-    robot: Option<Robot>,
+    described: &Robot,
     [seed, run]: [u64; 2],
     home: Option<f32>,
 ) -> Result<EmulatedRig, CommandError> {
-    let described = match robot {
-        Some(robot) => robot,
-        None => Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml"))?,
-    };
-    let nameplate = Nameplate::from_robot(&described)?;
-    let mut plant = PlantConfig::laboratory(seed);
+    let nameplate = Nameplate::from_robot(described)?;
+    let mut plant = PlantConfig::laboratory_with(&hardware_of(described)?, seed);
     let hangs = plant.initial_position;
     let home = home.map_or(hangs, f64::from);
     if (home - hangs).abs() > HANGS {
@@ -175,6 +185,32 @@ fn emulated_at(
             "The estimator's settings cannot be used: {fault:?}."
         ))
     })
+}
+
+/// Says where the description's link cannot be the emulated one, and where its motor is too weak for the motion of that.
+///
+/// # Errors
+/// What is missing in the description.
+fn doubt(
+    rig: &EmulatedRig,
+    robot: &Robot,
+    motion: Option<&JointTrajectory>,
+    ui: &Ui,
+) -> Result<(), CommandError> {
+    let nameplate = Nameplate::from_robot(robot)?;
+    let plant = rig.plant().config();
+    if let Some(sentence) = other_link(plant, &nameplate, robot) {
+        ui.remark(&sentence);
+    }
+    let Some(motion) = motion else { return Ok(()) };
+    let short = shortfalls(plant, &nameplate, &motion.trajectory, motion.start);
+    if !short.is_empty() {
+        ui.remark(&format!(
+            "The described drive is too weak to move the link of the emulated rig like this. {} Design a slower or smaller motion from this description (`rig excite --speed-share`), or describe another drive.",
+            short.join(" ")
+        ));
+    }
+    Ok(())
 }
 
 /// The rig behind the debug probe.
@@ -192,11 +228,11 @@ pub(crate) fn open_probe() -> Result<Box<dyn Port>, CommandError> {
 }
 
 /// The motion of the rig's one joint, if it starts where the link stands.
-fn single(
-    file: &TrajectoryFile,
+fn single<'a>(
+    file: &'a TrajectoryFile,
     path: &Path,
     home: Option<f32>,
-) -> Result<Trajectory<f32>, CommandError> {
+) -> Result<&'a JointTrajectory, CommandError> {
     let [joint] = file.joints.as_slice() else {
         return Err(CommandError::Sentence(format!(
             "{} moves {} joints, but the rig has one; design it with `rig excite` from the rig's description.",
@@ -212,7 +248,7 @@ fn single(
             joint.start
         )));
     }
-    Ok(joint.trajectory.to_f32())
+    Ok(joint)
 }
 
 /// A link that is said to stand within this of where it hangs does hang, rad.
@@ -222,10 +258,36 @@ const HANGS: f64 = 0.2;
 /// limits from where the link really stands.
 const START_TOLERANCE: f64 = 0.02;
 
+/// What a board tells of a fault after the recording; the emulated rig is gone with it.
+const ON_BOARD: &str =
+    " `rig board fault` fetches the ticks around it, `rig board clear` forgets it.";
+
+/// What is written beside the rows: firmware, modes and limits by number.
+fn metadata(firmware: &str) -> BTreeMap<String, String> {
+    let modes = names(&[
+        Mode::Calibrating,
+        Mode::Disarmed,
+        Mode::Holding,
+        Mode::Running,
+        Mode::Stopping,
+        Mode::Fault,
+    ]);
+    let limits = Limit::ALL
+        .map(|limit| format!("{} {}", limit as u8, limit.name()))
+        .join(", ");
+    BTreeMap::from([
+        ("firmware".to_string(), firmware.to_string()),
+        ("modes".to_string(), modes),
+        ("limits".to_string(), limits),
+    ])
+}
+
+/// Records an experiment to a file. `more` is added to the sentence about a fault.
 fn record<P: Port>(
     port: P,
     experiment: &Experiment,
     out: &Path,
+    more: &str,
     ui: &Ui,
 ) -> Result<LossReport, CommandError> {
     let mut session = Session::open(port, SessionSettings::default())?;
@@ -236,34 +298,12 @@ fn record<P: Port>(
         .zip(UNITS)
         .map(|(name, unit)| Column::new(name, unit))
         .collect();
-    let metadata = BTreeMap::from([
-        ("firmware".to_string(), greeting.firmware.to_string()),
-        (
-            "modes".to_string(),
-            names(&[
-                Mode::Calibrating,
-                Mode::Disarmed,
-                Mode::Holding,
-                Mode::Running,
-                Mode::Stopping,
-                Mode::Fault,
-            ]),
-        ),
-        (
-            "limits".to_string(),
-            Limit::ALL
-                .map(|limit| format!("{} {}", limit as u8, limit.name()))
-                .join(", "),
-        ),
-    ]);
-    let mut writer = RecordingWriter::create(out, &columns, &metadata)?;
+    let mut writer = RecordingWriter::create(out, &columns, &metadata(&greeting.firmware))?;
     let total = experiment.samples(1.0 / converter.period());
     let mut progress = ui.progress("recording", total);
     let mut failed = None;
-    let mut fault = None;
-    let mut mode = Mode::Disarmed;
-    let mut done = 0;
-    listen_to_interrupts()?;
+    let mut ending = Ending::default();
+    interrupts::listen(writer.temporary())?;
     let recorded = run_experiment(&mut session, experiment, |event| {
         match event {
             Event::Samples {
@@ -278,14 +318,14 @@ fn record<P: Port>(
                         return ControlFlow::Break(());
                     }
                 }
-                done += samples.len() as u64;
-                mode = samples.last().map_or(mode, |sample| sample.mode);
-                progress.at(done);
+                ending.done += samples.len() as u64;
+                ending.mode = samples.last().map_or(ending.mode, |sample| sample.mode);
+                progress.at(ending.done);
             }
-            Event::Fault(record) => fault = Some(*record),
+            Event::Fault(record) => ending.fault = Some(*record),
             _ => {}
         }
-        if PRESSED.load(Ordering::Relaxed) {
+        if interrupts::asked() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -296,60 +336,63 @@ fn record<P: Port>(
     }
     let losses = match recorded {
         Ok(losses) => losses,
-        Err(error) if done == 0 => return Err(error.into()),
+        Err(error) if ending.done == 0 => return Err(error.into()),
         Err(error) => {
             writer.finish()?;
             return Err(CommandError::Sentence(format!(
-                "{error} {} holds the {done} samples that came before; how many were lost is not known.",
-                out.display()
+                "{error} {} holds the {} samples that came before; how many were lost is not known.",
+                out.display(),
+                ending.done
             )));
         }
     };
     writer.finish()?;
-    if let Some(record) = fault {
-        return Err(CommandError::Sentence(format!(
-            "The rig has stopped with the fault {:?} ({}) at tick {}; {} holds what was recorded until the end. `rig board fault` fetches the ticks around it, `rig board clear` forgets it.",
-            record.fault,
-            record.value,
-            record.tick,
-            out.display()
-        )));
-    }
-    if mode == Mode::Fault {
-        return Err(CommandError::Sentence(format!(
-            "The rig has a fault latched that was not announced while {} was recorded: `rig board fault` says which, `rig board clear` forgets it.",
-            out.display()
-        )));
-    }
-    if PRESSED.load(Ordering::Relaxed) {
-        return Err(CommandError::Sentence(format!(
-            "Broken off: the motion was stopped and the bridge switched off; {} holds the {done} samples until then.",
-            out.display()
-        )));
-    }
+    ending.judge(out, more, f64::from(greeting.control_rate_hz))?;
     Ok(losses)
 }
 
-/// Whether Ctrl-C has been pressed since the recording began.
-static PRESSED: AtomicBool = AtomicBool::new(false);
+/// How a recording ended.
+struct Ending {
+    fault: Option<FaultRecord>,
+    mode: Mode,
+    /// Samples that came.
+    done: u64,
+}
 
-/// Listens to Ctrl-C from now on: the link is then brought to rest before the program ends. Pressed again it ends at once,
-/// and the rig stops by itself when it no longer hears anything.
-fn listen_to_interrupts() -> Result<(), CommandError> {
-    // A process has one handler; the program as a library records more than once.
-    static LISTENING: OnceLock<Result<(), String>> = OnceLock::new();
-    let listening = LISTENING.get_or_init(|| {
-        ctrlc::set_handler(|| {
-            if PRESSED.swap(true, Ordering::Relaxed) {
-                // As a shell says that SIGINT ended it.
-                std::process::exit(130);
-            }
-        })
-        .map_err(|error| error.to_string())
-    });
-    PRESSED.store(false, Ordering::Relaxed);
-    (listening.clone())
-        .map_err(|error| CommandError::Sentence(format!("Ctrl-C cannot be caught: {error}.")))
+impl Default for Ending {
+    fn default() -> Self {
+        Self {
+            fault: None,
+            mode: Mode::Disarmed,
+            done: 0,
+        }
+    }
+}
+
+impl Ending {
+    /// # Errors
+    /// A sentence where a fault or the user ended the recording.
+    fn judge(&self, out: &Path, more: &str, control_rate: f64) -> Result<(), CommandError> {
+        let out = out.display();
+        if let Some(record) = &self.fault {
+            return Err(CommandError::Sentence(format!(
+                "The rig has stopped. {} {out} holds what was recorded until the end.{more}",
+                describe_fault(record, control_rate)
+            )));
+        }
+        if self.mode == Mode::Fault {
+            return Err(CommandError::Sentence(format!(
+                "The rig has a fault latched that was not announced while {out} was recorded: `rig board fault` says which, `rig board clear` forgets it."
+            )));
+        }
+        if interrupts::asked() {
+            return Err(CommandError::Sentence(format!(
+                "Broken off: the motion was stopped and the bridge switched off; {out} holds the {} samples until then.",
+                self.done
+            )));
+        }
+        Ok(())
+    }
 }
 
 fn names(modes: &[Mode]) -> String {

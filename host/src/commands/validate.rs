@@ -56,15 +56,15 @@ pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
         ui.remark(&warning);
     }
     if voltage {
+        for sentence in inputs.strange_references(&robot)? {
+            ui.remark(&format!(
+                "{sentence} The controller that moved the joint was looked for with these references."
+            ));
+        }
         return under_voltage(args, ui, &robot, &inputs);
     }
     if let Some(fuller) = args.robot.fuller() {
         ui.remark(&fuller);
-    }
-    for sentence in inputs.strange_references(&robot)? {
-        ui.remark(&format!(
-            "{sentence}. A controller of the description follows them as they are."
-        ));
     }
     let mut progress = ui.progress("validating", 1000);
     let mut validation = validate(

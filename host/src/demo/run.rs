@@ -10,7 +10,9 @@ use rig_shared::wire::message::{Estimate, RequestBody};
 use super::DemoError;
 use crate::data::{Column, RecordingWriter};
 use crate::link::experiment::{Experiment, run};
-use crate::link::{COLUMNS, Converter, Event, LossReport, Port, Row, Session, UNITS};
+use crate::link::{
+    COLUMNS, Converter, Event, LossReport, Port, Row, Session, UNITS, describe_fault,
+};
 
 /// Lets a rig hang at rest, disarmed, for some seconds of its own time.
 ///
@@ -86,8 +88,8 @@ impl Run {
                 }
                 Event::Fault(record) => {
                     trouble = Some(DemoError::Sentence(format!(
-                        "The emulated rig has stopped with the fault {:?} ({}).",
-                        record.fault, record.value
+                        "The emulated rig has stopped. {}",
+                        describe_fault(record, rate)
                     )));
                     return ControlFlow::Break(());
                 }

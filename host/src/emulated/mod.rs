@@ -1,5 +1,6 @@
 //! The rig without hardware: the firmware's own control application closed around the emulated rig.
 
+mod demand;
 mod nameplate;
 pub mod upload;
 
@@ -14,7 +15,8 @@ use rig_shared::estimation::SettingsFault;
 use crate::link::Device;
 use crate::plant::{Plant, PlantConfig};
 
-pub use nameplate::{Nameplate, NameplateError, link_parameters};
+pub use demand::{other_link, shortfalls};
+pub use nameplate::{Nameplate, NameplateError, hardware_of, link_parameters};
 
 /// The control application, run tick by tick against the plant, with the real wire protocol at its end.
 pub struct EmulatedRig {

@@ -14,6 +14,7 @@ use rig_shared::precompensation::PrecompensationSettings;
 use rig_shared::safety::Limits;
 use thiserror::Error;
 
+use crate::plant::Hardware;
 use crate::robot::{Joint, JointKind, Robot};
 use crate::simulate::{Model, SimulateError};
 
@@ -122,14 +123,13 @@ impl Nameplate {
         if joint.kind == JointKind::Prismatic {
             return Err(NameplateError::Prismatic(joint.name.clone()));
         }
-        let missing = |what| NameplateError::Missing {
-            joint: joint.name.clone(),
-            what,
-        };
         let drive = joint
             .drive
             .as_ref()
-            .ok_or_else(|| missing("[joint.drive]"))?;
+            .ok_or_else(|| NameplateError::Missing {
+                joint: joint.name.clone(),
+                what: "[joint.drive]",
+            })?;
         let unfit = |what: String| NameplateError::Drive {
             joint: joint.name.clone(),
             what,
@@ -144,24 +144,18 @@ impl Nameplate {
             return Err(unfit(format!("has gear_ratio = {}", drive.gear_ratio)));
         }
         let rates = Rates::default();
-        let counts = drive
-            .encoder_counts_per_rev
-            .ok_or_else(|| missing("drive.encoder_counts_per_rev"))?;
+        let hardware = hardware_of(robot)?;
         let limits = limits(joint, drive)?;
         let model = link_parameters(robot)?;
         let parts = Drive {
-            gear_ratio: drive.gear_ratio as f32,
-            rotor_inertia: drive.rotor_inertia as f32,
-            torque_constant: drive.torque_constant as f32,
-            resistance: drive
-                .resistance
-                .ok_or_else(|| missing("drive.resistance"))? as f32,
-            inductance: drive
-                .inductance
-                .ok_or_else(|| missing("drive.inductance"))? as f32,
+            gear_ratio: hardware.gear_ratio as f32,
+            rotor_inertia: hardware.rotor_inertia as f32,
+            torque_constant: hardware.torque_constant as f32,
+            resistance: hardware.resistance as f32,
+            inductance: hardware.inductance as f32,
         };
         let encoder = Encoder {
-            counts_per_motor_turn: counts as u32,
+            counts_per_motor_turn: hardware.counts_per_turn as u32,
             observer_bandwidth: OBSERVER_BANDWIDTH,
             index_levels: 0b00,
         };
@@ -190,6 +184,37 @@ impl Nameplate {
         };
         Ok(Self { config, settings })
     }
+}
+
+/// The drive and encoder that a description states for the first joint: what the emulated rig is made of.
+///
+/// # Errors
+/// [`NameplateError::Missing`] naming the value that is not stated.
+pub fn hardware_of(robot: &Robot) -> Result<Hardware, NameplateError> {
+    let joint = robot.joints.first().ok_or(NameplateError::JointCount {
+        robot: robot.name.clone(),
+        joints: 0,
+    })?;
+    let missing = |what| NameplateError::Missing {
+        joint: joint.name.clone(),
+        what,
+    };
+    let stated = |value: Option<f64>, what| value.ok_or_else(|| missing(what));
+    let drive = joint
+        .drive
+        .as_ref()
+        .ok_or_else(|| missing("[joint.drive]"))?;
+    // A torque constant of 0 stands for an unknown one.
+    let constant = Some(drive.torque_constant).filter(|constant| *constant != 0.0);
+    Ok(Hardware {
+        gear_ratio: drive.gear_ratio,
+        counts_per_turn: stated(drive.encoder_counts_per_rev, "drive.encoder_counts_per_rev")?
+            .trunc(),
+        torque_constant: stated(constant, "drive.torque_constant")?,
+        resistance: stated(drive.resistance, "drive.resistance")?,
+        inductance: stated(drive.inductance, "drive.inductance")?,
+        rotor_inertia: drive.rotor_inertia,
+    })
 }
 
 /// The six one-link parameters that a description states.
@@ -334,6 +359,49 @@ mod tests {
         );
         let by_ratio = refused(&|d| d.gear_ratio = 0.0);
         assert!(by_ratio.contains("gear_ratio = 0"), "{by_ratio}");
+    }
+
+    /// With the template the emulated rig is, bit by bit, the one of the documentation.
+    #[test]
+    fn the_templates_drive_is_the_emulated_rigs_own() {
+        use crate::plant::{Hardware, PlantConfig};
+        let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+        let hardware = hardware_of(&robot).unwrap();
+        assert_eq!(hardware, Hardware::default());
+        for seed in 0..20 {
+            assert_eq!(
+                PlantConfig::laboratory_with(&hardware, seed),
+                PlantConfig::laboratory(seed)
+            );
+        }
+        // Another drive: the same link and friction at the joint.
+        let own = PlantConfig::laboratory(3).equivalent();
+        for gear_ratio in [-50.0, 7.5, 160.0] {
+            let other = Hardware {
+                gear_ratio,
+                rotor_inertia: 2.0e-5 * (50.0 / gear_ratio) * (50.0 / gear_ratio),
+                ..hardware
+            };
+            let other = PlantConfig::laboratory_with(&other, 3).equivalent();
+            for (a, b) in own.to_array().into_iter().zip(other.to_array()).take(5) {
+                assert!((a - b).abs() < 1e-9, "{gear_ratio}: {own:?} {other:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_of_the_drive_that_are_missing_are_named() {
+        let template = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
+        let missing = |change: &dyn Fn(&mut crate::robot::Drive)| {
+            let mut robot = template.clone();
+            change(robot.joints[0].drive.as_mut().unwrap());
+            hardware_of(&robot).unwrap_err().to_string()
+        };
+        assert!(missing(&|d| d.torque_constant = 0.0).contains("drive.torque_constant"));
+        assert!(missing(&|d| d.resistance = None).contains("drive.resistance"));
+        assert!(
+            missing(&|d| d.encoder_counts_per_rev = None).contains("drive.encoder_counts_per_rev")
+        );
     }
 
     /// The board must start as the emulated rig does: else their recordings would differ.

@@ -175,6 +175,37 @@ pub struct PlantConfig {
     pub sensors: Sensors,
 }
 
+/// Drive and encoder as a data sheet states them: what a description can make another rig of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hardware {
+    /// Motor turns per joint turn, negative where the gear reverses; not 0.
+    pub gear_ratio: f64,
+    /// Encoder counts per motor turn after quadrature.
+    pub counts_per_turn: f64,
+    /// N·m/A, equal to the back-EMF constant in V·s/rad.
+    pub torque_constant: f64,
+    /// Ω.
+    pub resistance: f64,
+    /// H.
+    pub inductance: f64,
+    /// Rotor with pinion, kg·m².
+    pub rotor_inertia: f64,
+}
+
+impl Default for Hardware {
+    /// The drive and encoder of the documentation's rig.
+    fn default() -> Self {
+        Self {
+            gear_ratio: 50.0,
+            counts_per_turn: 8192.0,
+            torque_constant: 0.05,
+            resistance: 0.6,
+            inductance: 0.5e-3,
+            rotor_inertia: 2.0e-5,
+        }
+    }
+}
+
 /// The six one-link parameters this rig has in steady sliding, joint-side:
 /// τ = J·q̈ + gc·cos q + gs·sin q + fv·q̇ + fc·sgn q̇ + off.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -252,24 +283,9 @@ impl PlantConfig {
         [motor[0] + link[0], motor[1] + link[1]]
     }
 
-    pub(crate) fn load(&self) -> Load {
-        self.mechanism
-            .bodies
-            .iter()
-            .fold(Load::default(), |load, body| load.add(body))
-    }
-
-    pub(crate) fn gravity(&self) -> [f64; 3] {
-        self.mechanism.tilt.map_or(self.mechanism.gravity, |tilt| {
-            tilt.apply(self.mechanism.gravity)
-        })
-    }
-}
-
-impl Default for PlantConfig {
-    /// The one-link rig of the documentation: a geared 24 V motor and a 1 kg arm, powered up hanging at
-    /// rest, its incremental counter at 0 there.
-    fn default() -> Self {
+    /// The one-link rig of the documentation with another drive and encoder: a geared 24 V motor and a 1 kg arm, powered up
+    /// hanging at rest, its incremental counter at 0 there. Link and friction seen at the joint are the same for every drive.
+    pub fn with_hardware(hardware: &Hardware) -> Self {
         let weakening = Some(VelocityWeakening {
             breakaway_ratio: 1.33,
             velocity: 0.025,
@@ -279,7 +295,8 @@ impl Default for PlantConfig {
             damping_time: 1.0e-3,
             lag: 1.0e-3,
         };
-        let ratio = 50.0;
+        // Friction has no sign of the gear's.
+        let ratio = hardware.gear_ratio.abs();
         Self {
             tick: 1.0e-4,
             substeps: 10,
@@ -287,10 +304,10 @@ impl Default for PlantConfig {
             held: false,
             ambient: 25.0,
             motor: Motor {
-                resistance: 0.6,
-                inductance: 0.5e-3,
-                torque_constant: 0.05,
-                rotor_inertia: 2.0e-5,
+                resistance: hardware.resistance,
+                inductance: hardware.inductance,
+                torque_constant: hardware.torque_constant,
+                rotor_inertia: hardware.rotor_inertia,
                 // 0.1 N·m and 0.1 N·m·s/rad of the joint's friction sit on the rotor.
                 friction: Friction {
                     coulomb: 0.1 / ratio,
@@ -322,7 +339,7 @@ impl Default for PlantConfig {
                 dead_time: None,
             },
             mechanism: Mechanism {
-                ratio,
+                ratio: hardware.gear_ratio,
                 bodies: vec![Body {
                     mass: 1.0,
                     distance: 0.3,
@@ -356,7 +373,7 @@ impl Default for PlantConfig {
             },
             sensors: Sensors {
                 encoder: Encoder {
-                    counts_per_turn: 8192.0,
+                    counts_per_turn: hardware.counts_per_turn,
                     zero: -FRAC_PI_2,
                     eccentricity: None,
                     unequal_lines: None,
@@ -385,5 +402,25 @@ impl Default for PlantConfig {
                 scaling: Scaling::default(),
             },
         }
+    }
+
+    pub(crate) fn load(&self) -> Load {
+        self.mechanism
+            .bodies
+            .iter()
+            .fold(Load::default(), |load, body| load.add(body))
+    }
+
+    pub(crate) fn gravity(&self) -> [f64; 3] {
+        self.mechanism.tilt.map_or(self.mechanism.gravity, |tilt| {
+            tilt.apply(self.mechanism.gravity)
+        })
+    }
+}
+
+impl Default for PlantConfig {
+    /// The one-link rig of the documentation: [`PlantConfig::with_hardware`] with its own drive.
+    fn default() -> Self {
+        Self::with_hardware(&Hardware::default())
     }
 }

@@ -64,9 +64,11 @@ impl Friction {
     /// The same contact as seen from the far side of a reduction: the torque grows with `ratio`, the
     /// angle shrinks by it. Position dependence turns `ratio` times faster.
     pub fn seen_through(self, ratio: f64) -> Self {
+        // A gear that reverses exchanges the directions and makes no friction negative.
+        let (turn, ratio) = (ratio.signum(), ratio.abs());
         Self {
             coulomb: self.coulomb * ratio,
-            asymmetry: self.asymmetry,
+            asymmetry: self.asymmetry * turn,
             viscous: self.viscous * ratio * ratio,
             weakening: self.weakening.map(|w| VelocityWeakening {
                 velocity: w.velocity / ratio,
@@ -78,7 +80,7 @@ impl Friction {
             },
             load: self.load,
             position: self.position.map(|p| PositionFriction {
-                order: p.order * ratio,
+                order: p.order * turn * ratio,
                 ..p
             }),
             drag: self.drag.map(|d| QuadraticDrag {

@@ -44,7 +44,8 @@ mod tests;
 
 pub use body::Body;
 pub use config::{
-    Bridge, Channel, Encoder, Equivalent, LinkEncoder, Mechanism, Motor, PlantConfig, Sensors,
+    Bridge, Channel, Encoder, Equivalent, Hardware, LinkEncoder, Mechanism, Motor, PlantConfig,
+    Sensors,
 };
 pub use fault::Faults;
 pub use friction::{Friction, Presliding, VelocityWeakening};

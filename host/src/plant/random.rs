@@ -4,7 +4,7 @@ use rand_distr::{Distribution, StandardUniform, Uniform};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::SeedableRng;
 
-use super::config::PlantConfig;
+use super::config::{Hardware, PlantConfig};
 use super::effect::disturbance::Disturbance;
 use super::friction::Friction;
 
@@ -47,7 +47,12 @@ impl PlantConfig {
     /// ±30 %, the centre of mass up to 0.3 rad off the link's axis, and Coulomb friction up to ±10 %
     /// different with direction. Gear ratio, encoder, supply and codes stay.
     pub fn random(seed: u64) -> Self {
-        let mut config = Self::default();
+        Self::random_with(&Hardware::default(), seed)
+    }
+
+    /// [`PlantConfig::random`] about a rig with another drive and encoder: motor values vary about the stated ones.
+    pub fn random_with(hardware: &Hardware, seed: u64) -> Self {
+        let mut config = Self::with_hardware(hardware);
         // The bounds are constants in order, so the distribution always exists; the default stands else.
         let (Ok(factor), Ok(signed)) = (
             Uniform::new(1.0 - SPREAD, 1.0 + SPREAD),
@@ -93,7 +98,12 @@ impl PlantConfig {
     /// with a correlation time of 50 ms, 0.05 A rms of noise in every current sample, and a counter that
     /// stands anywhere in its range at power on.
     pub fn laboratory(seed: u64) -> Self {
-        let mut config = Self::random(seed);
+        Self::laboratory_with(&Hardware::default(), seed)
+    }
+
+    /// [`PlantConfig::laboratory`] with another drive and encoder.
+    pub fn laboratory_with(hardware: &Hardware, seed: u64) -> Self {
+        let mut config = Self::random_with(hardware, seed);
         config.mechanism.disturbance = Some(Disturbance {
             std: DISTURBANCE,
             correlation_time: CORRELATION,

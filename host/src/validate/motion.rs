@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Motion, MotionCheck, MotionSeries, Options, ValidateError};
-use crate::data::{Block, Implausible, JUDGED_ROWS, JointColumns, strange_references};
+use crate::data::{Block, JUDGED_ROWS, JointColumns, strange_references};
 use crate::diagnose::{Run, of_joints, replayed, runs_of_blocks};
 use crate::excite::REPLAY_STEP;
 use crate::prepare::{LowPass, Recording, Survey, Treatment, first_block};
@@ -353,12 +353,13 @@ fn of_block(robot: &Robot, block: &Block) -> Result<Vec<f64>, String> {
         let value = columns.reference.as_ref().and_then(|r| r.first().copied());
         first.push(value.ok_or_else(|| no_reference(&joint.name, j))?);
     }
-    // A controller that is described is told what it was told; a stand-in only what the joint did follow.
-    let strange = strange_references(block, robot).into_iter().find(|found| {
-        matches!(found, Implausible::ReferenceScale { joint, .. }
-            if robot.joints.get(joint - 1).is_some_and(|j| j.controller.is_none()))
-    });
-    match strange {
+    let controlled = |joint: usize| {
+        (robot.joints.get(joint.saturating_sub(1))).is_some_and(|j| j.controller.is_some())
+    };
+    match strange_references(block, robot).into_iter().next() {
+        Some(found) if controlled(found.joint()) => Err(format!(
+            "A simulated controller cannot follow these references as the robot did: {found}."
+        )),
         Some(found) => Err(format!(
             "The description has no [joint.controller], and a stand-in cannot follow these references: {found}."
         )),

@@ -8,7 +8,7 @@ use super::{FrictionFit, FrictionPoint};
 
 /// p-value below which the Stribeck term is taken in. Its velocity exists only if the term does, which makes
 /// the F distribution too optimistic (Davies 1977); a thousandth leaves room for that.
-const WARRANT: f64 = 1e-3;
+pub(super) const WARRANT: f64 = 1e-3;
 /// Points from which both laws are compared: the larger one has five parameters.
 const FEWEST: usize = 7;
 /// Stribeck velocities that are tried, evenly spaced in their logarithm.

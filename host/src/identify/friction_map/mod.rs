@@ -4,10 +4,12 @@
 //! position. A pass gives one point: its mean speed, its mean friction and the standard deviation of that mean. Noise makes
 //! a point less certain and takes no point away. What is left out is listed with its reason.
 //!
-//! The sweep has its own sample rate, clipping and time stamps; only parameters come from the identification.
+//! The sweep has its own sample rate, band, clipping and time stamps; only parameters come from the identification. Whether both
+//! belong together is checked ([`FrictionMap::doubts`]).
 //!
 //! Leaves out: friction that depends on position, load or temperature; memory: all rows of a sweep are held.
 
+mod consistency;
 mod law;
 mod passes;
 
@@ -18,8 +20,11 @@ use self::law::Decision;
 use self::passes::{Signal, Stretch, slope};
 use super::base::chain_of;
 use super::covariance::Memory;
-use super::{Identification, IdentifyError};
-use crate::prepare::{PrepareError, Recording, Spooled, Survey, Treatment, each_motion, surveyed};
+use super::{Identification, IdentifyError, treatment_for};
+use crate::prepare::{
+    PrepareError, PrepareOptions, Recording, Spooled, Survey, Treatment, each_motion, surveyed,
+};
+use crate::report::format_significant;
 use crate::robot::{JointKind, Robot};
 
 /// How stretches of constant speed are found.
@@ -60,6 +65,9 @@ pub struct FrictionPoint {
     pub start: f64,
     /// s
     pub duration: f64,
+    /// First row that counts and one past the last.
+    #[serde(skip)]
+    pub rows: (usize, usize),
 }
 
 /// A stretch of constant speed that gave no point.
@@ -126,13 +134,25 @@ pub struct FrictionMap {
     pub text: String,
     /// What was done to the sweep's time stamps, a sentence.
     pub note: Option<String>,
+    /// Why the map cannot be trusted, a sentence each: a torque of another clock or scale than the position or than the
+    /// recordings of the identification, friction below zero. Empty for a sound sweep.
+    pub doubts: Vec<String>,
 }
 
-/// The rows of a sweep in which the joint moved or not, with what friction is left of the torque.
-#[derive(Default)]
+/// The rows of a sweep, whether the joint moved in them or not.
+#[derive(Clone, Default)]
 struct Rows {
     position: Signal,
-    friction: Vec<f64>,
+    /// Filtered speed, rad/s or m/s.
+    speed: Vec<f64>,
+    /// Torque, N·m or N.
+    tau: Vec<f64>,
+    /// All that the identified model has of it but the joint's own friction, N·m or N.
+    model: Vec<f64>,
+    /// The same with the joint's own friction.
+    whole: Vec<f64>,
+    /// What the identified model holds at rest: gravity and the constant torque, N·m or N.
+    weight: Vec<f64>,
     saturated: Vec<bool>,
 }
 
@@ -161,7 +181,7 @@ pub fn friction_map(
     let (Some(survey), Some(even)) = (surveys.first(), even.first()) else {
         return Err(IdentifyError::NoRecording);
     };
-    let treatment = treatment_of(&identification.details.treatment, survey);
+    let treatment = treatment_of(robot, &identification.details.treatment, survey, even)?;
     let rows = rows_of(robot, identification, even, joint, &treatment)?;
     let reference = reference_of(recording, joint)?;
     let planned = reference.passes_of_reference(&options);
@@ -171,28 +191,22 @@ pub fn friction_map(
     } else {
         rows.position.passes_of_position(&options)
     };
-    let (mut points, mut dropped) = (Vec::new(), Vec::new());
-    for stretch in stretches {
-        match rows.point(&stretch, &options) {
-            Ok(point) => points.push(point),
-            Err(why) => dropped.push(DroppedPass {
-                speed: stretch.speed,
-                start: stretch.from,
-                duration: stretch.to - stretch.from,
-                why,
-            }),
-        }
-    }
-    points.sort_by(|a, b| a.speed.total_cmp(&b.speed));
+    let (points, dropped) = rows.points(&stretches, &options);
     if !both_ways(points.iter().map(|p| p.speed)) {
         return Err(too_few(&described.name, &points, &dropped));
     }
-    let decision = law::decide(&points).ok_or_else(|| {
-        IdentifyError::FrictionMap(format!(
-            "All stretches of joint {} have the same speed; a friction map needs several.",
-            described.name
-        ))
-    })?;
+    let decision = law::decide(&points).ok_or_else(|| one_speed(&described.name))?;
+    let check = Check {
+        rows: &rows,
+        stretches: &stretches,
+        options: &options,
+        sweep: &survey.label,
+        joint: &described.name,
+        noise: (identification.details.train.get(joint)).map_or(f64::INFINITY, |own| own.rms),
+        number: joint + 1,
+        kind: described.kind,
+    };
+    let doubts = check.doubts(&points, &decision);
     let text = text_of(&decision, &points, described.kind);
     let warranted = decision.warranted;
     Ok(FrictionMap {
@@ -209,7 +223,62 @@ pub fn friction_map(
         warranted,
         text,
         note: survey.note.clone(),
+        doubts,
     })
+}
+
+/// The error where no law can be fitted.
+fn one_speed(joint: &str) -> IdentifyError {
+    IdentifyError::FrictionMap(format!(
+        "All stretches of joint {joint} have the same speed; a friction map needs several."
+    ))
+}
+
+/// What the checks of a map look at.
+struct Check<'a> {
+    rows: &'a Rows,
+    stretches: &'a [Stretch],
+    options: &'a FrictionMapOptions,
+    sweep: &'a str,
+    joint: &'a str,
+    /// What the identified model leaves of the joint's torque in the recordings that it was fitted to, N·m or N rms.
+    noise: f64,
+    /// Number of the joint, from 1.
+    number: usize,
+    kind: JointKind,
+}
+
+impl Check<'_> {
+    /// Why the map cannot be trusted: the clock first, as a late torque looks like another scale too.
+    fn doubts(&self, points: &[FrictionPoint], decision: &Decision) -> Vec<String> {
+        let units = match self.kind {
+            JointKind::Revolute => ["N·m", "N·m·s/rad"],
+            JointKind::Prismatic => ["N", "N·s/m"],
+        };
+        let chosen = |decision: &Decision, stribeck: bool| {
+            let stribeck = decision.stribeck.clone().filter(|_| stribeck);
+            stribeck.unwrap_or_else(|| decision.simple.clone())
+        };
+        let recorded = chosen(decision, decision.warranted);
+        let clock = self.rows.late().and_then(|late| {
+            let moved = self.rows.earlier(late.by)?;
+            let (points, _) = moved.points(self.stretches, self.options);
+            let moved = chosen(&law::decide(&points)?, decision.warranted);
+            consistency::late_doubt(
+                &late,
+                [&recorded, &moved],
+                self.sweep,
+                self.number,
+                units[1],
+            )
+        });
+        let scale = || {
+            (self.rows.gravity_shown(points)).doubt(self.noise, self.sweep, self.joint, self.number)
+        };
+        let impossible =
+            consistency::impossible(&recorded, points.len(), self.joint, self.number, units);
+        (clock.or_else(scale).into_iter().chain(impossible)).collect()
+    }
 }
 
 /// Whether speeds are enough for a map: four or more, in both directions.
@@ -237,11 +306,23 @@ fn too_few(joint: &str, points: &[FrictionPoint], dropped: &[DroppedPass]) -> Id
     ))
 }
 
-/// What is done to the sweep: the band of the identification as far as the sweep's own rate has it, its own clipping. Means
-/// over passes are taken, so nothing is decimated.
-fn treatment_of(fitted: &Treatment, sweep: &Survey) -> Treatment {
+/// What is done to the sweep: the band of the identification as far as the sweep's own rate and noise have it, its own clipping.
+/// Means over passes are taken, so nothing is decimated.
+fn treatment_of(
+    robot: &Robot,
+    fitted: &Treatment,
+    sweep: &Survey,
+    recording: &dyn Recording,
+) -> Result<Treatment, IdentifyError> {
     let rate = sweep.sample_rate;
-    let cutoff = fitted.cutoff.min(0.4 * rate);
+    // A position with noise or time stamps of its own must not be differentiated in the band of a better one.
+    let (_, own) = treatment_for(
+        robot,
+        &[recording],
+        vec![sweep.clone()],
+        &PrepareOptions::default(),
+    )?;
+    let cutoff = fitted.cutoff.min(own.cutoff).min(0.4 * rate);
     let saturation = (fitted.saturation.iter().zip(&sweep.joints))
         .map(|([low, high], own)| {
             let tighter = |a: Option<f64>, b: Option<f64>, pick: fn(f64, f64) -> f64| {
@@ -253,7 +334,7 @@ fn treatment_of(fitted: &Treatment, sweep: &Survey) -> Treatment {
             ]
         })
         .collect();
-    Treatment {
+    Ok(Treatment {
         sample_rate: rate,
         cutoff,
         decimation: 1,
@@ -262,7 +343,7 @@ fn treatment_of(fitted: &Treatment, sweep: &Survey) -> Treatment {
         // One period of the filter: a pass may end with the recording.
         trimmed: (rate / cutoff).ceil() as usize,
         ..fitted.clone()
-    }
+    })
 }
 
 /// The recorded reference of the joint; empty where there is none.
@@ -293,11 +374,12 @@ fn rows_of(
     let n = robot.joints.len();
     let width = n * COLUMNS;
     let friction_columns = [column::VISCOUS, column::COULOMB].map(|c| joint * COLUMNS + c);
-    let rest: Vec<(usize, f64)> = (details.columns.iter().zip(&details.estimate.values))
-        .filter(|(c, _)| !friction_columns.contains(c))
-        .map(|(c, v)| (*c, *v))
-        .collect();
-    let mut out = vec![0.0; n * width];
+    let (own, rest): (Vec<(usize, f64)>, Vec<(usize, f64)>) =
+        (details.columns.iter().zip(&details.estimate.values))
+            .map(|(c, v)| (*c, *v))
+            .partition(|(c, _)| friction_columns.contains(c));
+    let (mut out, mut still) = (vec![0.0; n * width], vec![0.0; n * width]);
+    let at_rest = vec![0.0; n];
     let mut rows = Rows::default();
     let mut last = None;
     each_motion(recording, treatment, 0, &mut |motion| {
@@ -311,13 +393,21 @@ fn rows_of(
                 state(&|j| j.qdd[k]),
             );
             differential_regressor(&chain, &q, &qd, &qdd, &mut out)
+                .and_then(|()| differential_regressor(&chain, &q, &at_rest, &at_rest, &mut still))
                 .map_err(|e| PrepareError::Stopped(e.to_string()))?;
-            let row = &out[joint * width..(joint + 1) * width];
-            let model: f64 = rest.iter().map(|(c, v)| row[*c] * v).sum();
+            let of = |columns: &[f64], values: &[(usize, f64)]| {
+                let row = &columns[joint * width..(joint + 1) * width];
+                values.iter().map(|(c, v)| row[*c] * v).sum::<f64>()
+            };
+            let model = of(&out, &rest);
             rows.position
                 .push(motion.t[k], q[joint], last == Some(motion.segment));
             last = Some(motion.segment);
-            rows.friction.push(motion.joints[joint].tau[k] - model);
+            rows.speed.push(qd[joint]);
+            rows.tau.push(motion.joints[joint].tau[k]);
+            rows.model.push(model);
+            rows.whole.push(model + of(&out, &own));
+            rows.weight.push(of(&still, &rest));
             rows.saturated.push(motion.joints[joint].saturated[k]);
         }
         Ok(())
@@ -329,6 +419,28 @@ fn rows_of(
 const PARTS: usize = 10;
 
 impl Rows {
+    /// The points of all passes, by speed, and the passes that give none.
+    fn points(
+        &self,
+        stretches: &[Stretch],
+        options: &FrictionMapOptions,
+    ) -> (Vec<FrictionPoint>, Vec<DroppedPass>) {
+        let (mut points, mut dropped) = (Vec::new(), Vec::new());
+        for stretch in stretches {
+            match self.point(stretch, options) {
+                Ok(point) => points.push(point),
+                Err(why) => dropped.push(DroppedPass {
+                    speed: stretch.speed,
+                    start: stretch.from,
+                    duration: stretch.to - stretch.from,
+                    why,
+                }),
+            }
+        }
+        points.sort_by(|a, b| a.speed.total_cmp(&b.speed));
+        (points, dropped)
+    }
+
     /// The mean of a pass, or why it has none.
     fn point(&self, pass: &Stretch, options: &FrictionMapOptions) -> Result<FrictionPoint, String> {
         let t = &self.position.t;
@@ -365,25 +477,40 @@ impl Rows {
         let x = &self.position.x;
         let speed = slope(&t[rows.clone()], &x[rows.clone()])
             .ok_or_else(|| "its rows have one time".to_owned())?;
-        let edge = |part: usize| first + part * (rows.len() - 1) / PARTS;
-        let stopped = (0..PARTS)
+        // Between ten rows are nine parts.
+        let parts = PARTS.min(rows.len() - 1);
+        let edge = |part: usize| first + part * (rows.len() - 1) / parts;
+        let stopped = (0..parts)
             .filter(|part| (x[edge(part + 1)] - x[edge(*part)]) * pass.speed <= 0.0)
             .count();
         if stopped > 0 {
             return Err(format!(
-                "the joint stands or turns back in {stopped} of its {PARTS} parts (it sticks and slips, or does not follow)"
+                "the joint stands or turns back in {stopped} of its {parts} parts (it sticks and slips, or does not follow)"
             ));
         }
-        let friction = &self.friction[rows];
-        let (mean, std) = mean_of(friction);
+        let friction: Vec<f64> = (self.tau[rows.clone()].iter())
+            .zip(&self.model[rows.clone()])
+            .map(|(tau, model)| tau - model)
+            .collect();
+        let (mean, std) = mean_of(&friction);
         Ok(FrictionPoint {
             speed,
             friction: mean,
             std,
             start: pass.from,
             duration,
+            rows: (rows.start, rows.end),
         })
     }
+}
+
+/// Means over tenths.
+fn tenths(values: &[f64]) -> [f64; PARTS] {
+    std::array::from_fn(|part| {
+        let edge = |part: usize| part * values.len() / PARTS;
+        let own = &values[edge(part)..edge(part + 1)];
+        own.iter().sum::<f64>() / own.len().max(1) as f64
+    })
 }
 
 /// Mean and its standard deviation: the larger of what the correlation from row to row gives, and what the means of the
@@ -398,13 +525,7 @@ fn mean_of(values: &[f64]) -> (f64, f64) {
         squares += (value - mean).powi(2);
     }
     let by_rows = (squares / n * memory.length() / n).sqrt();
-    let tenths: Vec<f64> = (0..PARTS)
-        .map(|part| {
-            let edge = |part: usize| part * values.len() / PARTS;
-            let own = &values[edge(part)..edge(part + 1)];
-            own.iter().sum::<f64>() / own.len().max(1) as f64
-        })
-        .collect();
+    let tenths = tenths(values);
     let about = tenths.iter().sum::<f64>() / PARTS as f64;
     let spread: f64 = tenths.iter().map(|m| (m - about).powi(2)).sum();
     let by_tenths = (spread / (PARTS * (PARTS - 1)) as f64).sqrt();
@@ -446,7 +567,18 @@ fn text_of(decision: &Decision, points: &[FrictionPoint], kind: JointKind) -> St
             "{tested} do not warrant a Stribeck term: friction is lower at low speed than Coulomb and viscous friction say (p = {p:.1e}), which no Stribeck law does; look at the torque's limits and at the motion's clock."
         );
     }
+    let untold = "a Stribeck velocity below the slowest speed would not show";
+    let less = if p >= law::WARRANT {
+        format!("(p = {})", format_significant(p, 2))
+    } else {
+        // The squares alone say yes: what says no is named.
+        format!(
+            "(p = {p:.1e}, but its size is less certain than it is large, or points left out are predicted no better: {} against {} {torque})",
+            format_significant(b.leave_one_out_rms, 3),
+            format_significant(simple.leave_one_out_rms, 3)
+        )
+    };
     format!(
-        "{tested} do not warrant a Stribeck term beside Coulomb and viscous friction (p = {p:.2}); a Stribeck velocity below the slowest speed would not show."
+        "{tested} do not warrant a Stribeck term beside Coulomb and viscous friction {less}; {untold}."
     )
 }

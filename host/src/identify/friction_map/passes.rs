@@ -17,7 +17,7 @@ const HALVES_PER_PASS: f64 = 6.0;
 const REFERENCE_TOLERANCE: f64 = 0.01;
 
 /// A signal over time in stretches without a gap.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Signal {
     /// s
     pub t: Vec<f64>,
@@ -48,6 +48,16 @@ impl Signal {
         self.x.push(x);
     }
 
+    /// First row and one past the last of each stretch without a gap.
+    pub(super) fn stretches(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        let ends = self.starts.iter().skip(1).copied().chain([self.t.len()]);
+        self.starts
+            .iter()
+            .copied()
+            .zip(ends)
+            .map(|(from, to)| [from, to])
+    }
+
     /// The stretches of constant speed of a computed reference, in order of time.
     pub(super) fn passes_of_reference(&self, options: &FrictionMapOptions) -> Vec<Stretch> {
         self.passes(REFERENCE_TOLERANCE, options.shortest)
@@ -60,8 +70,7 @@ impl Signal {
 
     fn passes(&self, tolerance: f64, shortest: f64) -> Vec<Stretch> {
         let mut all = Vec::new();
-        for (k, &start) in self.starts.iter().enumerate() {
-            let end = self.starts.get(k + 1).copied().unwrap_or(self.t.len());
+        for [start, end] in self.stretches() {
             let mut taken = vec![false; end - start];
             let mut found: Vec<(Range<usize>, f64)> = Vec::new();
             for half in WINDOWS {
