@@ -21,7 +21,7 @@ const ELEMENTS: [Element; 14] = [
         ..element("link", &["inertial"], &["name", "type"])
     },
     element("inertial", &["origin", "mass", "inertia"], &[]),
-    element("origin", &[], &["xyz", "rpy", "quat_xyzw"]),
+    element("origin", &[], &["xyz", "rpy"]),
     element("mass", &[], &["value"]),
     element("inertia", &[], &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]),
     element(
@@ -42,18 +42,7 @@ const ELEMENTS: [Element; 14] = [
     element("parent", &[], &["link"]),
     element("child", &[], &["link"]),
     element("axis", &[], &["xyz"]),
-    element(
-        "limit",
-        &[],
-        &[
-            "lower",
-            "upper",
-            "velocity",
-            "effort",
-            "acceleration",
-            "jerk",
-        ],
-    ),
+    element("limit", &[], &["lower", "upper", "velocity", "effort"]),
     element("dynamics", &[], &["damping", "friction"]),
     element("mimic", &[], &["joint", "multiplier", "offset"]),
     element(

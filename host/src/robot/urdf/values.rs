@@ -204,7 +204,11 @@ impl<'a> Reader<'a> {
                 .collect();
             for joint in &joints {
                 let name = self.attribute(*joint, "name")?;
-                if known.iter().all(|(other, _)| *other != name) {
+                // Controllers of ROS 2 may move what another file describes.
+                let other_file = transmission
+                    .ancestors()
+                    .any(|n| n.has_tag_name("ros2_control"));
+                if !other_file && known.iter().all(|(other, _)| *other != name) {
                     return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
                 }
             }
