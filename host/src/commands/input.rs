@@ -137,10 +137,14 @@ impl Outside {
     }
 }
 
-/// What the beginning of a recording cannot be by itself.
-fn plausible(source: &Source, robot: &Robot) -> Result<Vec<Implausible>, CommandError> {
+/// What the first rows of a recording show of its columns.
+fn at_start<T>(
+    source: &Source,
+    robot: &Robot,
+    look: fn(&Block, &Robot) -> Vec<T>,
+) -> Result<Vec<T>, CommandError> {
     match source.blocks(JUDGED_ROWS).next() {
-        Some(block) => Ok(plausibility(&block?, robot)),
+        Some(block) => Ok(look(&block?, robot)),
         None => Ok(Vec::new()),
     }
 }
@@ -203,7 +207,7 @@ impl Inputs {
     ) -> Result<Self, CommandError> {
         let inputs = Self::read_with(robot, paths, need)?;
         for source in &inputs.sources {
-            let wrong: Vec<Implausible> = (plausible(source, robot)?.into_iter())
+            let wrong: Vec<Implausible> = (at_start(source, robot, plausibility)?.into_iter())
                 .filter(|problem| !problem.is_doubt())
                 .collect();
             if !wrong.is_empty() {
@@ -224,8 +228,9 @@ impl Inputs {
             doubtful: Vec::new(),
         };
         for source in &self.sources {
-            let (doubts, wrong): (Vec<_>, Vec<_>) =
-                (plausible(source, robot)?.into_iter()).partition(Implausible::is_doubt);
+            let (doubts, wrong): (Vec<_>, Vec<_>) = (at_start(source, robot, plausibility)?
+                .into_iter())
+            .partition(Implausible::is_doubt);
             if !doubts.is_empty() {
                 faults.doubtful.push(sentence(source, &doubts));
             }
@@ -268,11 +273,9 @@ impl Inputs {
     pub(crate) fn strange_rates(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
-            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
-                let found = strange_rates(&block?, robot);
-                if !found.is_empty() {
-                    strange.push(sentence(source, &found));
-                }
+            let found = at_start(source, robot, strange_rates)?;
+            if !found.is_empty() {
+                strange.push(sentence(source, &found));
             }
         }
         Ok(strange)
@@ -285,17 +288,16 @@ impl Inputs {
     pub(crate) fn strange_references(&self, robot: &Robot) -> Result<Vec<String>, CommandError> {
         let mut strange = Vec::new();
         for source in &self.sources {
-            if let Some(block) = source.blocks(JUDGED_ROWS).next() {
-                let found = strange_references(&block?, robot);
-                let mut found = found.iter();
-                let Some(first) = found.next() else { continue };
-                let rest: Vec<String> = found.map(StrangeReference::column).collect();
-                let rest = match rest.as_slice() {
-                    [] => String::new(),
-                    _ => format!("; wrong as well: {}", rest.join(", ")),
-                };
-                strange.push(format!("{}: {first}{rest}.", source.path().display()));
-            }
+            let found = at_start(source, robot, strange_references)?;
+            let mut found = found.iter();
+            let Some(first) = found.next() else { continue };
+            let rest: Vec<String> = found.map(StrangeReference::column).collect();
+            let rest = match rest.as_slice() {
+                [] => String::new(),
+                _ => format!("; wrong as well: {}", rest.join(", ")),
+            };
+            let text = source.in_its_names(&format!("{first}{rest}"));
+            strange.push(format!("{}: {text}.", source.path().display()));
         }
         Ok(strange)
     }

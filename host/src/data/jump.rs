@@ -21,6 +21,11 @@ pub(super) struct Jump {
     pub fastest: f64,
 }
 
+/// Whether a column jumps anywhere.
+pub(crate) fn jumps(t: &[f64], q: &[f64]) -> bool {
+    jump(t, q).is_some()
+}
+
 /// The largest jump of `q` over `t`; none where there is none, or where the rows are too few to know how the joint moves.
 pub(super) fn jump(t: &[f64], q: &[f64]) -> Option<Jump> {
     let steps: Vec<[f64; 2]> = (t.windows(2).zip(q.windows(2)))

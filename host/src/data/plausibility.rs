@@ -10,7 +10,7 @@ use super::rate_spike::rate_spike;
 use super::spike::spike;
 use super::unsigned::{Unsigned, unsigned};
 use super::{Block, JointColumns};
-use crate::report::{format_significant, format_trimmed, listed};
+use crate::report::{format_significant, format_time, format_trimmed, listed};
 use crate::robot::{Joint, JointKind, Robot, is_placeholder};
 
 /// A column that cannot be in the unit of the contract.
@@ -68,7 +68,8 @@ pub enum Implausible {
     },
     /// A position that jumps.
     #[error(
-        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {at} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}"
+        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}",
+        format_time(*at)
     )]
     Jump {
         /// Joint, 1-based.
@@ -88,7 +89,8 @@ pub enum Implausible {
     },
     /// Single rows of effort that no other comes near.
     #[error(
-        "tau{joint} is {value:.4} {unit} in the row at t = {at} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out"
+        "tau{joint} is {value:.4} {unit} in the row at t = {} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out",
+        format_time(*at)
     )]
     Spike {
         /// Joint, 1-based.
@@ -186,13 +188,14 @@ pub enum Implausible {
     },
     /// Rows of a measured velocity that the position does not have.
     #[error(
-        "qd{joint} is {value} {unit}/s in the row at t = {at} s{more}, where q{joint} changes by {speed} {unit}/s; such rows are no velocity: look for a wrapped counter or a lost sample, or leave qd{joint} out"
+        "qd{joint} is {value} {unit}/s in the row at t = {} s{more}, where q{joint} changes by {speed} {unit}/s; such rows are no velocity: look for a wrapped counter or a lost sample, or leave qd{joint} out",
+        format_time(*at)
     )]
     RateSpike {
         /// Joint, 1-based.
         joint: usize,
         /// Time of the largest, s.
-        at: String,
+        at: f64,
         /// What stands there.
         value: String,
         /// What the position does there.
@@ -396,7 +399,8 @@ fn more(count: usize) -> String {
     }
 }
 
-fn range(values: &[f64]) -> (f64, f64) {
+/// Lowest and highest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
     values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
@@ -554,7 +558,7 @@ pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
             let number = |x: f64| format_significant(x, 4);
             found.push(Implausible::RateSpike {
                 joint: k,
-                at: format_significant(block.t[spike.row], 6),
+                at: block.t[spike.row],
                 value: number(spike.value),
                 speed: number(spike.speed),
                 more: more(spike.count),
@@ -593,57 +597,6 @@ pub(crate) fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     }
     // Only where the two are clearly the same motion: correlation above 0.8.
     (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
-}
-
-/// A reference that is not in the unit or sense of its position.
-pub(super) fn reference_unit(
-    k: usize,
-    columns: &JointColumns,
-    joint: &Joint,
-) -> Option<Implausible> {
-    let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
-    let (unit, _) = joint.kind.units();
-    // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
-    let hint = match (ratio, unit) {
-        (0.1..10.0, _) => return None,
-        (50.0..65.0, "rad") => ", as degrees would",
-        (0.0154..0.02, "rad") => ", as if turned from degrees to rad twice",
-        (900.0..1100.0, "m") => ", as millimetres would",
-        (r, _) if r < 0.0 => ", the other way",
-        _ => "",
-    };
-    Some(Implausible::ReferenceScale {
-        joint: k,
-        ratio,
-        hint,
-        unit,
-    })
-}
-
-/// Spread of the reference over that of the position, below zero where they run against each other; none where they are
-/// not the same motion.
-pub(crate) fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
-    // The variance of one value is rounding, and so is what goes with it.
-    let stands = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
-    if stands(q) || stands(reference) {
-        return None;
-    }
-    let count = q.len().max(1) as f64;
-    let (mean_q, mean_ref) = (
-        q.iter().sum::<f64>() / count,
-        reference.iter().sum::<f64>() / count,
-    );
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in q.iter().zip(reference) {
-        let (x, y) = (x - mean_q, y - mean_ref);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    let alike = xy / (xx * yy).sqrt();
-    // A position that lags far behind its reference is still like it (KUKA LWR4+: 0.77); one that runs against it has to be
-    // its very mirror image.
-    (alike.is_finite() && !(-0.9..=0.6).contains(&alike)).then(|| (yy / xx).sqrt() * alike.signum())
 }
 
 fn check_effort(

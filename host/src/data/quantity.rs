@@ -114,15 +114,20 @@ impl Quantity {
 }
 
 impl Layout {
-    /// Whether a joint's values went through a drive: its ratio or its torque constant.
-    fn is_turned(&self, joint: usize, quantity: Quantity) -> bool {
-        let of_motors = self.motors.as_ref().is_some_and(|m| match quantity {
+    /// Returns true if a joint's values are made of columns of its motors.
+    fn is_of_motors(&self, joint: usize, quantity: Quantity) -> bool {
+        self.motors.as_ref().is_some_and(|m| match quantity {
             Quantity::Position => m.positions,
             Quantity::Effort => m.torques.get(joint) == Some(&true),
             _ => false,
-        });
+        })
+    }
+
+    /// Returns true if a joint's values went through a drive: its ratio or its torque constant.
+    fn is_turned(&self, joint: usize, quantity: Quantity) -> bool {
         let scaled = |role| matches!(role, Role::Effort(k, factor) if k == joint && factor != 1.0);
-        of_motors || quantity == Quantity::Effort && self.columns.iter().any(|c| scaled(c.role))
+        self.is_of_motors(joint, quantity)
+            || quantity == Quantity::Effort && self.columns.iter().any(|c| scaled(c.role))
     }
 
     /// See [`super::Source::column_name`].
@@ -132,12 +137,7 @@ impl Layout {
             let column = self.columns.iter().find(|c| quantity.is_of(c.role, k));
             column.map(|c| c.label.clone())
         };
-        let turned = self.motors.as_ref().is_some_and(|m| match quantity {
-            Quantity::Position => m.positions,
-            Quantity::Effort => m.torques.get(joint) == Some(&true),
-            _ => false,
-        });
-        if !turned {
+        if !self.is_of_motors(joint, quantity) {
             return label(joint).unwrap_or(derived);
         }
         let motors = self.movers.get(joint).into_iter().flatten();

@@ -5,10 +5,10 @@
 
 use core::f64::consts::TAU;
 
-use super::plausibility::{Implausible, reference_scale, reference_unit};
+use super::plausibility::{Implausible, range};
 use super::{Block, JointColumns};
 use crate::report::format_significant;
-use crate::robot::{JointKind, Robot};
+use crate::robot::{Joint, JointKind, Robot};
 
 /// Travel of a joint from which it counts as moving, rad or m.
 const MOVES: f64 = 0.05;
@@ -174,16 +174,8 @@ pub fn strange_references(block: &Block, robot: &Robot) -> Vec<StrangeReference>
         .collect()
 }
 
-fn range(values: &[f64]) -> [f64; 2] {
-    values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-            [l.min(*v), h.max(*v)]
-        })
-}
-
 fn travel(values: &[f64]) -> f64 {
-    let [low, high] = range(values);
+    let (low, high) = range(values);
     (high - low).max(0.0)
 }
 
@@ -288,6 +280,12 @@ fn other_joint(j: usize, joints: &[JointColumns], reference: &[f64]) -> Option<S
 
 /// Correlation of two columns; no number where one of them stands still.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let [xx, xy, yy] = about_means(a, b);
+    xy / (xx * yy).sqrt()
+}
+
+/// Squares of the first column, products of both and squares of the second, about their means.
+fn about_means(a: &[f64], b: &[f64]) -> [f64; 3] {
     let count = a.len().min(b.len()).max(1) as f64;
     let (ma, mb) = (a.iter().sum::<f64>() / count, b.iter().sum::<f64>() / count);
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -297,7 +295,43 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
         xy += x * y;
         yy += y * y;
     }
-    xy / (xx * yy).sqrt()
+    [xx, xy, yy]
+}
+
+/// A reference that is not in the unit or sense of its position.
+fn reference_unit(k: usize, columns: &JointColumns, joint: &Joint) -> Option<Implausible> {
+    let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
+    let (unit, _) = joint.kind.units();
+    // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
+    let hint = match (ratio, unit) {
+        (0.1..10.0, _) => return None,
+        (50.0..65.0, "rad") => ", as degrees would",
+        (0.0154..0.02, "rad") => ", as if turned from degrees to rad twice",
+        (900.0..1100.0, "m") => ", as millimetres would",
+        (r, _) if r < 0.0 => ", the other way",
+        _ => "",
+    };
+    Some(Implausible::ReferenceScale {
+        joint: k,
+        ratio,
+        hint,
+        unit,
+    })
+}
+
+/// Spread of the reference over that of the position, below zero where they run against each other; none where they are
+/// not the same motion.
+pub(crate) fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
+    // The variance of one value is rounding, and so is what goes with it.
+    let stands = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
+    if stands(q) || stands(reference) {
+        return None;
+    }
+    let [xx, xy, yy] = about_means(q, reference);
+    let alike = xy / (xx * yy).sqrt();
+    // A position that lags far behind its reference is still like it (KUKA LWR4+: 0.77); one that runs against it has to be
+    // its very mirror image.
+    (alike.is_finite() && !(-0.9..=0.6).contains(&alike)).then(|| (yy / xx).sqrt() * alike.signum())
 }
 
 /// A reference that is the position at another time than a loop can make it.

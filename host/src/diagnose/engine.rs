@@ -12,7 +12,7 @@ mod unbelieved;
 
 use rig_shared::effects::Kind;
 
-use self::even::Uneven;
+use self::even::{Uneven, of_error};
 pub(super) use self::follow::Follower;
 use self::intake::{Intake, Material, intake, without};
 use self::pass::Pass;
@@ -38,6 +38,7 @@ use super::position_reading::PositionReading;
 use super::profile::Profile;
 use super::proof::{Proof, unexplained};
 use super::refit::Refit;
+use super::sanity::spoilt_columns;
 use super::search::{is_friction, with};
 use super::stated::{Now, Stated};
 use super::treated::treated;
@@ -70,7 +71,9 @@ pub fn diagnose(
     stated.pulls_told = (1..training.len()).contains(&unburdened);
     let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
     stated.no_offsets = options.no_offsets && !told;
+    let given = [training, holdout].concat();
     let mut uneven = Uneven::default();
+    let mut spoilt = Vec::new();
     loop {
         // Each time around more of the description's effects are held or its limits left out, or another recording is brought to an even step.
         let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
@@ -78,10 +81,18 @@ pub fn diagnose(
         match attempt(robot, &stated, &training, &holdout, options, progress) {
             Ok(Attempt::Done(mut result)) => {
                 result.0.words.extend(uneven.told());
+                result.0.data_faults.splice(0..0, spoilt);
                 return Ok(*result);
             }
             Ok(Attempt::Hold(more)) => stated = *more,
-            Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {}
+            Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {
+                // Between interpolated rows nothing tells of columns that have no derivative.
+                let found = spoilt_columns(robot, &of_error(&error, &given))?;
+                if !options.fits(&found) {
+                    return Ok((faulty(robot, found), robot.clone()));
+                }
+                spoilt.extend(found);
+            }
             Err(DiagnoseError::Prepare(error)) => {
                 let Some(fault) = of_preparing(&error) else {
                     return Err(error.into());

@@ -18,29 +18,45 @@ pub(super) struct NoText {
     pub line: usize,
 }
 
-/// Reads bytes by their byte order mark, else by the encoding that an XML declaration states, else as UTF-8.
+/// Reads bytes by their byte order mark; else as UTF-8, which other encodings hardly ever are by chance and which is often declared
+/// as something else; else by the encoding that an XML declaration states.
 pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, NoText> {
     let marked = Encoding::for_bom(bytes).map(|(encoding, _)| encoding);
-    let stated = stated(bytes).and_then(|label| Encoding::for_label(label.as_bytes()));
-    let encoding = marked.or(stated).unwrap_or(UTF_8);
+    if marked.is_none_or(|encoding| encoding == UTF_8) {
+        match of_utf_8(bytes) {
+            Ok(text) => return Ok(Decoded { text, from: None }),
+            Err(wrong) => {
+                let label = stated(bytes).map(str::as_bytes);
+                let encoding = label.and_then(Encoding::for_label);
+                // UTF-16 that is declared without a mark has no ASCII letters to say so.
+                let Some(encoding) = encoding.filter(|own| *own != UTF_8) else {
+                    return Err(wrong);
+                };
+                return of_other(encoding, bytes);
+            }
+        }
+    }
+    of_other(marked.unwrap_or(UTF_8), bytes)
+}
+
+fn of_utf_8(bytes: &[u8]) -> Result<String, NoText> {
     let at = |offset: usize| NoText {
         offset,
         line: 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count(),
     };
-    if encoding == UTF_8 {
-        let text = std::str::from_utf8(bytes).map_err(|error| at(error.valid_up_to()))?;
-        if let Some(offset) = text.bytes().position(unprintable) {
-            return Err(at(offset));
-        }
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text).to_owned();
-        return Ok(Decoded { text, from: None });
+    let text = std::str::from_utf8(bytes).map_err(|error| at(error.valid_up_to()))?;
+    match text.bytes().position(unprintable) {
+        Some(offset) => Err(at(offset)),
+        None => Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned()),
     }
+}
+
+fn of_other(encoding: &'static Encoding, bytes: &[u8]) -> Result<Decoded, NoText> {
     let (text, _, wrong) = encoding.decode(bytes);
     if wrong || text.bytes().any(unprintable) {
         // Where, in the text as far as it could be read.
-        let end =
-            text.find(|c: char| c == '\u{fffd}' || (c as u32) < 0x20 && !"\t\n\r".contains(c));
-        let end = end.unwrap_or(text.len());
+        let is_none = |c: char| c == '\u{fffd}' || u8::try_from(c).is_ok_and(unprintable);
+        let end = text.find(is_none).unwrap_or(text.len());
         return Err(NoText {
             offset: end,
             line: 1 + text[..end].matches('\n').count(),
@@ -105,6 +121,16 @@ mod tests {
         let read = decoded(&bytes).ok().unwrap();
         assert_eq!(read.text, text.replace("UTF-16", "UTF-8"));
         assert_eq!(read.from, Some("UTF-16LE"));
+    }
+
+    /// Files are saved as UTF-8 whatever they declared before.
+    #[test]
+    fn utf_8_is_read_as_such_whatever_is_declared() {
+        for label in ["UTF-16", "ISO-8859-1", "Shift_JIS", "US-ASCII", "none"] {
+            let text = format!("<?xml version='1.0' encoding='{label}'?>\n<robot name='ü'/>");
+            let read = decoded(text.as_bytes()).ok().unwrap();
+            assert_eq!((read.text, read.from), (text, None));
+        }
     }
 
     #[test]

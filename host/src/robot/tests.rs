@@ -254,6 +254,44 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> Strin
     )
 }
 
+/// A ratio stands wherever ROS 1, ROS 2 or Drake have it; 1 says nothing beside another, and two that differ are no ratio.
+#[test]
+fn gear_ratios_are_read_in_every_form() {
+    let read = |transmission: &str| {
+        let text = urdf(&format!(
+            "{}{}{transmission}",
+            joint("one", "continuous", "base", "a", ""),
+            joint("two", "continuous", "a", "b", "")
+        ));
+        let robot = Robot::from_urdf(&text, Path::new("r.urdf"));
+        robot.map(|robot| robot.joints[0].drive.as_ref().map(|drive| drive.gear_ratio))
+    };
+    let ros_2 = |of_actuator: &str, of_joint: &str| {
+        format!(
+            "<ros2_control name='c' type='system'>\n<transmission name='t'><actuator name='m'>{of_actuator}</actuator>\n<joint name='one'>{of_joint}</joint></transmission></ros2_control>"
+        )
+    };
+    let reduction = |value: f64| format!("<mechanical_reduction>{value}</mechanical_reduction>");
+    for transmission in [
+        ros_2("", &reduction(50.0)),
+        ros_2(&reduction(1.0), &reduction(50.0)),
+        ros_2(&reduction(50.0), &reduction(50.0)),
+        ros_2("", "<param name='mechanical_reduction'>50</param>"),
+        "<transmission name='t'><joint name='one'/><actuator name='m'><mechanicalReduction>1</mechanicalReduction><drake:gear_ratio xmlns:drake='d' value='50'/></actuator></transmission>".to_owned(),
+    ] {
+        assert_eq!(read(&transmission).unwrap(), Some(50.0), "{transmission}");
+    }
+    let two = read(&ros_2(&reduction(60.0), &reduction(50.0))).unwrap_err();
+    let two = two.to_string();
+    assert!(
+        two.contains("r.urdf:9:19") && two.contains("60 at 8:"),
+        "{two}"
+    );
+    // What another file describes.
+    let other = ros_2("", &reduction(50.0)).replace("'one'", "'gripper'");
+    assert_eq!(read(&other).unwrap(), None);
+}
+
 #[test]
 fn urdf_drives_friction_and_limits_are_kept() {
     let text = urdf(&format!(

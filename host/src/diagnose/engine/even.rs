@@ -33,3 +33,15 @@ impl Uneven {
         self.0.values().map(|(_, note)| note.clone())
     }
 }
+
+/// The recordings that an error of preparing names.
+pub(super) fn of_error<'a>(
+    error: &PrepareError,
+    given: &[&'a dyn Recording],
+) -> Vec<&'a dyn Recording> {
+    let PrepareError::Irregular { label, .. } = error else {
+        return Vec::new();
+    };
+    let own = |recording: &&&dyn Recording| recording.label() == *label;
+    given.iter().filter(own).copied().collect()
+}

@@ -10,7 +10,7 @@ use crate::diagnose::outcome::DataFault;
 use crate::diagnose::past::in_sessions;
 use crate::diagnose::refit::{Open, Refit, open};
 use crate::diagnose::runs::{Run, copies};
-use crate::diagnose::sanity::{faults, spoilt, too_short_to_judge, too_short_to_learn};
+use crate::diagnose::sanity::{faults, too_short_to_judge, too_short_to_learn};
 use crate::diagnose::stated::Stated;
 use crate::diagnose::touched::touched;
 use crate::diagnose::{DiagnoseError, Options};
@@ -54,12 +54,6 @@ pub(super) fn intake<'a>(
     holdout: &[&dyn Recording],
     options: &Options,
 ) -> Result<Intake<'a>, DiagnoseError> {
-    let mut given = training.to_vec();
-    given.extend(holdout);
-    let spoilt = spoilt(&stated.robot, &given)?;
-    if !options.fits(&spoilt) {
-        return Ok(Intake::Faulty(spoilt));
-    }
     let mut bench = Bench::of(stated, training)?;
     let mut loaded = bench.load(training)?;
     let mut sealed = if holdout.is_empty() {
@@ -71,9 +65,7 @@ pub(super) fn intake<'a>(
     if let Some(sealed) = &mut sealed {
         in_sessions(&mut sealed.runs, &loaded.runs);
     }
-    let mut faults = wrong(stated, &loaded, sealed.as_ref(), options)?;
-    faults.retain(|own| spoilt.iter().all(|other| other.text != own.text));
-    faults.splice(0..0, spoilt);
+    let faults = wrong(stated, &loaded, sealed.as_ref(), options)?;
     if !options.fits(&faults) {
         return Ok(Intake::Faulty(faults));
     }

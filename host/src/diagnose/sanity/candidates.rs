@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::super::DiagnoseError;
 use super::super::outcome::{About, DataFault};
 use super::fit::{Fit, about_mean};
-use super::model::{GOOD, Judge, MUCH_BETTER, POOR, TRIAL};
+use super::model::{EXACT, GOOD, Judge, MUCH_BETTER, POOR, TRIAL};
 use super::rows::Rows;
 use super::senses::{Described, friction};
 use super::trial::Suspicion;
@@ -37,7 +37,7 @@ pub(super) struct Found {
 /// What a recording leaves of the torques as it stands, which transformations are compared with.
 pub(super) struct Before {
     /// Rows of the trial.
-    pub(super) rows: Rows,
+    rows: Rows,
     /// Joints that move.
     pub(super) moving: Vec<usize>,
     /// Share of each torque's variance.
@@ -260,9 +260,6 @@ impl Judge<'_> {
         Ok((0..n).map(share).collect())
     }
 }
-
-/// Shares below this count as this: data without noise have no scale.
-const EXACT: f64 = 1e-6;
 
 impl Found {
     /// Whether the recording is poor as it stands, good without the fault, and by far the better. What has a value of its own that

@@ -202,12 +202,12 @@ pub(super) fn clock(robot: &Robot, runs: &[&Run]) -> Option<DataFault> {
     })
 }
 
-/// Columns of recordings as they are on the disk that have no derivative or no size: of uneven rows nothing else tells, once
-/// they are brought to an even step.
+/// Columns of recordings with uneven rows that have no derivative or no size: once the rows are brought to an even step nothing tells
+/// of them.
 ///
 /// # Errors
 /// What reading gives.
-pub(in crate::diagnose) fn spoilt(
+pub(in crate::diagnose) fn spoilt_columns(
     robot: &Robot,
     recordings: &[&dyn Recording],
 ) -> Result<Vec<DataFault>, DiagnoseError> {

@@ -3,7 +3,7 @@
 use super::super::Run;
 use super::super::outcome::{About, DataFault};
 use super::{columns, names};
-use crate::data::{Block, Implausible, JointColumns, plausibility};
+use crate::data::jumps;
 use crate::robot::{JointKind, Robot};
 
 /// How far the link may move per move of the joint's own encoder: play and twist take a part of a small motion, no more.
@@ -20,19 +20,8 @@ pub(super) fn fault(robot: &Robot, runs: &[&Run], k: usize) -> Option<DataFault>
         let Some(reading) = run.joints.get(k).and_then(|j| j.link_raw.as_ref()) else {
             continue;
         };
-        let block = Block {
-            t: run.t.clone(),
-            joints: (run.joints.iter().enumerate())
-                .map(|(j, own)| JointColumns {
-                    q: if j == k { reading } else { &own.q_raw }.clone(),
-                    ..JointColumns::default()
-                })
-                .collect(),
-            ..Block::default()
-        };
-        // Its zero is free, so that only a jump is one.
-        let jumps = |i: &Implausible| matches!(i, Implausible::Jump { joint, .. } if *joint == n);
-        if plausibility(&block, robot).iter().any(jumps) {
+        // Its zero is free, so that only a jump is a fault.
+        if jumps(&run.t, reading) {
             return named(
                 "jump",
                 format!(

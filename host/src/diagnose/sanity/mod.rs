@@ -33,7 +33,7 @@ mod wave;
 #[cfg(test)]
 mod tests;
 
-pub(super) use columns::{moves, spoilt, too_short_to_judge, too_short_to_learn};
+pub(super) use columns::{moves, spoilt_columns, too_short_to_judge, too_short_to_learn};
 
 use super::outcome::{About, DataFault};
 use super::runs::runs_of;

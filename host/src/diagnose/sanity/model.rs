@@ -47,12 +47,10 @@ const STIRS: f64 = 0.01;
 const OUTSIDE: f64 = 0.2;
 /// A factor that differs by less from another is the same.
 const SAME: f64 = 0.1;
-/// Rows of one trial of several joints.
+/// Rows of one trial.
 pub(super) const TRIAL: usize = 500;
-/// Rows of one trial of a single joint, of which there are more.
-const TRIAL_ALONE: usize = 2000;
-/// Share of a torque's variance that any rounding leaves.
-const EXACT: f64 = 1e-6;
+/// Share of a torque's variance that any rounding leaves: data without noise have no scale below it.
+pub(super) const EXACT: f64 = 1e-6;
 
 /// One recording against models of the robot.
 pub(super) struct Judge<'a> {
@@ -277,7 +275,7 @@ impl<'a> Judge<'a> {
         if left.iter().all(|u| *u < poor) {
             return Ok(Vec::new());
         }
-        let rows = self.rows.thinned(if n == 1 { TRIAL_ALONE } else { TRIAL });
+        let rows = self.rows.thinned(TRIAL);
         let try_out = |joint: Option<usize>, factor: f64| -> Result<Vec<f64>, DiagnoseError> {
             let moved = rows.rescaled(joint, factor);
             let matrices = moved.regressors(&self.form)?;

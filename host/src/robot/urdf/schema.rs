@@ -2,8 +2,11 @@
 //!
 //! Elements of other programs (Gazebo, Drake, ros2_control) may stand anywhere and are not looked into.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::reader::{Reader, Xml};
-use crate::robot::error::RobotError;
+use crate::report::listed;
+use crate::robot::error::{Place, RobotError};
 
 /// An element that is read: its name, its children that may stand once, those that may stand more often, and its attributes.
 struct Element {
@@ -70,6 +73,9 @@ const fn element(
     }
 }
 
+/// Attributes that are not read, by the name of their element: where the first stands, their names, and the number of elements.
+type Unread<'a> = BTreeMap<&'static str, (Place, BTreeSet<&'a str>, usize)>;
+
 impl<'a> Reader<'a> {
     /// Refuses elements that stand twice, and elements and attributes that are misspelt; remarks on attributes that are not read.
     ///
@@ -77,36 +83,53 @@ impl<'a> Reader<'a> {
     /// The first of them, by line.
     pub(super) fn as_described(&self) -> Result<(), RobotError> {
         let root = self.document.root_element();
-        self.element(root)?;
+        let mut unread = Unread::new();
+        self.element(root, &mut unread)?;
         for tag in ["link", "joint"] {
             for node in root.children().filter(|node| node.has_tag_name(tag)) {
-                self.element(node)?;
+                self.element(node, &mut unread)?;
                 for own in node.children().filter(Xml::is_element) {
                     // What they hold is drawn, and enters no dynamics.
                     if own.has_tag_name("visual") || own.has_tag_name("collision") {
                         continue;
                     }
-                    self.element(own)?;
+                    self.element(own, &mut unread)?;
                     for part in own.children().filter(Xml::is_element) {
-                        self.element(part)?;
+                        self.element(part, &mut unread)?;
                     }
                 }
             }
+        }
+        for (tag, (place, names, elements)) in unread {
+            let names: Vec<String> = names.into_iter().map(|name| format!("`{name}`")).collect();
+            let more = match elements {
+                1 => String::new(),
+                n => format!(", here and in {} more elements", n - 1),
+            };
+            self.remarks.borrow_mut().push(format!(
+                "{}:{place}: {} of <{tag}> {} not read{more}: no attribute of URDF.",
+                self.path.display(),
+                listed(&names),
+                if names.len() == 1 { "is" } else { "are" },
+            ));
         }
         Ok(())
     }
 
     /// One element against its description; one that is not described is not looked into.
-    fn element(&self, node: Xml<'a>) -> Result<(), RobotError> {
+    fn element(&self, node: Xml<'a>, unread: &mut Unread<'a>) -> Result<(), RobotError> {
         let name = node.tag_name().name();
         let Some(known) = ELEMENTS.iter().find(|element| element.name == name) else {
             return Ok(());
         };
-        if node.tag_name().namespace().is_some() {
+        // Names with another prefix than the robot's own are of other programs.
+        let own = self.document.root_element().tag_name().namespace();
+        let is_own = |node: &Xml<'a>| node.tag_name().namespace() == own;
+        if !is_own(&node) {
             return Ok(());
         }
         let children: Vec<Xml<'a>> = (node.children())
-            .filter(|child| child.is_element() && child.tag_name().namespace().is_none())
+            .filter(|child| child.is_element() && is_own(child))
             .collect();
         for (k, child) in children.iter().enumerate() {
             let tag = child.tag_name().name();
@@ -139,11 +162,17 @@ impl<'a> Reader<'a> {
                 ));
             }
         }
-        self.attributes_of(node, known)
+        self.attributes_of(node, known, unread)
     }
 
-    fn attributes_of(&self, node: Xml<'a>, known: &Element) -> Result<(), RobotError> {
+    fn attributes_of(
+        &self,
+        node: Xml<'a>,
+        known: &Element,
+        unread: &mut Unread<'a>,
+    ) -> Result<(), RobotError> {
         let own = node.attributes().filter(|own| own.namespace().is_none());
+        let mut counted = false;
         for attribute in own.filter(|own| !known.attributes.contains(&own.name())) {
             let (name, tag) = (attribute.name(), known.name);
             let missing = known
@@ -156,11 +185,11 @@ impl<'a> Reader<'a> {
                     format!("`{name}` is no attribute of <{tag}>; is `{meant}` meant?"),
                 ));
             }
-            let place = format!("{}:{}", self.path.display(), self.place(node));
-            self.remarks.borrow_mut().push(format!(
-                "{place}: `{name}` is no attribute of <{tag}> and is not read; <{tag}> has {}.",
-                known.attributes.join(", ")
-            ));
+            let first = || (self.place(node), BTreeSet::new(), 0);
+            let (_, names, elements) = unread.entry(tag).or_insert_with(first);
+            names.insert(name);
+            *elements += usize::from(!counted);
+            counted = true;
         }
         Ok(())
     }
@@ -265,6 +294,25 @@ mod tests {
     }
 
     #[test]
+    fn attributes_that_are_not_read_are_remarked_once() {
+        let dynamics = format!("{LIMIT}<dynamics damping='1' mu_viscous='2' D='1'/>");
+        let text = format!(
+            "<robot name='r'>\n<link name='base'/><link name='arm'>{INERTIAL}</link><link name='hand'>{INERTIAL}</link>\n<joint name='a' type='revolute'><parent link='base'/><child link='arm'/>{dynamics}</joint>\n<joint name='b' type='revolute'><parent link='arm'/><child link='hand'/>{dynamics}<origin quat_xyzw='0 0 0 1'/></joint></robot>"
+        );
+        let original = Original::read(text, Path::new("r.urdf")).unwrap();
+        let said: Vec<&String> = (original.remarks().iter())
+            .filter(|own| own.contains("not read"))
+            .collect();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said[0].contains("r.urdf:3:") && said[0].contains("here and in 1 more elements"));
+        assert!(
+            said[0].contains("`D` and `mu_viscous` of <dynamics> are"),
+            "{said:?}"
+        );
+        assert!(said[1].contains("`quat_xyzw` of <origin> is"), "{said:?}");
+    }
+
+    #[test]
     fn misspelt_elements_and_attributes_are_refused_with_what_is_meant() {
         let meant = |link: &str, joint: &str, words: &str| {
             let said = read(link, joint).unwrap_err();
@@ -305,6 +353,13 @@ mod tests {
             &LIMIT.replace("limit", "limits"),
             "is <limit> meant?",
         );
+        // So are they where the file has a namespace of its own.
+        let text = format!(
+            "<robot name='r' xmlns='http://www.ros.org'><link name='base'/><link name='arm'>{INERTIAL}</link><joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{}</joint></robot>",
+            LIMIT.replace("upper", "uper")
+        );
+        let said = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap_err();
+        assert!(said.to_string().contains("is `upper` meant?"), "{said}");
         // Elements of other programs stay.
         let more = "<hardwareInterface/><gazebo/><sensor name='s'/>";
         assert!(read(&format!("{INERTIAL}{more}"), &format!("{LIMIT}{more}")).is_ok());

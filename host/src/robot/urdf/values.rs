@@ -202,52 +202,50 @@ impl<'a> Reader<'a> {
                 .children()
                 .filter(|n| n.has_tag_name("joint"))
                 .collect();
+            let of_ros_2 = (transmission.ancestors()).any(|n| n.has_tag_name("ros2_control"));
             for joint in &joints {
                 let name = self.attribute(*joint, "name")?;
                 // Controllers of ROS 2 may move what another file describes.
-                let other_file = transmission
-                    .ancestors()
-                    .any(|n| n.has_tag_name("ros2_control"));
-                if !other_file && known.iter().all(|(other, _)| *other != name) {
+                if !of_ros_2 && known.iter().all(|(other, _)| *other != name) {
                     return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
                 }
             }
-            let Some((reduction, what, text)) = reduction(transmission) else {
-                continue;
-            };
-            let value = self.parse_number(reduction, &what, text)?;
-            if value == 0.0 {
-                return Err(self.error(
-                    reduction,
-                    format!(
-                        "{what} is 0, but it must be motor turns per joint turn, different from 0"
-                    ),
-                ));
-            }
-            match joints.as_slice() {
-                [joint] if value != 1.0 => {
-                    let name = self.attribute(*joint, "name")?;
-                    let first = found.insert(name, (value, reduction));
-                    if let Some((other, first)) = first.filter(|(other, _)| *other != value) {
-                        return Err(self.error(
-                            reduction,
-                            format!(
-                                "{what} of joint `{name}` is {value}, and {other} at {}; give one transmission a joint",
-                                self.place(first)
-                            ),
-                        ));
-                    }
-                }
-                [_] => {}
-                // Of ROS 2's controllers, which may couple joints that move by themselves here.
-                _ if transmission.ancestors().any(|n| n.has_tag_name("ros2_control")) => {
-                    let place = format!("{}:{}", self.path.display(), self.place(transmission));
-                    self.remarks.borrow_mut().push(format!(
-                        "{place}: this <transmission> names {} joints; only those of one joint each are read.",
-                        joints.len()
+            for (reduction, what, text) in reductions(transmission) {
+                let value = self.parse_number(reduction, &what, text)?;
+                if value == 0.0 {
+                    return Err(self.error(
+                        reduction,
+                        format!(
+                            "{what} is 0, but it must be motor turns per joint turn, different from 0"
+                        ),
                     ));
                 }
-                _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
+                match joints.as_slice() {
+                    [joint] if value != 1.0 => {
+                        let name = self.attribute(*joint, "name")?;
+                        let first = found.insert(name, (value, reduction));
+                        if let Some((other, first)) = first.filter(|(other, _)| *other != value) {
+                            return Err(self.error(
+                                reduction,
+                                format!(
+                                    "{what} of joint `{name}` is {value}, and {other} at {}; give a joint one reduction",
+                                    self.place(first)
+                                ),
+                            ));
+                        }
+                    }
+                    [_] => {}
+                    // Of ROS 2's controllers, which may couple joints that move by themselves here.
+                    _ if of_ros_2 => {
+                        let place = format!("{}:{}", self.path.display(), self.place(transmission));
+                        self.remarks.borrow_mut().push(format!(
+                            "{place}: this <transmission> names {} joints; only those of one joint each are read.",
+                            joints.len()
+                        ));
+                        break;
+                    }
+                    _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
+                }
             }
         }
         Ok(found
@@ -257,35 +255,24 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The reduction of a transmission: where it stands, what it is called there, and its text. ROS 1 has `<mechanicalReduction>`, ROS 2
-/// `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
-fn reduction<'a>(transmission: Xml<'a>) -> Option<(Xml<'a>, String, &'a str)> {
-    let names = ["mechanicalReduction", "mechanical_reduction"];
-    transmission
-        .descendants()
-        .filter(Xml::is_element)
-        .find_map(|node| {
-            let tag = node.tag_name().name();
-            match tag {
-                _ if names.contains(&tag) => {
-                    Some((node, format!("<{tag}>"), node.text().unwrap_or_default()))
-                }
-                "param"
-                    if node
-                        .attribute("name")
-                        .is_some_and(|name| names.contains(&name)) =>
-                {
-                    let name = node.attribute("name").unwrap_or_default();
-                    Some((node, format!("`{name}`"), node.text().unwrap_or_default()))
-                }
-                "gear_ratio" => Some((
-                    node,
-                    "<drake:gear_ratio>".to_owned(),
-                    node.attribute("value")?,
-                )),
-                _ => None,
+/// The reductions that a transmission states: where each stands, what it is called there, and its text. ROS 1 has
+/// `<mechanicalReduction>`, ROS 2 `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
+fn reductions<'a>(transmission: Xml<'a>) -> impl Iterator<Item = (Xml<'a>, String, &'a str)> {
+    let is_name = |name: &str| ["mechanicalReduction", "mechanical_reduction"].contains(&name);
+    (transmission.descendants().filter(Xml::is_element)).filter_map(move |node| {
+        let tag = node.tag_name().name();
+        let text = node.text().unwrap_or_default();
+        let name = node.attribute("name").unwrap_or_default();
+        match tag {
+            _ if is_name(tag) => Some((node, format!("<{tag}>"), text)),
+            "param" if is_name(name) => Some((node, format!("`{name}`"), text)),
+            "gear_ratio" => {
+                let value = node.attribute("value")?;
+                Some((node, "<drake:gear_ratio>".to_owned(), value))
             }
-        })
+            _ => None,
+        }
+    })
 }
 
 /// Whether an effort limit stands for "none": 0, powers of ten and rows of nines from `least` (N·m or N) on, and whatever
