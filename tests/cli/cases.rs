@@ -15,7 +15,7 @@ use crate::run::{rig, succeed};
 fn cases() -> Option<&'static Path> {
     static COPY: OnceLock<Option<TempDir>> = OnceLock::new();
     let copy = COPY.get_or_init(|| {
-        let beside = rig_host::data::data_dir()?.parent()?.join("cases");
+        let beside = rig_output::data_dir()?.parent()?.join("cases");
         if !beside.is_dir() {
             return None;
         }

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod bad_input;
-mod benchmark;
 mod cases;
 mod diagnose;
 mod excite;

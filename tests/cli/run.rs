@@ -11,13 +11,13 @@ pub(crate) fn rig() -> Command {
 /// A description that ships with the project.
 pub(crate) fn robot(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("robots")
+        .join("../robots")
         .join(name)
 }
 
 /// The real recordings, or nothing after having said so.
 pub(crate) fn real_data(folder: &str) -> Option<PathBuf> {
-    let found = rig_host::data::data_dir()
+    let found = rig_output::data_dir()
         .map(|dir| dir.join(folder))
         .filter(|dir| dir.is_dir());
     if found.is_none() {

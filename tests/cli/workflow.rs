@@ -265,7 +265,7 @@ fn arms_with_coupled_drives_go_from_template_to_parameters() {
                 .arg(at("found")),
         );
         let written = at("found").join("identified.toml");
-        let loaded = rig_host::robot::Robot::load(&written).unwrap();
+        let loaded = rig_model::robot::Robot::load(&written).unwrap();
         assert!(loaded.joints.len() > 1);
         let result = json(&at("found").join("identification.json"));
         if template == "irp6" {

@@ -143,7 +143,7 @@ struct Motion {
     std::vector<VectorXd> q, v, a;
 };
 
-// The motion of host/benches/arms/mod.rs.
+// The motion of host/model/benches/arms/mod.rs.
 Motion motion(int n, int samples) {
     Motion m;
     for (int k = 0; k < samples; k++) {

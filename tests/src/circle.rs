@@ -4,13 +4,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser as _;
-use rig_host::commands::Cli;
-use rig_host::demo::Run;
-use rig_host::emulated::upload::requests;
-use rig_host::link::{Port, Session};
-use rig_host::plant::PlantConfig;
-use rig_host::plant::effect::cogging::Cogging;
-use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig::commands::Cli;
+use rig_link::RecordedRun;
+use rig_link::{Port, Session};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_plant::PlantConfig;
+use rig_plant::effect::cogging::Cogging;
+use rig_plant::emulated::upload::requests;
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::trajectory::{FrictionSweep, SlowReversals, Trajectory};
 use rig_shared::wire::message::RequestBody;
@@ -102,7 +102,7 @@ pub fn go_round<P: Port>(line: &mut Session<P>, folder: &Path) -> Circle {
         .iter()
         .map(|(name, motion)| {
             let path = folder.join(name);
-            Run::record(line, vec![], motion, 0.2, &path).unwrap();
+            RecordedRun::record(line, vec![], motion, 0.2, &path).unwrap();
             path
         })
         .collect();
@@ -124,7 +124,7 @@ pub fn go_round<P: Port>(line: &mut Session<P>, folder: &Path) -> Circle {
     let reversals = Trajectory::SlowReversals(SlowReversals::new(0.05, 0.1, &[0.1], 1).unwrap());
     let mut tracking = |told: Vec<RequestBody>| {
         let path = folder.join("reversals.csv");
-        Run::record(line, told, &reversals, 0.2, &path)
+        RecordedRun::record(line, told, &reversals, 0.2, &path)
             .unwrap()
             .tracking_rms()
     };

@@ -10,13 +10,13 @@ use std::time::Duration;
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use rig_host::emulated::{EmulatedRig, Nameplate};
-use rig_host::link::experiment::{Experiment, run};
-use rig_host::link::{
+use rig_link::experiment::{Experiment, run};
+use rig_link::{
     Converter, EmulatedPort, Event, LinkError, LossReport, Port, Row, Session, SessionSettings,
 };
-use rig_host::plant::PlantConfig;
-use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_plant::PlantConfig;
+use rig_plant::emulated::{EmulatedRig, Nameplate};
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::friction::Friction;
 use rig_shared::link::{LinkParameters, PARAMETER_COUNT};

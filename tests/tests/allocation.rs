@@ -5,10 +5,10 @@ use std::alloc::System;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use rig_host::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, lower};
-use rig_host::data::Source;
-use rig_host::identify::{Options, chain_of, identify};
-use rig_host::robot::{Joint, JointKind, Robot};
+use rig_data::Source;
+use rig_identify::{Options, chain_of, identify};
+use rig_model::batch::{BLOCK, BatchError, ChainBatch, ModelBatch, RegressorBlock, lower};
+use rig_model::robot::{Joint, JointKind, Robot};
 use rig_shared::multibody::{COLUMNS, column, inverse_dynamics};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 

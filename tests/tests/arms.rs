@@ -6,10 +6,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use rig_host::data::{Source, data_dir};
-use rig_host::identify::{Estimator, Identification, ModelKind, Options, identify};
-use rig_host::prepare::Recording;
-use rig_host::robot::Robot;
+use rig_data::Source;
+use rig_data::prepare::Recording;
+use rig_identify::{Estimator, Identification, ModelKind, Options, identify};
+use rig_model::robot::Robot;
+use rig_output::data_dir;
 
 const BOTH: [ModelKind; 2] = [ModelKind::Differential, ModelKind::Integral];
 

@@ -2,7 +2,7 @@
 //! way in `tests/mcu`.
 #![allow(clippy::unwrap_used)]
 
-use rig_host::plant::PlantConfig;
+use rig_plant::PlantConfig;
 use rig_shared::wire::message::RequestBody;
 use rig_tests::circle::{go_round, with_cogging};
 use rig_tests::{calibrated, connect, in_parallel, nameplate};

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use rig_host::emulated::{EmulatedRig, Nameplate};
-use rig_host::plant::PlantConfig;
-use rig_host::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_plant::PlantConfig;
+use rig_plant::emulated::{EmulatedRig, Nameplate};
 use rig_shared::safety::Mode;
 
 fn robot() -> Robot {

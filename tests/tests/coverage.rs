@@ -5,10 +5,10 @@
 //! no motion of the rig can show it. The error of the measured current offset is part of what is covered.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use rig_host::data::{Block, JointColumns};
-use rig_host::identify::{ModelKind, Options, identify};
-use rig_host::plant::PlantConfig;
-use rig_host::prepare::InMemory;
+use rig_data::prepare::InMemory;
+use rig_data::{Block, JointColumns};
+use rig_identify::{ModelKind, Options, identify};
+use rig_plant::PlantConfig;
 use rig_shared::wire::message::Estimate;
 use rig_tests::{Recording, bench, driven, excitation, in_parallel, robot};
 
@@ -34,8 +34,7 @@ fn truth(plant: &PlantConfig) -> [f64; 6] {
 
 /// The recording as the identification takes it.
 fn as_recording(label: &str, recording: &Recording, torque_per_ampere: f64) -> InMemory {
-    let of =
-        |f: &dyn Fn(&rig_host::link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
+    let of = |f: &dyn Fn(&rig_link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
     InMemory {
         label: label.into(),
         blocks: vec![Block {

@@ -1,12 +1,12 @@
 //! Effects beyond the standard model, hidden in the plant and told to the rig over the wire.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use rig_host::emulated::EmulatedRig;
-use rig_host::link::LinkError;
-use rig_host::plant::PlantConfig;
-use rig_host::plant::effect::cogging::Cogging;
-use rig_host::plant::effect::dead_time::DeadTime;
-use rig_host::plant::effect::gear_eccentricity::GearEccentricity;
+use rig_link::LinkError;
+use rig_plant::PlantConfig;
+use rig_plant::effect::cogging::Cogging;
+use rig_plant::effect::dead_time::DeadTime;
+use rig_plant::effect::gear_eccentricity::GearEccentricity;
+use rig_plant::emulated::EmulatedRig;
 use rig_shared::effects::{Effect, Kind};
 use rig_shared::safety::Mode;
 use rig_shared::trajectory::{Chirp, FrictionSweep, SlowReversals, Sweep, Trajectory};

@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use rig_host::link::Device;
-use rig_host::plant::{Body, PlantConfig};
+use rig_link::Device;
+use rig_plant::{Body, PlantConfig};
 use rig_shared::link::PARAMETER_NAMES;
 use rig_shared::safety::Mode;
 use rig_shared::wire::encode;

@@ -1,11 +1,11 @@
 //! Faults injected at the plant: bridge off, the right one latched first, explained by its snapshot, cleared.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use rig_host::link::LinkError;
-use rig_host::plant::effect::dead_time::DeadTime;
-use rig_host::plant::effect::end_stops::EndStops;
-use rig_host::plant::effect::winding_temperature::WindingTemperature;
-use rig_host::plant::{Faults, PlantConfig};
+use rig_link::LinkError;
+use rig_plant::effect::dead_time::DeadTime;
+use rig_plant::effect::end_stops::EndStops;
+use rig_plant::effect::winding_temperature::WindingTemperature;
+use rig_plant::{Faults, PlantConfig};
 use rig_shared::safety::{Fault, Mode};
 use rig_shared::trajectory::{Staircase, Trajectory};
 use rig_shared::wire::message::{Refusal, RequestBody};

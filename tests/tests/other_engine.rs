@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use rig_host::data::{Source, data_dir};
-use rig_host::identify::{Estimator, ModelKind, Options, identified_robot, identify};
-use rig_host::prepare::Recording;
-use rig_host::robot::{Description, IRP6_TEMPLATE, Robot};
+use rig_data::Source;
+use rig_data::prepare::Recording;
+use rig_identify::{Estimator, ModelKind, Options, identified_robot, identify};
+use rig_model::robot::{Description, IRP6_TEMPLATE, Robot};
+use rig_output::data_dir;
 
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("other_engine")

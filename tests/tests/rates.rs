@@ -3,8 +3,8 @@
 
 use rig_firmware::config::Rates;
 use rig_firmware::nameplate::one_link_at;
-use rig_host::emulated::Nameplate;
-use rig_host::plant::PlantConfig;
+use rig_plant::PlantConfig;
+use rig_plant::emulated::Nameplate;
 use rig_shared::link::PARAMETER_NAMES;
 use rig_shared::wire::message::RequestBody;
 use rig_tests::{calibrated, connect, deviations, driven, excitation};

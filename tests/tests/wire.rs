@@ -7,7 +7,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use rig_host::link::{
+use rig_link::{
     Device, Disturbance, EmulatedPort, Event, LinkError, Lossy, RecordSettings, Session,
     SessionSettings, record,
 };

@@ -280,6 +280,11 @@ registry! {
 }
 
 impl Kind {
+    /// Returns true for what pulls on a joint from outside the robot (cables, hoses, springs), so that it can be taken off.
+    pub const fn is_external(self) -> bool {
+        matches!(self, Self::TorqueOffset | Self::Spring)
+    }
+
     /// How many of the parameters are gains; they come first.
     pub fn gains(self) -> usize {
         self.about().gains.len()

@@ -10,7 +10,7 @@ use crate::scalar::{Mask, Real};
 /// 7.1), drive inertias, friction and offsets included as in [`super::forward_dynamics`], which it agrees with.
 ///
 /// Takes O(n) operations, and sample by sample a tenth less time than [`super::forward_dynamics`] with six joints, a
-/// quarter less with twelve (`host/benches/dynamics.rs` prints both). Blocks of samples ([`super::block`]) use composite
+/// quarter less with twelve (`host/model/benches/dynamics.rs` prints both). Blocks of samples ([`super::block`]) use composite
 /// bodies, which share the work of the inverse dynamics before them.
 ///
 /// # Errors

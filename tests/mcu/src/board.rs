@@ -5,7 +5,7 @@
 //! last speed for the encoder, which so counts at the instant it is read.
 
 use rig_firmware::sample::Command;
-use rig_host::plant::{Plant, PlantConfig, Truth};
+use rig_plant::{Plant, PlantConfig, Truth};
 use rig_shared::units::Duty;
 
 use crate::ripple::Ripple;

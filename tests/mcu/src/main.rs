@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use rig_host::plant::PlantConfig;
 use rig_mcu::chip::{CONTROL_EXCEPTION, Chip};
 use rig_mcu::emulation::EmulationError;
 use rig_mcu::image::{Image, ImageError};
 use rig_mcu::rig::{EmulatedBoard, power_on};
 use rig_mcu::unicorn::EngineError;
+use rig_plant::PlantConfig;
 use serialport::{SerialPort, TTYPort};
 use thiserror::Error;
 

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use rig_host::link::Device;
-use rig_host::plant::PlantConfig;
+use rig_link::Device;
+use rig_plant::PlantConfig;
 
 use crate::board::Board;
 use crate::chip::Chip;

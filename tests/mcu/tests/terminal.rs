@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use clap::Parser;
-use rig_host::commands::Cli;
-use rig_host::plant::PlantConfig;
+use rig::commands::Cli;
+use rig_plant::PlantConfig;
 use serde_json::Value;
 
 /// Gravity acceleration of description and plant, m/s².

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 use std::time::Duration;
 
-use rig_host::link::{EmulatedPort, Session, SessionSettings};
+use rig_link::{EmulatedPort, Session, SessionSettings};
 use rig_mcu::cpu::Memory;
 use rig_mcu::map;
 use rig_mcu::rig::{EmulatedBoard, Line};

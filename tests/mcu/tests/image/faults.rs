@@ -1,6 +1,6 @@
 //! Faults injected at the hardware: the bridge is off in time, the right fault is latched, its snapshot can be had.
 
-use rig_host::link::LinkError;
+use rig_link::LinkError;
 use rig_mcu::board::BoardFaults;
 use rig_mcu::chip::{CONTROL_EXCEPTION, Chip};
 use rig_mcu::cpu::{Cpu, Memory, Register};

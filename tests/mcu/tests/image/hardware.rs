@@ -1,7 +1,7 @@
 //! What the hardware does by itself, and what of it the program finds: comparators, encoder wires and index, lock-up, flash
 //! errors, the bridge's wake-up, the converter's reference, heat across a reset.
 
-use rig_host::link::LinkError;
+use rig_link::LinkError;
 use rig_mcu::chip::Chip;
 use rig_mcu::peripheral::rcc::Cause;
 use rig_mcu::rig::power_on;

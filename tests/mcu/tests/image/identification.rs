@@ -2,16 +2,16 @@
 //! desktop computes from the same samples.
 #![allow(clippy::float_cmp)]
 
+use rig_data::prepare::InMemory;
+use rig_data::{Block, JointColumns};
 use rig_firmware::examined::examine;
 use rig_firmware::nameplate;
 use rig_firmware::request::carry_out;
 use rig_firmware::sample::Sample;
 use rig_firmware::state::State;
 use rig_firmware::step::step;
-use rig_host::data::{Block, JointColumns};
-use rig_host::identify::{Options, identify};
-use rig_host::link::experiment::Experiment;
-use rig_host::prepare::InMemory;
+use rig_identify::{Options, identify};
+use rig_link::experiment::Experiment;
 use rig_mcu::board::BoardFaults;
 use rig_mcu::time::from_seconds;
 use rig_shared::effects::{Effect, Kind};
@@ -31,8 +31,7 @@ use crate::{BoardSession, bench, board, greeted, image, plant, powered};
 const GRAVITY: f64 = 9.81;
 
 fn as_recording(recording: &Recording, torque_per_ampere: f64) -> InMemory {
-    let of =
-        |f: &dyn Fn(&rig_host::link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
+    let of = |f: &dyn Fn(&rig_link::Row) -> f64| recording.rows.iter().map(f).collect::<Vec<_>>();
     InMemory {
         label: "emulated board".into(),
         blocks: vec![Block {

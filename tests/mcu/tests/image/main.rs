@@ -15,10 +15,10 @@ mod storage;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use rig_host::link::{EmulatedPort, Session, SessionSettings};
-use rig_host::plant::PlantConfig;
+use rig_link::{EmulatedPort, Session, SessionSettings};
 use rig_mcu::image::Image;
 use rig_mcu::rig::{EmulatedBoard, Line, power_on};
+use rig_plant::PlantConfig;
 use rig_shared::safety::SnapshotSample;
 use rig_shared::wire::message::{Health, Report, RequestBody};
 use rig_tests::{calibrated, excitation, snapshot, wait};

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use rig_host::link::LinkError;
+use rig_link::LinkError;
 use rig_mcu::chip::CONTROL_EXCEPTION;
 use rig_mcu::emulation::Silenced;
 use rig_mcu::peripheral::rcc::Cause;

@@ -1,11 +1,11 @@
 //! Settings that survive a power cycle, and flash that does not.
 
-use rig_host::link::LinkError;
-use rig_host::plant::PlantConfig;
-use rig_host::plant::effect::cogging::Cogging;
+use rig_link::LinkError;
 use rig_mcu::cpu::Memory;
 use rig_mcu::map;
 use rig_mcu::peripheral::rcc::Cause;
+use rig_plant::PlantConfig;
+use rig_plant::effect::cogging::Cogging;
 use rig_shared::trajectory::{SlowReversals, Trajectory};
 use rig_shared::wire::message::{Refusal, RequestBody, ResetCause, SettingsOrigin};
 use rig_tests::{calibrated, cogging_of, driven, truth_of, wait};
@@ -94,7 +94,7 @@ fn tracking(line: &mut BoardSession) -> f64 {
 #[test]
 fn effects_survive_a_power_cycle_and_damaged_ones_are_not_used() {
     let rig = PlantConfig {
-        motor: rig_host::plant::Motor {
+        motor: rig_plant::Motor {
             cogging: Some(Cogging {
                 amplitude: 0.006,
                 order: 12.0,

@@ -1,0 +1,92 @@
+//! The experiment that is proposed for an open set of names, run on the same rig, and what is said with it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::answer::{Answer, Method};
+use super::cases::Case;
+use crate::BenchError;
+use rig_diagnose::experiment::{FILE, Family, OFF_LOG, PULLS_OFF};
+use rig_excite::TrajectoryFile;
+use rig_scenario::Made;
+use rig_scenario::ScenarioError;
+
+/// What came of a proposed experiment.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Followed {
+    /// What is said with its recording beside the others; none where it asks for more than to take off what pulls on the rig, or
+    /// has failed.
+    pub answer: Option<Answer>,
+    /// Why it has failed.
+    pub failure: Option<String>,
+}
+
+/// Follows what is proposed where the first name is open; none where it is not, or nothing is proposed for it.
+pub(super) fn follow(
+    case: &Case,
+    made: &Made,
+    method: &dyn Method,
+    answer: &Answer,
+) -> Option<Followed> {
+    let open = &answer.named.first()?.set;
+    let next = answer.next.as_ref()?;
+    if open.len() < 2 || !next.separates.iter().all(|name| open.contains(name)) {
+        return None;
+    }
+    let mut followed = Followed {
+        answer: None,
+        failure: None,
+    };
+    let more = match &next.trajectory {
+        Some(trajectory) if next.kind == PULLS_OFF => Some(unburdened(case, made, trajectory)),
+        Some(trajectory) if next.kind == Family::LockedRotor.name() => {
+            Some(clamped(case, made, trajectory))
+        }
+        Some(trajectory) => Some(moved(case, made, trajectory)),
+        None if next.kind == OFF_LOG => Some(at_rest(case, made)),
+        None => None,
+    };
+    match more.map(|more| method.answer(&more?, &case.without)) {
+        Some(Ok(answer)) => followed.answer = Some(answer),
+        Some(Err(error)) => followed.failure = Some(error.to_string()),
+        None => {}
+    }
+    Some(followed)
+}
+
+/// The recordings with that of the proposed motion.
+fn moved(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
+    let mut more = made.clone();
+    (more.further).push(case.scenario.proposed(made, &file(trajectory)?)?);
+    Ok(more)
+}
+
+/// The recordings with that of the rig whose shaft is clamped.
+fn clamped(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
+    Ok(Made {
+        clamped: Some(case.scenario.clamped(made, &file(trajectory)?)?),
+        ..made.clone()
+    })
+}
+
+/// The recordings with that of the proposed motion of the rig with what pulls on it taken off.
+fn unburdened(case: &Case, made: &Made, trajectory: &str) -> Result<Made, BenchError> {
+    let mut more = made.clone();
+    let scenario = case.scenario.unburdened();
+    (more.unburdened).push(scenario.proposed(made, &file(trajectory)?)?);
+    Ok(more)
+}
+
+fn file(trajectory: &str) -> Result<TrajectoryFile, BenchError> {
+    TrajectoryFile::from_toml(trajectory, Path::new(FILE))
+        .map_err(|error| BenchError::Scenario(ScenarioError(error.to_string())))
+}
+
+/// The recordings with that of the drive off.
+fn at_rest(case: &Case, made: &Made) -> Result<Made, BenchError> {
+    Ok(Made {
+        drive_off: Some(case.scenario.drive_off(made)?),
+        ..made.clone()
+    })
+}

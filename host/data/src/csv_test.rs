@@ -1,0 +1,308 @@
+//! CSV as spreadsheet programs and scripts write it.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::path::Path;
+
+use super::{Block, Quantity, Source};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+
+fn rig() -> Robot {
+    Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
+}
+
+/// What is read of a file, and the remarks; else the error.
+fn read(text: impl AsRef<[u8]>) -> Result<(Vec<Block>, Vec<String>), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    std::fs::write(&path, text).unwrap();
+    let source = Source::open(&path, &rig()).map_err(|e| e.to_string())?;
+    let (blocks, warnings) = source.read_all().map_err(|e| e.to_string())?;
+    Ok((blocks, warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// Asserts that a file holds the rows (0, 0.5, −12.5), (0.001, 0.25, 3) in these lines, with these remarks.
+fn holds(text: impl AsRef<[u8]>, first_line: u64, remarks: &[&str]) {
+    let shown = String::from_utf8_lossy(text.as_ref()).into_owned();
+    let (blocks, said) = read(text).unwrap_or_else(|e| panic!("{shown}: {e}"));
+    let block = &blocks[0];
+    assert_eq!(block.t, [0.0, 0.001], "{shown}");
+    assert_eq!(block.joints[0].q, [0.5, 0.25], "{shown}");
+    assert_eq!(block.joints[0].tau, [-12.5, 3.0], "{shown}");
+    assert_eq!(block.first_line, first_line, "{shown}");
+    assert_eq!(said.len(), remarks.len(), "{shown}: {said:?}");
+    for (said, remark) in said.iter().zip(remarks) {
+        assert!(said.contains(remark), "{shown}: {said}");
+    }
+}
+
+#[test]
+fn quotes_are_those_of_csv() {
+    holds(
+        "\"t\",\"q1\",\"tau1\"\n\"0\",\"0.5\",\"-12.5\"\n\"0.001\",\"0.25\",\"3\"\n",
+        2,
+        &[],
+    );
+    // Only some fields, blanks inside, and a separator, a doubled quotation mark and a line end in a text.
+    holds(
+        "t,\"q1\",tau1\n0,\" 0.5 \",-12.5\n0.001,0.25,\"3\"\n",
+        2,
+        &[],
+    );
+    holds(
+        "note,t,q1,tau1\n\"a, b\",0,0.5,-12.5\n\"say \"\"so\"\"\nand so\",0.001,0.25,3\n",
+        2,
+        &["line 2: column `note`"],
+    );
+    holds(
+        "t,\"no, te\",q1,tau1\n0,1,0.5,-12.5\n0.001,2,0.25,3\n",
+        2,
+        &[],
+    );
+    let said = read("t,q1,tau1,note\n0,0,0,\n0.1,0,0,\"abc\n0.2,0,0,\n").unwrap_err();
+    assert!(
+        said.contains("a.csv:3:") && said.contains("not closed"),
+        "{said}"
+    );
+    // The line of an error behind a text of two lines.
+    let said = read("note,t,q1,tau1\n\"a\nb\",0,0,0\n\"c\",1,\"x\",0\n").unwrap_err();
+    assert!(
+        said.contains("a.csv:4:") && said.contains("`q1` holds \"x\""),
+        "{said}"
+    );
+}
+
+#[test]
+fn separators_and_decimal_commas_are_read_where_they_are_unambiguous() {
+    let semicolon = "columns are separated by `;`";
+    holds("t;q1;tau1\n0;0,5;-12,5\n0,001;0,25;3\n", 2, &[semicolon]);
+    holds(
+        "t;q1;tau1\r\n0;0.5;-12.5\r\n0.001;0.25;3\r\n",
+        2,
+        &[semicolon],
+    );
+    holds(
+        "\"t\";\"q1\";\"tau1\"\n\"0\";\"0,5\";\"-12,5\"\n\"0,001\";\"0,25\";\"3\"\n",
+        2,
+        &[semicolon],
+    );
+    holds(
+        "t\tq1\ttau1\n0\t0,5\t-12,5\n0,001\t0,25\t3\n",
+        2,
+        &["separated by tabs"],
+    );
+    holds(
+        "t q1 tau1\n 0.000 0.5   -12.5\n 0.001 0.25  3\n",
+        2,
+        &["separated by blanks"],
+    );
+    holds(
+        "sep=;\nt;q1;tau1\n0;0,5;-12,5\n0,001;0,25;3\n",
+        3,
+        &["header stands in line 2", semicolon],
+    );
+    holds(
+        "t,q1,tau1\n0,\"0,5\",\"-12,5\"\n\"0,001\",\"0,25\",3\n",
+        2,
+        &["line 2: a comma in a quoted number is a decimal comma"],
+    );
+    for (text, place, words) in [
+        // A comma that separates and is a decimal comma too.
+        (
+            "t,q1,tau1\n0,0,0,5,1,2\n",
+            "a.csv:2:",
+            "decimal comma makes two fields",
+        ),
+        (
+            "t,q1,tau1\n0,0.5,1.5\n0,001,0.5,1.5\n",
+            "a.csv:3:",
+            "separate the columns by `;`",
+        ),
+        // Both marks in one file, and in one number.
+        (
+            "t;q1;tau1\n0.0;0;0\n0,1;0;0\n",
+            "a.csv:3:",
+            "earlier numbers have a decimal point",
+        ),
+        (
+            "t;q1;tau1\n0,0;0;0\n0,1;0.5;0\n",
+            "a.csv:3:",
+            "earlier numbers have a decimal comma",
+        ),
+        (
+            "t,q1,tau1\n0,0,0.5\n1,0,\"0,5\"\n",
+            "a.csv:3:",
+            "`tau1` holds \"0,5\" with a decimal comma",
+        ),
+        (
+            "t;q1;tau1\n0;1.234,5;0\n",
+            "a.csv:2:",
+            "`q1` holds \"1.234,5\"",
+        ),
+        (
+            "t;q1;tau1\n0;1,234,5;0\n",
+            "a.csv:2:",
+            "`q1` holds \"1,234,5\"",
+        ),
+        (
+            "t;q1;tau1\n0,0,0\n",
+            "a.csv:2:",
+            "separated by `;`, as in the header",
+        ),
+    ] {
+        let said = read(text).unwrap_err();
+        assert!(
+            said.contains(place) && said.contains(words),
+            "{text}: {said}"
+        );
+    }
+}
+
+#[test]
+fn what_stands_before_the_header_is_passed_over() {
+    let rows = "0,0.5,-12.5\n0.001,0.25,3\n";
+    holds(
+        format!("\n\nt,q1,tau1\n{rows}"),
+        4,
+        &["header stands in line 3"],
+    );
+    holds(format!("\u{feff}\r\nt,q1,tau1\n{rows}"), 3, &["line 2"]);
+    holds(
+        format!("# recorded on rig 3\n%\n\nt,q1,tau1\n{rows}"),
+        5,
+        &["line 4"],
+    );
+    // As numpy and MATLAB scripts write it.
+    holds(
+        format!("# t,q1,tau1\n{rows}"),
+        2,
+        &["line 1 begins with `#`"],
+    );
+    holds(
+        "% t q1 tau1\n0 0.5 -12.5\n0.001 0.25 3\n",
+        2,
+        &["line 1 begins with `%`", "blanks"],
+    );
+    let said = read("# nothing\n\n").unwrap_err();
+    assert!(said.contains("is empty"), "{said}");
+    let said = read("\n\nt,q1,tau1\n0,0,0\n0.1,x,0\n").unwrap_err();
+    assert!(said.contains("a.csv:5:"), "{said}");
+}
+
+#[test]
+fn carriage_returns_alone_end_lines() {
+    holds("t,q1,tau1\r0,0.5,-12.5\r0.001,0.25,3\r", 2, &[]);
+    holds("t;q1;tau1\r0;0,5;-12,5\r0,001;0,25;3", 2, &["`;`"]);
+    holds(
+        "\r\rt,q1,tau1\r0,0.5,-12.5\r0.001,0.25,3\r\r",
+        4,
+        &["line 3"],
+    );
+    let said = read("t,q1,tau1\r0,0,0\r0.1,x,0\r").unwrap_err();
+    assert!(said.contains("a.csv:3:"), "{said}");
+}
+
+#[test]
+fn exponents_of_fortran_are_exponents() {
+    holds(
+        "t,q1,tau1\n0.0D+00,5D-1,-1.25d01\n1.0D-03,0.25D0,3.D0\n",
+        2,
+        &[],
+    );
+    for bad in ["D", "1D", "D5", "1D5D", "0x1D", "5.2E-01D0"] {
+        let said = read(format!("t,q1,tau1\n0,{bad},0\n")).unwrap_err();
+        assert!(said.contains("column `q1` holds"), "{bad}: {said}");
+    }
+}
+
+#[test]
+fn what_no_measurement_has_is_named_in_few_digits() {
+    for (text, place, words) in [
+        (
+            "t,q1,tau1\n0,1.04e224,0\n",
+            "a.csv:2:",
+            "column `q1` holds 1.04·10²²⁴, but 1.04·10²²⁴ is no position",
+        ),
+        (
+            "t,q1,i1\n0,0,0\n1,0,-1e13\n",
+            "a.csv:3:",
+            "is no motor current",
+        ),
+        (
+            "t,q1,tau1\n0,0,9007199254740991\n",
+            "a.csv:2:",
+            "9.0072·10¹⁵ is no torque or force",
+        ),
+        ("t,q1,tau1\n0,0,0\n1e300,0,0\n", "a.csv:3:", "is no time"),
+    ] {
+        let said = read(text).unwrap_err();
+        assert!(
+            said.contains(place) && said.contains(words),
+            "{text}: {said}"
+        );
+        assert!(said.len() < 200, "{said}");
+    }
+    // Nanoseconds since 1970 are told as what they are, and small numbers are numbers.
+    assert!(read("t,q1,tau1\n1700000000000000000,1e-321,0\n1700000000001000000,0,1e9\n").is_ok());
+    let said = read("t,q1,tau1\n1700000000.25,0,0\n1700000000.1234567,0,0\n").unwrap_err();
+    assert!(
+        said.contains("jumps back from 1700000000.25 to 1700000000.123457 s"),
+        "{said}"
+    );
+}
+
+#[test]
+fn files_of_other_programs_are_named_by_their_first_bytes() {
+    let zip = |name: &str| [b"PK\x03\x04\x14\0\0\0".as_slice(), name.as_bytes()].concat();
+    let matlab = [b"MATLAB 5.0 MAT-file".to_vec(), vec![0; 200]].concat();
+    let wide: Vec<u8> = "t,q1,tau1\n0,0,0\n".bytes().flat_map(|b| [b, 0]).collect();
+    for (bytes, words) in [
+        (
+            b"#ROSBAG V2.0\n\x45\0\0\0".to_vec(),
+            "a ROS 1 bag; convert it",
+        ),
+        (
+            b"SQLite format 3\0\x10\0".to_vec(),
+            "SQLite database, as rosbag2",
+        ),
+        (b"\x1f\x8b\x08\0\0\0".to_vec(), "compressed by gzip"),
+        (zip("t.npy"), "NumPy"),
+        (zip("[Content_Types].xml"), "workbook"),
+        (zip("a.csv"), "zip archive"),
+        (matlab, "MATLAB file"),
+        (b"\x89HDF\r\n\x1a\n\0\0".to_vec(), "HDF5"),
+        (b"PAR1\x15\x04".to_vec(), "pandas.read_parquet"),
+        (b"\x80\x04\x95\x00".to_vec(), "pickle"),
+        (b"\xff\xfet\0,\0".to_vec(), "UTF-16"),
+        (wide, "save it as UTF-8"),
+        (b"[{\"t\":0,\"q1\":0}]".to_vec(), "JSON"),
+        (b"<?xml version=\"1.0\"?><robot/>".to_vec(), "XML"),
+    ] {
+        let said = read(&bytes).unwrap_err();
+        assert!(said.contains(words) && !said.contains('\n'), "{said}");
+    }
+}
+
+#[test]
+fn columns_are_called_what_the_file_calls_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    let names = |header: &str| {
+        let fields = header.split(',').count();
+        let row = vec!["0"; fields].join(",");
+        std::fs::write(&path, format!("{header}\n{row}\n")).unwrap();
+        let source = Source::open(&path, &rig()).unwrap();
+        [
+            Quantity::Position,
+            Quantity::Effort,
+            Quantity::Voltage,
+            Quantity::Reference,
+        ]
+        .map(|quantity| source.column_name(0, quantity))
+    };
+    assert_eq!(names("t,q1,tau1"), ["q1", "tau1", "u1", "ref1"]);
+    assert_eq!(
+        names("t,qm1,i1,duty1,supply"),
+        ["qm1", "i1", "duty1", "ref1"]
+    );
+    assert_eq!(names("t,qm1,taum1,u1,i1"), ["qm1", "taum1", "u1", "ref1"]);
+}

@@ -1,0 +1,326 @@
+//! What can be wrong with a recording.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::foreign::ForeignFormat;
+use super::place::Place;
+use super::remark::Remark;
+use rig_output::{format_short, format_time};
+
+/// Why a recording could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DataError {
+    /// The file cannot be opened or read.
+    #[error("cannot read the recording {}: {source}; give the path of a .csv or .mcap file", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The path is a directory.
+    #[error("{} is a directory, but a recording is one .csv or .mcap file", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The path is a pipe or a device.
+    #[error("{} is a pipe or a device, but a recording is gone through from its start more than once; save it as a .csv or .mcap file and give that", path.display())]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+    },
+    /// No byte, or nothing but empty lines.
+    #[error("{} is empty, but a recording has a header line such as `t,q1,tau1` and one row per sample", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A header and nothing else.
+    #[error("{} has a header but no rows; a recording has one row per sample below the header", path.display())]
+    NoRows {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Rows were stamped on arrival, several at a time.
+    #[error("{}: rows come in bursts of {rows}, as where they are stamped when they arrive ({rate} Hz in the mean, no row missing); stamp them where they are measured, or number them and write t = number / {rate}", path.display())]
+    Bursts {
+        /// The file.
+        path: PathBuf,
+        /// Rows of a burst.
+        rows: usize,
+        /// Rows a second in the mean.
+        rate: String,
+    },
+    /// A file of another program.
+    #[error("{} is {format}", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to do with it.
+        format: ForeignFormat,
+    },
+    /// Bytes that are no text.
+    #[error("{}:{line}: this line is not text (it holds bytes that are not printable UTF-8), but a recording is CSV text or an MCAP file; save text as UTF-8", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+    },
+    /// A line without an end.
+    #[error("{}:{line}: this line is longer than 1 MiB, but a recording has one sample per line", path.display())]
+    LineTooLong {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+    },
+    /// The header does not name what is needed.
+    #[error("{}: {message}", place.map_or_else(|| path.display().to_string(), |p| p.in_file(path)))]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header; none where the file has no lines.
+        place: Option<Place>,
+        /// One sentence: what is there and what would be right.
+        message: String,
+    },
+    /// A row with too few or too many fields.
+    #[error("{}:{line}: this row has {found} fields, but the header names {expected} columns ({hint})", path.display())]
+    FieldCount {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+        /// Fields of the row.
+        found: usize,
+        /// Columns of the header.
+        expected: usize,
+        /// The first column without a field, or the first field without a column.
+        hint: String,
+    },
+    /// A quotation mark that nothing closes.
+    #[error("{}:{line}: a quotation mark in this line is not closed; close it or take it out", path.display())]
+    OpenQuote {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+    },
+    /// Numbers with a decimal comma beside others with a decimal point.
+    #[error("{}:{line}: column `{column}` holds \"{found}\" with a decimal {}, but earlier numbers have a decimal {}; use the same in the whole file", path.display(), if *is_comma { "comma" } else { "point" }, if *is_comma { "point" } else { "comma" })]
+    MixedDecimals {
+        /// The file.
+        path: PathBuf,
+        /// Line.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        found: String,
+        /// Whether this number has the comma.
+        is_comma: bool,
+    },
+    /// A number that no measurement has.
+    #[error("{}: column `{column}` holds {}, but {} is no {quantity}; look for a damaged or misread value", place.in_file(path), format_short(*value), format_short(*value))]
+    OutOfRange {
+        /// The file.
+        path: PathBuf,
+        /// Line or message.
+        place: Place,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        value: f64,
+        /// What the column measures.
+        quantity: &'static str,
+    },
+    /// A field that is no finite number.
+    #[error("{}: column `{column}` holds {found}, but it must be a finite number, in SI units and with a decimal point", place.in_file(path))]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// Line or message.
+        place: Place,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
+    /// Time that does not grow.
+    #[error("{}: column `t` {}, but time must grow from row to row{hint}", place.in_file(path), not_growing(*previous, *now))]
+    TimeNotGrowing {
+        /// The file.
+        path: PathBuf,
+        /// Line or message.
+        place: Place,
+        /// Time of the row before, s.
+        previous: f64,
+        /// Time of this row, s.
+        now: f64,
+        /// What may be the cause, with a semicolon before it; empty where nothing is known.
+        hint: &'static str,
+    },
+    /// Motor positions that no joint positions give.
+    #[error("{}: the motor positions (columns `qm<k>`) of this row belong to no joint position: {message} The description's drives (ratios, screw, zero) or the recording's signs or units are wrong.", place.in_file(path))]
+    Motors {
+        /// The file.
+        path: PathBuf,
+        /// Line or message.
+        place: Place,
+        /// What cannot be turned to the joints, one sentence.
+        message: String,
+    },
+    /// An MCAP file that is damaged or holds something else.
+    #[error("{}: {message}", path.display())]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// One sentence: what is there and what would be right.
+        message: String,
+    },
+    /// The recording cannot be written.
+    #[error("cannot write the recording {}: {source}; give a path in a folder that exists, may be written and has room", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system or the encoder said.
+        source: std::io::Error,
+    },
+    /// The file's ending does not say which format.
+    #[error("cannot tell the format of {} from its name; end it in .csv or .mcap", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Columns or a row that do not fit the recording to be written.
+    #[error("cannot write row {row} of {}: {message}", path.display())]
+    BadRow {
+        /// The file.
+        path: PathBuf,
+        /// Row, counted from 1.
+        row: u64,
+        /// What is there and what would be right.
+        message: String,
+    },
+}
+
+/// What time does instead of growing.
+fn not_growing(previous: f64, now: f64) -> String {
+    let (from, to) = (format_time(previous), format_time(now));
+    if now == previous {
+        format!("stands still at {to} s")
+    } else if from == to {
+        format!("jumps back by {} s at {to} s", format_short(previous - now))
+    } else {
+        format!("jumps back from {from} to {to} s")
+    }
+}
+
+/// Something about a recording that its reader should know and that does not stop the work.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// Samples are missing; a new block begins.
+    Gap {
+        /// The first row after the gap.
+        place: Place,
+        /// Time of the last row before it, s.
+        from: f64,
+        /// Time missing beyond one sample period, s.
+        lost: f64,
+    },
+    /// An interval of a regular recording is too short or too long for its neighbours to be filtered together; a
+    /// new block begins.
+    Uneven {
+        /// The row after it.
+        place: Place,
+        /// The interval, s.
+        step: f64,
+        /// The usual one, s.
+        period: f64,
+    },
+    /// One time stamp lies off the even grid, the rows before and after on it; the row is taken as evenly sampled.
+    Misplaced {
+        /// The row.
+        place: Place,
+        /// How much later than the grid it is stamped, s.
+        off: f64,
+    },
+    /// A column without meaning to the model holds something that is no number; it is NaN in
+    /// [`super::Block::extra`].
+    ExtraNotANumber {
+        /// First row where that is so.
+        place: Place,
+        /// The column.
+        column: String,
+    },
+    /// `duty<k>` is there but no `supply`, so that there is no voltage.
+    DutyWithoutSupply {
+        /// The column.
+        column: String,
+    },
+    /// How the file was read where it could be read in more than one way.
+    Reading {
+        /// What was assumed or passed over.
+        remark: Remark,
+    },
+}
+
+impl Warning {
+    /// Place of its kind, the gravest first, and how bad it is among that.
+    pub fn rank(&self) -> (usize, f64) {
+        match self {
+            Self::Gap { lost, .. } => (0, *lost),
+            Self::Uneven { step, period, .. } => (1, (step / period).ln().abs()),
+            Self::Misplaced { off, .. } => (2, off.abs()),
+            Self::ExtraNotANumber { .. } => (3, 0.0),
+            Self::DutyWithoutSupply { .. } => (4, 0.0),
+            Self::Reading { remark } => (5 + remark.kind(), 0.0),
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gap { place, from, lost } => {
+                write!(
+                    f,
+                    "{place}: {lost:.6} s are missing after t = {} s; the rows before and after are treated apart",
+                    format_time(*from)
+                )
+            }
+            Self::Uneven {
+                place,
+                step,
+                period,
+            } => {
+                write!(
+                    f,
+                    "{place}: the time advances by {step:.6} s where {period:.6} s is usual; the rows before and after are treated apart"
+                )
+            }
+            Self::Misplaced { place, off } => {
+                write!(
+                    f,
+                    "{place}: its time stamp lies {off:.6} s off the even grid that the rows around it keep; it is taken as evenly sampled"
+                )
+            }
+            Self::ExtraNotANumber { place, column } => {
+                write!(
+                    f,
+                    "{place}: column `{column}` holds something that is no number; it has no meaning to the model and is kept as \"not a number\""
+                )
+            }
+            Self::DutyWithoutSupply { column } => {
+                write!(
+                    f,
+                    "column `{column}` gives a duty cycle but there is no column `supply`, so the motor voltage is not known"
+                )
+            }
+            Self::Reading { remark } => write!(f, "{remark}"),
+        }
+    }
+}

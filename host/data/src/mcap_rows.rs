@@ -1,0 +1,426 @@
+//! MCAP: one JSON message per sample on `/joint/state`, or ROS's joint states.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ::mcap::records::{Record, op};
+
+use super::columns::{FileColumn, Layout};
+use super::error::DataError;
+use super::joint_states::{JointStates, Refusal};
+use super::json_samples::{JsonSamples, written};
+use super::mcap_records::Records;
+use super::place::Place;
+use super::remark::Remark;
+use super::ros_layout::{Field, joint_state};
+use super::ros_message::Encoding;
+use super::source::Header;
+use rig_output::format_short;
+
+/// Topic of the joint samples.
+pub(super) const TOPIC: &str = "/joint/state";
+
+/// Names of ROS's joint state in both versions.
+const JOINT_STATE: [&str; 2] = ["sensor_msgs/msg/JointState", "sensor_msgs/JointState"];
+
+/// What the messages of a channel are.
+enum Content {
+    /// One JSON object per sample.
+    Json,
+    /// ROS's joint states.
+    JointStates(Vec<Field>, Encoding),
+    /// Joint samples that cannot be read: one clause.
+    Unreadable(String),
+    /// Something else.
+    Other,
+}
+
+struct Channel {
+    topic: usize,
+    content: Content,
+}
+
+struct Schema {
+    name: String,
+    encoding: String,
+    text: String,
+}
+
+struct Topic {
+    name: String,
+    /// Name of its schema.
+    of: String,
+    /// Messages so far.
+    messages: u64,
+}
+
+/// How the samples are read.
+enum Samples {
+    Json(JsonSamples),
+    JointStates(Box<JointStates>),
+}
+
+/// Rows of an MCAP file in the order of the file.
+pub(super) struct McapRows {
+    path: PathBuf,
+    records: Records,
+    channels: BTreeMap<u16, Channel>,
+    schemas: BTreeMap<u16, Schema>,
+    topics: Vec<Topic>,
+    /// Names of the robot's joints.
+    joints: Vec<String>,
+    /// Topic of the recording, once a message of it came, and how it is read.
+    chosen: Option<(usize, Samples)>,
+    message: Vec<u8>,
+    /// Number of the message on its topic.
+    number: u64,
+    log_time: u64,
+    /// Whether a message was logged before the one that precedes it in the file.
+    is_unsorted: bool,
+    /// Rows given, and the time of the last one, s.
+    given: (u64, f64),
+    remarks: Vec<Remark>,
+    /// Whether the first message is read but not given.
+    waiting: bool,
+}
+
+impl McapRows {
+    /// Opens the file and takes the columns from the first message.
+    pub(super) fn open(path: &Path, joints: &[String]) -> Result<(Self, Header), DataError> {
+        let mut rows = Self {
+            path: path.into(),
+            records: Records::open(path)?,
+            channels: BTreeMap::new(),
+            schemas: BTreeMap::new(),
+            topics: Vec::new(),
+            joints: joints.to_vec(),
+            chosen: None,
+            message: Vec::new(),
+            number: 0,
+            log_time: 0,
+            is_unsorted: false,
+            given: (0, 0.0),
+            remarks: Vec::new(),
+            waiting: false,
+        };
+        if !rows.next_message()? {
+            return Err(rows.nothing_there());
+        }
+        rows.waiting = true;
+        let header = match &rows.chosen {
+            Some((_, Samples::Json(samples))) => Header::of(samples.names().to_vec()),
+            Some((topic, Samples::JointStates(states))) => {
+                let topic = &rows.topics[*topic].name;
+                rows.remarks.extend(states.remarks(topic));
+                let (names, labels) = states.columns();
+                Header {
+                    names,
+                    labels,
+                    line: None,
+                    without_effort: (!states.has_effort()).then(|| {
+                        format!(
+                            "message 1 on {topic} has an empty `effort` array, so there is no torque; let the robot's driver publish the efforts and record again"
+                        )
+                    }),
+                }
+            }
+            None => Header::of(Vec::new()),
+        };
+        Ok((rows, header))
+    }
+
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.records.bytes_read()
+    }
+
+    /// What was assumed and passed over so far; complete once the last row was read.
+    pub(super) fn remarks(&self) -> Vec<Remark> {
+        let mut remarks = self.remarks.clone();
+        if let Some(broken) = self.records.broken() {
+            remarks.push(Remark::CutOff {
+                at: broken.at,
+                messages: self.given.0,
+                until: self.given.1,
+                lost: broken.lost,
+            });
+        }
+        remarks
+    }
+
+    /// What may be the cause of time that does not grow, with a semicolon before it; empty where nothing is known.
+    pub(super) fn order_hint(&self) -> &'static str {
+        if self.is_unsorted {
+            "; the messages of the file are not in the order of their log time (`mcap sort in.mcap -o out.mcap` sorts them)"
+        } else if matches!(self.chosen, Some((_, Samples::JointStates(_)))) {
+            "; several publishers on one topic interleave like this: record that of one"
+        } else {
+            ""
+        }
+    }
+
+    fn error(&self, message: String) -> DataError {
+        DataError::Mcap {
+            path: self.path.clone(),
+            message,
+        }
+    }
+
+    /// What to say of a file without a sample.
+    fn nothing_there(&self) -> DataError {
+        let passed_over = self.remarks.iter().find_map(|remark| match remark {
+            Remark::OtherMessages {
+                topic,
+                number,
+                joints,
+            } => Some((topic, number, joints)),
+            _ => None,
+        });
+        if let Some((topic, number, joints)) = passed_over {
+            let wanted: Vec<String> = self.joints.iter().map(|j| format!("\"{j}\"")).collect();
+            return self.error(format!(
+                "no message has the joints of the robot ({}); message {number} on {topic} has {joints}; give the joints in the description the names that the messages have",
+                wanted.join(", ")
+            ));
+        }
+        if let Some(broken) = self.records.broken() {
+            return self.error(format!(
+                "the file breaks off at byte {} before the first sample; record it again",
+                broken.at
+            ));
+        }
+        let topics: Vec<String> = self
+            .topics
+            .iter()
+            .map(|t| format!("{} ({})", t.name, t.of))
+            .collect();
+        let there = if topics.is_empty() {
+            "it has no channel".to_owned()
+        } else {
+            format!("its topics are {}", topics.join(", "))
+        };
+        self.error(format!(
+            "there is no message on topic {TOPIC} and none of type {}; {there}, and a recording has one JSON message per sample on {TOPIC}, or joint states of ROS",
+            JOINT_STATE[0]
+        ))
+    }
+
+    /// Puts the next message of the recording's topic into `self.message` and reads its joints; false at the end.
+    fn next_message(&mut self) -> Result<bool, DataError> {
+        loop {
+            let (code, body) = match self.records.next_record()? {
+                None => return Ok(false),
+                Some(record) => record,
+            };
+            if !matches!(code, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+                continue;
+            }
+            match ::mcap::parse_record(code, body) {
+                Ok(Record::Schema { header, data }) => {
+                    let schema = Schema {
+                        name: header.name,
+                        encoding: header.encoding,
+                        text: String::from_utf8_lossy(&data).into_owned(),
+                    };
+                    self.schemas.insert(header.id, schema);
+                }
+                Ok(Record::Channel(channel)) => {
+                    let schema = self.schemas.get(&channel.schema_id);
+                    let of = schema.map_or("no schema", |s| s.name.as_str()).to_owned();
+                    let content = content(&channel.topic, &channel.message_encoding, schema);
+                    let known = self.topics.iter().position(|t| t.name == channel.topic);
+                    let topic = known.unwrap_or(self.topics.len());
+                    if known.is_none() {
+                        self.topics.push(Topic {
+                            name: channel.topic,
+                            of,
+                            messages: 0,
+                        });
+                    }
+                    self.channels.insert(channel.id, Channel { topic, content });
+                }
+                Ok(Record::Message { header, data }) => {
+                    let Some(channel) = self.channels.get(&header.channel_id) else {
+                        continue;
+                    };
+                    if matches!(channel.content, Content::Other) {
+                        continue;
+                    }
+                    self.message.clear();
+                    self.message.extend_from_slice(&data);
+                    if self.accept(header.channel_id, header.log_time)? {
+                        return Ok(true);
+                    }
+                }
+                Ok(_) => {}
+                Err(e) => {
+                    let said = e.to_string();
+                    let said = said.lines().next().unwrap_or_default().to_owned();
+                    let at = self.records.bytes_read();
+                    return Err(self.error(format!(
+                        "the MCAP file is damaged before byte {at} ({}); copy it from the recorder again",
+                        said.trim_end_matches('.')
+                    )));
+                }
+            }
+        }
+    }
+
+    /// Judges the message in `self.message`; false where it is passed over.
+    fn accept(&mut self, channel: u16, log_time: u64) -> Result<bool, DataError> {
+        let Some(Channel { topic, content }) = self.channels.get(&channel) else {
+            return Ok(false);
+        };
+        let topic = *topic;
+        self.topics[topic].messages += 1;
+        let number = self.topics[topic].messages;
+        let name = &self.topics[topic].name;
+        let refuse = |what: String| DataError::Mcap {
+            path: self.path.clone(),
+            message: format!("message {number} on {name} {what}"),
+        };
+        let another = match &self.chosen {
+            Some((chosen, _)) if *chosen != topic => Some(&self.topics[*chosen].name),
+            _ => None,
+        };
+        match content {
+            Content::Other => return Ok(false),
+            Content::Unreadable(why) => {
+                return Err(self.error(format!("the messages on {name} {why}")));
+            }
+            Content::Json => match &self.chosen {
+                None => {
+                    let samples = JsonSamples::new(&self.message).map_err(|what| {
+                        refuse(format!(
+                            "{what}; a sample looks like {{\"t\":0.0,\"q1\":0.1,\"tau1\":2.5}}"
+                        ))
+                    })?;
+                    self.chosen = Some((topic, Samples::Json(samples)));
+                }
+                Some(_) if another.is_some() => return Err(self.two_topics(topic)),
+                Some(_) => {}
+            },
+            Content::JointStates(fields, encoding) => {
+                // Beside samples of the project's own, ROS's topics are of other things.
+                if let Some((_, Samples::Json(_))) = &self.chosen {
+                    return Ok(false);
+                }
+                let mut fresh = JointStates::new(&self.joints);
+                let states = match &mut self.chosen {
+                    Some((_, Samples::JointStates(states))) if another.is_none() => states,
+                    _ => &mut fresh,
+                };
+                match states.read(&self.message, fields, *encoding, log_time) {
+                    Ok(()) => {}
+                    Err(Refusal::Foreign(joints)) => {
+                        let (topic, joints) = (name.clone(), joints);
+                        self.pass_over(topic, number, joints);
+                        return Ok(false);
+                    }
+                    Err(Refusal::Message(what)) => return Err(refuse(what)),
+                }
+                if another.is_some() {
+                    return Err(self.two_topics(topic));
+                }
+                if self.chosen.is_none() {
+                    self.chosen = Some((topic, Samples::JointStates(Box::new(fresh))));
+                }
+            }
+        }
+        self.is_unsorted |= log_time < self.log_time;
+        (self.number, self.log_time) = (number, log_time);
+        Ok(true)
+    }
+
+    fn pass_over(&mut self, topic: String, number: u64, joints: String) {
+        let is_known =
+            |r: &Remark| matches!(r, Remark::OtherMessages { topic: t, .. } if *t == topic);
+        if !self.remarks.iter().any(is_known) {
+            self.remarks.push(Remark::OtherMessages {
+                topic,
+                number,
+                joints,
+            });
+        }
+    }
+
+    /// Two topics that could both be the recording.
+    fn two_topics(&self, other: usize) -> DataError {
+        let chosen = self.chosen.as_ref().map_or(other, |(topic, _)| *topic);
+        let (a, b) = (&self.topics[chosen].name, &self.topics[other].name);
+        self.error(format!(
+            "topics {a} and {b} both hold states of the robot's joints; keep one of them (`mcap filter in.mcap -o out.mcap --include-topic-regex '^{a}$'`)"
+        ))
+    }
+
+    /// Reads the next message into `values`, one per column; gives its number, or none at the end.
+    pub(super) fn next_row(
+        &mut self,
+        layout: &Layout,
+        values: &mut [f64],
+    ) -> Result<Option<u64>, DataError> {
+        if !std::mem::take(&mut self.waiting) && !self.next_message()? {
+            return Ok(None);
+        }
+        match &self.chosen {
+            Some((topic, Samples::Json(samples))) => {
+                samples.read(&self.message, values).map_err(|what| {
+                    let name = &self.topics[*topic].name;
+                    self.error(format!("message {} on {name} {what}", self.number))
+                })?;
+            }
+            Some((_, Samples::JointStates(states))) => states.row(self.log_time, values),
+            None => return Ok(None),
+        }
+        for (value, column) in values.iter().zip(&layout.columns) {
+            if column.strict && !(value.abs() <= column.largest()) {
+                return Err(self.bad_value(column, *value));
+            }
+        }
+        let time = values.get(layout.time).copied().unwrap_or(f64::NAN);
+        self.given = (self.given.0 + 1, time);
+        Ok(Some(self.number))
+    }
+
+    fn bad_value(&self, column: &FileColumn, value: f64) -> DataError {
+        let place = Place::Message(self.number);
+        if value.is_finite() {
+            return column.out_of_range(&self.path, place, value);
+        }
+        DataError::NotANumber {
+            path: self.path.clone(),
+            place,
+            column: column.label.clone(),
+            found: match &self.chosen {
+                Some((_, Samples::Json(_))) => written(&self.message, &column.name),
+                _ => format_short(value),
+            },
+        }
+    }
+}
+
+/// What the messages of a channel are.
+fn content(topic: &str, encoding: &str, schema: Option<&Schema>) -> Content {
+    let is_joint_state = schema.is_some_and(|s| JOINT_STATE.contains(&s.name.as_str()));
+    let ros = match encoding {
+        "cdr" => Some(Encoding::Cdr),
+        "ros1" => Some(Encoding::Ros1),
+        _ => None,
+    };
+    match (schema, ros) {
+        _ if topic == TOPIC && encoding == "json" => Content::Json,
+        (Some(schema), Some(ros)) if is_joint_state => {
+            // Other languages of definitions describe the same standard message.
+            let is_msg = matches!(schema.encoding.as_str(), "ros2msg" | "ros1msg");
+            let text = if is_msg { schema.text.as_str() } else { "" };
+            match joint_state(text, ros == Encoding::Ros1) {
+                Ok(fields) => Content::JointStates(fields, ros),
+                Err(why) => Content::Unreadable(format!("cannot be read: {why}")),
+            }
+        }
+        _ if topic == TOPIC => Content::Unreadable(format!(
+            "are encoded as \"{}\", but only \"json\" can be read on this topic; export the recording as JSON or CSV",
+            encoding.escape_debug()
+        )),
+        _ => Content::Other,
+    }
+}

@@ -1,0 +1,673 @@
+//! Wrong units, noticed before they become wrong parameters.
+//!
+//! Every rule leaves at least a factor of ten between what honest recordings do and what raises it;
+//! factors of unit mistakes are 57 (degrees) and 1000 (milli). Without limits in the robot's description
+//! only what the columns say about each other is checked.
+
+use super::held::held;
+use super::jump::jump;
+use super::rate_spike::rate_spike;
+use super::spike::spike;
+use super::unsigned::{Unsigned, unsigned};
+use super::{Block, JointColumns};
+use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
+use rig_output::{format_significant, format_time, format_trimmed, listed};
+
+/// A column that cannot be in the unit of the contract.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Implausible {
+    /// Position of a revolute joint in degrees.
+    #[error(
+        "q{joint} looks like degrees (range {lowest:.4} to {highest:.4}, while the joint reaches {limit:.4} rad); give it in rad{or}"
+    )]
+    Degrees {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Lowest value.
+        lowest: f64,
+        /// Highest value.
+        highest: f64,
+        /// Farthest position limit, rad.
+        limit: f64,
+        /// What else it may be, with a comma before it; empty where it is nothing else.
+        or: String,
+    },
+    /// Position far outside the limits.
+    #[error(
+        "q{joint} lies far outside the joint's range ({lowest:.4} to {highest:.4}, while the limits are {lower} to {upper} {unit}); give it in {unit} or correct the limits{or}"
+    )]
+    Position {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Lowest value.
+        lowest: f64,
+        /// Highest value.
+        highest: f64,
+        /// Lower limit.
+        lower: f64,
+        /// Upper limit.
+        upper: f64,
+        /// rad or m.
+        unit: &'static str,
+        /// What else it may be, with a comma before it; empty where it is nothing else.
+        or: String,
+    },
+    /// Faster than ten times the limit.
+    #[error(
+        "q{joint} moves at up to {speed:.4} {unit}/s, more than ten times its limit of {limit} {unit}/s; check the units of q{joint} and t and the limit"
+    )]
+    Velocity {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Highest speed, over ten samples.
+        speed: f64,
+        /// Limit.
+        limit: f64,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// A position that jumps.
+    #[error(
+        "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}",
+        format_time(*at)
+    )]
+    Jump {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the row before the largest jump, s.
+        at: f64,
+        /// Largest jump.
+        by: f64,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// Largest change from row to row apart from jumps.
+        fastest: f64,
+        /// What would be right.
+        mend: &'static str,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Single rows of effort that no other comes near.
+    #[error(
+        "tau{joint} is {value:.4} {unit} in the row at t = {} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out",
+        format_time(*at)
+    )]
+    Spike {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the largest, s.
+        at: f64,
+        /// What stands there.
+        value: f64,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// Largest magnitude elsewhere, but for one row in a thousand.
+        usual: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
+    /// Measured velocity and change of position do not belong together.
+    #[error(
+        "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
+    )]
+    VelocityScale {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Change of position over integral of velocity; 1 would be right.
+        ratio: f64,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Reference and position do not belong together.
+    #[error(
+        "ref{joint} does not belong to q{joint}: it moves {ratio:.4} times as far{hint}, while both should be in {unit} and counted in the same sense"
+    )]
+    ReferenceScale {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Change of the reference over that of the position; 1 would be right.
+        ratio: f64,
+        /// What a factor like that is called, with a comma before it; empty where it has no name.
+        hint: &'static str,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// A position that keeps each value for several rows.
+    #[error(
+        "{} only in every {}: a topic of {slow} Hz in a recording of {fast} Hz. Velocity and acceleration of such stairs are wrong; record the position at the rate of the rows, or keep only the rows in which it changes", changes("q", joints), nth(*rows)
+    )]
+    HeldPosition {
+        /// Joints, 1-based.
+        joints: Vec<usize>,
+        /// Rows for which a value stays.
+        rows: usize,
+        /// Rate of the values, Hz.
+        slow: String,
+        /// Rate of the rows, Hz.
+        fast: String,
+    },
+    /// An effort that keeps each value for several rows.
+    #[error(
+        "{} only in every {}: values of {slow} Hz in a recording of {fast} Hz. A measured torque is then late by {late} ms on average, and inertia and friction are biased: record it at the rate of the rows. A command that the drive holds for that long is right as it stands", changes("tau", joints), nth(*rows)
+    )]
+    HeldEffort {
+        /// Joints, 1-based.
+        joints: Vec<usize>,
+        /// Rows for which a value stays.
+        rows: usize,
+        /// Rate of the values, Hz.
+        slow: String,
+        /// Rate of the rows, Hz.
+        fast: String,
+        /// Mean delay, ms.
+        late: String,
+    },
+    /// A column whose negative values were read as large positive ones.
+    #[error(
+        "{column}{joint} is never negative, but in {share} % of the rows it is far above all others, as a negative number is that was read as an unsigned one ({how}); read the register as a signed number"
+    )]
+    Unsigned {
+        /// Name of the column without its number.
+        column: &'static str,
+        /// Joint, 1-based.
+        joint: usize,
+        /// Share of the rows, %.
+        share: String,
+        /// What was lost.
+        how: String,
+    },
+    /// A measured velocity or acceleration that is zero throughout.
+    #[error(
+        "{column}{joint} is 0 in every row while the joint moves; check that the column was recorded, or leave it out"
+    )]
+    NoRate {
+        /// Name of the column without its number.
+        column: &'static str,
+        /// Joint, 1-based.
+        joint: usize,
+    },
+    /// Rows of a measured velocity that the position does not have.
+    #[error(
+        "qd{joint} is {value} {unit}/s in the row at t = {} s{more}, where q{joint} changes by {speed} {unit}/s; such rows are no velocity: look for a wrapped counter or a lost sample, or leave qd{joint} out",
+        format_time(*at)
+    )]
+    RateSpike {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Time of the largest, s.
+        at: f64,
+        /// What stands there.
+        value: String,
+        /// What the position does there.
+        speed: String,
+        /// How many more there are, with words; empty where there is one.
+        more: String,
+        /// rad or m.
+        unit: &'static str,
+    },
+    /// Effort far above the limit.
+    #[error(
+        "tau{joint} looks too large by a factor of about 1000, as m{unit} would be (up to {highest:.4}, while the limit is {limit} {unit}); give it in {unit}, at the joint"
+    )]
+    EffortTooLarge {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Largest magnitude.
+        highest: f64,
+        /// Limit.
+        limit: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
+    /// Effort far below what moves the joint.
+    #[error(
+        "tau{joint} looks too small by a factor of about 1000, as k{unit} would be (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
+    )]
+    EffortTooSmall {
+        /// Joint, 1-based.
+        joint: usize,
+        /// Largest magnitude.
+        highest: f64,
+        /// What it is compared with.
+        of: &'static str,
+        /// That value.
+        expected: f64,
+        /// N·m or N.
+        unit: &'static str,
+    },
+    /// No effort at all.
+    #[error(
+        "tau{joint} is 0 in every row while the joint moves; check that the column is the torque and was recorded"
+    )]
+    NoEffort {
+        /// Joint, 1-based.
+        joint: usize,
+    },
+    /// Time in milliseconds or in a smaller unit.
+    #[error("t looks like {} (its steps are {step:.4}); give it in s", unit_of_steps(*step))]
+    NotSeconds {
+        /// Median step.
+        step: f64,
+    },
+}
+
+impl Implausible {
+    /// The column at fault, with its factor where it has one.
+    pub fn column(&self) -> String {
+        match self {
+            Self::Degrees { joint, .. }
+            | Self::Position { joint, .. }
+            | Self::Jump { joint, .. }
+            | Self::Velocity { joint, .. } => format!("q{joint}"),
+            Self::VelocityScale { joint, .. } | Self::RateSpike { joint, .. } => {
+                format!("qd{joint}")
+            }
+            Self::Unsigned { column, joint, .. } | Self::NoRate { column, joint } => {
+                format!("{column}{joint}")
+            }
+            Self::ReferenceScale { joint, ratio, .. } => format!("ref{joint} ({ratio:.4})"),
+            Self::EffortTooLarge { joint, .. }
+            | Self::EffortTooSmall { joint, .. }
+            | Self::NoEffort { joint }
+            | Self::Spike { joint, .. } => format!("tau{joint}"),
+            Self::HeldPosition { joints, .. } => columns_of("q", joints),
+            Self::HeldEffort { joints, .. } => columns_of("tau", joints),
+            Self::NotSeconds { .. } => "t".into(),
+        }
+    }
+}
+
+impl Implausible {
+    /// Whether the column may be right all the same, so that it is said and not refused.
+    pub fn is_doubt(&self) -> bool {
+        matches!(self, Self::HeldEffort { .. })
+    }
+
+    /// Whether nothing can be said of the motion or the torque before it is mended.
+    pub fn spoils(&self) -> bool {
+        matches!(
+            self,
+            Self::Jump { .. }
+                | Self::Spike { .. }
+                | Self::HeldPosition { .. }
+                | Self::Unsigned { .. }
+        )
+    }
+}
+
+/// Columns of these joints: `q1, q2 and q3`.
+fn columns_of(column: &str, joints: &[usize]) -> String {
+    let all: Vec<String> = joints.iter().map(|k| format!("{column}{k}")).collect();
+    listed(&all)
+}
+
+/// The same with their verb.
+fn changes(column: &str, joints: &[usize]) -> String {
+    let verb = if joints.len() == 1 {
+        "changes"
+    } else {
+        "change"
+    };
+    format!("{} {verb}", columns_of(column, joints))
+}
+
+/// "second row", "third row", "10th row".
+fn nth(rows: usize) -> String {
+    match rows {
+        2 => "second row".to_owned(),
+        3 => "third row".to_owned(),
+        n => format!("{n}th row"),
+    }
+}
+
+/// Everything in `block` that cannot be in SI units for `robot`; empty where all is well.
+pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let mut found = Vec::new();
+    let mut steps: Vec<f64> = block
+        .t
+        .iter()
+        .zip(block.t.iter().skip(1))
+        .map(|(a, b)| b - a)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    // Motion sampled at 5 Hz or less cannot be identified anyway; 0.2 ms as milliseconds is this much.
+    if let Some(&step) = steps.get(steps.len() / 2)
+        && step >= 0.2
+    {
+        found.push(Implausible::NotSeconds { step });
+    }
+    for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
+        check_joint(k, &block.t, columns, joint, &mut found);
+    }
+    found.extend(repeated(block));
+    found
+}
+
+/// Positions and efforts that keep each value for several rows, joints of one rate together.
+fn repeated(block: &Block) -> Vec<Implausible> {
+    let together = |of: fn(&JointColumns) -> &[f64]| {
+        let mut found: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (k, columns) in (1..).zip(&block.joints) {
+            let Some(rows) = held(of(columns)) else {
+                continue;
+            };
+            match found.iter_mut().find(|(own, _)| *own == rows) {
+                Some((_, joints)) => joints.push(k),
+                None => found.push((rows, vec![k])),
+            }
+        }
+        found
+    };
+    let rate = rate(&block.t);
+    let slow = |rows: usize| format_trimmed(rate / rows as f64, 4);
+    let fast = format_trimmed(rate, 4);
+    let positions = together(|columns| &columns.q)
+        .into_iter()
+        .map(|(rows, joints)| Implausible::HeldPosition {
+            joints,
+            rows,
+            slow: slow(rows),
+            fast: fast.clone(),
+        });
+    let efforts = together(|columns| &columns.tau)
+        .into_iter()
+        .map(|(rows, joints)| Implausible::HeldEffort {
+            joints,
+            rows,
+            slow: slow(rows),
+            fast: fast.clone(),
+            late: format_trimmed(500.0 * (rows as f64 - 1.0) / rate, 2),
+        });
+    positions.chain(efforts).collect()
+}
+
+/// The unit of time that steps of this size look like, where they are too long for seconds: rows come at between 5 and
+/// 5000 Hz.
+pub fn unit_of_steps(step: f64) -> &'static str {
+    match step {
+        ..200.0 => "milliseconds",
+        ..2e5 => "microseconds",
+        _ => "nanoseconds",
+    }
+}
+
+/// That a fault is there more than once, in words.
+fn more(count: usize) -> String {
+    match count {
+        1 => String::new(),
+        n => format!(" and at {} more places", n - 1),
+    }
+}
+
+/// Lowest and highest value.
+pub(super) fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        })
+}
+
+fn check_joint(
+    k: usize,
+    t: &[f64],
+    columns: &JointColumns,
+    joint: &Joint,
+    found: &mut Vec<Implausible>,
+) {
+    let (unit, effort_unit) = match joint.kind {
+        JointKind::Revolute => ("rad", "N·m"),
+        JointKind::Prismatic => ("m", "N"),
+    };
+    let (lowest, highest) = range(&columns.q);
+    if columns.q.is_empty() {
+        return;
+    }
+    if let Some(lost) = unsigned(&columns.q) {
+        found.push(lost_sign("q", k, lost));
+    } else if let Some(jump) = jump(t, &columns.q) {
+        found.push(Implausible::Jump {
+            joint: k,
+            at: t[jump.row],
+            by: jump.by,
+            more: more(jump.count),
+            fastest: jump.fastest,
+            mend: if unit == "rad" && (jump.by.abs() / core::f64::consts::TAU - 1.0).abs() < 0.02 {
+                "that is a turn: give the angle counted on beyond it"
+            } else {
+                "give recordings that were put together one by one, and check the encoder for lost counts"
+            },
+            unit,
+        });
+    } else if let Some(limits) = &joint.limits {
+        let [lower, upper] = limits.position;
+        let reach = lower.abs().max(upper.abs());
+        let farthest = lowest.abs().max(highest.abs());
+        let or = motor_angle(joint, farthest / reach);
+        let degrees = farthest.to_radians() <= 1.2 * reach;
+        if reach.is_finite() && farthest > 5.0 * reach {
+            found.push(if joint.kind == JointKind::Revolute && degrees {
+                Implausible::Degrees {
+                    joint: k,
+                    lowest,
+                    highest,
+                    limit: reach,
+                    or,
+                }
+            } else {
+                Implausible::Position {
+                    joint: k,
+                    lowest,
+                    highest,
+                    lower,
+                    upper,
+                    unit,
+                    or,
+                }
+            });
+        } else if let Some(speed) = highest_speed(t, &columns.q)
+            && speed > 10.0 * limits.velocity
+        {
+            found.push(Implausible::Velocity {
+                joint: k,
+                speed,
+                limit: limits.velocity,
+                unit,
+            });
+        }
+    }
+    if let Some(ratio) = columns
+        .qd
+        .as_ref()
+        .and_then(|qd| velocity_scale(t, &columns.q, qd))
+    {
+        // Degrees or rpm against rad are at least 6 apart, milli 1000.
+        if !(0.2..5.0).contains(&ratio.abs()) {
+            found.push(Implausible::VelocityScale {
+                joint: k,
+                ratio,
+                unit,
+            });
+        }
+    }
+    check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
+}
+
+/// Rows a second.
+fn rate(t: &[f64]) -> f64 {
+    let (Some(first), Some(last)) = (t.first(), t.last()) else {
+        return 0.0;
+    };
+    (t.len() - 1) as f64 / (last - first).max(f64::MIN_POSITIVE)
+}
+
+fn lost_sign(column: &'static str, joint: usize, lost: Unsigned) -> Implausible {
+    let offset = format_significant(lost.offset, 4);
+    Implausible::Unsigned {
+        column,
+        joint,
+        share: format_significant(100.0 * lost.share, 2),
+        how: match lost.sign_bit {
+            true => format!("−x reads as {offset} + x: its highest bit is the sign"),
+            false => format!("−x reads as {offset} − x: two's complement"),
+        },
+    }
+}
+
+/// That a position beyond its limits by this factor may be the motor's, with a comma before it.
+fn motor_angle(joint: &Joint, beyond: f64) -> String {
+    let Some(ratio) = joint.drive.as_ref().map(|drive| drive.gear_ratio.abs()) else {
+        return String::new();
+    };
+    let number = |x: f64| format_trimmed(x, 4);
+    if ratio > 1.0 && beyond / ratio <= 1.2 {
+        let ratio = number(ratio);
+        format!(
+            ", or the angle of the motor: divided by the gear ratio {ratio} it would fit as well; name it qm"
+        )
+    } else if ratio < 1.0 && beyond * ratio * ratio <= 1.2 {
+        format!(
+            ", or the gear ratio stands upside down: gear_ratio is {}, and motor turns per joint turn are wanted ({} would fit)",
+            number(ratio),
+            number(1.0 / ratio)
+        )
+    } else {
+        String::new()
+    }
+}
+
+/// What is wrong with measured velocities and accelerations, which concerns who uses them.
+pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
+    let mut found = Vec::new();
+    for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
+        let (lowest, highest) = range(&columns.q);
+        // 0.05 rad or 5 cm: less may be the noise of a joint that stands.
+        if highest - lowest < 0.05 || columns.q.is_empty() {
+            continue;
+        }
+        for (column, rates) in [("qd", &columns.qd), ("qdd", &columns.qdd)] {
+            if rates
+                .as_ref()
+                .is_some_and(|own| own.iter().all(|v| *v == 0.0))
+            {
+                found.push(Implausible::NoRate { column, joint: k });
+            }
+        }
+        let spike = (columns.qd.as_ref()).and_then(|qd| rate_spike(&block.t, &columns.q, qd));
+        if let Some(spike) = spike {
+            let number = |x: f64| format_significant(x, 4);
+            found.push(Implausible::RateSpike {
+                joint: k,
+                at: block.t[spike.row],
+                value: number(spike.value),
+                speed: number(spike.speed),
+                more: more(spike.count),
+                unit: joint.kind.units().0,
+            });
+        }
+    }
+    found
+}
+
+/// Highest mean speed over ten samples: a single step of a coarse encoder is no speed.
+fn highest_speed(t: &[f64], q: &[f64]) -> Option<f64> {
+    const SPAN: usize = 10;
+    let rows = t.iter().zip(q);
+    let later = rows.clone().skip(SPAN);
+    rows.zip(later)
+        .map(|((t0, q0), (t1, q1))| ((q1 - q0) / (t1 - t0)).abs())
+        .reduce(f64::max)
+}
+
+/// Least-squares factor between changes of q and the integral of qd over windows of twenty samples, if
+/// both go together.
+pub fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
+    const SPAN: usize = 20;
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for start in (SPAN..q.len()).step_by(SPAN) {
+        let rows = start - SPAN..start;
+        let x: f64 = rows
+            .clone()
+            .map(|i| 0.5 * (qd[i] + qd[i + 1]) * (t[i + 1] - t[i]))
+            .sum();
+        let y = q[start] - q[start - SPAN];
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    // Only where the two are clearly the same motion: correlation above 0.8.
+    (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
+}
+
+fn check_effort(
+    k: usize,
+    t: &[f64],
+    columns: &JointColumns,
+    joint: &Joint,
+    unit: &'static str,
+    travel: f64,
+    found: &mut Vec<Implausible>,
+) {
+    if let Some(lost) = unsigned(&columns.tau) {
+        found.push(lost_sign("tau", k, lost));
+        return;
+    }
+    if let Some(spike) = spike(&columns.tau) {
+        found.push(Implausible::Spike {
+            joint: k,
+            at: t[spike.row],
+            value: spike.value,
+            more: more(spike.count),
+            usual: spike.usual,
+            unit,
+        });
+        return;
+    }
+    let highest = columns.tau.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let limit = joint.limits.as_ref().and_then(|l| l.torque);
+    if let Some(limit) = limit
+        && highest > 20.0 * limit
+    {
+        found.push(Implausible::EffortTooLarge {
+            joint: k,
+            highest,
+            limit,
+            unit,
+        });
+        return;
+    }
+    // 0.05 rad or 5 cm of travel: a joint that hardly moves may well need next to nothing.
+    if columns.tau.is_empty() || travel < 0.05 {
+        return;
+    }
+    if highest == 0.0 {
+        found.push(Implausible::NoEffort { joint: k });
+        return;
+    }
+    // A joint cannot move against its friction with a hundredth of it, whatever else acts.
+    let coulomb = joint
+        .friction
+        .as_ref()
+        .map(|f| f.coulomb)
+        .filter(|c| *c > 0.0);
+    let too_small = match (coulomb, limit) {
+        (Some(c), _) if highest < 0.01 * c => Some(("Coulomb friction", c)),
+        // A limit that stands for "none" says nothing of what moves the joint, and where the link is described, that says more than
+        // any limit: a wrist in a table of equal limits may well need a thousandth of its own.
+        (None, Some(l))
+            if joint.inertial.is_none() && highest < 5e-4 * l && !is_placeholder(l, 1e3) =>
+        {
+            Some(("limit", l))
+        }
+        _ => None,
+    };
+    if let Some((of, expected)) = too_small {
+        found.push(Implausible::EffortTooSmall {
+            joint: k,
+            highest,
+            of,
+            expected,
+            unit,
+        });
+    }
+}

@@ -1,0 +1,350 @@
+//! A recording in pieces with margins: whole-recording filters in constant memory.
+
+use super::PrepareError;
+use crate::{Block, JointColumns};
+
+/// Something that gives its rows in blocks, as often as asked.
+pub trait Recording {
+    /// Name for messages and reports.
+    fn label(&self) -> String;
+    /// Calls `take` with each block in turn, from the first row on.
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError>;
+    /// Told when `share` of it has been gone through once more without reading it: for progress.
+    fn passed(&self, share: f64) {
+        let _ = share;
+    }
+    /// Whether everything that could pull on the joints from outside had been taken off.
+    fn unburdened(&self) -> bool {
+        false
+    }
+}
+
+/// The first rows of a recording, at most `rows`, as far as they follow without a gap; none where it has none. What comes
+/// after them is not read.
+///
+/// # Errors
+/// What reading as far as that gives.
+pub fn first_block(recording: &dyn Recording, rows: usize) -> Result<Option<Block>, PrepareError> {
+    let mut first = None;
+    let read = recording.each_block(rows, &mut |block| {
+        if block.is_empty() {
+            return Ok(());
+        }
+        first = Some(block);
+        Err(PrepareError::Stopped("enough".to_owned()))
+    });
+    match first {
+        Some(block) => Ok(Some(block)),
+        None => read.map(|()| None),
+    }
+}
+
+/// A recording of the rig with everything taken off that could pull on its joints from outside.
+pub struct Unburdened<'a>(pub &'a dyn Recording);
+
+impl Recording for Unburdened<'_> {
+    fn label(&self) -> String {
+        self.0.label()
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        self.0.each_block(rows, take)
+    }
+
+    fn passed(&self, share: f64) {
+        self.0.passed(share);
+    }
+
+    fn unburdened(&self) -> bool {
+        true
+    }
+}
+
+/// The first `rows` rows of a recording.
+pub struct Beginning<'a> {
+    /// The whole recording.
+    pub recording: &'a dyn Recording,
+    /// How many rows of it.
+    pub rows: usize,
+}
+
+impl Recording for Beginning<'_> {
+    fn label(&self) -> String {
+        self.recording.label()
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        let (mut left, mut enough) = (self.rows, false);
+        let read = self.recording.each_block(rows, &mut |block| {
+            if block.len() < left {
+                left -= block.len();
+                return take(block);
+            }
+            take(stretch(&block, 0, left))?;
+            enough = true;
+            Err(PrepareError::Stopped("enough".to_owned()))
+        });
+        if enough { Ok(()) } else { read }
+    }
+}
+
+/// A recording held in memory.
+#[derive(Clone, Debug, Default)]
+pub struct InMemory {
+    /// Name for messages.
+    pub label: String,
+    /// Its rows.
+    pub blocks: Vec<Block>,
+}
+
+impl Recording for InMemory {
+    fn label(&self) -> String {
+        self.label.clone()
+    }
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        for block in &self.blocks {
+            for start in (0..block.len()).step_by(rows.max(1)) {
+                let end = start.saturating_add(rows.max(1)).min(block.len());
+                take(stretch(block, start, end))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Recording for crate::Source {
+    fn label(&self) -> String {
+        self.path().display().to_string()
+    }
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        for block in self.blocks(rows) {
+            take(block.map_err(|e| PrepareError::Read(e.to_string()))?)?;
+        }
+        Ok(())
+    }
+}
+
+/// Rows that are processed together, and which of them are to be used.
+#[derive(Clone, Debug)]
+pub struct Piece {
+    /// The rows with margins on both sides (no margin where the segment ends).
+    pub rows: Block,
+    /// First row to be used.
+    pub core_start: usize,
+    /// One past the last row to be used.
+    pub core_end: usize,
+    /// Index of the first row of `rows` within its segment.
+    pub offset: u64,
+    /// Stretches of the recording without a gap in time are numbered from zero.
+    pub segment: usize,
+    /// Whether `rows` starts and ends where the segment does.
+    pub at_ends: [bool; 2],
+}
+
+/// Rows `start .. end` of a block.
+pub fn stretch(block: &Block, start: usize, end: usize) -> Block {
+    let of = |column: &Vec<f64>| column.get(start..end).unwrap_or_default().to_vec();
+    Block {
+        t: of(&block.t),
+        joints: block
+            .joints
+            .iter()
+            .map(|j| JointColumns {
+                q: of(&j.q),
+                tau: of(&j.tau),
+                qd: j.qd.as_ref().map(of),
+                qdd: j.qdd.as_ref().map(of),
+                reference: j.reference.as_ref().map(of),
+                voltage: j.voltage.as_ref().map(of),
+                temperature: j.temperature.as_ref().map(of),
+                link: j.link.as_ref().map(of),
+                effects: j.effects.as_ref().map(of),
+            })
+            .collect(),
+        extra: block
+            .extra
+            .iter()
+            .map(|(name, column)| (name.clone(), of(column)))
+            .collect(),
+        first_line: block.first_line + start as u64,
+        continues: start > 0 || block.continues,
+    }
+}
+
+fn append(block: &mut Block, mut more: Block) {
+    if block.is_empty() {
+        *block = more;
+        return;
+    }
+    fn join(a: &mut Option<Vec<f64>>, b: Option<Vec<f64>>) {
+        match (a.as_mut(), b) {
+            (Some(a), Some(b)) => a.extend(b),
+            _ => *a = None,
+        }
+    }
+    block.t.append(&mut more.t);
+    for (a, b) in block.joints.iter_mut().zip(more.joints) {
+        a.q.extend(b.q);
+        a.tau.extend(b.tau);
+        join(&mut a.qd, b.qd);
+        join(&mut a.qdd, b.qdd);
+        join(&mut a.reference, b.reference);
+        join(&mut a.voltage, b.voltage);
+        join(&mut a.temperature, b.temperature);
+        join(&mut a.link, b.link);
+        join(&mut a.effects, b.effects);
+    }
+    for ((_, a), (_, b)) in block.extra.iter_mut().zip(more.extra) {
+        a.extend(b);
+    }
+}
+
+fn drop_front(block: &mut Block, rows: usize) {
+    block.t.drain(..rows);
+    block.first_line += rows as u64;
+    for joint in &mut block.joints {
+        joint.q.drain(..rows);
+        joint.tau.drain(..rows);
+        for column in [
+            &mut joint.qd,
+            &mut joint.qdd,
+            &mut joint.reference,
+            &mut joint.voltage,
+            &mut joint.temperature,
+            &mut joint.link,
+            &mut joint.effects,
+        ]
+        .into_iter()
+        .flatten()
+        {
+            column.drain(..rows);
+        }
+    }
+    for (_, column) in &mut block.extra {
+        column.drain(..rows);
+    }
+}
+
+/// Calls `take` with pieces of `core` rows and `margin` rows beside them, in order; a segment that fits
+/// into one piece is one. Holds at most `2·(core + 2·margin)` rows.
+pub fn each_piece(
+    recording: &dyn Recording,
+    core: usize,
+    margin: usize,
+    take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>,
+) -> Result<(), PrepareError> {
+    let mut buffer = Block::default();
+    let mut offset = 0u64;
+    let mut done = 0usize;
+    let mut segment = 0usize;
+    let mut started = false;
+    let flush = |buffer: &mut Block,
+                 offset: &mut u64,
+                 done: &mut usize,
+                 segment: usize,
+                 take: &mut dyn FnMut(Piece) -> Result<(), PrepareError>| {
+        if !buffer.is_empty() {
+            let piece = Piece {
+                core_start: *done,
+                core_end: buffer.len(),
+                rows: std::mem::take(buffer),
+                offset: *offset,
+                segment,
+                at_ends: [*offset == 0, true],
+            };
+            take(piece)?;
+        }
+        *buffer = Block::default();
+        (*offset, *done) = (0, 0);
+        Ok::<(), PrepareError>(())
+    };
+    recording.each_block(core.min(1 << 16), &mut |block| {
+        if block.is_empty() {
+            return Ok(());
+        }
+        if started && !block.continues {
+            flush(&mut buffer, &mut offset, &mut done, segment, take)?;
+            segment += 1;
+        }
+        started = true;
+        append(&mut buffer, block);
+        // Twice the margin: what is left for the last piece is then never only a margin.
+        while buffer.len() >= done + core + 2 * margin {
+            let piece_len = done + core + margin;
+            let piece = Piece {
+                core_start: done,
+                core_end: done + core,
+                rows: stretch(&buffer, 0, piece_len),
+                offset,
+                segment,
+                at_ends: [offset == 0, false],
+            };
+            take(piece)?;
+            let drop = (done + core).saturating_sub(margin);
+            drop_front(&mut buffer, drop);
+            done = done + core - drop;
+            offset += drop as u64;
+        }
+        Ok(())
+    })?;
+    flush(&mut buffer, &mut offset, &mut done, segment, take)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Gives an empty block and these, then cannot be read on.
+    struct Broken(Vec<Block>);
+
+    impl Recording for Broken {
+        fn label(&self) -> String {
+            "broken".into()
+        }
+        fn each_block(
+            &self,
+            _: usize,
+            take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+        ) -> Result<(), PrepareError> {
+            take(Block::default())?;
+            self.0.iter().try_for_each(|block| take(block.clone()))?;
+            Err(PrepareError::Read("line 9 is no number".into()))
+        }
+    }
+
+    #[test]
+    fn for_its_first_rows_no_more_of_a_recording_is_read() {
+        let block = |t: f64| Block {
+            t: vec![t, t + 1.0],
+            ..Block::default()
+        };
+        let broken = Broken(vec![block(0.0), block(2.0)]);
+        assert_eq!(first_block(&broken, 100).unwrap(), Some(block(0.0)));
+        assert!(matches!(
+            first_block(&Broken(Vec::new()), 100),
+            Err(PrepareError::Read(_))
+        ));
+        assert_eq!(first_block(&InMemory::default(), 100).unwrap(), None);
+    }
+}

@@ -1,0 +1,169 @@
+//! What was decided for recordings of one rate, for a recording of another.
+
+use super::PrepareError;
+use super::filter::decimator_edge;
+use super::survey::Survey;
+use super::treatment::{HIGHEST, Treatment};
+use rig_output::format_short;
+
+impl Treatment {
+    /// The same for a further recording (a hold-out), at that recording's own rate: the band of torque and regressor as near
+    /// as a whole number of rows allows, masks and lead as they are. Unchanged where the rates agree within 1 %.
+    ///
+    /// A slower recording may need a lower cut-off of the position; as long as that lies above the band it passes all that is
+    /// compared.
+    ///
+    /// # Errors
+    /// [`PrepareError::BandBeyondRate`].
+    pub fn at_rate_of(&self, survey: &Survey) -> Result<Self, PrepareError> {
+        if same_rate(survey, self.sample_rate).is_ok() {
+            return Ok(self.clone());
+        }
+        let rate = survey.sample_rate;
+        let most = HIGHEST * rate / 2.0;
+        if self.parallel_edge > most {
+            return Err(PrepareError::BandBeyondRate {
+                label: survey.label.clone(),
+                rate,
+                most,
+                band: self.parallel_edge,
+            });
+        }
+        let cutoff = self.cutoff.min(most);
+        let decimation = if self.decimation == 1 {
+            // The low-pass over torque and regressor is then that of the position, whatever the rate.
+            1
+        } else {
+            (rate / self.kept_rate()).round().max(1.0) as usize
+        };
+        let (parallel_edge, parallel_filter) = parallel_pass(self.order, cutoff, decimation, rate);
+        let as_fitted = format!(
+            "as for the recordings at {} Hz.",
+            format_short(self.sample_rate)
+        );
+        Ok(Self {
+            sample_rate: rate,
+            cutoff,
+            cutoff_reason: format!("{cutoff:.3} Hz, {as_fitted}"),
+            decimation,
+            decimation_reason: format!(
+                "One row in {decimation}, up to {parallel_edge:.3} Hz, {as_fitted}"
+            ),
+            parallel_edge,
+            parallel_filter,
+            trimmed: trimmed_rows(cutoff, decimation, rate),
+            ..self.clone()
+        })
+    }
+}
+
+/// Pass band of the low-pass over torque and regressor, Hz, and what it is.
+pub(super) fn parallel_pass(
+    order: usize,
+    cutoff: f64,
+    decimation: usize,
+    rate: f64,
+) -> (f64, String) {
+    let over = "forward and backward, over torque and every regressor column alike";
+    if decimation > 1 {
+        let edge = decimator_edge(decimation, rate);
+        (
+            edge,
+            format!("Chebyshev I, order 8, 0.05 dB ripple up to {edge:.3} Hz, {over}"),
+        )
+    } else {
+        (
+            cutoff,
+            format!("Butterworth, order {order}, {cutoff:.3} Hz, {over}"),
+        )
+    }
+}
+
+/// Rows left out at both ends of every stretch, before decimation.
+pub fn trimmed_rows(cutoff: f64, decimation: usize, rate: f64) -> usize {
+    ((3.0 * rate / cutoff).ceil() as usize).max(3 * decimation)
+}
+
+/// Checks that a recording has this sample rate, within 1 %.
+///
+/// # Errors
+/// [`PrepareError::RateMismatch`].
+pub fn same_rate(survey: &Survey, rate: f64) -> Result<(), PrepareError> {
+    if (survey.sample_rate / rate - 1.0).abs() > 0.01 {
+        return Err(PrepareError::RateMismatch {
+            label: survey.label.clone(),
+            rate: survey.sample_rate,
+            first: rate,
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::prepare::{Choice, InMemory, PrepareOptions};
+    use crate::{Block, JointColumns};
+
+    fn survey(rate: f64) -> Survey {
+        let t: Vec<f64> = (0..(20.0 * rate) as usize)
+            .map(|k| k as f64 / rate)
+            .collect();
+        let joint = JointColumns {
+            q: t.iter().map(|t| (5.0 * t).sin()).collect(),
+            tau: t.iter().map(|t| (5.0 * t).cos()).collect(),
+            ..Default::default()
+        };
+        let recording = InMemory {
+            label: "made".into(),
+            blocks: vec![Block {
+                t,
+                joints: vec![joint],
+                first_line: 2,
+                ..Default::default()
+            }],
+        };
+        Survey::take(&recording, 1).unwrap()
+    }
+
+    fn decided(cutoff: f64, decimation: usize) -> Treatment {
+        let options = PrepareOptions {
+            cutoff: Choice::Fixed(cutoff),
+            decimation: Choice::Fixed(decimation),
+            ..Default::default()
+        };
+        Treatment::decide(&[survey(1000.0)], &options, &[None]).unwrap()
+    }
+
+    #[test]
+    fn the_band_stays_whatever_the_rate() {
+        let fitted = decided(50.0, 20);
+        assert_eq!(fitted.parallel_edge, 20.0);
+        assert_eq!(fitted.at_rate_of(&survey(1000.0)).unwrap(), fitted);
+        for (rate, decimation, cutoff) in [(5000.0, 100, 50.0), (250.0, 5, 50.0), (100.0, 2, 40.0)]
+        {
+            let own = fitted.at_rate_of(&survey(rate)).unwrap();
+            assert_eq!(own.decimation, decimation);
+            assert!((own.cutoff - cutoff).abs() < 1e-9);
+            assert!((own.parallel_edge - 20.0).abs() < 1e-9);
+            assert_eq!(own.speed_threshold, fitted.speed_threshold);
+            assert!(own.trimmed as f64 / rate >= 3.0 / cutoff);
+            assert!(own.position_filter().is_some() && own.parallel_low_pass().is_some());
+        }
+        // Without decimation the low-pass over the torque is that of the position, at any rate.
+        let whole = decided(50.0, 1).at_rate_of(&survey(5000.0)).unwrap();
+        assert_eq!((whole.decimation, whole.parallel_edge), (1, 50.0));
+    }
+
+    #[test]
+    fn a_rate_that_cannot_hold_the_band_is_refused() {
+        let error = decided(50.0, 20).at_rate_of(&survey(40.0)).unwrap_err();
+        assert!(matches!(error, PrepareError::BandBeyondRate { .. }));
+        let sentence = error.to_string();
+        assert!(
+            sentence.contains("20.0 Hz") && sentence.contains("16.0 Hz"),
+            "{sentence}"
+        );
+    }
+}

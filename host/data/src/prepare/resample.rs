@@ -1,0 +1,364 @@
+//! Rows at uneven instants brought to an even step.
+
+use super::PrepareError;
+use super::pieces::Recording;
+use crate::{Block, JointColumns};
+
+/// Longest step between neighbouring rows, as a multiple of the mean one, over which it is interpolated. Reading parts a recording
+/// at five usual steps already, so that recordings of a file are never refused for it.
+pub(super) const LONGEST_STEP: f64 = 5.0;
+
+/// A recording of which every stretch between gaps is interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …, its time stamps believed.
+///
+/// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
+/// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
+/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Columns that belong to no joint are
+/// interpolated by a line, and between two whole numbers, which may be a mode or a flag, taken from the nearer row. What the
+/// controller took for the effects is left out.
+pub struct Resampled<'a> {
+    source: &'a dyn Recording,
+    period: f64,
+}
+
+impl<'a> Resampled<'a> {
+    /// Resamples `source` every `period` seconds.
+    pub fn new(source: &'a dyn Recording, period: f64) -> Self {
+        Self { source, period }
+    }
+}
+
+/// Signals of a block in a fixed order: position, torque, then what else was recorded.
+fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
+    let optional = [
+        &joint.qd,
+        &joint.qdd,
+        &joint.reference,
+        &joint.voltage,
+        &joint.temperature,
+        &joint.link,
+    ];
+    ([&joint.q, &joint.tau].into_iter()).chain(optional.into_iter().flatten())
+}
+
+/// The same to be filled.
+fn signals_mut(joint: &mut JointColumns) -> impl Iterator<Item = &mut Vec<f64>> {
+    let optional = [
+        &mut joint.qd,
+        &mut joint.qdd,
+        &mut joint.reference,
+        &mut joint.voltage,
+        &mut joint.temperature,
+        &mut joint.link,
+    ];
+    ([&mut joint.q, &mut joint.tau].into_iter()).chain(optional.into_iter().flatten())
+}
+
+/// No rows of the same columns.
+fn empty_as(block: &Block) -> Block {
+    let none = |column: &Option<Vec<f64>>| column.as_ref().map(|_| Vec::new());
+    let joints = (block.joints.iter())
+        .map(|j| JointColumns {
+            qd: none(&j.qd),
+            qdd: none(&j.qdd),
+            reference: none(&j.reference),
+            voltage: none(&j.voltage),
+            temperature: none(&j.temperature),
+            link: none(&j.link),
+            ..JointColumns::default()
+        })
+        .collect();
+    let extra = block
+        .extra
+        .iter()
+        .map(|(name, _)| (name.clone(), Vec::new()));
+    Block {
+        joints,
+        extra: extra.collect(),
+        ..Block::default()
+    }
+}
+
+/// One row: time, line, values of all signals.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    t: f64,
+    line: u64,
+    values: Vec<f64>,
+    /// Columns that belong to no joint.
+    extra: Vec<f64>,
+}
+
+/// The value at a share `u` of the way from a row to the next.
+fn between(a: f64, b: f64, u: f64) -> f64 {
+    match a.fract() == 0.0 && b.fract() == 0.0 {
+        true if u < 0.5 => a,
+        true => b,
+        false => a + u * (b - a),
+    }
+}
+
+/// Slope of the parabola through three points at the one of them with number `at`.
+fn slope(points: [(f64, f64); 3], at: usize) -> f64 {
+    let [(t0, x0), (t1, x1), (t2, x2)] = points;
+    let (left, right) = ((x1 - x0) / (t1 - t0), (x2 - x1) / (t2 - t1));
+    let bend = (right - left) / (t2 - t0);
+    match at {
+        0 => left - bend * (t1 - t0),
+        1 => left + bend * (t1 - t0),
+        _ => right + bend * (t2 - t1),
+    }
+}
+
+/// Rows waiting to be interpolated between, and what has come out of them.
+struct Grid {
+    period: f64,
+    /// At most four: the interval lies between the second and the third, or starts or ends the stretch.
+    rows: Vec<Row>,
+    /// First instant of the stretch, and number of the next instant.
+    start: f64,
+    next: u64,
+    out: Block,
+}
+
+impl Grid {
+    fn value(&self, s: usize, from: usize, t: f64) -> f64 {
+        let at = |k: usize| (self.rows[k].t, self.rows[k].values[s]);
+        let ((t0, x0), (t1, x1)) = (at(from), at(from + 1));
+        let width = t1 - t0;
+        let chord = (x1 - x0) / width;
+        let last = self.rows.len() - 1;
+        let slope_at = |k: usize| {
+            if last < 2 {
+                return chord;
+            }
+            let middle = k.clamp(1, last - 1);
+            slope([at(middle - 1), at(middle), at(middle + 1)], k + 1 - middle)
+        };
+        let u = (t - t0) / width;
+        let (d0, d1) = (slope_at(from) * width, slope_at(from + 1) * width);
+        // Hermite's cubic.
+        let (a, b) = (d0 - (x1 - x0), (x1 - x0) - d1);
+        x0 + u * (x1 - x0) + u * (1.0 - u) * ((1.0 - u) * a + u * b)
+    }
+
+    /// Instants between the rows `from` and `from + 1`, the later one left to the next interval unless it is the last.
+    fn interval(&mut self, from: usize, last: bool) {
+        if self.rows.len() < from + 2 {
+            return;
+        }
+        let end = self.rows[from + 1].t;
+        loop {
+            let t = self.start + self.next as f64 * self.period;
+            let inside = if last {
+                t <= end + 1e-9 * self.period
+            } else {
+                t < end
+            };
+            if !inside {
+                return;
+            }
+            if self.out.t.is_empty() {
+                self.out.first_line = self.rows[from].line;
+            }
+            let mut s = 0;
+            for j in 0..self.out.joints.len() {
+                let count = signals(&self.out.joints[j]).count();
+                let values: Vec<f64> = (s..s + count).map(|s| self.value(s, from, t)).collect();
+                s += count;
+                let joint = &mut self.out.joints[j];
+                for (list, value) in signals_mut(joint).zip(values) {
+                    list.push(value);
+                }
+            }
+            let u = (t - self.rows[from].t) / (end - self.rows[from].t);
+            let (before, after) = (&self.rows[from].extra, &self.rows[from + 1].extra);
+            let ends = before.iter().zip(after);
+            for ((_, column), (a, b)) in self.out.extra.iter_mut().zip(ends) {
+                column.push(between(*a, *b, u));
+            }
+            self.out.t.push(t);
+            self.next += 1;
+        }
+    }
+
+    fn push(&mut self, row: Row) {
+        if self.rows.is_empty() {
+            (self.start, self.next) = (row.t, 0);
+        }
+        self.rows.push(row);
+        match self.rows.len() {
+            3 => self.interval(0, false),
+            4.. => {
+                self.interval(1, false);
+                self.rows.remove(0);
+            }
+            _ => {}
+        }
+    }
+
+    /// Ends the stretch.
+    fn end(&mut self) {
+        if let Some(from) = self.rows.len().checked_sub(2) {
+            self.interval(from, true);
+        }
+        self.rows.clear();
+    }
+
+    /// What is ready, as a block.
+    fn take(&mut self) -> Block {
+        let empty = Block {
+            continues: true,
+            ..empty_as(&self.out)
+        };
+        std::mem::replace(&mut self.out, empty)
+    }
+}
+
+impl Recording for Resampled<'_> {
+    fn label(&self) -> String {
+        self.source.label()
+    }
+
+    fn unburdened(&self) -> bool {
+        self.source.unburdened()
+    }
+
+    fn each_block(
+        &self,
+        rows: usize,
+        take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
+    ) -> Result<(), PrepareError> {
+        let mut grid = Grid {
+            period: self.period,
+            rows: Vec::new(),
+            start: 0.0,
+            next: 0,
+            out: Block::default(),
+        };
+        let mut give = |grid: &mut Grid| {
+            let block = grid.take();
+            if block.is_empty() {
+                Ok(())
+            } else {
+                take(block)
+            }
+        };
+        // A stretch ends only when the next one begins.
+        let mut started = false;
+        self.source.each_block(rows, &mut |block| {
+            if !block.continues || !started {
+                grid.end();
+                give(&mut grid)?;
+                grid.out = empty_as(&block);
+                started = true;
+            }
+            for (k, t) in block.t.iter().enumerate() {
+                grid.push(Row {
+                    t: *t,
+                    line: block.first_line + k as u64,
+                    values: block
+                        .joints
+                        .iter()
+                        .flat_map(signals)
+                        .map(|list| list[k])
+                        .collect(),
+                    extra: block.extra.iter().map(|(_, list)| list[k]).collect(),
+                });
+                if grid.out.len() >= rows {
+                    give(&mut grid)?;
+                }
+            }
+            Ok(())
+        })?;
+        grid.end();
+        give(&mut grid)
+    }
+
+    fn passed(&self, share: f64) {
+        self.source.passed(share);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::prepare::InMemory;
+
+    fn collect(source: &InMemory, period: f64, rows: usize) -> Vec<Block> {
+        let mut all = Vec::new();
+        Resampled::new(source, period)
+            .each_block(rows, &mut |block| {
+                all.push(block);
+                Ok(())
+            })
+            .unwrap();
+        all
+    }
+
+    #[test]
+    fn jittered_rows_come_back_even_and_on_the_curve() {
+        let mut g = rand_pcg::Pcg64::seed_from_u64(4);
+        let step = 1e-2;
+        let mut made = |from: usize, to: usize, continues: bool| {
+            let t: Vec<f64> = (from..to)
+                .map(|k| step * (k as f64 + 0.5 * (g.random::<f64>() - 0.5)))
+                .collect();
+            Block {
+                joints: vec![JointColumns {
+                    q: t.iter().map(|t| (3.0 * t).sin()).collect(),
+                    tau: t.iter().map(|t| 1.0 - 2.0 * t + 0.5 * t * t).collect(),
+                    qd: Some(t.iter().map(|t| 3.0 * (3.0 * t).cos()).collect()),
+                    ..Default::default()
+                }],
+                extra: vec![
+                    ("added1".into(), t.iter().map(|t| 0.1 + 2.0 * t).collect()),
+                    (
+                        "mode".into(),
+                        (from..to).map(|k| (k / 7 % 3) as f64).collect(),
+                    ),
+                ],
+                first_line: from as u64 + 2,
+                continues,
+                t,
+            }
+        };
+        let source = InMemory {
+            label: "made".into(),
+            blocks: vec![
+                made(0, 100, false),
+                made(100, 250, true),
+                made(300, 500, false),
+            ],
+        };
+        for rows in [10_000, 64] {
+            let blocks = collect(&source, step, rows);
+            let starts: Vec<usize> = (0..blocks.len())
+                .filter(|b| !blocks[*b].continues)
+                .collect();
+            assert_eq!(starts.len(), 2);
+            let all: usize = blocks.iter().map(Block::len).sum();
+            assert!((447..=451).contains(&all), "{all}");
+            let mut before: Option<f64> = None;
+            for block in &blocks {
+                let joint = &block.joints[0];
+                for (k, t) in block.t.iter().enumerate() {
+                    if let Some(before) = before.filter(|_| k > 0 || block.continues) {
+                        assert!((t - before - step).abs() < 1e-12);
+                    }
+                    before = Some(*t);
+                    // 200 rows a period of the sine.
+                    assert!((joint.q[k] - (3.0 * t).sin()).abs() < 3e-5, "{t}");
+                    // A parabola comes back as it is.
+                    assert!((joint.tau[k] - (1.0 - 2.0 * t + 0.5 * t * t)).abs() < 1e-12);
+                    assert!((joint.qd.as_ref().unwrap()[k] - 3.0 * (3.0 * t).cos()).abs() < 1e-3);
+                    // A line, and modes never in between.
+                    assert!((block.extra[0].1[k] - (0.1 + 2.0 * t)).abs() < 1e-12);
+                    assert!([0.0, 1.0, 2.0].contains(&block.extra[1].1[k]));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,463 @@
+//! What is done to the recordings, decided once and written down.
+
+use rig_model::robot::IdentifiedBand;
+use serde::Serialize;
+
+use super::PrepareError;
+use super::filter::{LowPass, decimator_edge};
+use super::rate::{parallel_pass, same_rate, trimmed_rows};
+use super::spectrum::{NOISE_SHARE, PositionSpectrum};
+use super::survey::Survey;
+use rig_output::format_short;
+
+/// A setting that the data choose or that is given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Choice<T> {
+    /// Chosen from the data.
+    #[default]
+    Auto,
+    /// Given.
+    Fixed(T),
+}
+
+/// How recordings are to be prepared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrepareOptions {
+    /// Cut-off of the low-pass on the position, Hz (half power after one of its two passes).
+    pub cutoff: Choice<f64>,
+    /// Order of the Butterworth filter, run forward and backward.
+    pub order: usize,
+    /// Every how many rows one is kept after the parallel low-pass.
+    pub decimation: Choice<usize>,
+    /// Speed below which a row is masked, rad/s or m/s, the same for all joints; 0 masks nothing.
+    pub speed_threshold: Choice<f64>,
+    /// Velocity and acceleration from the recording's own columns where the position would be differentiated.
+    pub measured_derivatives: bool,
+    /// How much later the torque recorded at an instant acts, s: half a sample for a command that is held until
+    /// the next one, plus dead time. The motion is taken that much later. Left at zero, such a lead L shifts
+    /// viscous friction by about −J·L·ω² for a motion of angular frequency ω.
+    pub torque_lead: f64,
+    /// Rows that are processed together; memory grows with it, results do not depend on it.
+    pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has. Results do not depend on it, to the last bit.
+    pub threads: usize,
+}
+
+impl Default for PrepareOptions {
+    fn default() -> Self {
+        Self {
+            cutoff: Choice::Auto,
+            order: 4,
+            decimation: Choice::Auto,
+            speed_threshold: Choice::Auto,
+            measured_derivatives: false,
+            torque_lead: 0.0,
+            piece_rows: 1 << 16,
+            threads: 0,
+        }
+    }
+}
+
+/// Rows left out, and why.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Masked {
+    /// Number of the joint, from 1; 0 where it concerns all.
+    pub joint: usize,
+    /// Rows (after decimation), or windows of the integral model.
+    pub rows: u64,
+    /// Why.
+    pub why: String,
+}
+
+/// What is done to every recording of an identification.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Treatment {
+    /// Hz
+    pub sample_rate: f64,
+    /// Cut-off of the position filter, Hz.
+    pub cutoff: f64,
+    /// Why this cut-off, a sentence.
+    pub cutoff_reason: String,
+    /// Cut-offs that were tried on the torque, lowest first; empty where none was.
+    pub trials: Vec<CutoffTrial>,
+    /// Cut-off that the spectrum of the position alone gives, where the torque gave another one, Hz.
+    pub spectral_cutoff: Option<f64>,
+    /// Order of the Butterworth filter, forward and backward.
+    pub order: usize,
+    /// Every how many rows one is kept.
+    pub decimation: usize,
+    /// Why this decimation, a sentence.
+    pub decimation_reason: String,
+    /// Pass band of the parallel low-pass over torque and regressor, Hz.
+    pub parallel_edge: f64,
+    /// What the parallel low-pass is, a sentence.
+    pub parallel_filter: String,
+    /// How velocity and acceleration were got, a sentence.
+    pub derivatives: String,
+    /// Whether the recording's own velocity and acceleration are used.
+    pub measured_derivatives: bool,
+    /// How much later the torque recorded at an instant is taken to act, s.
+    pub torque_lead: f64,
+    /// Per joint, speed below which rows are masked, rad/s or m/s.
+    pub speed_threshold: Vec<f64>,
+    /// The same where values are judged by recordings that they were not fitted to: no higher, as rows that are left out of a
+    /// fit because they bend it still say how good it is.
+    pub judged_speed: Vec<f64>,
+    /// Why these thresholds, a sentence.
+    pub speed_reason: String,
+    /// Per joint, torques beyond which rows count as saturated (lowest, highest).
+    pub saturation: Vec<[Option<f64>; 2]>,
+    /// Rows left out at both ends of every stretch, before decimation.
+    pub trimmed: usize,
+    /// Per joint, the spectrum of the position that the cut-off was read from.
+    pub spectra: Vec<PositionSpectrum>,
+    /// Highest frequency of the motion over all joints, Hz (99 % of the power of the velocity).
+    pub motion_frequency: f64,
+    /// Rows that one piece holds.
+    #[serde(skip)]
+    pub piece_rows: usize,
+    /// Threads; 0 for as many as the machine has.
+    #[serde(skip)]
+    pub threads: usize,
+}
+
+/// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
+/// motion itself.
+const LEAST_HEADROOM: f64 = 5.0;
+
+/// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion: reversals of
+/// friction have harmonics well above the motion itself, and the residual is to show them.
+const PARALLEL_HEADROOM: f64 = 10.0;
+
+/// Highest cut-off as a share of the Nyquist frequency.
+pub const HIGHEST: f64 = 0.8;
+
+/// Above what rounding leaves of the velocity of a joint that stands still, below what any encoder shows, rad/s or m/s.
+const STILL: f64 = 1e-6;
+
+/// A cut-off that was tried, and how well the torque is explained with it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CutoffTrial {
+    /// Hz
+    pub cutoff: f64,
+    /// Per joint, RMS of the torque residual over RMS of the torque; not a number where no row of the joint was usable.
+    pub relative_error: Vec<f64>,
+}
+
+impl Treatment {
+    /// Band and rows for the description, in which values identified by it are judged.
+    #[must_use]
+    pub fn band(&self) -> IdentifiedBand {
+        IdentifiedBand {
+            cutoff: self.cutoff,
+            rate: self.kept_rate(),
+            min_speed: self.judged_speed.clone(),
+            torque_lead: self.torque_lead,
+        }
+    }
+
+    /// Decides from the surveys of all training recordings and the robot's torque limits.
+    ///
+    /// # Errors
+    /// [`PrepareError`]: different rates, impossible cut-off or decimation.
+    pub fn decide(
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let first = surveys
+            .first()
+            .ok_or_else(|| PrepareError::Stopped("No recording was given.".into()))?;
+        let rate = first.sample_rate;
+        for survey in surveys {
+            same_rate(survey, rate)?;
+        }
+        let spectra = spectra_of(surveys, first);
+        let motion = spectra.iter().map(|s| s.motion).fold(0.0, f64::max);
+        let nyquist = rate / 2.0;
+        let (cutoff, cutoff_reason) = match options.cutoff {
+            Choice::Fixed(hz) => (hz, format!("{} Hz, as given.", format_short(hz))),
+            Choice::Auto => choose_cutoff(&spectra, motion, nyquist),
+        };
+        if LowPass::butterworth(options.order, cutoff, rate).is_none() {
+            return Err(PrepareError::Cutoff {
+                cutoff,
+                rate,
+                nyquist,
+            });
+        }
+        let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+        let most = most_decimated(shortest, FEWEST_KEPT, cutoff, rate);
+        let (decimation, decimation_reason) = match options.decimation {
+            Choice::Fixed(n) => (n, format!("Every {n}th row, as given.")),
+            Choice::Auto => choose_decimation(motion, cutoff, rate, most),
+        };
+        if decimation == 0 || (decimation as u64) > most {
+            return Err(PrepareError::Decimation {
+                factor: decimation,
+                rows: shortest,
+                most,
+            });
+        }
+        let (speed_threshold, speed_reason) =
+            choose_speeds(surveys, &spectra, cutoff, options.speed_threshold);
+        let (parallel_edge, parallel_filter) =
+            parallel_pass(options.order, cutoff, decimation, rate);
+        let trimmed = trimmed_rows(cutoff, decimation, rate);
+        enough_rows(
+            surveys,
+            FEWEST_KEPT * decimation as u64 + 2 * trimmed as u64,
+        )?;
+        Ok(Self {
+            sample_rate: rate,
+            cutoff,
+            cutoff_reason,
+            trials: Vec::new(),
+            spectral_cutoff: None,
+            order: options.order,
+            decimation,
+            decimation_reason,
+            parallel_edge,
+            parallel_filter,
+            derivatives: if options.measured_derivatives {
+                "Velocity and, where recorded, acceleration from the recording, through the position's filter.".into()
+            } else {
+                "Differences of the filtered position by five points (Abramowitz and Stegun 1964, table 25.2)."
+                    .into()
+            },
+            measured_derivatives: options.measured_derivatives,
+            torque_lead: options.torque_lead,
+            judged_speed: speed_threshold.clone(),
+            speed_threshold,
+            speed_reason,
+            saturation: saturation(surveys, torque_limits, spectra.len()),
+            trimmed,
+            spectra,
+            motion_frequency: motion,
+            piece_rows: options.piece_rows,
+            threads: options.threads,
+        })
+    }
+
+    /// The same with fewer rows: the low-pass before decimation passes only what the model explains, up to `band` in Hz,
+    /// as long as `rows` of the shortest recording are left; unchanged where that keeps as many rows, or where the
+    /// decimation was given.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn narrowed(
+        &self,
+        band: f64,
+        rows: u64,
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let shortest = surveys.iter().map(|s| s.longest).min().unwrap_or(0);
+        let possible = most_decimated(shortest, FEWEST_KEPT, self.cutoff, self.sample_rate);
+        let most = (shortest / rows.max(FEWEST_KEPT)).clamp(1, possible);
+        let n = ((0.4 * self.sample_rate / band).floor() as u64).clamp(1, most) as usize;
+        if options.decimation != Choice::Auto || n <= self.decimation {
+            return Ok(self.clone());
+        }
+        let mut narrow = self.decimated(n, surveys, options, torque_limits)?;
+        narrow.decimation_reason = format!(
+            "One row in {n}: the low-pass before it passes up to {:.3} Hz; beyond {band:.3} Hz more than half of the power of every joint's torque is nothing that the model explains.",
+            narrow.parallel_edge
+        );
+        Ok(narrow)
+    }
+
+    /// The same with one row in `decimation` kept.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn decimated(
+        &self,
+        decimation: usize,
+        surveys: &[Survey],
+        options: &PrepareOptions,
+        torque_limits: &[Option<f64>],
+    ) -> Result<Self, PrepareError> {
+        let fixed = PrepareOptions {
+            cutoff: Choice::Fixed(self.cutoff),
+            decimation: Choice::Fixed(decimation),
+            ..options.clone()
+        };
+        Ok(Self {
+            cutoff_reason: self.cutoff_reason.clone(),
+            trials: self.trials.clone(),
+            spectral_cutoff: self.spectral_cutoff,
+            ..Self::decide(surveys, &fixed, torque_limits)?
+        })
+    }
+
+    /// The same for recordings that fitted values are judged by.
+    pub fn judging(&self) -> Self {
+        Self {
+            speed_threshold: self.judged_speed.clone(),
+            ..self.clone()
+        }
+    }
+
+    /// s
+    pub fn dt(&self) -> f64 {
+        1.0 / self.sample_rate
+    }
+
+    /// Filter over the position.
+    pub fn position_filter(&self) -> Option<LowPass> {
+        LowPass::butterworth(self.order, self.cutoff, self.sample_rate)
+    }
+
+    /// Filter over torque and regressor.
+    pub fn parallel_low_pass(&self) -> Option<LowPass> {
+        if self.decimation > 1 {
+            LowPass::decimator(self.decimation, self.sample_rate)
+        } else {
+            self.position_filter()
+        }
+    }
+
+    /// Rows per second after decimation.
+    pub fn kept_rate(&self) -> f64 {
+        self.sample_rate / self.decimation as f64
+    }
+}
+
+/// Rows that must be left after decimation.
+const FEWEST_KEPT: u64 = 50;
+
+/// Spectrum of each joint. The longest recording speaks for it, for a joint the longest in which it moves.
+fn spectra_of(surveys: &[Survey], first: &Survey) -> Vec<PositionSpectrum> {
+    let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
+    (0..speaker.joints.len())
+        .map(|j| {
+            let moving = surveys.iter().filter(|s| !s.joints[j].still());
+            let own = moving.max_by_key(|s| s.rows).unwrap_or(speaker);
+            own.joints[j].spectrum.clone()
+        })
+        .collect()
+}
+
+/// Returns the highest decimation that leaves `kept` rows of the shortest stretch of `rows` rows once both its ends are trimmed.
+fn most_decimated(rows: u64, kept: u64, cutoff: f64, rate: f64) -> u64 {
+    let fits = |n: u64| kept * n + 2 * trimmed_rows(cutoff, n as usize, rate) as u64 <= rows;
+    let mut most = rows / kept;
+    while most > 1 && !fits(most) {
+        most -= 1;
+    }
+    most.max(1)
+}
+
+/// Every how many rows one is kept. Torque and regressor pass the same filter, so its band costs no bias; it drops noise.
+fn choose_decimation(motion: f64, cutoff: f64, rate: f64, most: u64) -> (usize, String) {
+    let band = (PARALLEL_HEADROOM * motion).min(cutoff);
+    let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
+    (
+        n,
+        format!(
+            "One row in {n}: the low-pass before it passes up to {:.3} Hz, at least ten times the highest frequency of the motion ({motion:.3} Hz) or all that the position filter leaves.",
+            if n > 1 {
+                decimator_edge(n, rate)
+            } else {
+                cutoff
+            }
+        ),
+    )
+}
+
+/// Per joint, the speed below which rows are masked, and why.
+fn choose_speeds(
+    surveys: &[Survey],
+    spectra: &[PositionSpectrum],
+    cutoff: f64,
+    choice: Choice<f64>,
+) -> (Vec<f64>, String) {
+    let (mut speeds, reason): (Vec<f64>, String) = match choice {
+        Choice::Fixed(speed) => (vec![speed; spectra.len()], format!("{}, as given.", format_short(speed))),
+        Choice::Auto => (
+            (spectra.iter())
+                .map(|s| (5.0 * s.velocity_noise(cutoff)).max(0.01 * s.velocity_rms()))
+                .collect(),
+            "Five standard deviations of the velocity's noise behind the filter, at least 1 % of its RMS: below it the sign of the velocity, and with it Coulomb friction, is not known.".into(),
+        ),
+    };
+    // At rest friction, or a brake, carries any part of the torque: no row of such a joint tells anything.
+    for (j, speed) in speeds.iter_mut().enumerate() {
+        if surveys.iter().all(|s| s.joints[j].still()) {
+            *speed = speed.max(STILL);
+        }
+    }
+    (speeds, reason)
+}
+
+/// Per joint, the torques beyond which rows count as saturated: the limit that is stated, or where a recording rests.
+fn saturation(surveys: &[Survey], limits: &[Option<f64>], joints: usize) -> Vec<[Option<f64>; 2]> {
+    let of = |j: usize| {
+        let limit = limits.get(j).copied().flatten();
+        let seen = |side: usize| surveys.iter().find_map(|s| s.joints[j].clipped[side]);
+        [
+            (limit.map(|l| -l).into_iter().chain(seen(0))).reduce(f64::max),
+            limit.into_iter().chain(seen(1)).reduce(f64::min),
+        ]
+    };
+    (0..joints).map(of).collect()
+}
+
+/// Refuses a recording without a stretch of `needed` rows.
+fn enough_rows(surveys: &[Survey], needed: u64) -> Result<(), PrepareError> {
+    let Some(survey) = surveys.iter().find(|s| s.longest < needed) else {
+        return Ok(());
+    };
+    let (label, rows, longest) = (survey.label.clone(), survey.rows, survey.longest);
+    Err(if longest < rows {
+        PrepareError::Broken {
+            label,
+            longest,
+            rows,
+            needed,
+        }
+    } else {
+        PrepareError::TooShort {
+            label,
+            rows,
+            needed,
+        }
+    })
+}
+
+/// The lowest frequency at which some joint's signal sinks into its noise, or less where that still leaves
+/// too much noise in the acceleration.
+fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f64, String) {
+    let crossing = spectra
+        .iter()
+        .map(|s| s.crossing)
+        .fold(f64::INFINITY, f64::min);
+    let clean = spectra
+        .iter()
+        .map(|s| s.clean)
+        .fold(f64::INFINITY, f64::min);
+    let most = HIGHEST * nyquist;
+    let least = (LEAST_HEADROOM * motion).min(most);
+    let wish = crossing.min(clean);
+    let cutoff = wish.clamp(least, most);
+    let reason = if wish < least {
+        format!(
+            "{cutoff:.3} Hz, five times the highest frequency of the motion ({motion:.3} Hz), although noise outweighs the signal from {crossing:.3} Hz on: a lower cut-off would bend the motion itself."
+        )
+    } else if wish > most {
+        format!(
+            "{cutoff:.3} Hz, 80 % of the Nyquist frequency: the position stands above its noise over the whole band."
+        )
+    } else if clean < crossing {
+        format!(
+            "{cutoff:.3} Hz: above it noise would be more than {:.1} % of the power of the acceleration; the position itself sinks into its noise at {crossing:.3} Hz.",
+            NOISE_SHARE * 100.0
+        )
+    } else {
+        format!("{cutoff:.3} Hz: there the spectrum of the position sinks into its noise floor.")
+    };
+    (cutoff, reason)
+}

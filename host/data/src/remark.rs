@@ -1,0 +1,123 @@
+//! How a file was read where it could be read in more than one way.
+
+/// What was assumed or passed over while a recording was read; one sentence each.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Remark {
+    /// A CSV file whose columns are not separated by commas.
+    #[error("columns are separated by {separator}; a comma in a number is a decimal comma")]
+    Separator {
+        /// Name of the separator.
+        separator: &'static str,
+    },
+    /// Quoted numbers with a decimal comma in a file that commas separate.
+    #[error("line {line}: a comma in a quoted number is a decimal comma")]
+    QuotedDecimalComma {
+        /// First line with one.
+        line: u64,
+    },
+    /// Lines before the header.
+    #[error(
+        "the header stands in line {}; what precedes it is empty or a comment and is passed over",
+        before + 1
+    )]
+    Preamble {
+        /// Line before the header.
+        before: u64,
+    },
+    /// The header stands behind the sign of a comment.
+    #[error("line {line} begins with `{sign}` and names the columns: it is read as the header")]
+    CommentedHeader {
+        /// Its line.
+        line: u64,
+        /// `#` or `%`.
+        sign: char,
+    },
+    /// An MCAP file without its end.
+    #[error(
+        "the file breaks off at byte {at}, as after a power loss or a recorder that was killed: {messages} messages are read, the last at t = {until} s; {lost}",
+        until = rig_output::format_time(*until)
+    )]
+    CutOff {
+        /// Byte behind the last whole record.
+        at: u64,
+        /// Messages that were read.
+        messages: u64,
+        /// Time of the last one, s.
+        until: f64,
+        /// What is lost.
+        lost: &'static str,
+    },
+    /// A ROS topic by another name than usual.
+    #[error("the joint states are read from topic {topic}")]
+    Topic {
+        /// The topic.
+        topic: String,
+    },
+    /// Time of ROS messages.
+    #[error("t is the header stamp of a message, counted from that of message 1 ({origin} s)")]
+    Stamp {
+        /// Stamp of the first message, seconds and nanoseconds.
+        origin: String,
+    },
+    /// ROS messages without a stamp.
+    #[error(
+        "the header stamp of message 1 is zero: t is the time at which the recorder logged a message, counted from message 1 ({origin} s)"
+    )]
+    LogTime {
+        /// Log time of the first message, seconds and nanoseconds.
+        origin: String,
+    },
+    /// Joint names with a prefix.
+    #[error("the joints of topic {topic} are those of the robot behind the prefix \"{prefix}\"")]
+    Prefix {
+        /// The topic.
+        topic: String,
+        /// What stands before the robot's names.
+        prefix: String,
+    },
+    /// Joints that the robot has not.
+    #[error("joints that the robot has not are passed over: {joints}")]
+    OtherJoints {
+        /// Their names, quoted.
+        joints: String,
+    },
+    /// Messages that hold no joint of the robot.
+    #[error(
+        "messages that hold no joint of the robot are passed over; the first is message {number} on {topic}, with {joints}"
+    )]
+    OtherMessages {
+        /// The topic.
+        topic: String,
+        /// The first such message.
+        number: u64,
+        /// Its joints, quoted.
+        joints: String,
+    },
+    /// Velocities that are not numbers.
+    #[error(
+        "the velocity of joint \"{joint}\" is NaN in the first message: the velocities are not read"
+    )]
+    NoVelocity {
+        /// The joint.
+        joint: String,
+    },
+}
+
+impl Remark {
+    /// Number of its kind, from 0.
+    pub(super) fn kind(&self) -> usize {
+        match self {
+            Self::CutOff { .. } => 0,
+            Self::OtherMessages { .. } => 1,
+            Self::OtherJoints { .. } => 2,
+            Self::NoVelocity { .. } => 3,
+            Self::Topic { .. } => 4,
+            Self::Stamp { .. } | Self::LogTime { .. } => 5,
+            Self::Prefix { .. } => 6,
+            Self::CommentedHeader { .. } => 7,
+            Self::Preamble { .. } => 8,
+            Self::Separator { .. } => 9,
+            Self::QuotedDecimalComma { .. } => 10,
+        }
+    }
+}

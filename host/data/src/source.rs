@@ -1,0 +1,674 @@
+//! A recording as a stream of blocks, as often as asked.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::bursts::bursts;
+use super::columns::{EffortNeed, Layout, Role, layout};
+use super::csv::CsvRows;
+use super::error::{DataError, Warning};
+use super::foreign::{ForeignFormat, HEAD};
+use super::mcap_records::MAGIC;
+use super::mcap_rows::McapRows;
+use super::motors::{MotorPass, MotorSide};
+use super::place::Place;
+use super::quantity::Quantity;
+use super::remark::Remark;
+use super::{Block, JointColumns};
+use rig_model::robot::Robot;
+use rig_output::format_trimmed;
+
+/// Rows that decide on the sample period.
+const PROBED_ROWS: usize = 1001;
+
+/// Spread of the intervals (5th to 95th percentile over the median) above which the recording counts
+/// as irregular. Clocked recordings stay below 0.03 (KUKA LWR over a network: 0.02), polled servos
+/// begin at 0.07.
+const IRREGULAR: f64 = 0.05;
+
+/// Intervals longer than this many periods are a gap: one sample is missing.
+const GAP: f64 = 1.5;
+
+/// The same for irregular recordings, whose intervals vary by nature.
+const IRREGULAR_GAP: f64 = 5.0;
+
+/// In a regular recording an interval that differs from the period by more than this share parts the rows before
+/// it from those after it: controllers whose loop settles over the first rows (3.6 instead of 2 ms), a row sent
+/// twice. Time stamps in single precision and clocks that jitter stay well below; a single stamp off the grid between
+/// rows that are on it (KUKA LWR over a network: 3.4 and 6.5 ms instead of 5 ms twice) parts nothing.
+const UNEVEN: f64 = 0.2;
+
+/// Warnings of a recording that are kept; more are only counted, so that memory does not grow.
+pub const KEPT_WARNINGS: usize = 1000;
+
+/// How a recording is sampled, judged by its first 1001 rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Median interval, s; 0 where there is a single row.
+    pub period: f64,
+    /// Whether the intervals vary so much (5th to 95th percentile more than 5 % of the median apart)
+    /// that the rows must not be taken as evenly spaced.
+    pub irregular: bool,
+}
+
+impl Sampling {
+    fn of(times: &[f64]) -> Self {
+        let mut intervals: Vec<f64> = times
+            .iter()
+            .zip(times.iter().skip(1))
+            .map(|(a, b)| b - a)
+            .collect();
+        intervals.sort_by(f64::total_cmp);
+        let Some(last) = intervals.len().checked_sub(1) else {
+            return Self {
+                period: 0.0,
+                irregular: false,
+            };
+        };
+        let at = |share: f64| intervals[(share * last as f64).round() as usize];
+        let period = at(0.5);
+        Self {
+            period,
+            irregular: at(0.95) - at(0.05) > IRREGULAR * period,
+        }
+    }
+
+    /// Longest interval that is not a gap, s.
+    pub fn longest_interval(&self) -> f64 {
+        self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
+    }
+
+    /// Whether rows so far apart in time belong to different blocks.
+    fn parts(&self, interval: f64) -> bool {
+        let uneven = !self.irregular && (interval - self.period).abs() > UNEVEN * self.period;
+        uneven || interval > self.longest_interval()
+    }
+
+    /// What is said of it.
+    fn parting(&self, place: Place, from: f64, now: f64) -> Warning {
+        if now - from > self.longest_interval() {
+            Warning::Gap {
+                place,
+                from,
+                lost: now - from - self.period,
+            }
+        } else {
+            Warning::Uneven {
+                place,
+                step: now - from,
+                period: self.period,
+            }
+        }
+    }
+}
+
+/// Columns of a file.
+#[derive(Debug, Default)]
+pub(super) struct Header {
+    /// Names by which the columns find their meaning.
+    pub names: Vec<String>,
+    /// What messages call them, one per name.
+    pub labels: Vec<String>,
+    /// Line on which they stand; none where the file has no lines.
+    pub line: Option<u64>,
+    /// Why there is no torque, where the file could have one.
+    pub without_effort: Option<String>,
+}
+
+impl Header {
+    /// Of columns that messages call by their names.
+    pub(super) fn of(names: Vec<String>) -> Self {
+        Self {
+            labels: names.clone(),
+            names,
+            ..Self::default()
+        }
+    }
+}
+
+/// A recording that was opened and whose header fits the robot.
+#[derive(Clone, Debug)]
+pub struct Source {
+    path: PathBuf,
+    /// Names of the robot's joints.
+    joints: Vec<String>,
+    pub(super) layout: Layout,
+    sampling: Sampling,
+    is_mcap: bool,
+    bytes: u64,
+}
+
+enum Rows {
+    Csv(Box<CsvRows>),
+    Mcap(Box<McapRows>),
+}
+
+impl Rows {
+    fn open(path: &Path, is_mcap: bool, joints: &[String]) -> Result<(Self, Header), DataError> {
+        if is_mcap {
+            McapRows::open(path, joints).map(|(r, h)| (Self::Mcap(Box::new(r)), h))
+        } else {
+            CsvRows::open(path).map(|(r, h)| (Self::Csv(Box::new(r)), h))
+        }
+    }
+
+    /// What was assumed and passed over so far.
+    fn remarks(&self) -> Vec<Remark> {
+        match self {
+            Self::Csv(r) => r.remarks().to_vec(),
+            Self::Mcap(r) => r.remarks(),
+        }
+    }
+
+    /// Time that grows from row to row.
+    fn check_growth(
+        &self,
+        path: &Path,
+        row: u64,
+        previous: Option<f64>,
+        now: f64,
+    ) -> Result<(), DataError> {
+        let (place, hint) = match self {
+            Self::Csv(_) => (Place::Line(row), ""),
+            Self::Mcap(r) => (Place::Message(row), r.order_hint()),
+        };
+        match previous {
+            Some(previous) if now <= previous => Err(DataError::TimeNotGrowing {
+                path: path.into(),
+                place,
+                previous,
+                now,
+                hint,
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    fn next_row(&mut self, layout: &Layout, values: &mut [f64]) -> Result<Option<u64>, DataError> {
+        match self {
+            Self::Csv(r) => r.next_row(layout, values),
+            Self::Mcap(r) => r.next_row(layout, values),
+        }
+    }
+
+    fn bytes_read(&self) -> u64 {
+        match self {
+            Self::Csv(r) => r.bytes_read(),
+            Self::Mcap(r) => r.bytes_read(),
+        }
+    }
+}
+
+impl Source {
+    /// Opens a recording (CSV or MCAP, told by its first bytes and not by its name) in which every joint has its torque.
+    ///
+    /// Reads the header and the first 1001 rows; what is wrong with them is said here, what is wrong
+    /// later by [`Blocks`].
+    pub fn open(path: &Path, robot: &Robot) -> Result<Self, DataError> {
+        Self::open_with(path, robot, EffortNeed::Required)
+    }
+
+    /// As [`Source::open`], saying whether the torque may be missing.
+    pub fn open_with(path: &Path, robot: &Robot, need: EffortNeed) -> Result<Self, DataError> {
+        let failed = |source| DataError::Read {
+            path: path.into(),
+            source,
+        };
+        let metadata = std::fs::metadata(path).map_err(failed)?;
+        if metadata.is_dir() {
+            return Err(DataError::Directory { path: path.into() });
+        }
+        // Opening a pipe that nobody writes to would wait for ever.
+        if !metadata.is_file() {
+            return Err(DataError::NotAFile { path: path.into() });
+        }
+        let mut start = Vec::new();
+        let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
+        head.read_to_end(&mut start).map_err(failed)?;
+        // By what it holds: endings are often wrong.
+        let is_mcap = start.starts_with(&MAGIC[..5]);
+        if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
+            return Err(DataError::Foreign {
+                path: path.into(),
+                format,
+            });
+        }
+        let joints: Vec<String> = robot.joints.iter().map(|j| j.name.clone()).collect();
+        let (mut rows, header) = Rows::open(path, is_mcap, &joints)?;
+        let mut layout = layout(path, &header, robot, need)?;
+        let mut values = vec![0.0; layout.columns.len()];
+        let mut times = Vec::new();
+        while times.len() < PROBED_ROWS
+            && let Some(line) = rows.next_row(&layout, &mut values)?
+        {
+            let now = values[layout.time];
+            rows.check_growth(path, line, times.last().copied(), now)?;
+            times.push(now);
+        }
+        if times.is_empty() {
+            return Err(DataError::NoRows { path: path.into() });
+        }
+        if let Some(found) = bursts(&times) {
+            return Err(DataError::Bursts {
+                path: path.into(),
+                rows: found.rows,
+                rate: format_trimmed(found.rate, 4),
+            });
+        }
+        let sampling = Sampling::of(&times);
+        // Where the file breaks off is said by the pass that comes to it.
+        let remarks = rows.remarks().into_iter();
+        let said = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
+        layout
+            .warnings
+            .extend(said.map(|remark| Warning::Reading { remark }));
+        Ok(Self {
+            path: path.into(),
+            joints,
+            layout,
+            sampling,
+            is_mcap,
+            bytes: metadata.len(),
+        })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Length of the file in bytes, for progress.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// How the recording is sampled.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Whether the joints have a torque: their own, or from the motors' currents or torques.
+    pub fn has_effort(&self) -> bool {
+        let effort = |role| matches!(role, Role::Effort(..) | Role::MotorEffort(..));
+        self.layout.columns.iter().any(|c| effort(c.role))
+    }
+
+    /// Whether the joints have a motor voltage: their own, or a duty cycle with its supply.
+    pub fn has_voltage(&self) -> bool {
+        let voltage = |role| matches!(role, Role::Voltage(_) | Role::Duty(..));
+        self.layout.columns.iter().any(|c| voltage(c.role))
+    }
+
+    /// Joints of the robot that the recording was opened for.
+    pub fn joint_count(&self) -> usize {
+        self.layout.joints
+    }
+
+    /// Names of the file's columns in their order.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.layout.columns.iter().map(|c| c.name.as_str())
+    }
+
+    /// What the file calls the column that a joint's values come from, without quotation marks around it: `i1` where the
+    /// torque of the first joint is turned from its current, `qm2` where its position is that of its motor,
+    /// `effort of joint "elbow"` in a ROS 2 recording, and `tau2 (from i1, i2)` where several columns make one. The name
+    /// of the contract (`tau1`) where the file has no such column.
+    ///
+    /// `joint` counts from 0. Messages name a column by this, so that it is found in the file.
+    pub fn column_name(&self, joint: usize, quantity: Quantity) -> String {
+        self.layout.column_name(joint, quantity)
+    }
+
+    /// The row with this number as its user finds it: line of a text file, message of an MCAP file.
+    pub fn place(&self, row: u64) -> Place {
+        if self.is_mcap {
+            Place::Message(row)
+        } else {
+            Place::Line(row)
+        }
+    }
+
+    /// What the header makes worth saying; [`Blocks::warnings`] adds what the rows do.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.layout.warnings
+    }
+
+    /// One pass over the recording in blocks of at most `rows_per_block` rows (at least 1); a block ends
+    /// early before a gap or an uneven step in time. After an error there are no further blocks.
+    pub fn blocks(&self, rows_per_block: usize) -> Blocks<'_> {
+        Blocks {
+            source: self,
+            rows_per_block: rows_per_block.max(1),
+            rows: None,
+            values: vec![0.0; self.layout.columns.len()],
+            pending: None,
+            previous: None,
+            ahead: None,
+            pardoned: false,
+            continues: false,
+            finished: false,
+            warnings: Vec::new(),
+            gaps: 0,
+            named_extras: vec![false; self.layout.columns.len()],
+            motors: self.layout.motors.as_ref().map(MotorSide::pass),
+        }
+    }
+
+    /// The whole recording, one block per evenly sampled stretch, and the warnings.
+    pub fn read_all(&self) -> Result<(Vec<Block>, Vec<Warning>), DataError> {
+        let mut blocks = self.blocks(usize::MAX);
+        let mut all = Vec::new();
+        for block in blocks.by_ref() {
+            all.push(block?);
+        }
+        let warnings = [self.warnings(), blocks.warnings()].concat();
+        Ok((all, warnings))
+    }
+}
+
+/// One pass over a recording; see [`Source::blocks`].
+pub struct Blocks<'a> {
+    source: &'a Source,
+    rows_per_block: usize,
+    rows: Option<Rows>,
+    values: Vec<f64>,
+    /// Line of the row in `values` that is not in a block yet.
+    pending: Option<u64>,
+    previous: Option<f64>,
+    /// A row that was read to judge the one before it.
+    ahead: Option<(u64, Vec<f64>)>,
+    /// Whether the interval to come makes up for a misplaced time stamp.
+    pardoned: bool,
+    continues: bool,
+    finished: bool,
+    warnings: Vec<Warning>,
+    gaps: u64,
+    named_extras: Vec<bool>,
+    motors: Option<MotorPass>,
+}
+
+impl Blocks<'_> {
+    /// What the rows read so far make worth saying; at most 1000 are kept.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Gaps and uneven steps in time so far.
+    pub fn gaps(&self) -> u64 {
+        self.gaps
+    }
+
+    /// Bytes read so far, for progress.
+    pub fn bytes_read(&self) -> u64 {
+        self.rows.as_ref().map_or(0, Rows::bytes_read)
+    }
+
+    fn warn(&mut self, warning: Warning) {
+        if self.warnings.len() < KEPT_WARNINGS {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Warns of what the whole file made worth saying beyond its beginning.
+    fn hear_the_rows(&mut self) {
+        let remarks = self.rows.as_ref().map(Rows::remarks).unwrap_or_default();
+        for remark in remarks {
+            let warning = Warning::Reading { remark };
+            if !self.source.warnings().contains(&warning) {
+                self.warn(warning);
+            }
+        }
+    }
+
+    fn empty_block(&self, first_line: u64) -> Block {
+        let layout = &self.source.layout;
+        let room = self.rows_per_block.min(1 << 16);
+        let column = || Vec::with_capacity(room);
+        let mut block = Block {
+            t: column(),
+            joints: vec![JointColumns::default(); layout.joints],
+            extra: Vec::with_capacity(layout.extras),
+            first_line,
+            continues: self.continues,
+        };
+        for c in &layout.columns {
+            if c.extra.is_some() {
+                block.extra.push((c.name.clone(), column()));
+            }
+            let Some(joint) = joint_of(c.role).and_then(|k| block.joints.get_mut(k)) else {
+                continue;
+            };
+            match c.role {
+                Role::Position(_) | Role::MotorPosition(_) => joint.q = column(),
+                Role::Effort(..) => joint.tau = column(),
+                Role::Velocity(_) => joint.qd = Some(column()),
+                Role::Acceleration(_) => joint.qdd = Some(column()),
+                Role::Reference(_) => joint.reference = Some(column()),
+                Role::Voltage(_) | Role::Duty(..) => joint.voltage = Some(column()),
+                Role::Temperature(_) => joint.temperature = Some(column()),
+                Role::LinkPosition(_) => joint.link = Some(column()),
+                Role::Time | Role::None | Role::MotorEffort(..) => {}
+            }
+        }
+        if let Some(motors) = &layout.motors {
+            for (joint, turned) in block.joints.iter_mut().zip(&motors.torques) {
+                if *turned {
+                    joint.tau = column();
+                }
+            }
+        }
+        block
+    }
+
+    fn push_row(&mut self, block: &mut Block, line: u64) -> Result<(), DataError> {
+        let source = self.source;
+        let layout = &source.layout;
+        for (i, (c, &value)) in layout.columns.iter().zip(&self.values).enumerate() {
+            if let Some((_, column)) = c.extra.and_then(|e| block.extra.get_mut(e)) {
+                column.push(value);
+                if value.is_nan() && !self.named_extras[i] {
+                    self.named_extras[i] = true;
+                    // At most one per column: no cap needed.
+                    self.warnings.push(Warning::ExtraNotANumber {
+                        place: source.place(line),
+                        column: c.name.clone(),
+                    });
+                }
+            }
+            if c.role == Role::Time {
+                block.t.push(value);
+            }
+            let Some(joint) = joint_of(c.role).and_then(|k| block.joints.get_mut(k)) else {
+                continue;
+            };
+            let (column, value) = match c.role {
+                Role::Position(_) => (Some(&mut joint.q), value),
+                Role::Effort(_, factor) => (Some(&mut joint.tau), value * factor),
+                Role::Velocity(_) => (joint.qd.as_mut(), value),
+                Role::Acceleration(_) => (joint.qdd.as_mut(), value),
+                Role::Reference(_) => (joint.reference.as_mut(), value),
+                Role::Voltage(_) => (joint.voltage.as_mut(), value),
+                Role::Duty(_, supply, scale) => {
+                    let share = signed_register(value) * scale;
+                    (joint.voltage.as_mut(), share * self.values[supply])
+                }
+                Role::Temperature(_) => (joint.temperature.as_mut(), value),
+                Role::LinkPosition(_) => (joint.link.as_mut(), value),
+                Role::MotorPosition(k) => {
+                    set(self.motors.as_mut().map(|m| &mut m.psi), k, value);
+                    (None, value)
+                }
+                Role::MotorEffort(k, factor) => {
+                    let torque = value * factor;
+                    set(self.motors.as_mut().map(|m| &mut m.tau_motor), k, torque);
+                    (None, value)
+                }
+                Role::Time | Role::None => (None, value),
+            };
+            if let (Role::Position(k), Some(motors)) = (c.role, self.motors.as_mut()) {
+                set(Some(&mut motors.q), k, value);
+            }
+            if let Some(column) = column {
+                column.push(value);
+            }
+        }
+        let (Some(side), Some(motors)) = (&layout.motors, self.motors.as_mut()) else {
+            return Ok(());
+        };
+        motors.turn(side).map_err(|error| DataError::Motors {
+            path: source.path.clone(),
+            place: source.place(line),
+            message: error.to_string(),
+        })?;
+        for (k, joint) in block.joints.iter_mut().enumerate() {
+            if side.positions {
+                joint.q.push(motors.q[k]);
+            }
+            if side.torques[k] {
+                joint.tau.push(motors.tau[k]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The next row into `values`; its line.
+    fn fetch(&mut self) -> Result<Option<u64>, DataError> {
+        if let Some((line, values)) = self.ahead.take() {
+            self.values = values;
+            return Ok(Some(line));
+        }
+        match self.rows.as_mut() {
+            Some(rows) => rows.next_row(&self.source.layout, &mut self.values),
+            None => Ok(None),
+        }
+    }
+
+    /// Whether only the time stamp of the row just read lies off the even grid: the next row is back on it. A clock
+    /// that is read late now and then does that; no row is missing or doubled.
+    fn misplaced(&mut self, line: u64, from: f64, now: f64) -> Result<bool, DataError> {
+        let sampling = self.source.sampling;
+        if sampling.irregular {
+            return Ok(false);
+        }
+        let mut values = vec![0.0; self.values.len()];
+        let Some(rows) = self.rows.as_mut() else {
+            return Ok(false);
+        };
+        let Some(next) = rows.next_row(&self.source.layout, &mut values)? else {
+            return Ok(false);
+        };
+        let then = values[self.source.layout.time];
+        self.ahead = Some((next, values));
+        self.pardoned = (then - from - 2.0 * sampling.period).abs() <= UNEVEN * sampling.period;
+        if self.pardoned {
+            self.warn(Warning::Misplaced {
+                place: self.source.place(line),
+                off: now - from - sampling.period,
+            });
+        }
+        Ok(self.pardoned)
+    }
+
+    fn next_block(&mut self) -> Result<Option<Block>, DataError> {
+        let source = self.source;
+        if self.rows.is_none() {
+            self.rows = Some(Rows::open(&source.path, source.is_mcap, &source.joints)?.0);
+        }
+        let mut block: Option<Block> = None;
+        loop {
+            if block
+                .as_ref()
+                .is_some_and(|b| b.len() >= self.rows_per_block)
+            {
+                self.continues = true;
+                return Ok(block);
+            }
+            let line = match self.pending.take() {
+                Some(line) => line,
+                None => {
+                    let Some(line) = self.fetch()? else {
+                        self.finished = true;
+                        self.hear_the_rows();
+                        return Ok(block);
+                    };
+                    let now = self.values[source.layout.time];
+                    if let Some(rows) = &self.rows {
+                        rows.check_growth(&source.path, line, self.previous, now)?;
+                    }
+                    let before = self.previous.replace(now);
+                    let pardoned = std::mem::take(&mut self.pardoned);
+                    if let Some(from) = before
+                        && !pardoned
+                        && source.sampling.parts(now - from)
+                        && !self.misplaced(line, from, now)?
+                    {
+                        self.gaps += 1;
+                        self.warn(source.sampling.parting(source.place(line), from, now));
+                        self.continues = false;
+                        if block.is_some() {
+                            self.pending = Some(line);
+                            return Ok(block);
+                        }
+                    }
+                    line
+                }
+            };
+            let mut current = match block.take() {
+                Some(current) => current,
+                None => self.empty_block(line),
+            };
+            self.push_row(&mut current, line)?;
+            block = Some(current);
+        }
+    }
+}
+
+/// The joint that a role belongs to.
+fn joint_of(role: Role) -> Option<usize> {
+    match role {
+        Role::Time | Role::None => None,
+        Role::Position(k)
+        | Role::Effort(k, _)
+        | Role::Velocity(k)
+        | Role::Acceleration(k)
+        | Role::Reference(k)
+        | Role::Voltage(k)
+        | Role::Duty(k, ..)
+        | Role::MotorPosition(k)
+        | Role::MotorEffort(k, _)
+        | Role::Temperature(k)
+        | Role::LinkPosition(k) => Some(k),
+    }
+}
+
+/// Duty cycles are read from registers of 16 bits: what lies in the upper half of one is negative (two's complement), as
+/// no duty cycle is so large.
+fn signed_register(value: f64) -> f64 {
+    if value > f64::from(i16::MAX) && value <= f64::from(u16::MAX) {
+        value - 65_536.0
+    } else {
+        value
+    }
+}
+
+fn set(list: Option<&mut Vec<f64>>, k: usize, value: f64) {
+    if let Some(entry) = list.and_then(|l| l.get_mut(k)) {
+        *entry = value;
+    }
+}
+
+impl Iterator for Blocks<'_> {
+    type Item = Result<Block, DataError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.finished {
+            return None;
+        }
+        let block = self.next_block().transpose();
+        if !matches!(block, Some(Ok(_))) {
+            self.finished = true;
+        }
+        block
+    }
+}

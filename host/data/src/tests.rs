@@ -1,0 +1,737 @@
+//! Reading, writing and what is said about wrong recordings.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::*;
+use rig_model::robot::{EMPS, JointKind, JointLimits, ONE_LINK_TEMPLATE, Robot};
+
+fn rig() -> Robot {
+    Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
+}
+
+/// A robot of `n` joints without drives and limits.
+fn arm(n: usize) -> Robot {
+    let mut robot = rig();
+    let mut joint = robot.joints.remove(0);
+    (joint.drive, joint.limits, joint.friction, joint.inertial) = (None, None, None, None);
+    for k in 1..=n {
+        joint.name = format!("joint {k}");
+        robot.joints.push(joint.clone());
+    }
+    robot
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+    fn file(&self, text: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path("a.csv");
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+}
+
+fn read(path: &Path, robot: &Robot) -> Result<(Vec<Block>, Vec<Warning>), DataError> {
+    Source::open(path, robot)?.read_all()
+}
+
+#[test]
+fn columns_find_their_joints_and_units() {
+    let folder = Folder::new();
+    let path = folder.file(
+        "\u{feff}t, q1,i1 ,duty1,supply,temp1,note,pulses\r\n0,0.5,2,0.5,12,30,run,1\r\n0.001,0.25,-4,-1,12,31,,2\r\n\r\n",
+    );
+    let source = Source::open(&path, &rig()).unwrap();
+    let (blocks, warnings) = source.read_all().unwrap();
+    let [block] = blocks.as_slice() else {
+        panic!("one block expected")
+    };
+    let joint = &block.joints[0];
+    // 50 motor turns per joint turn at 0.05 N·m/A.
+    assert_eq!(
+        (&joint.q, &joint.tau),
+        (&vec![0.5, 0.25], &vec![5.0, -10.0])
+    );
+    assert_eq!(
+        (&joint.voltage, &joint.temperature),
+        (&Some(vec![6.0, -12.0]), &Some(vec![30.0, 31.0]))
+    );
+    assert_eq!((block.first_line, block.continues), (2, false));
+    let names: Vec<&str> = block.extra.iter().map(|(n, _)| n.as_str()).collect();
+    assert_eq!(names, ["duty1", "supply", "note", "pulses"]);
+    assert!(block.extra[2].1.iter().all(|v| v.is_nan()));
+    assert_eq!(
+        warnings,
+        [Warning::ExtraNotANumber {
+            place: Place::Line(2),
+            column: "note".into()
+        }]
+    );
+}
+
+#[test]
+fn an_encoder_on_the_link_has_a_column_of_its_own() {
+    let folder = Folder::new();
+    let path = folder.file("t,q1,ql1,tau1\n0,0.5,-0.25,1\n0.001,0.25,-0.5,2\n");
+    let (blocks, warnings) = read(&path, &rig()).unwrap();
+    let joint = &blocks[0].joints[0];
+    assert_eq!(joint.q, [0.5, 0.25]);
+    assert_eq!(joint.link.as_deref(), Some([-0.25, -0.5].as_slice()));
+    assert!(blocks[0].extra.is_empty() && warnings.is_empty());
+
+    for (text, words) in [
+        ("t,q1,ql1,tau1\n0,0,0,0\n0.1,0,nan,0\n", "a.csv:3:"),
+        ("t,q1,ql1,tau1\n0,0,0,0\n0.1,0,far,0\n", "`ql1`"),
+        (
+            "t,q1,ql2,tau1\n0,0,0,0\n0.1,0,0,0\n",
+            "`ql2` belongs to joint 2",
+        ),
+    ] {
+        let error = read(&folder.file(text), &rig()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn a_joint_without_columns_beside_others_may_be_one_that_never_moves() {
+    let folder = Folder::new();
+    let path = folder.file("t,q1,tau1\n0,0.5,1\n0.001,0.25,2\n");
+    let mut robot = rig();
+    let mut finger = robot.joints[0].clone();
+    finger.name = "finger".into();
+    robot.joints.push(finger);
+    let said = read(&path, &robot).unwrap_err().to_string();
+    assert!(
+        said.contains("no column `q2` (position of joint `finger`")
+            && said
+                .contains("where joint `finger` never moves, make it type=\"fixed\" in the URDF"),
+        "{said}"
+    );
+}
+
+#[test]
+fn wrong_recordings_are_named_by_line_and_column() {
+    let folder = Folder::new();
+    let rows = "0,0,0\n0.1,0,0\n";
+    let cases: Vec<(String, &str, &[&str])> = vec![
+        (String::new(), "a.csv", &["is empty"]),
+        ("\n\n".into(), "a.csv", &["is empty"]),
+        ("t,q1,tau1\n".into(), "a.csv", &["no rows"]),
+        (
+            format!("time,q1,tau1\n{rows}"),
+            "a.csv:1:",
+            &["no column `t`", "`time`"],
+        ),
+        (
+            format!("t;q1;tau1\n{rows}"),
+            "a.csv:2:",
+            &["1 fields", "separated by `;`"],
+        ),
+        (rows.into(), "a.csv:1:", &["no column `t`"]),
+        (
+            format!("t,q2,tau1\n{rows}"),
+            "a.csv:1:",
+            &["`q2` belongs to joint 2", "1 only"],
+        ),
+        (
+            format!("t,q0,tau1\n{rows}"),
+            "a.csv:1:",
+            &["`q0` belongs to joint 0"],
+        ),
+        (
+            format!("t,p1,tau1\n{rows}"),
+            "a.csv:1:",
+            &["no column `q1`", "`link`"],
+        ),
+        (
+            format!("t,q1,u1\n{rows}"),
+            "a.csv:1:",
+            &["neither `tau1`", "nor `i1`"],
+        ),
+        (
+            format!("t,q1,q1\n{rows}"),
+            "a.csv:1:",
+            &["`q1` is there twice"],
+        ),
+        (
+            format!("t,q1,\n{rows}"),
+            "a.csv:1:",
+            &["column 3 has no name"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,nan,0\n".into(),
+            "a.csv:3:",
+            &["column `q1` holds \"nan\""],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0,inf\n".into(),
+            "a.csv:3:",
+            &["column `tau1` holds \"inf\""],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0,abc\n".into(),
+            "a.csv:3:",
+            &["column `tau1` holds \"abc\""],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,,0\n".into(),
+            "a.csv:3:",
+            &["column `q1` holds nothing"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0\n".into(),
+            "a.csv:3:",
+            &["2 fields", "3 columns", "`tau1`"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0,0,0\n".into(),
+            "a.csv:3:",
+            &["4 fields", "3 columns"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n\n0.1,0,0\n".into(),
+            "a.csv:3:",
+            &["0 fields"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0,0\n0.05,0,0\n".into(),
+            "a.csv:4:",
+            &["jumps back from 0.1 to 0.05 s"],
+        ),
+        (
+            "t,q1,tau1\n0,0,0\n0.1,0,0\n0.1,0,0\n".into(),
+            "a.csv:4:",
+            &["stands still"],
+        ),
+    ];
+    for (text, place, parts) in cases {
+        let said = read(&folder.file(&text), &rig()).unwrap_err().to_string();
+        assert!(
+            said.contains(place) && !said.contains('\n'),
+            "{text}: {said}"
+        );
+        for part in parts {
+            assert!(said.contains(part), "{text}: {said}");
+        }
+    }
+    let said = read(&folder.file(format!("t,q1,i1\n{rows}")), &arm(1))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("`i1` is a motor current") && said.contains("no [joint.drive]"),
+        "{said}"
+    );
+    assert!(matches!(
+        read(folder.0.path(), &rig()),
+        Err(DataError::Directory { .. })
+    ));
+    #[cfg(unix)]
+    assert!(matches!(
+        read(Path::new("/dev/null"), &rig()),
+        Err(DataError::NotAFile { .. })
+    ));
+    assert!(matches!(
+        read(&folder.path("none.csv"), &rig()),
+        Err(DataError::Read { .. })
+    ));
+    assert!(matches!(
+        read(&folder.file(b"\x7fELF\x02\x00\x00\n\x00"), &rig()),
+        Err(DataError::NotText { line: 1, .. })
+    ));
+}
+
+#[test]
+fn files_without_line_ends_are_refused_unread() {
+    let folder = Folder::new();
+    let zeros = folder.path("zeros.csv");
+    std::fs::File::create(&zeros)
+        .unwrap()
+        .set_len(2 << 30)
+        .unwrap();
+    assert!(matches!(
+        Source::open(&zeros, &rig()),
+        Err(DataError::NotText { line: 1, .. })
+    ));
+    let long = folder.file([b"t,q1,tau1\n".to_vec(), vec![b'1'; 3 << 20]].concat());
+    assert!(matches!(
+        Source::open(&long, &rig()),
+        Err(DataError::LineTooLong { line: 2, .. })
+    ));
+}
+
+/// 1 kHz rows; `missing` are left out.
+fn sweep(rows: usize, missing: &[usize]) -> String {
+    let mut text = String::from("t,q1,tau1,qd1,mark\n");
+    for i in (0..rows).filter(|i| !missing.contains(i)) {
+        let t = i as f64 * 1e-3;
+        text += &format!("{t},{},{},{},{i}\n", t.sin(), 3.0 * t.cos(), t.cos());
+    }
+    text
+}
+
+#[test]
+fn blocks_of_any_size_hold_the_same_rows_and_gaps() {
+    let folder = Folder::new();
+    let path = folder.file(sweep(3000, &[1500, 1501, 1502, 2000]));
+    let source = Source::open(&path, &rig()).unwrap();
+    assert!(!source.sampling().irregular);
+    assert!((source.sampling().period - 1e-3).abs() < 1e-12);
+    let (whole, warnings) = source.read_all().unwrap();
+    assert_eq!(
+        whole.iter().map(Block::len).collect::<Vec<_>>(),
+        [1500, 497, 999]
+    );
+    let lost: Vec<(u64, f64)> = warnings
+        .iter()
+        .map(|w| match w {
+            Warning::Gap {
+                place: Place::Line(line),
+                lost,
+                ..
+            } => (*line, (lost * 1e6).round() / 1e6),
+            other => panic!("{other}"),
+        })
+        .collect();
+    assert_eq!(lost, [(1502, 0.003), (1999, 0.001)]);
+    for size in [1, 7, 500, 1500, 2996] {
+        let mut blocks = source.blocks(size);
+        let mut joined: Vec<Block> = Vec::new();
+        for block in blocks.by_ref() {
+            let block = block.unwrap();
+            assert!(!block.is_empty() && block.len() <= size);
+            match joined.last_mut() {
+                Some(last) if block.continues => {
+                    last.t.extend(&block.t);
+                    last.joints[0].q.extend(&block.joints[0].q);
+                    last.joints[0].tau.extend(&block.joints[0].tau);
+                    last.joints[0]
+                        .qd
+                        .as_mut()
+                        .unwrap()
+                        .extend(block.joints[0].qd.as_ref().unwrap());
+                    last.extra[0].1.extend(&block.extra[0].1);
+                }
+                _ => joined.push(block),
+            }
+        }
+        assert_eq!(blocks.gaps(), 2);
+        assert_eq!(blocks.bytes_read(), source.bytes());
+        assert!(joined == whole, "blocks of {size}");
+    }
+}
+
+#[test]
+fn irregular_recordings_are_flagged_not_split() {
+    let folder = Folder::new();
+    let mut text = String::from("t,q1,tau1\n");
+    let mut t = 0.0;
+    for i in 0..500 {
+        text += &format!("{t},0,0\n");
+        t += if i % 3 == 0 { 0.006 } else { 0.0035 };
+    }
+    let source = Source::open(&folder.file(text), &rig()).unwrap();
+    assert!(source.sampling().irregular);
+    let (blocks, warnings) = source.read_all().unwrap();
+    assert_eq!((blocks.len(), warnings.len()), (1, 0));
+}
+
+fn columns() -> Vec<Column> {
+    [
+        ("t", "s"),
+        ("q1", "rad"),
+        ("tau1", "N*m"),
+        ("odd \u{e9}", "1"),
+    ]
+    .map(|(n, u)| Column::new(n, u))
+    .to_vec()
+}
+
+fn write(path: &Path, rows: &[[f64; 4]]) {
+    let metadata = BTreeMap::from([("robot".to_owned(), "one-link rig".to_owned())]);
+    let mut writer = RecordingWriter::create(path, &columns(), &metadata).unwrap();
+    for row in rows {
+        writer.push_row(row).unwrap();
+    }
+    assert!(
+        !path.exists(),
+        "the file must not be there before it is complete"
+    );
+    writer.finish().unwrap();
+}
+
+fn awkward_rows() -> Vec<[f64; 4]> {
+    let mut rows = Vec::new();
+    for i in 0..20_000_u32 {
+        let t = f64::from(i) * 1e-3;
+        rows.push([
+            t,
+            (t * 1.7).sin() / 3.0,
+            1e-310 * t + (t * 0.3).exp() * 1e9,
+            -t.powi(7),
+        ]);
+    }
+    rows
+}
+
+#[test]
+fn csv_and_mcap_read_back_bit_for_bit_and_are_deterministic() {
+    let folder = Folder::new();
+    let rows = awkward_rows();
+    for ending in ["csv", "mcap"] {
+        let (first, second) = (
+            folder.path(&format!("1.{ending}")),
+            folder.path(&format!("2.{ending}")),
+        );
+        write(&first, &rows);
+        write(&second, &rows);
+        assert!(std::fs::read(&first).unwrap() == std::fs::read(&second).unwrap());
+        let (blocks, warnings) = read(&first, &rig()).unwrap();
+        assert_eq!((blocks.len(), warnings.len()), (1, 0));
+        let block = &blocks[0];
+        for (i, row) in rows.iter().enumerate() {
+            let back = [
+                block.t[i],
+                block.joints[0].q[i],
+                block.joints[0].tau[i],
+                block.extra[0].1[i],
+            ];
+            assert_eq!(
+                back.map(f64::to_bits),
+                row.map(f64::to_bits),
+                "{ending} row {i}"
+            );
+        }
+    }
+    // Nothing else was left in the folder.
+    assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn mcap_files_carry_what_other_players_look_for() {
+    let folder = Folder::new();
+    let path = folder.path("a.mcap");
+    write(&path, &awkward_rows()[..100]);
+    let bytes = std::fs::read(&path).unwrap();
+    let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    let statistics = summary.stats.unwrap();
+    assert_eq!(
+        (statistics.message_count, statistics.channel_count),
+        (100, 1)
+    );
+    assert_eq!(
+        (statistics.message_start_time, statistics.message_end_time),
+        (0, 99_000_000)
+    );
+    let channel = summary.channels.values().next().unwrap();
+    assert_eq!(
+        (channel.topic.as_str(), channel.message_encoding.as_str()),
+        ("/joint/state", "json")
+    );
+    let schema = channel.schema.as_ref().unwrap();
+    assert_eq!(schema.encoding, "jsonschema");
+    let schema: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+    assert_eq!(schema["properties"]["tau1"]["description"], "N*m");
+    for message in ::mcap::MessageStream::new(&bytes).unwrap() {
+        let sample: serde_json::Value = serde_json::from_slice(&message.unwrap().data).unwrap();
+        assert!(sample["q1"].is_number());
+    }
+}
+
+#[test]
+fn damaged_mcap_gets_a_sentence() {
+    let folder = Folder::new();
+    let path = folder.path("a.mcap");
+    write(&path, &awkward_rows()[..2000]);
+    let good = std::fs::read(&path).unwrap();
+    let whole = read(&path, &rig()).unwrap().0;
+    let said_of = |bytes: &[u8]| {
+        let damaged = folder.path("b.mcap");
+        std::fs::write(&damaged, bytes).unwrap();
+        read(&damaged, &rig())
+    };
+    for cut in [6, 9, 100, 300] {
+        let said = said_of(&good[..cut]).unwrap_err().to_string();
+        assert!(
+            said.contains("b.mcap") && !said.contains('\n'),
+            "{cut}: {said}"
+        );
+    }
+    // What was written before the break is read, and the break is told.
+    let all = &whole[0];
+    for cut in [good.len() / 3, good.len() / 2, good.len() - 1] {
+        let (blocks, warnings) = said_of(&good[..cut]).unwrap();
+        let block = &blocks[0];
+        let rows = block.len();
+        assert!(blocks.len() == 1 && rows > 100);
+        assert_eq!(block.joints[0].q, all.joints[0].q[..rows]);
+        let told = |w: &Warning| matches!(w, Warning::Reading { remark: Remark::CutOff { messages, until, .. } } if *messages == rows as u64 && *until == block.t[rows - 1]);
+        assert!(warnings.iter().any(told), "{cut}: {warnings:?}");
+    }
+    for at in (8..good.len()).step_by(good.len() / 150) {
+        let mut bytes = good.clone();
+        bytes[at] ^= 0x20;
+        match said_of(&bytes) {
+            Err(e) => assert!(!e.to_string().contains('\n'), "{e}"),
+            // Indices, padding and metadata are not data: then every sample must be right.
+            Ok((blocks, _)) => assert!(
+                blocks == whole,
+                "a flipped bit at byte {at} changed the data unseen"
+            ),
+        }
+    }
+}
+
+#[test]
+fn writers_refuse_what_readers_would() {
+    let folder = Folder::new();
+    let none = BTreeMap::new();
+    let create = |name: &str, columns: &[Column]| {
+        RecordingWriter::create(&folder.path(name), columns, &none)
+    };
+    assert!(matches!(
+        create("a.xlsx", &columns()),
+        Err(DataError::UnknownFormat { .. })
+    ));
+    assert!(matches!(
+        create("a.csv", &columns()[1..]),
+        Err(DataError::Header { .. })
+    ));
+    assert!(matches!(
+        create("none/a.csv", &columns()),
+        Err(DataError::Write { .. })
+    ));
+    for name in ["a.csv", "a.mcap"] {
+        let mut writer = create(name, &columns()).unwrap();
+        let said = writer
+            .push_row(&[0.0, 1.0, f64::NAN, 0.0])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.contains("row 1") && said.contains("`tau1` is NaN"),
+            "{said}"
+        );
+        assert!(writer.push_row(&[0.0, 1.0]).is_err());
+        drop(writer);
+    }
+    assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn wrong_units_are_named_and_right_ones_are_not() {
+    let folder = Folder::new();
+    let block = read(&folder.file(sweep(3000, &[])), &rig())
+        .unwrap()
+        .0
+        .remove(0);
+    assert_eq!(plausibility(&block, &rig()), []);
+    let scaled = |change: &dyn Fn(&mut Block)| {
+        let mut b = block.clone();
+        change(&mut b);
+        plausibility(&b, &rig())
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(" | ")
+    };
+    let all = |v: &mut Vec<f64>, f: f64| v.iter_mut().for_each(|x| *x *= f);
+    assert!(
+        scaled(&|b| all(&mut b.joints[0].q, 57.296))
+            .contains("q1 looks like degrees (range 0.0000 to 57")
+    );
+    assert!(scaled(&|b| all(&mut b.joints[0].q, 1000.0)).contains("far outside"));
+    assert!(
+        scaled(&|b| all(b.joints[0].qd.as_mut().unwrap(), 57.296))
+            .contains("do not belong together")
+    );
+    assert!(scaled(&|b| all(&mut b.joints[0].tau, 1000.0)).contains("tau1 looks too large"));
+    assert!(scaled(&|b| all(&mut b.joints[0].tau, 1e-3)).contains("tau1 looks too small"));
+    let referred = |factor: f64| {
+        let mut b = block.clone();
+        let reference = b.joints[0].q.iter().map(|q| factor * q).collect();
+        b.joints[0].reference = Some(reference);
+        assert_eq!(plausibility(&b, &rig()), []);
+        let found = strange_references(&b, &rig());
+        found.first().map_or(String::new(), ToString::to_string)
+    };
+    assert_eq!(referred(1.1), "");
+    assert!(
+        referred(57.296).contains(
+            "ref1 does not belong to q1: it moves 57.2960 times as far, as degrees would"
+        )
+    );
+    assert!(referred(-1.0).contains("it moves -1.0000 times as far, the other way"));
+    // A limit that stands for none is no measure of the torque.
+    let mut open = rig();
+    open.joints[0].friction = None;
+    open.joints[0].inertial = None;
+    for (limit, found) in [(900.0, 1), (1e3, 0), (1e4, 0), (99999.0, 0), (3e6, 0)] {
+        open.joints[0].limits.as_mut().unwrap().torque = Some(limit);
+        let mut b = block.clone();
+        let peak = b.joints[0].tau.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        all(&mut b.joints[0].tau, 0.1 / peak);
+        assert_eq!(plausibility(&b, &open).len(), found, "{limit}");
+        // Nor is any limit where the link is described: what that says of the torque is for the comparison of models.
+        let mut described = open.clone();
+        described.joints[0].inertial = rig().joints[0].inertial.clone();
+        assert_eq!(plausibility(&b, &described), [], "{limit}");
+    }
+    for (factor, unit) in [
+        (1e3, "milliseconds"),
+        (1e6, "microseconds"),
+        (1e9, "nanoseconds"),
+    ] {
+        let said = scaled(&|b| all(&mut b.t, factor));
+        assert!(said.contains(&format!("t looks like {unit}")), "{said}");
+    }
+    assert!(scaled(&|b| all(&mut b.t, 1e-3)).contains("more than ten times its limit"));
+}
+
+fn real(folder: &Path, robot: &Robot, need: EffortNeed, rows: usize, irregular: Option<bool>) {
+    let source = Source::open_with(folder, robot, need).unwrap();
+    if let Some(irregular) = irregular {
+        assert_eq!(
+            source.sampling().irregular,
+            irregular,
+            "{}",
+            folder.display()
+        );
+    }
+    let (blocks, warnings) = source.read_all().unwrap();
+    assert_eq!(
+        blocks.iter().map(Block::len).sum::<usize>(),
+        rows,
+        "{}",
+        folder.display()
+    );
+    println!(
+        "{}: {:?}, {} blocks, {warnings:?}",
+        folder.display(),
+        source.sampling(),
+        blocks.len()
+    );
+    for block in &blocks {
+        assert_eq!(plausibility(block, robot), [], "{}", folder.display());
+    }
+}
+
+#[test]
+fn real_recordings_are_accepted_without_false_alarm() {
+    let Some(data) = rig_output::data_dir() else {
+        println!("no real recordings here (set RIG_DATA): nothing read");
+        return;
+    };
+    let emps = Robot::from_toml(EMPS, Path::new("emps.toml")).unwrap();
+    assert_eq!(emps.joints[0].kind, JointKind::Prismatic);
+    for file in ["emps/train.csv", "emps/test_pulses.csv"] {
+        real(
+            &data.join(file),
+            &emps,
+            EffortNeed::Required,
+            24841,
+            Some(false),
+        );
+    }
+    // Millimetres and millinewtons do raise it.
+    for factor in [1000.0, 1e-3] {
+        let mut block = read(&data.join("emps/train.csv"), &emps)
+            .unwrap()
+            .0
+            .remove(0);
+        block.joints[0].tau.iter_mut().for_each(|v| *v *= factor);
+        assert_eq!(plausibility(&block, &emps).len(), 1);
+    }
+    let kuka = Robot::load(&data.join("kuka_lwr4/kuka_lwr4.urdf")).unwrap();
+    for run in 1..=3 {
+        real(
+            &data.join(format!("kuka_lwr4/run{run}.csv")),
+            &kuka,
+            EffortNeed::Required,
+            5027,
+            Some(false),
+        );
+    }
+    for (file, rows) in [("train", 2996), ("test", 2997)] {
+        real(
+            &data.join(format!("dfki_double_pendulum/{file}.csv")),
+            &arm(2),
+            EffortNeed::Required,
+            rows,
+            Some(false),
+        );
+    }
+    let mut servo = arm(1);
+    servo.joints[0].limits = Some(JointLimits {
+        position: [-3.2, 3.2],
+        soft_position: None,
+        velocity: 11.0,
+        acceleration: None,
+        torque: Some(0.6),
+    });
+    let mut count = 0;
+    for entry in std::fs::read_dir(data.join("rhoban_xl330")).unwrap() {
+        let path = entry.unwrap().path();
+        let rows = std::fs::read_to_string(&path).unwrap().lines().count() - 1;
+        assert!(matches!(
+            Source::open(&path, &servo),
+            Err(DataError::Header { .. })
+        ));
+        real(&path, &servo, EffortNeed::Optional, rows, Some(true));
+        count += 1;
+    }
+    assert!(count > 0);
+    // Motor positions under their own names: no `q1`, and it says so.
+    let tx40 = Robot::load(&data.join("staubli_tx40/tx40.urdf")).unwrap();
+    let said = Source::open(&data.join("staubli_tx40/motor_1kHz.csv"), &tx40)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        said.contains("no column `q1`") && said.contains("`qm1`"),
+        "{said}"
+    );
+}
+
+/// Prints the reading speed: `cargo test --release -p rig-data --lib reading_speed -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement, not a test"]
+fn reading_speed() {
+    let folder = Folder::new();
+    for (joints, rows) in [(1, 2_000_000_usize), (6, 400_000)] {
+        for ending in ["csv", "mcap"] {
+            let path = folder.path(&format!("s{joints}.{ending}"));
+            let mut columns = vec![Column::new("t", "s")];
+            for k in 1..=joints {
+                columns.push(Column::new(&format!("q{k}"), "rad"));
+                columns.push(Column::new(&format!("tau{k}"), "N*m"));
+            }
+            let mut writer = RecordingWriter::create(&path, &columns, &BTreeMap::new()).unwrap();
+            let mut row = vec![0.0; columns.len()];
+            for i in 0..rows {
+                for (c, v) in row.iter_mut().enumerate() {
+                    // Nine digits, as recorders print them.
+                    *v = ((i as f64 * 1e-3 * (c as f64 + 0.1)).sin() * 1e8).round() / 1e8;
+                }
+                row[0] = (i as f64) / 1000.0;
+                writer.push_row(&row).unwrap();
+            }
+            writer.finish().unwrap();
+            let source = Source::open(&path, &arm(joints)).unwrap();
+            let start = std::time::Instant::now();
+            let read: usize = source.blocks(4096).map(|b| b.unwrap().len()).sum();
+            let seconds = start.elapsed().as_secs_f64();
+            assert_eq!(read, rows);
+            println!(
+                "{joints} joints {ending}: {:.0} MB/s, {:.2} million rows/s",
+                source.bytes() as f64 / 1e6 / seconds,
+                rows as f64 / 1e6 / seconds
+            );
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! Recordings out: whole or not at all, and the same bytes from the same rows.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use ::mcap::records::MessageHeader;
+use tempfile::NamedTempFile;
+
+use super::error::DataError;
+use super::mcap_rows::TOPIC;
+use rig_output::format_short;
+use rig_output::{persist, temporary};
+
+/// A column to be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Name as in the contract, for instance `tau1`.
+    pub name: String,
+    /// Unit, for instance `N*m`.
+    pub unit: String,
+}
+
+impl Column {
+    /// From name and unit.
+    pub fn new(name: &str, unit: &str) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+        }
+    }
+}
+
+/// Writes one recording; the file appears under its name at [`RecordingWriter::finish`].
+pub enum RecordingWriter {
+    /// `.csv`
+    Csv(CsvWriter),
+    /// `.mcap`
+    Mcap(Box<McapWriter>),
+}
+
+impl RecordingWriter {
+    /// Begins a recording in the format that the path ends in; the first column must be `t`.
+    ///
+    /// Units and metadata go into MCAP; CSV has one header line and no place for them.
+    pub fn create(
+        path: &Path,
+        columns: &[Column],
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Self, DataError> {
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        match extension.as_deref() {
+            Some("csv") => CsvWriter::create(path, columns).map(Self::Csv),
+            Some("mcap") => {
+                McapWriter::create(path, columns, metadata).map(|w| Self::Mcap(Box::new(w)))
+            }
+            _ => Err(DataError::UnknownFormat { path: path.into() }),
+        }
+    }
+
+    /// Appends a row, one finite value per column.
+    pub fn push_row(&mut self, row: &[f64]) -> Result<(), DataError> {
+        match self {
+            Self::Csv(w) => w.push_row(row),
+            Self::Mcap(w) => w.push_row(row),
+        }
+    }
+
+    /// The hidden file that is written until [`RecordingWriter::finish`], for whoever must remove it: a program that ends at
+    /// once leaves it behind.
+    pub fn temporary(&self) -> &Path {
+        match self {
+            Self::Csv(w) => &w.rows.hidden,
+            Self::Mcap(w) => &w.rows.hidden,
+        }
+    }
+
+    /// Completes the file and gives it its name; without this call nothing is left behind.
+    pub fn finish(self) -> Result<(), DataError> {
+        match self {
+            Self::Csv(w) => w.finish(),
+            Self::Mcap(w) => w.finish(),
+        }
+    }
+}
+
+/// What both formats share: names, the row counter and the checks.
+struct Rows {
+    path: PathBuf,
+    /// Where they are written until the file is whole.
+    hidden: PathBuf,
+    names: Vec<String>,
+    count: u64,
+    text: String,
+}
+
+impl Rows {
+    fn new(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
+        let names: Vec<String> = columns.iter().map(|c| c.name.clone()).collect();
+        let mut sorted = names.clone();
+        sorted.sort();
+        sorted.dedup();
+        let plain =
+            |n: &String| !n.is_empty() && !n.contains([',', '"', '\n', '\r']) && n.trim() == n;
+        if names.first().map(String::as_str) != Some("t")
+            || sorted.len() != names.len()
+            || !names.iter().all(plain)
+        {
+            return Err(DataError::Header {
+                path: path.into(),
+                place: None,
+                message: format!(
+                    "columns cannot be called {names:?}; the first must be `t`, and all need different names without commas and quotes"
+                ),
+            });
+        }
+        Ok(Self {
+            path: path.into(),
+            hidden: PathBuf::new(),
+            names,
+            count: 0,
+            text: String::new(),
+        })
+    }
+
+    fn accept(&mut self, row: &[f64]) -> Result<(), DataError> {
+        self.count += 1;
+        let bad = |message| DataError::BadRow {
+            path: self.path.clone(),
+            row: self.count,
+            message,
+        };
+        if row.len() != self.names.len() {
+            return Err(bad(format!(
+                "it has {} values, but there are {} columns",
+                row.len(),
+                self.names.len()
+            )));
+        }
+        match self.names.iter().zip(row).find(|(_, v)| !v.is_finite()) {
+            Some((name, value)) => Err(bad(format!(
+                "column `{name}` is {}, but a recording holds finite numbers only",
+                format_short(*value)
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn failed(&self, source: io::Error) -> DataError {
+        DataError::Write {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+/// CSV: a header line, then one line per row, numbers in the shortest form that reads back the same.
+pub struct CsvWriter {
+    rows: Rows,
+    out: BufWriter<NamedTempFile>,
+}
+
+impl CsvWriter {
+    /// Begins the file; see [`RecordingWriter::create`].
+    pub fn create(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
+        let mut rows = Rows::new(path, columns)?;
+        let file = temporary(path).map_err(|e| rows.failed(e))?;
+        rows.hidden = file.path().to_path_buf();
+        let mut out = BufWriter::with_capacity(1 << 17, file);
+        writeln!(out, "{}", rows.names.join(",")).map_err(|e| rows.failed(e))?;
+        Ok(Self { rows, out })
+    }
+
+    /// Appends a row.
+    pub fn push_row(&mut self, row: &[f64]) -> Result<(), DataError> {
+        self.rows.accept(row)?;
+        let text = &mut self.rows.text;
+        text.clear();
+        for (i, value) in row.iter().enumerate() {
+            if i > 0 {
+                text.push(',');
+            }
+            push_number(text, *value);
+        }
+        text.push('\n');
+        self.out
+            .write_all(text.as_bytes())
+            .map_err(|e| self.rows.failed(e))
+    }
+
+    /// Completes the file.
+    pub fn finish(self) -> Result<(), DataError> {
+        let Self { rows, out } = self;
+        let file = out.into_inner().map_err(|e| rows.failed(e.into_error()))?;
+        persist(file, &rows.path).map_err(|e| rows.failed(e))
+    }
+}
+
+/// Shortest form that reads back to the same number; whole numbers without a point.
+fn push_number(text: &mut String, value: f64) {
+    // Plain notation of very large or small numbers would be hundreds of digits long.
+    let magnitude = value.abs();
+    let plain = value == 0.0 || (1e-5..1e16).contains(&magnitude);
+    // Writing to a String cannot fail.
+    let _ = if plain {
+        write!(text, "{value}")
+    } else {
+        write!(text, "{value:e}")
+    };
+}
+
+/// MCAP: one JSON message per row on `/joint/state`, with a JSON schema that names the units.
+///
+/// Log and publish time are `t` in nanoseconds, so that players show the recording's own time.
+pub struct McapWriter {
+    rows: Rows,
+    out: ::mcap::Writer<BufWriter<NamedTempFile>>,
+    channel: u16,
+}
+
+impl McapWriter {
+    /// Begins the file; see [`RecordingWriter::create`].
+    pub fn create(
+        path: &Path,
+        columns: &[Column],
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Self, DataError> {
+        let mut rows = Rows::new(path, columns)?;
+        let file = temporary(path).map_err(|e| rows.failed(e))?;
+        rows.hidden = file.path().to_path_buf();
+        let schema = schema(columns);
+        let begin = || -> ::mcap::McapResult<_> {
+            let mut out = ::mcap::WriteOptions::new()
+                .compression(None)
+                .library("rig")
+                .create(BufWriter::with_capacity(1 << 17, file))?;
+            let schema = out.add_schema("rig.JointState", "jsonschema", schema.as_bytes())?;
+            let channel = out.add_channel(schema, TOPIC, "json", &BTreeMap::new())?;
+            out.write_metadata(&::mcap::records::Metadata {
+                name: "rig".into(),
+                metadata: metadata.clone(),
+            })?;
+            Ok((out, channel))
+        };
+        let (out, channel) = begin().map_err(|e| rows.failed(io::Error::other(e)))?;
+        Ok(Self { rows, out, channel })
+    }
+
+    /// Appends a row; its time must not be negative.
+    pub fn push_row(&mut self, row: &[f64]) -> Result<(), DataError> {
+        self.rows.accept(row)?;
+        let t = row.first().copied().unwrap_or(0.0);
+        // 2^64 ns are 584 years.
+        if !(0.0..1.8e10).contains(&t) {
+            return Err(DataError::BadRow {
+                path: self.rows.path.clone(),
+                row: self.rows.count,
+                message: format!(
+                    "its time is {} s, but MCAP counts nanoseconds from 0 upwards; shift the time or write .csv",
+                    format_short(t)
+                ),
+            });
+        }
+        let text = &mut self.rows.text;
+        text.clear();
+        for (i, (name, value)) in self.rows.names.iter().zip(row).enumerate() {
+            text.push(if i == 0 { '{' } else { ',' });
+            text.push('"');
+            text.push_str(&escaped(name));
+            text.push_str("\":");
+            push_number(text, *value);
+        }
+        text.push('}');
+        let nanoseconds = (t * 1e9).round() as u64;
+        // The sequence number of MCAP is 32 bits wide and optional: it wraps.
+        let header = MessageHeader {
+            channel_id: self.channel,
+            sequence: (self.rows.count - 1) as u32,
+            log_time: nanoseconds,
+            publish_time: nanoseconds,
+        };
+        self.out
+            .write_to_known_channel(&header, self.rows.text.as_bytes())
+            .map_err(|e| self.rows.failed(io::Error::other(e)))
+    }
+
+    /// Completes the file.
+    pub fn finish(self) -> Result<(), DataError> {
+        let Self { rows, mut out, .. } = self;
+        out.finish().map_err(|e| rows.failed(io::Error::other(e)))?;
+        let file = out
+            .into_inner()
+            .into_inner()
+            .map_err(|e| rows.failed(e.into_error()))?;
+        persist(file, &rows.path).map_err(|e| rows.failed(e))
+    }
+}
+
+fn escaped(name: &str) -> String {
+    let quoted = serde_json::Value::from(name).to_string();
+    quoted.trim_matches('"').to_owned()
+}
+
+fn schema(columns: &[Column]) -> String {
+    let property = |c: &Column| {
+        let description = serde_json::Value::from(c.unit.as_str());
+        format!(
+            "\"{}\":{{\"type\":\"number\",\"description\":{description}}}",
+            escaped(&c.name)
+        )
+    };
+    let properties: Vec<String> = columns.iter().map(property).collect();
+    format!(
+        "{{\"title\":\"rig.JointState\",\"type\":\"object\",\"properties\":{{{}}}}}",
+        properties.join(",")
+    )
+}

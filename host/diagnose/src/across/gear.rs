@@ -1,0 +1,107 @@
+//! The gear that the coefficients of a transmission's equation stand for.
+
+use rig_shared::effects::{Kind, SHAPES};
+
+use super::contact::Contact;
+use super::law::{self, Law, Laws};
+use super::{Between, Solved, Term};
+use crate::fit::Fit;
+
+/// Teeth that are closed carry their link at more than so many Hz; where it swings more slowly, something gives beside them.
+pub(crate) const CLOSED_TEETH: f64 = 16.0;
+/// Standard deviations from which stiffness, damping and friction of the link count as told.
+const TOLD: f64 = 3.0;
+/// Damping ratio that stands where the motion does not tell one.
+const USUAL_DAMPING: f64 = 0.03;
+
+/// A gear with the standard deviations of its shapes.
+pub(super) struct Gear {
+    pub(super) kind: Kind,
+    pub(super) shapes: [f64; SHAPES],
+    pub(super) stds: [f64; SHAPES],
+    /// Stiffness, damping and share of the link's friction of what gives beside play, each with its standard deviation.
+    pub(super) gives: Option<[[f64; 2]; 3]>,
+}
+
+impl Gear {
+    pub(super) fn values(&self) -> Vec<[f64; 2]> {
+        let count = self.kind.about().shapes.len();
+        (self.shapes.iter().zip(&self.stds).take(count))
+            .map(|(value, std)| [*value, *std])
+            .collect()
+    }
+}
+
+impl Between<'_, '_> {
+    /// The gear as the coefficients have it; none where it neither gives nor has play.
+    pub(super) fn gear(
+        &self,
+        solved: &Solved,
+        base: &Fit,
+        laws: &Laws,
+        touch: Option<&Contact>,
+    ) -> Option<Gear> {
+        let equation = self.training;
+        let usual = |stiffness: f64| {
+            let damping = 2.0 * USUAL_DAMPING * (stiffness * equation.mass.max(0.0)).sqrt();
+            [damping, f64::INFINITY]
+        };
+        let twist = laws.found.iter().any(|f| f.law == Law::Twist);
+        if let Some(touch) = touch {
+            let [stiffness, std] = touch.stiffness;
+            let stiff = [
+                stiffness,
+                std.hypot(stiffness * self.of_the_load(base, solved)),
+            ];
+            let damping = Some(touch.damping)
+                .filter(|[d, std]| *d > TOLD * std)
+                .unwrap_or_else(|| usual(stiffness));
+            let share = (equation.friction > 0.0)
+                .then(|| touch.friction.map(|f| f / equation.friction))
+                .map_or([0.0, f64::INFINITY], |[s, std]| [s.clamp(0.0, 1.0), std]);
+            // Closed teeth give, too, but less.
+            let mass = equation.mass.max(f64::MIN_POSITIVE);
+            let swing = (stiffness / mass).sqrt() / std::f64::consts::TAU;
+            return Some(Gear {
+                kind: Kind::Backlash,
+                shapes: [touch.gap[0], stiff[0], damping[0], share[0]],
+                stds: [touch.gap[1], stiff[1], damping[1], share[1]],
+                gives: (twist && swing < CLOSED_TEETH).then_some([stiff, damping, share]),
+            });
+        }
+        if !twist {
+            return None;
+        }
+        let of = |wanted: &dyn Fn(&Term) -> bool| solved.of(equation, wanted);
+        let given = of(&|t| *t == Term::Load).filter(|[a, std]| *a > TOLD * std);
+        let [compliance, told] = match given {
+            Some([a, std]) => {
+                let load = self.of_the_load(base, solved);
+                [a, std.hypot(a * load)]
+            }
+            // Too stiff to tell: as stiff as that.
+            None => {
+                let [a, std] = of(&|t| *t == Term::Load).unwrap_or([0.0, 0.0]);
+                let least = equation.resolution / law::spread(equation, &equation.load);
+                [(a + TOLD * std).max(least), f64::INFINITY]
+            }
+        };
+        let stiffness = 1.0 / compliance;
+        let stiffness_std = told * stiffness * stiffness;
+        let damping = (of(&|t| *t == Term::Change))
+            .map(|[c, std]| [-c * stiffness * stiffness, std * stiffness * stiffness])
+            .filter(|[d, std]| *d > TOLD * std)
+            .unwrap_or_else(|| usual(stiffness));
+        let per_friction = stiffness / equation.friction.max(f64::MIN_POSITIVE);
+        let share = (of(&|t| *t == Term::Direction))
+            .map(|[c, std]| [(c * per_friction).clamp(0.0, 1.0), std * per_friction])
+            .filter(|_| equation.friction > 0.0)
+            .unwrap_or([0.0, f64::INFINITY]);
+        Some(Gear {
+            kind: Kind::JointElasticity,
+            shapes: [stiffness, damping[0], share[0], 0.0],
+            stds: [stiffness_std, damping[1], share[1], 0.0],
+            gives: None,
+        })
+    }
+}

@@ -1,0 +1,173 @@
+//! How far up in frequency torque and motion of a joint go together.
+//!
+//! The spectrum of a position shows where it sinks into noise only if the noise is white. Time stamps with jitter and positions that
+//! were filtered before make noise that rises with the frequency once it is differentiated, and looks like motion. An acceleration
+//! takes torque, noise takes none: where the coherence of the two (Welch; Bendat and Piersol, Random Data, 2010, chapter 6) falls
+//! below a half, less than half of the acceleration is one, and the best linear filter (Wiener) passes no more than half.
+//!
+//! Leaves out: noise of the torque, friction and coupling of joints, which lower the coherence too: motion reaches at least as far as
+//! it says. So it is asked only where the spectrum takes noise for motion.
+
+use std::f64::consts::PI;
+
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+
+use rig_data::prepare::{PrepareError, Recording};
+
+/// Coherence from which on acceleration and torque go together.
+const TOGETHER: f64 = 0.5;
+/// Segments that a coherence is formed of at least: of 16 independent ones chance makes 0.18 in one of twenty frequencies.
+const SEGMENTS: usize = 16;
+/// Lengths of a segment, samples.
+const SEGMENT: [usize; 2] = [64, 1024];
+/// Ratio of a frequency to the ends of the band that its coherence is averaged over, a third of an octave in all.
+const BAND: f64 = 1.12;
+/// Rows of a block.
+const ROWS: usize = 1 << 16;
+
+/// Sums of the cross-spectra of a joint's acceleration and torque.
+#[derive(Clone)]
+struct Spectra {
+    acceleration: Vec<f64>,
+    torque: Vec<f64>,
+    cross: Vec<Complex<f64>>,
+    segments: usize,
+}
+
+/// The highest frequency at which the torque of some joint goes with its acceleration, Hz; none where none does, or where the
+/// recordings are too short to tell. `longest` are the rows of the longest stretch.
+///
+/// # Errors
+/// [`PrepareError`] of reading.
+pub(super) fn highest(
+    recordings: &[&dyn Recording],
+    joints: usize,
+    rate: f64,
+    longest: u64,
+) -> Result<Option<f64>, PrepareError> {
+    let most = (longest as usize / SEGMENTS).clamp(SEGMENT[0], SEGMENT[1]);
+    let length = 1usize << most.ilog2();
+    let none = Spectra {
+        acceleration: vec![0.0; length / 2 + 1],
+        torque: vec![0.0; length / 2 + 1],
+        cross: vec![Complex::default(); length / 2 + 1],
+        segments: 0,
+    };
+    let mut all = vec![none; joints];
+    for recording in recordings {
+        recording.each_block(ROWS, &mut |block| {
+            for (own, joint) in all.iter_mut().zip(&block.joints) {
+                own.take(&joint.q, &joint.tau, length);
+            }
+            Ok(())
+        })?;
+    }
+    let step = rate / length as f64;
+    let ends = all.iter().filter_map(Spectra::end).map(|k| k as f64 * step);
+    Ok(ends.reduce(f64::max))
+}
+
+impl Spectra {
+    /// Takes a stretch, in half overlapping segments under a Hann window.
+    fn take(&mut self, q: &[f64], torque: &[f64], length: usize) {
+        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let window = |k: usize| 0.5 - 0.5 * (2.0 * PI * k as f64 / length as f64).cos();
+        let samples = q.len().min(torque.len());
+        let mut from = 1;
+        while from + length < samples {
+            let transform = |value: &dyn Fn(usize) -> f64| {
+                let mean = (from..from + length).map(value).sum::<f64>() / length as f64;
+                let own = |k: usize| window(k) * (value(from + k) - mean);
+                let mut input: Vec<f64> = (0..length).map(own).collect();
+                let mut output = fft.make_output_vec();
+                // The lengths are those of the plan; the only error of this call is another length.
+                let done = fft.process(&mut input, &mut output).is_ok();
+                done.then_some(output)
+            };
+            let both =
+                transform(&|k| q[k + 1] - 2.0 * q[k] + q[k - 1]).zip(transform(&|k| torque[k]));
+            if let Some((a, b)) = both {
+                for (k, (a, b)) in a.iter().zip(&b).enumerate() {
+                    self.acceleration[k] += a.norm_sqr();
+                    self.torque[k] += b.norm_sqr();
+                    self.cross[k] += a.conj() * b;
+                }
+                self.segments += 1;
+            }
+            from += length / 2;
+        }
+    }
+
+    /// The last place about which the coherence is no less than [`TOGETHER`] on average: a line that both sensors read, such as a mains
+    /// hum, is no motion.
+    fn end(&self) -> Option<usize> {
+        let coherence = |k: usize| {
+            let both = self.acceleration[k] * self.torque[k];
+            self.cross[k].norm_sqr() / both.max(f64::MIN_POSITIVE)
+        };
+        let about = |k: usize| {
+            let (from, to) = (k as f64 / BAND, k as f64 * BAND);
+            let to = (to.floor() as usize).min(self.cross.len() - 1);
+            let band = from.ceil() as usize..=to;
+            let count = band.clone().count();
+            band.map(coherence).sum::<f64>() / count as f64
+        };
+        (self.segments >= SEGMENTS)
+            .then(|| (1..self.cross.len()).rfind(|k| about(*k) >= TOGETHER))
+            .flatten()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::highest;
+    use rig_data::prepare::InMemory;
+    use rig_data::{Block, JointColumns};
+
+    /// A mass of 2 kg under a force with as much power up to 60 Hz, its position read with noise whose acceleration rises with the
+    /// square of the frequency.
+    #[test]
+    fn noise_of_the_position_takes_no_torque() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(3);
+        let mut white = || -> f64 { StandardNormal.sample(&mut rng) };
+        let (mut q, mut v, mut force) = (0.0, 0.0, [0.0; 4]);
+        let mut joint = JointColumns::default();
+        let mut t = Vec::new();
+        for k in 0..30_000 {
+            let share = 1.0 - (-2.0 * std::f64::consts::PI * 60.0 / 1000.0_f64).exp();
+            let mut wanted = white();
+            for stage in &mut force {
+                *stage += share * (wanted - *stage);
+                wanted = *stage;
+            }
+            t.push(k as f64 * 1e-3);
+            joint.q.push(q + 2e-7 * white());
+            joint.tau.push(wanted);
+            v += 1e-3 * (wanted / 2.0 - 0.5 * v);
+            q += 1e-3 * v;
+        }
+        let block = Block {
+            t,
+            joints: vec![joint],
+            ..Block::default()
+        };
+        let made = InMemory {
+            label: "made".into(),
+            blocks: vec![block],
+        };
+        let end = highest(&[&made], 1, 1000.0, 30_000).unwrap().unwrap();
+        // Force and noise are as loud in the acceleration where the four stages let so much pass.
+        println!("{end} Hz");
+        assert!((40.0..160.0).contains(&end), "{end} Hz");
+        let mut other = made.clone();
+        for x in &mut other.blocks[0].joints[0].tau {
+            *x = white();
+        }
+        assert_eq!(highest(&[&other], 1, 1000.0, 30_000).unwrap(), None);
+    }
+}

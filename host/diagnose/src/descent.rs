@@ -1,0 +1,227 @@
+//! The RMS of the torque residual from model to model.
+
+use super::DiagnoseError;
+use super::bench::Loaded;
+use super::bodies::Fitting;
+use super::columns::Source;
+use super::floor;
+use super::outcome::Waterfall;
+use super::position_reading::PositionReading;
+use super::profile::Profile;
+use super::refit::Refit;
+use super::search::with;
+use rig_model::robot::{Robot, title_of};
+
+/// RMS on one set of recordings, joint by joint.
+pub(super) struct Fall {
+    /// What the description as it stands leaves.
+    pub(super) frozen: Vec<f64>,
+    /// What the refitted description leaves, then each model with one more effect.
+    pub(super) models: Vec<Vec<f64>>,
+}
+
+impl Fall {
+    /// A model more.
+    fn push(&mut self, found: Vec<f64>) {
+        for (list, rms) in self.models.iter_mut().zip(found) {
+            list.push(rms);
+        }
+    }
+
+    /// Before and after the `k`-th effect found.
+    pub(super) fn step(&self, joint: usize, k: usize) -> [f64; 2] {
+        [self.models[joint][k], self.models[joint][k + 1]]
+    }
+
+    /// Of the last model, joint by joint.
+    pub(super) fn last(&self) -> Vec<f64> {
+        (0..self.models.len()).map(|j| self.whole(j)[1]).collect()
+    }
+
+    /// Of the refitted description, and of the last model.
+    pub(super) fn whole(&self, joint: usize) -> [f64; 2] {
+        let list = &self.models[joint];
+        [list[0], list[list.len() - 1]]
+    }
+}
+
+/// RMS on the training data and on those that nothing was fitted to.
+pub(super) struct Descent {
+    /// Each model refitted jointly.
+    pub(super) train: Fall,
+    /// With the coefficients of the training data; none without a hold-out.
+    pub(super) holdout: Option<Fall>,
+    /// Noise of the rows held back in units of that of the training's: of a slower recording fewer samples make up a row.
+    louder: f64,
+    /// What the floor of the training data has of the reading of its positions, joint by joint, which goes by the inertia of the poses.
+    added: Vec<f64>,
+    /// What that of the rows held back leaves in them.
+    position_reading: PositionReading,
+    /// Noise of the rows held back by two runs of one motion among them, joint by joint.
+    repeated: Vec<Option<f64>>,
+}
+
+impl Descent {
+    /// Through the effects in the order that they were found in; the first `described` are the description's. `added` is what the
+    /// training's floor has of the reading of its positions, joint by joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn of(
+        fitting: &Fitting,
+        refit: &Refit,
+        chosen: &[Profile],
+        described: usize,
+        loaded: &Loaded,
+        sealed: Option<&Loaded>,
+        source: &Source,
+        added: Vec<f64>,
+    ) -> Result<Self, DiagnoseError> {
+        let bench = fitting.bench;
+        let n = bench.robot.joints.len();
+        let frozen = |loaded| -> Result<Fall, DiagnoseError> {
+            Ok(Fall {
+                frozen: bench.frozen(loaded)?,
+                models: vec![Vec::new(); n],
+            })
+        };
+        let mut train = frozen(loaded)?;
+        for count in described..=chosen.len() {
+            let part = &chosen[..count];
+            // Of one link the free fit is what stands.
+            let found = if n == 1 {
+                let fit = with(refit.footing(part)[1], part, None);
+                vec![fit.even_rms(0)]
+            } else {
+                fitting.unseen(part, loaded)?
+            };
+            train.push(found);
+        }
+        let mut holdout = None;
+        if let Some(sealed) = sealed {
+            let mut fall = frozen(sealed)?;
+            for count in described..=chosen.len() {
+                fall.push(fitting.unseen(&chosen[..count], sealed)?);
+            }
+            holdout = Some(fall);
+        }
+        let position_reading = match sealed {
+            Some(sealed) => PositionReading::of(
+                &bench.source(sealed, &source.values)?,
+                &sealed.rows,
+                &sealed.position_filter()?,
+            )?,
+            None => PositionReading::of_noise(added.clone()),
+        };
+        let mut repeated = vec![None; n];
+        if let Some(sealed) = sealed {
+            let stands = fitting.of(chosen)?;
+            let left = bench.remaining(sealed, stands.fitted(), chosen)?;
+            let pairs = floor::repeats(&sealed.runs);
+            for (j, own) in repeated.iter_mut().enumerate() {
+                *own = floor::from_repeats(&sealed.rows, &pairs, &left[j], None, j)
+                    .map(|repeated| repeated.noise);
+            }
+        }
+        let slower = sealed.map_or(1.0, |sealed| bench.rate() / sealed.treatment.sample_rate);
+        Ok(Self {
+            train,
+            holdout,
+            louder: slower.max(1.0).sqrt(),
+            added,
+            position_reading,
+            repeated,
+        })
+    }
+
+    /// Whether two runs of one motion among the data held back say what their noise is at a joint.
+    pub(super) fn is_held_twice(&self, joint: usize) -> bool {
+        self.repeated[joint].is_some()
+    }
+
+    /// Noise of the data held back where two runs among them repeat one motion, else that of the training data, as loud as
+    /// their rate makes it.
+    fn noise(&self, floors: &[f64]) -> impl Iterator<Item = f64> {
+        (floors.iter().zip(&self.repeated)).map(|(floor, own)| own.unwrap_or(self.louder * floor))
+    }
+
+    /// Noise floors of the data that a share of the gap is of, the training's given.
+    pub(super) fn floors(&self, floors: &[f64]) -> Vec<f64> {
+        // Of an unknown floor the steps of an encoder say nothing.
+        self.with_positions(floors, |floor, steps| match floor.is_nan() {
+            true => floor,
+            false => steps.max(floor),
+        })
+    }
+
+    /// Noise of the data held back with what the reading of the positions leaves besides: less than that is no finding.
+    pub(super) fn noise_held(&self, floors: &[f64]) -> Vec<f64> {
+        self.with_positions(floors, f64::hypot)
+    }
+
+    /// Noise of the data held back with what the reading of their positions leaves: in its place where the training's floor has that
+    /// added; else their noise is in it, and the steps are taken with it as `both` says.
+    fn with_positions(&self, floors: &[f64], both: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let (added, held) = (&self.added, &self.position_reading);
+        (self.noise(floors).enumerate())
+            .map(|(j, floor)| {
+                let added = self.louder * added[j];
+                match self.repeated[j].is_none() && floor > added && added > 0.0 {
+                    true => (floor * floor - added * added).sqrt().hypot(held.whole(j)),
+                    false => both(floor, held.steps[j]),
+                }
+            })
+            .collect()
+    }
+
+    /// Share of the gap that all steps close together, each joint in units of its floor; `changed` where the nominal
+    /// parameters count as a step. 1 at most: below the floor there is nothing to explain. None where there is no gap, it has grown, or
+    /// no joint's floor is known.
+    pub(super) fn gap_closed(&self, floors: &[f64], changed: bool) -> Option<f64> {
+        let fall = self.holdout.as_ref().unwrap_or(&self.train);
+        let (mut gap, mut closed) = (0.0, 0.0);
+        for (j, floor) in self.floors(floors).iter().enumerate() {
+            if floor.is_nan() {
+                continue;
+            }
+            let [refitted, last] = fall.whole(j);
+            let first = if changed {
+                fall.frozen[j].max(refitted)
+            } else {
+                refitted
+            };
+            gap += (first - floor) / floor;
+            closed += (first - last) / floor;
+        }
+        (gap > 0.0 && closed >= 0.0).then(|| (closed / gap).min(1.0))
+    }
+
+    /// As a result has it; `found` are the effects that the description does not state.
+    pub(super) fn waterfall(
+        &self,
+        robot: &Robot,
+        found: &[Profile],
+        floors: &[f64],
+    ) -> Vec<Waterfall> {
+        let models: Vec<String> = (["frozen description", "refitted"].map(str::to_owned))
+            .into_iter()
+            .chain(found.iter().map(|p| title_of(p.candidate.kind)))
+            .collect();
+        let list = |fall: &Fall, j: usize| {
+            let mut list = vec![fall.frozen[j]];
+            list.extend(&fall.models[j]);
+            list
+        };
+        (robot.joints.iter().enumerate())
+            .map(|(j, joint)| Waterfall {
+                joint: joint.name.clone(),
+                unit: joint.kind.units().1.to_owned(),
+                models: models.clone(),
+                train: list(&self.train, j),
+                holdout: (self.holdout.as_ref()).map_or_else(Vec::new, |fall| list(fall, j)),
+                floor: floors[j],
+                holdout_floor: self.floors(floors)[j],
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,539 @@
+//! The workflow from recordings to a verdict.
+
+mod even;
+mod follow;
+mod intake;
+mod pass;
+mod plausible;
+mod remarks;
+mod steps;
+mod trial;
+mod unbelieved;
+
+use rig_shared::effects::Kind;
+
+use self::even::{Uneven, of_error};
+pub(super) use self::follow::Follower;
+use self::intake::{Intake, Material, intake, without};
+use self::pass::Pass;
+use self::remarks::{remarks, weight_of_a_spring};
+use self::steps::{change_step, reconcile, steps};
+use self::trial::{Survivors, Trial};
+use super::across::{across, names_something, refutes, tell as tell_across};
+use super::bodies::Fitting;
+use super::by_motion::by_motion;
+use super::change::change;
+use super::descent::Descent;
+use super::fault::{faulty, of_preparing};
+use super::finish::{Drawn, Found, finish};
+use super::floor;
+use super::judge::{
+    Judge, Judged, besides, left_of_held, not_carried_over, taken_by_none, too_short_for_names,
+};
+use super::lead::{differ, leads, moved};
+use super::locate::coordinates;
+use super::motion::Replay;
+use super::outcome::{Before, Diagnosis, Residual, Verdict};
+use super::position_reading::PositionReading;
+use super::profile::Profile;
+use super::proof::{Proof, unexplained};
+use super::refit::Refit;
+use super::sanity::spoilt_columns;
+use super::search::{is_friction, with};
+use super::stated::{Now, Stated};
+use super::treated::treated;
+use super::waves::is_of_the_motor;
+use super::winding::{contradict, left_of_voltage, name_something, settled, tell, windings, zeros};
+use super::zeros::{another_zero, another_zero_held};
+use super::{DiagnoseError, Options};
+use rig_data::prepare::{Recording, as_recordings};
+use rig_model::robot::Robot;
+
+/// Finds what the model lacks. The second result is the description with the effects and the parameters identified
+/// anew.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn diagnose(
+    robot: &Robot,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Diagnosis, Robot), DiagnoseError> {
+    if training.is_empty() {
+        return Err(DiagnoseError::NoRecording);
+    }
+    let mut stated = Stated::of(robot);
+    // What the sensors read with the drive off gives a constant its name, and so does what is gone with all that pulled on the
+    // rig: then it is searched for.
+    let unburdened = training.iter().filter(|r| r.unburdened()).count();
+    stated.pulls_told = (1..training.len()).contains(&unburdened);
+    let told = !options.sensor_zeros.is_empty() || stated.pulls_told;
+    stated.no_offsets = options.no_offsets && !told;
+    let given = [training, holdout].concat();
+    let mut uneven = Uneven::default();
+    let mut spoilt = Vec::new();
+    loop {
+        // Each time around more of the description's effects are held or its limits left out, or another recording is brought to an even step.
+        let [training, holdout] = [training, holdout].map(|recordings| uneven.even(recordings));
+        let [training, holdout] = [&training, &holdout].map(|recordings| as_recordings(recordings));
+        match attempt(robot, &stated, &training, &holdout, options, progress) {
+            Ok(Attempt::Done(mut result)) => {
+                result.0.words.extend(uneven.told());
+                result.0.data_faults.splice(0..0, spoilt);
+                return Ok(*result);
+            }
+            Ok(Attempt::Hold(more)) => stated = *more,
+            Err(DiagnoseError::Prepare(error)) if uneven.takes(&error) => {
+                // Between interpolated rows nothing tells of columns that have no derivative.
+                let found = spoilt_columns(robot, &of_error(&error, &given))?;
+                if !options.fits(&found) {
+                    return Ok((faulty(robot, found), robot.clone()));
+                }
+                spoilt.extend(found);
+            }
+            Err(DiagnoseError::Prepare(error)) => {
+                let Some(fault) = of_preparing(&error) else {
+                    return Err(error.into());
+                };
+                return Ok((faulty(robot, vec![fault]), robot.clone()));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// What came of one way to treat the description's effects.
+enum Attempt {
+    Done(Box<(Diagnosis, Robot)>),
+    /// The same with more of them held, or limits left out.
+    Hold(Box<Stated>),
+}
+
+fn attempt(
+    robot: &Robot,
+    stated: &Stated,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Attempt, DiagnoseError> {
+    let material = match intake(stated, training, holdout, options)? {
+        Intake::Fit(material) => *material,
+        Intake::Hold(more) => return Ok(Attempt::Hold(more)),
+        Intake::Faulty(wrong) => {
+            let fault = (faulty(robot, wrong), robot.clone());
+            return Ok(Attempt::Done(Box::new(fault)));
+        }
+    };
+    let Material {
+        bench,
+        loaded,
+        sealed,
+        open,
+        nameless,
+        touches,
+        faults,
+    } = material;
+    let options = &Options {
+        without: without(options, nameless.is_some()),
+        ..options.clone()
+    };
+    progress(0.1);
+    let lead = {
+        let refit = Refit::of(&bench, &loaded.rows)?;
+        let source = bench.source(&loaded, &bench.anchor.values(&refit.before.values))?;
+        leads(&source, &refit.base, &vec![0.0; robot.joints.len()])?
+    };
+    let loaded = moved(&bench, loaded, &lead)?;
+    let first = Pass::over(&bench, &loaded, options, progress)?;
+    // What was missing may have looked like a lead, or hidden one; a delay found beside a wrong lead is its other half.
+    let found: Vec<Profile> = (first.found.iter())
+        .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
+        .cloned()
+        .collect();
+    let beside = with(&first.refit.base, &found, None);
+    let better = leads(&first.search.source, &beside, &lead)?;
+    let again;
+    let (loaded, lead, pass) = if differ(&better, &lead, &loaded.runs) {
+        let more: Vec<f64> = better.iter().zip(&lead).map(|(b, l)| b - l).collect();
+        let runs = loaded.runs.clone();
+        drop((first, beside));
+        drop(loaded.rows);
+        again = moved(&bench, bench.rows(runs, &loaded.treatment)?, &more)?;
+        let pass = Pass::over(&bench, &again, options, progress)?;
+        (&again, better, pass)
+    } else {
+        (&loaded, lead, first)
+    };
+    let refuted = |c: &_| refutes(&pass.across, c);
+    let mut more = stated.clone();
+    if more.give_up_tilts(&pass.found)
+        || more.hold_what_is_not_refuted(
+            &pass.search.source,
+            &pass.refit.base,
+            &pass.found,
+            &refuted,
+        )?
+    {
+        return Ok(Attempt::Hold(Box::new(more)));
+    }
+    let sealed = sealed
+        .map(|sealed| moved(&bench, sealed, &lead))
+        .transpose()?;
+    let Pass {
+        refit,
+        search,
+        found,
+        mut tried,
+        across: _,
+    } = pass;
+    progress(0.85);
+    let robot = bench.robot;
+    let coordinates: Vec<_> = (0..robot.joints.len())
+        .map(|j| {
+            let predicted = &search.source.predicted;
+            coordinates(
+                &loaded.rows,
+                &loaded.runs,
+                predicted,
+                robot,
+                j,
+                &waves(&found, j),
+            )
+        })
+        .collect();
+    let follower = Follower::new(&bench, loaded, &refit, &search);
+    let judge = Judge {
+        robot,
+        follower: &follower,
+        search: &search,
+        rows: &loaded.rows,
+        coordinates: &coordinates,
+        pairs: floor::repeats(&loaded.runs),
+        position_reading: PositionReading::of(
+            &search.source,
+            &loaded.rows,
+            &loaded.position_filter()?,
+        )?,
+        base: &refit.base,
+        seed: options.seed,
+    };
+    let values = &search.source.values;
+    let fitting = Fitting::new(&bench, &refit, &loaded.runs, values);
+    let learnt = Replay::of(&fitting, loaded)?;
+    let (windings, silent) = windings(&bench, loaded, sealed.as_ref(), options)?;
+    let trial = Trial {
+        judge: &judge,
+        refit: &refit,
+        fitting: &fitting,
+        replay: &learnt,
+        sealed: sealed.as_ref(),
+    };
+    let Survivors {
+        mut judged,
+        mut fallen,
+    } = trial.stand(found.clone(), &mut tried)?;
+    let said = settled(
+        &zeros(&options.sensor_zeros, &windings, robot.joints.len()),
+        &search,
+        &refit.base,
+        &mut judged.chosen,
+    )?;
+    // What the voltage has given another name is the description's no longer.
+    let mut named: Vec<_> = judged.chosen.drain(..).zip(said).collect();
+    named.sort_by_key(|(profile, _)| search.rank_of(&profile.candidate));
+    let (chosen, said): (Vec<_>, Vec<_>) = named.into_iter().unzip();
+    judged.chosen = chosen;
+    let mut source = &search.source;
+    let followed;
+    if let Some(chosen) = follower.followed(&judged.chosen, &judged.quiet)? {
+        judged = judge.as_found(chosen);
+        followed = follower.source(&judged.chosen)?;
+        source = &followed;
+    }
+    let described = search.count_described(&judged.chosen);
+    let mut joint = refit.joint(source, &judged.chosen, &judge.pairs, &coordinates)?;
+    let threads = rig_data::prepare::threads(options.threads);
+    let again = by_motion(&fitting, &learnt, source, &judged.chosen, &joint, threads)?;
+    let by_motion = again.map(|again| {
+        if let Some((standing, effects)) = again.adopted {
+            fitting.adopt(&effects, standing);
+            judged.chosen = effects;
+        }
+        again.told
+    });
+    let replay = match &sealed {
+        Some(sealed) => Replay::of(&fitting, sealed)?,
+        None => learnt,
+    };
+    let descent = Descent::of(
+        &fitting,
+        &refit,
+        &judged.chosen,
+        described,
+        loaded,
+        sealed.as_ref(),
+        &search.source,
+        judge.added(&judged.from),
+    )?;
+    if let (None, Some(held)) = (&judged.left, &descent.holdout) {
+        let mut named: Vec<(usize, [f64; 2])> = (judged.chosen[described..].iter())
+            .map(|p| (p.candidate.joint, held.whole(p.candidate.joint)))
+            .collect();
+        named.dedup_by_key(|(joint, _)| *joint);
+        judged.left = left_of_held(
+            robot,
+            &held.last(),
+            &descent.train.last(),
+            [&judged.floors, &descent.noise_held(&judged.floors)],
+            &judged.chosen,
+            &|joint| {
+                let rows = &sealed
+                    .as_ref()
+                    .filter(|_| descent.is_held_twice(joint))?
+                    .rows;
+                Some(besides(&judged.chosen, rows, joint, held.whole(joint)))
+            },
+        )
+        .or_else(|| not_carried_over(robot, &named, &descent.floors(&judged.floors)));
+    }
+    // Where a motion was repeated, what is left has been held against the noise.
+    if judged.left.is_none() && judge.pairs.is_empty() {
+        fallen.extend(search.still_taking(&refit.base, &found)?);
+        judged.left = taken_by_none(robot, &fallen, &judged.chosen, &judged.floors);
+    }
+    let proof = Proof {
+        robot,
+        fitting: &fitting,
+        base: &refit.base,
+        loaded,
+        sealed: sealed.as_ref(),
+        descent: &descent,
+    };
+    let sizes = proof.left(&judged, described)?;
+    if judged.left.is_none() {
+        let of = |name: &str| robot.joints.iter().position(|joint| joint.name == name);
+        let named = |name: &str| {
+            (judged.chosen[described..].iter()).any(|p| Some(p.candidate.joint) == of(name))
+        };
+        judged.left = unexplained(&sizes, &named);
+    }
+    if let Some(why) = nameless {
+        // No effect was tried, so that nothing says of what is left that none explains it.
+        judged.left = too_short_for_names(robot, &refit.base, &judged.known, why);
+    }
+    let left = judged.left.is_some();
+    judged.left = judged.left.or_else(|| left_of_voltage(&windings));
+    let Judged {
+        chosen,
+        floors,
+        known,
+        ..
+    } = &judged;
+    let stands = fitting.of(chosen)?;
+    joint.solution.values = stands.coefficients(&bench.anchor);
+    let after = &joint.solution;
+    let first = &chosen[..described];
+    let before = fitting.of(first)?;
+    let across = {
+        let nominal = bench.anchor.values(&after.values[..refit.free.len()]);
+        let of = |loaded| -> Result<_, DiagnoseError> {
+            (bench.source(loaded, &nominal)?).loaded_by(chosen, &after.values[refit.free.len()..])
+        };
+        let held = (sealed.as_ref()).map(of).transpose()?;
+        across(
+            &of(loaded)?,
+            &bench.anchor,
+            after,
+            loaded,
+            held.as_ref().zip(sealed.as_ref()),
+            options,
+        )?
+    };
+    progress(0.95);
+    let motion = (described..=chosen.len())
+        .map(|count| replay.errors(&chosen[..count]))
+        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+    let mut steps = steps(
+        &search, &refit, &judged, described, &joint, &descent, &motion,
+    )?;
+    for (step, word) in steps.iter_mut().zip(said.into_iter().skip(described)) {
+        word.applied(step);
+    }
+    let explained = refit.explained(chosen, after);
+    let without = &options.without;
+    let friction = chosen.iter().any(|p| is_friction(p.candidate.kind));
+    let change = change(
+        &bench,
+        &refit,
+        &loaded.rows,
+        &explained,
+        friction,
+        left,
+        after,
+        without,
+    );
+    if let Some(mut step) = (change.as_ref()).and_then(|c| change_step(robot, c, &descent, known)) {
+        let given = replay.errors_of(&stated.moving());
+        let last = motion.last().and_then(Option::as_ref);
+        let tip = robot.joints.len() - 1;
+        step.motion_rms = (given.as_ref().zip(last)).map(|(a, b)| [a, b].map(|e| e.rms(tip)));
+        steps.push(step);
+    }
+    let stood = stated.told(
+        (stated.matched(chosen).into_iter())
+            .map(|place| {
+                place.map(|k| Now {
+                    kind: chosen[k].candidate.kind,
+                    parameters: joint.parameters(&search.source, chosen, refit.free.len(), k),
+                })
+            })
+            .collect(),
+    );
+    reconcile(robot, &mut tried, &chosen[described..], search.trials());
+    let absorbed = |before: &[f64]| refit.absorbed(&bench, before, after);
+    let (absorbed_before, absorbed) = if chosen.len() > described {
+        let without = before.coefficients(&bench.anchor);
+        (Before::WithoutEffects, absorbed(&without))
+    } else if bench.anchor.stated {
+        let mut stated = bench.anchor.prior_coefficients();
+        for (k, value) in stated.iter_mut().enumerate() {
+            if bench.anchor.is_unstated(k) {
+                *value = f64::NAN;
+            }
+        }
+        (Before::Described, absorbed(&stated))
+    } else {
+        (Before::Described, Vec::new())
+    };
+    let mut diagnosis = Diagnosis {
+        schema: "rig-diagnosis/1".into(),
+        robot: robot.name.clone(),
+        verdict: verdict(
+            &judged,
+            chosen.len() > described
+                || name_something(&windings)
+                || names_something(&across, &|c| stated.states(c)),
+            change.is_some() || contradict(&windings) || stated.changed(&stood),
+        ),
+        residual: Residual::Torque,
+        words: Vec::new(),
+        noise_floor_rms: known.clone(),
+        noise_floor_from: judged.from.clone(),
+        left: sizes,
+        noise_floor_how: String::new(),
+        motion_how: replay.told(chosen, described)?,
+        treatment: Some(treated(robot, loaded, sealed.as_ref())),
+        torque_lead: lead,
+        places: judge.places(
+            refit.footing(&chosen[..described])[1],
+            floors,
+            &chosen[..described],
+        ),
+        gap_closed: (!steps.is_empty())
+            .then(|| descent.gap_closed(known, change.is_some()))
+            .flatten(),
+        described: stood,
+        steps,
+        absorbed,
+        absorbed_before,
+        by_motion,
+        not_testable: Vec::new(),
+        detectable: Vec::new(),
+        next_experiment: None,
+        remainder: judged.left.clone(),
+        data_faults: faults,
+        waterfall: descent.waterfall(robot, &chosen[described..], known),
+        tried,
+        maps: Vec::new(),
+        curves: Vec::new(),
+    };
+    let mut model = stands.model.clone();
+    let drawn = sealed.as_ref().unwrap_or(loaded);
+    let found = Found {
+        robot,
+        nominal: &bench.nominal,
+        anchor: &bench.anchor,
+        search: &search,
+        rows: &loaded.rows,
+        base: &refit.base,
+        model: &model,
+        chosen,
+        described,
+        coordinates: &coordinates,
+        floors,
+        known,
+        seed: options.seed,
+        sensor_zeros: &options.sensor_zeros,
+        one_way: &bench.one_way,
+        drawn: Drawn {
+            runs: &drawn.runs,
+            rows: &drawn.rows,
+            left: [
+                bench.remaining(drawn, before.fitted(), first)?,
+                bench.remaining(drawn, stands.fitted(), chosen)?,
+            ],
+            motion: replay.drawn(chosen, described)?,
+        },
+    };
+    finish(&found, &mut diagnosis)?;
+    diagnosis.words.extend(stands.remarks.iter().cloned());
+    model.effects.extend(stated.held().cloned());
+    tell(windings, &mut diagnosis, &mut model);
+    tell_across(across, &mut diagnosis, &mut model);
+    let told = diagnosis.described.iter().map(|d| d.text.clone());
+    diagnosis.words.extend(told);
+    diagnosis.words.extend(silent);
+    diagnosis.words.extend(touches);
+    let by_motion = diagnosis.by_motion.as_ref().map(|m| m.text.clone());
+    diagnosis.words.extend(by_motion);
+    let taken = {
+        let [before, after] = [&refit.base, &with(&refit.base, chosen, None)].map(|fit| fit.rms(0));
+        1.0 - after / before
+    };
+    let zero = match (another_zero(&search.source, &refit.base, taken)?, &sealed) {
+        (None, Some(sealed)) if left => {
+            let residual = bench.remaining(sealed, stands.fitted(), chosen)?;
+            another_zero_held(&bench, sealed, &search.source.values, &residual)?
+        }
+        (told, _) => told,
+    };
+    diagnosis.words.extend(stated.lifted.iter().cloned());
+    diagnosis.words.extend(zero);
+    diagnosis.words.extend(remarks(
+        &bench,
+        loaded,
+        sealed.as_ref(),
+        &open,
+        &options.sensor_zeros,
+        after,
+    ));
+    diagnosis.words.extend(change.map(|c| c.words));
+    (diagnosis.words).extend(weight_of_a_spring(&bench, chosen, after));
+    progress(1.0);
+    Ok(Attempt::Done(Box::new((diagnosis, model))))
+}
+
+/// Orders over the motor's turn of the waves among effects of a joint.
+fn waves(found: &[Profile], joint: usize) -> Vec<f64> {
+    let wave = |p: &Profile| {
+        let motor = is_of_the_motor(p.candidate.kind);
+        (p.candidate.joint == joint && motor).then_some(p.shapes[0])
+    };
+    found.iter().filter_map(wave).collect()
+}
+
+/// `named`: whether there is an effect that the description does not state.
+fn verdict(judged: &Judged, named: bool, changed: bool) -> Verdict {
+    if judged.left.is_some() {
+        Verdict::Remainder
+    } else if named {
+        Verdict::Explained
+    } else if changed {
+        Verdict::ParameterChange
+    } else {
+        Verdict::NothingMissing
+    }
+}

@@ -1,0 +1,162 @@
+//! Recordings taken in: read, looked through for faults, freed of touches, under one treatment.
+
+use rig_shared::effects::Kind;
+
+use crate::alike::alike;
+use crate::bench::{Bench, Loaded, library};
+use crate::lead::slack;
+use crate::one_way::{OneWay, one_way};
+use crate::outcome::DataFault;
+use crate::refit::{Open, Refit, open};
+use crate::sanity::{faults, too_short_to_judge, too_short_to_learn};
+use crate::stated::Stated;
+use crate::touched::touched;
+use crate::{DiagnoseError, Options};
+use rig_data::past::in_sessions;
+use rig_data::prepare::Recording;
+use rig_data::runs::{Run, copies};
+
+/// What came of looking at the recordings.
+pub(super) enum Intake<'a> {
+    /// They can be learnt from.
+    Fit(Box<Material<'a>>),
+    /// They cannot.
+    Faulty(Vec<DataFault>),
+    /// The same with more of the description's effects held, or its limits left out.
+    Hold(Box<Stated>),
+}
+
+/// Recordings that can be learnt from.
+pub(super) struct Material<'a> {
+    /// Robot and treatment.
+    pub(super) bench: Bench<'a>,
+    /// The training data.
+    pub(super) loaded: Loaded,
+    /// Those held back.
+    pub(super) sealed: Option<Loaded>,
+    /// What of the description the training data tell less of, and what they contradict.
+    pub(super) open: Open,
+    /// Why no name is learnt from them, a sentence: they are too short. None where they are not.
+    pub(super) nameless: Option<String>,
+    /// What was left out of them, and what of the model they do not tell apart, sentences.
+    pub(super) touches: Vec<String>,
+    /// What may be wrong with them, or is wrong where they were fitted all the same.
+    pub(super) faults: Vec<DataFault>,
+}
+
+/// Reads the recordings.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub(super) fn intake<'a>(
+    stated: &'a Stated,
+    training: &[&dyn Recording],
+    holdout: &[&dyn Recording],
+    options: &Options,
+) -> Result<Intake<'a>, DiagnoseError> {
+    let mut bench = Bench::of(stated, training)?;
+    let mut loaded = bench.load(training)?;
+    let mut sealed = if holdout.is_empty() {
+        None
+    } else {
+        Some(bench.load_held(holdout)?)
+    };
+    in_sessions(&mut loaded.runs, &[]);
+    if let Some(sealed) = &mut sealed {
+        in_sessions(&mut sealed.runs, &loaded.runs);
+    }
+    let faults = wrong(stated, &loaded, sealed.as_ref(), options)?;
+    if !options.fits(&faults) {
+        return Ok(Intake::Faulty(faults));
+    }
+    // From a short motion the parameters follow, and no name: both need stretches that nothing was fitted to.
+    let nameless = too_short_to_learn(&loaded.runs).map(|fault| fault.text);
+    let without = without(options, nameless.is_some());
+    let mut more = stated.clone();
+    if more.lift_limits(&loaded.runs)
+        || more.hold_delays(slack(&loaded.runs))
+        || more.hold_what_is_not_in(&library(bench.robot, &loaded.runs, &without))
+    {
+        return Ok(Intake::Hold(Box::new(more)));
+    }
+    let one_way = one_way(&bench.nominal, &loaded.rows);
+    if !one_way.is_empty() {
+        let constants: Vec<usize> = one_way.iter().map(OneWay::constant).collect();
+        bench.anchor.hold(&constants);
+        bench.one_way = one_way;
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
+    let open = open(&bench, &loaded.rows);
+    if !open.held.is_empty() {
+        bench.anchor.hold(&open.held);
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
+    let alike = alike(&bench, &loaded.rows);
+    if !alike.is_empty() {
+        let held: Vec<usize> = alike.iter().map(|one| one.parameter).collect();
+        bench.anchor.hold(&held);
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
+    if bench.look_about_rests(&loaded)? {
+        let rows = |loaded: Loaded| bench.rows(loaded.runs, &loaded.treatment);
+        loaded = rows(loaded)?;
+        sealed = sealed.map(rows).transpose()?;
+    }
+    let left: Vec<Vec<f64>> = {
+        let refit = Refit::of(&bench, &loaded.rows)?;
+        (0..bench.robot.joints.len())
+            .map(|j| refit.base.residual(j))
+            .collect()
+    };
+    let mut touches = touched(bench.robot, &left, &mut loaded);
+    if !touches.is_empty() {
+        loaded = bench.rows(loaded.runs, &loaded.treatment)?;
+    }
+    touches.extend(alike.iter().map(|one| one.said(&bench)));
+    Ok(Intake::Fit(Box::new(Material {
+        bench,
+        loaded,
+        sealed,
+        open,
+        nameless,
+        touches,
+        faults,
+    })))
+}
+
+/// Kinds that are left out of the search: all where recordings are `nameless`.
+pub(super) fn without(options: &Options, nameless: bool) -> Vec<Kind> {
+    match nameless {
+        true => Kind::ALL.to_vec(),
+        false => options.without.clone(),
+    }
+}
+
+/// What about the recordings cannot be.
+fn wrong(
+    stated: &Stated,
+    loaded: &Loaded,
+    sealed: Option<&Loaded>,
+    options: &Options,
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let all: Vec<&Run> = (loaded.runs.iter())
+        .chain(sealed.iter().flat_map(|sealed| &sealed.runs))
+        .collect();
+    if let Some((a, b)) = copies(&all) {
+        let [label, again] = [a, b].map(|k| all[k].label.clone());
+        return Err(DiagnoseError::Copy { label, again });
+    }
+    let mut wrong = faults(&stated.robot, &loaded.runs)?;
+    if let (true, Some(sealed)) = (options.fits(&wrong), sealed) {
+        let held = faults(&stated.robot, &sealed.runs)?;
+        let short = too_short_to_judge(&sealed.runs).filter(|_| options.fits(&held));
+        wrong.extend(held.into_iter().chain(short));
+    }
+    Ok(wrong)
+}

@@ -1,0 +1,150 @@
+//! A search for effects on the training data: from the refitted model on, and once more beside gears that it has found.
+
+use super::follow::Follower;
+use crate::across::{Across, across, gears, refutes};
+use crate::bench::{Bench, Loaded, library};
+use crate::columns::Candidate;
+use crate::outcome::Tried;
+use crate::profile::Profile;
+use crate::refit::Refit;
+use crate::search::{Search, is_constant, same};
+use crate::stated::candidate;
+use crate::{DiagnoseError, Options};
+use rig_model::robot::title_of;
+
+/// How often all else is searched beside gears, whose own shapes it may move.
+const BESIDE_GEARS: usize = 2;
+
+/// What a search has found.
+pub(super) struct Pass<'a> {
+    /// The nominal model, rows counting by what gears leave about them.
+    pub(super) refit: Refit<'a>,
+    /// The library, by the last model.
+    pub(super) search: Search<'a>,
+    /// The effects.
+    pub(super) found: Vec<Profile>,
+    /// All that was tried.
+    pub(super) tried: Vec<Tried>,
+    /// What encoders on the links show.
+    pub(super) across: Vec<Across>,
+}
+
+/// What was tried, and how many sweeps that took.
+#[derive(Default)]
+struct Heard {
+    tried: Vec<Tried>,
+    sweeps: i32,
+}
+
+impl<'a> Pass<'a> {
+    /// Over recordings whose torque has been moved to when it acts.
+    pub(super) fn over(
+        bench: &'a Bench,
+        loaded: &'a Loaded,
+        options: &Options,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, DiagnoseError> {
+        let refit = Refit::of(bench, &loaded.rows)?;
+        let source = bench.source(loaded, &bench.anchor.values(&refit.before.values))?;
+        // Encoders on the links come before the torque: what acts across a transmission they show or exclude.
+        let across = across(&source, &bench.anchor, &refit.before, loaded, None, options)?;
+        let mut library = library(bench.robot, &loaded.runs, &options.without);
+        library.retain(|c| !refutes(&across, c));
+        // Of a joint that moves one way every constant is its dry friction.
+        let one_way = |c: &Candidate| bench.one_way.iter().any(|own| own.joint == c.joint);
+        library.retain(|c| !(is_constant(c.kind) && one_way(c)));
+        let mut described = bench.stated.free();
+        described.retain(|placed| !refutes(&across, &candidate(placed)));
+        let mut search = Search::new(
+            source,
+            library,
+            described,
+            rig_data::prepare::threads(options.threads),
+        );
+        search.measured = gears(&across);
+        let mut heard = Heard::default();
+        let mut further = |refit: &Refit, search: &mut Search<'a>, found| {
+            searched(bench, loaded, refit, search, found, &mut heard, progress)
+        };
+        let mut found = further(&refit, &mut search, None)?;
+        if let Some(play) = search.nearly.take() {
+            let candidate = play.candidate;
+            if Follower::new(bench, loaded, &refit, &search).hears(&found, play)? {
+                search.heard.push(candidate);
+                found = further(&refit, &mut search, Some(found))?;
+            }
+        }
+        let mut refit = refit;
+        for _ in 0..BESIDE_GEARS {
+            let loud = search.loud(&found);
+            if loud.is_empty() {
+                break;
+            }
+            search.settle_gears(refit.even(), &mut found)?;
+            refit = refit.quieted(&found, &loud);
+            let before = found.clone();
+            found = further(&refit, &mut search, Some(found))?;
+            if same(&before, &found) {
+                break;
+            }
+        }
+        if refit.is_quieted() && search.loud(&found).is_empty() {
+            // The gear was none after all.
+            refit = refit.evened();
+            search.settle_gears(refit.even(), &mut found)?;
+            found = further(&refit, &mut search, Some(found))?;
+        }
+        Ok(Self {
+            refit,
+            search,
+            found,
+            tried: heard.tried,
+            across,
+        })
+    }
+}
+
+/// The effects, beginning with those `found` by then.
+fn searched<'a>(
+    bench: &'a Bench,
+    loaded: &'a Loaded,
+    refit: &Refit,
+    search: &mut Search<'a>,
+    found: Option<Vec<Profile>>,
+    heard: &mut Heard,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Profile>, DiagnoseError> {
+    let trials = search.trials();
+    // Where the effects' columns stand in for nominal ones, these stay as they were.
+    let renew = |chosen: &[Profile]| {
+        let solution = refit.solution(chosen);
+        let coefficients = solution.as_ref().unwrap_or(&refit.before);
+        let nominal = &coefficients.values[..refit.free.len()];
+        let source = bench.source(loaded, &bench.anchor.values(nominal))?;
+        match &solution {
+            Ok(solution) => source.loaded_by(chosen, &solution.values[refit.free.len()..]),
+            Err(_) => Ok(source),
+        }
+    };
+    let mut told = |step: usize, profiles: &[Profile]| {
+        heard.sweeps += 1;
+        progress(0.1 + 0.7 * (1.0 - 0.6_f64.powi(heard.sweeps)));
+        let first = profiles.iter().position(|p| p.refused(trials).is_none());
+        for (k, p) in profiles.iter().enumerate() {
+            heard.tried.push(Tried {
+                effect: title_of(p.candidate.kind),
+                joint: bench.robot.joints[p.candidate.joint].name.clone(),
+                step,
+                gain: p.evidence.gain,
+                gain_sigmas: p.evidence.gain_sigmas,
+                p_value: p.evidence.corrected(trials),
+                refused: match p.refused(trials) {
+                    Some(why) => why,
+                    None if Some(k) == first => String::new(),
+                    None => "another takes away more".into(),
+                },
+            });
+        }
+    };
+    search.run(&refit.base, found, &renew, &mut told)
+}

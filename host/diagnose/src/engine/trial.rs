@@ -1,0 +1,124 @@
+//! Which of the effects that a search has found stand before the simulated motion, all the others and the recordings held back.
+
+use super::steps::{refuse, refuse_guesses};
+use super::unbelieved::{CarriedOver, carried_over, ordered, unbelieved};
+use crate::DiagnoseError;
+use crate::bench::Loaded;
+use crate::bodies::Fitting;
+use crate::described::by_description;
+use crate::judge::{Judge, Judged};
+use crate::motion::Replay;
+use crate::outcome::Tried;
+use crate::profile::Profile;
+use crate::refit::Refit;
+
+/// Share by which a name may not make the simulated motion held back worse: that is often too short to say how sure it is.
+const MUCH_WORSE: f64 = 0.1;
+
+/// What effects are held against.
+pub(super) struct Trial<'a, 'r> {
+    /// The training data.
+    pub(super) judge: &'a Judge<'a, 'r>,
+    /// The nominal model on them.
+    pub(super) refit: &'a Refit<'r>,
+    /// Its models with effects.
+    pub(super) fitting: &'a Fitting<'a, 'r>,
+    /// The training motion simulated.
+    pub(super) replay: &'a Replay<'a>,
+    /// Recordings held back.
+    pub(super) sealed: Option<&'a Loaded>,
+}
+
+/// What is left of the effects.
+pub(super) struct Survivors {
+    /// Those that stand.
+    pub(super) judged: Judged,
+    /// Those that took much away and could not stand.
+    pub(super) fallen: Vec<Profile>,
+}
+
+impl Trial<'_, '_> {
+    /// Takes the effects `found` that do not stand out, one by one. Why goes to `tried`.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn stand(
+        &self,
+        found: Vec<Profile>,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let Self { judge, refit, .. } = self;
+        let (robot, search) = (judge.robot, judge.search);
+        let judged = judge.judged(found)?;
+        refuse_guesses(robot, tried, &judged);
+        let judged = by_description(judge, refit, self.fitting.bench, judged)?;
+        refuse_guesses(robot, tried, &judged);
+        let mut left = Survivors {
+            judged,
+            fallen: Vec::new(),
+        };
+        // A name that makes the simulated motion worse stands in for something else.
+        let why = "explains torque, but the simulated motion gets worse with it";
+        left = self.unspoilt(left, (self.replay, f64::INFINITY), why, tried)?;
+        while let Some((k, why)) = unbelieved(refit, search, judge, &left.judged.chosen)? {
+            left = self.without(left, k, why, tried)?;
+        }
+        // The hold-out finds no name; one that it contradicts does not stand.
+        if let Some(sealed) = self.sealed {
+            let why = "explains the training data, and leaves more of the recordings held back than there is without it";
+            loop {
+                match carried_over(self.fitting, search, &left.judged.chosen, sealed)? {
+                    CarriedOver::Yes => break,
+                    CarriedOver::InAnotherOrder => {
+                        let found = std::mem::take(&mut left.judged.chosen);
+                        left.judged.chosen = ordered(self.fitting, search, found, sealed)?;
+                        break;
+                    }
+                    CarriedOver::Not(k) => left = self.without(left, k, why, tried)?,
+                }
+            }
+            let held = Replay::of(self.fitting, sealed)?;
+            let why = "explains torque, but the simulated motion of the recordings held back gets worse with it";
+            left = self.unspoilt(left, (&held, MUCH_WORSE), why, tried)?;
+        }
+        Ok(left)
+    }
+
+    /// Without what makes a simulated motion worse, by a share that is too much however sure it is.
+    fn unspoilt(
+        &self,
+        mut left: Survivors,
+        (replay, most): (&Replay, f64),
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let given = |chosen: &[Profile]| self.judge.search.count_given(chosen);
+        while let Some(k) = {
+            let chosen = &left.judged.chosen;
+            replay.spoiling(chosen, given(chosen), most)?
+        } {
+            left = self.without(left, k, why, tried)?;
+        }
+        Ok(left)
+    }
+
+    fn without(
+        &self,
+        Survivors { judged, mut fallen }: Survivors,
+        k: usize,
+        why: &str,
+        tried: &mut [Tried],
+    ) -> Result<Survivors, DiagnoseError> {
+        let (robot, search) = (self.judge.robot, self.judge.search);
+        let mut stand = judged.chosen;
+        let gone = stand.remove(k);
+        refuse(robot, tried, &gone, why);
+        if gone.takes_much(search.trials()) {
+            fallen.push(gone);
+        }
+        let stand = search.possible(&self.refit.base, stand)?;
+        let judged = self.judge.judged(stand)?;
+        refuse_guesses(robot, tried, &judged);
+        Ok(Survivors { judged, fallen })
+    }
+}

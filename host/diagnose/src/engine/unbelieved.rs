@@ -1,0 +1,212 @@
+//! Effects that all effects fitted together take back, or that other recordings do.
+
+use std::f64::consts::TAU;
+
+use rig_shared::effects::{GAINS, Kind};
+
+use super::plausible::Asked;
+use crate::DiagnoseError;
+use crate::bench::Loaded;
+use crate::bodies::Fitting;
+use crate::judge::Judge;
+use crate::profile::{Profile, SIGNIFICANT};
+use crate::refit::Refit;
+use crate::search::{Search, is_gear};
+
+/// Probability above which an effect may be nothing: its 95 % interval holds zero.
+const NOTHING: f64 = 0.05;
+/// Gains of a coupling that are of an inertia, which come first; the last is friction.
+const OF_INERTIA: usize = 2;
+/// Share of the torque that a twist changes, beyond which it is no twist: the mass and load of the link hold no more than 1, and
+/// true gears of the emulated rig come out from 0.7 to 1.1.
+const MOST_OF_A_TWIST: f64 = 4.0 / 3.0;
+/// Amplitude of what an encoder on the joint may read wrongly, rad: half more than the catalogue has of any, 0.6 mm off centre on a ring
+/// of 20 mm radius. A larger one is a wave of something else, friction under load for one.
+const MOST_OF_AN_ENCODER: f64 = 0.03;
+/// What a name may leave more on recordings held back than the model without it: half of what the least of names takes away.
+const WORSE: f64 = 1.01;
+
+/// The effect found that is least to be believed beside the others, and why; none where all are.
+///
+/// # Errors
+/// [`DiagnoseError`] of the fit.
+pub(super) fn unbelieved(
+    refit: &Refit,
+    search: &Search,
+    judge: &Judge,
+    chosen: &[Profile],
+) -> Result<Option<(usize, &'static str)>, DiagnoseError> {
+    let found = search.count_given(chosen)..chosen.len();
+    if found.is_empty() {
+        return Ok(None);
+    }
+    let joint = refit.joint(&search.source, chosen, &judge.pairs, judge.coordinates)?;
+    let free = refit.free.len();
+    let asked = Asked {
+        search,
+        joint: &joint,
+        free,
+        chosen,
+    };
+    if let Some(implausible) = asked.implausible(found.clone()) {
+        return Ok(Some(implausible));
+    }
+    let nothing = (found.clone())
+        .filter(|k| !is_gear(chosen[*k].candidate.kind))
+        .map(|k| (k, joint.of_nothing(chosen, free, k, GAINS)))
+        .filter(|(_, p)| *p > NOTHING)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, _)) = nothing {
+        return Ok(Some((
+            k,
+            "by its own deviation it could as well be nothing",
+        )));
+    }
+    let couples = |k: &usize| chosen[*k].candidate.kind == Kind::InertiaCoupling;
+    for k in found.clone().filter(couples) {
+        if joint.of_nothing(chosen, free, k, OF_INERTIA) > SIGNIFICANT {
+            let why = "what it takes away goes with the other joint's speed alone, and no inertia is shown";
+            return Ok(Some((k, why)));
+        }
+    }
+    let reads = |k: &usize| chosen[*k].candidate.kind == Kind::EncoderEccentricityJoint;
+    for k in found.clone().filter(reads) {
+        let amplitude = joint
+            .gains(chosen, free, k)
+            .iter()
+            .fold(0.0, |a: f64, g| a.hypot(*g));
+        if amplitude > MOST_OF_AN_ENCODER {
+            let why = "its encoder would have to be farther off its centre than any is";
+            return Ok(Some((k, why)));
+        }
+    }
+    for k in found.filter(|k| is_gear(chosen[*k].candidate.kind)) {
+        let shares = joint.gains(chosen, free, k);
+        if shares.iter().any(|share| *share > MOST_OF_A_TWIST) {
+            let why = "it would change more torque than mass and load of the link have";
+            return Ok(Some((k, why)));
+        }
+        if resonance(search, &chosen[k])? > 0.5 / judge.rows.period {
+            let why = "it would resonate beyond the band of the data, where other laws of fast motion look alike";
+            return Ok(Some((k, why)));
+        }
+    }
+    Ok(None)
+}
+
+/// What recordings held back say of the effects found.
+pub(super) enum CarriedOver {
+    /// One by one they explain them better.
+    Yes,
+    /// All together they do, though not one by one in the order that they were found in.
+    InAnotherOrder,
+    /// This one does not.
+    Not(usize),
+}
+
+/// Whether the effects found explain the recordings held back. One does not with which they are explained worse than without it by
+/// what came before it, and no better beside all the others. Beside a gear that is not to be told: its link is followed only once
+/// its name stands.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn carried_over(
+    fitting: &Fitting,
+    search: &Search,
+    chosen: &[Profile],
+    sealed: &Loaded,
+) -> Result<CarriedOver, DiagnoseError> {
+    let mut rising = rising(fitting, search, chosen, sealed)?;
+    if rising.is_empty() {
+        return Ok(CarriedOver::Yes);
+    }
+    rising.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let whole = fitting.unseen(chosen, sealed)?;
+    for (k, _) in rising {
+        let joint = chosen[k].candidate.joint;
+        let without = fitting.unseen(&but(chosen, k), sealed)?;
+        if WORSE * whole[joint] > without[joint] {
+            return Ok(CarriedOver::Not(k));
+        }
+    }
+    Ok(CarriedOver::InAnotherOrder)
+}
+
+/// The effects with those found in another order, last always what is missed least of the recordings held back: friction that depends
+/// on the position may show there only once its warming is known.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn ordered(
+    fitting: &Fitting,
+    search: &Search,
+    mut front: Vec<Profile>,
+    sealed: &Loaded,
+) -> Result<Vec<Profile>, DiagnoseError> {
+    let given = search.count_given(&front);
+    let mut behind = Vec::new();
+    while front.len() > given + 1 {
+        let whole = fitting.unseen(&front, sealed)?;
+        let mut least: Option<(usize, f64)> = None;
+        for k in given..front.len() {
+            let joint = front[k].candidate.joint;
+            let missed = fitting.unseen(&but(&front, k), sealed)?[joint] / whole[joint];
+            if least.is_none_or(|(_, least)| missed < least) {
+                least = Some((k, missed));
+            }
+        }
+        let Some((k, _)) = least else { break };
+        behind.push(front.remove(k));
+    }
+    front.extend(behind.into_iter().rev());
+    Ok(front)
+}
+
+/// The effects found after which more is left of the recordings held back than by what came before them, and by how many times.
+fn rising(
+    fitting: &Fitting,
+    search: &Search,
+    chosen: &[Profile],
+    sealed: &Loaded,
+) -> Result<Vec<(usize, f64)>, DiagnoseError> {
+    let geared = |joint: usize| {
+        (chosen.iter()).any(|p| p.candidate.joint == joint && is_gear(p.candidate.kind))
+    };
+    let mut rising = Vec::new();
+    let mut last: Option<(usize, Vec<f64>)> = None;
+    for k in search.count_given(chosen)..chosen.len() {
+        let joint = chosen[k].candidate.joint;
+        if geared(joint) {
+            continue;
+        }
+        let left = |count| fitting.unseen(&chosen[..count], sealed);
+        let before = match last.take() {
+            Some((count, known)) if count == k => known,
+            _ => left(k)?,
+        };
+        let after = left(k + 1)?;
+        let rise = after[joint] / before[joint];
+        last = Some((k + 1, after));
+        if rise > WORSE {
+            rising.push((k, rise));
+        }
+    }
+    Ok(rising)
+}
+
+/// All but the `k`-th.
+fn but(chosen: &[Profile], k: usize) -> Vec<Profile> {
+    let others = (chosen.iter().enumerate()).filter(|(i, _)| *i != k);
+    others.map(|(_, profile)| profile.clone()).collect()
+}
+
+/// Frequency at which the link swings on its gear while the motor stands, Hz.
+fn resonance(search: &Search, gear: &Profile) -> Result<f64, DiagnoseError> {
+    let shapes = gear.candidate.kind.about().shapes;
+    let stiffness = (shapes.iter().zip(&gear.shapes)).find(|(shape, _)| shape.name == "stiffness");
+    let mass = search.source.mass(gear.candidate.joint, 0)?;
+    Ok(stiffness.map_or(0.0, |(_, stiffness)| (stiffness / mass).sqrt() / TAU))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,247 @@
+//! Gears that are none.
+
+#![allow(clippy::unwrap_used)]
+
+use crate::test_made::Diagnosed as _;
+use std::sync::Arc;
+
+use super::*;
+use crate::Options;
+use crate::bench::{Bench, Loaded, library};
+use crate::columns::Candidate;
+use crate::engine::Follower;
+use crate::fit::Evidence;
+use crate::outcome::{Tried, Verdict};
+use crate::position_reading::PositionReading;
+use crate::stated::Stated;
+use rig_data::prepare::Recording;
+use rig_scenario::{Arm, ArmScenario, Effect, Scenario};
+use rig_shared::effects::{Kind, SHAPES};
+
+const SPRING: Effect = Effect::JointElasticity {
+    stiffness: 700.0,
+    damping: 0.3,
+};
+const GEAR: Candidate = Candidate::on(Kind::JointElasticity, 0);
+
+/// What `ask` makes of the library on a rig with that hidden.
+fn on<T>(
+    effect: Option<Effect>,
+    seed: u64,
+    ask: impl FnOnce(&Bench, &Loaded, &Refit, &Search) -> T,
+) -> T {
+    let made = Scenario::short(effect, seed).make().unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    ask(&bench, &loaded, &refit, &search)
+}
+
+/// Stiffness, damping and share of the friction as shapes.
+fn shapes(of: [f64; 3]) -> [f64; SHAPES] {
+    let mut shapes = [0.0; SHAPES];
+    shapes[..3].copy_from_slice(&of);
+    shapes
+}
+
+/// What is said of an elastic gear of such a stiffness on a rig that has one of 700 N·m/rad; its torque made `times` as large.
+fn said(stiffness: f64, times: f64) -> Option<&'static str> {
+    on(Some(SPRING), 5, |bench, loaded, refit, search| {
+        let shapes = shapes([stiffness, 0.3, 0.25]);
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            position_reading: PositionReading::of_noise(vec![0.0]),
+            base: &refit.base,
+            seed: 1,
+        };
+        let mut columns = search.source.columns(&GEAR, &shapes).unwrap();
+        for value in columns.iter_mut().flatten().flatten().flatten() {
+            *value *= times;
+        }
+        let gear = Profile {
+            candidate: GEAR,
+            shapes,
+            columns: Arc::new(columns),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+            doubled: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[gear]).unwrap();
+        fallen.map(|(_, why)| why)
+    })
+}
+
+#[test]
+fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_moves_too_much() {
+    assert_eq!(said(700.0, 1.0), None);
+    // A quarter of its torque is asked for four times.
+    assert!(said(700.0, 0.25).unwrap().contains("mass and load"));
+    // Of 0.15 kg·m² at 1e5 N·m/rad that is 130 Hz, beyond rows of less than 100 Hz.
+    assert!(said(1e5, 1.0).unwrap().contains("band"));
+}
+
+/// Where the rig creeps, its friction lags a little: a link with all friction on it behind a spring of five times critical damping
+/// would take a tenth off what that leaves, and 6 % with rows about rests left out.
+#[test]
+fn a_gear_that_does_not_swing_is_none() {
+    let made = Scenario::short([], 900).make().unwrap();
+    let (diagnosis, _) = made.diagnosed(&made.robot, &Options::default());
+    assert_eq!(
+        diagnosis.verdict,
+        Verdict::NothingMissing,
+        "{:?}",
+        diagnosis.words
+    );
+    let gear = |t: &&Tried| t.effect.contains("elasticity");
+    let why = ["swing", "less than 10 %"];
+    for tried in diagnosis.tried.iter().filter(gear) {
+        assert!(
+            why.iter().any(|why| tried.refused.contains(why)),
+            "{tried:?}"
+        );
+    }
+}
+
+/// What comes of an elastic gear where the search begins with one like that.
+fn profiled(effect: Option<Effect>, seed: u64, begun: [f64; 3]) -> Profile {
+    on(effect, seed, |_, _, refit, search| {
+        let place = search.library.iter().position(|c| *c == GEAR).unwrap();
+        let profile = search.profile(&refit.base, place, Some(shapes(begun)));
+        profile.unwrap().unwrap()
+    })
+}
+
+/// On the creeping rig the best gear beyond critical damping stays there; a true one swings.
+#[test]
+fn a_gear_beyond_critical_damping_is_refused_for_that_alone() {
+    let lag = profiled(None, 900, [3000.0, 190.0, 0.25]);
+    assert!(lag.refused(300).unwrap().contains("swing"), "{lag:?}");
+    let gear = profiled(Some(SPRING), 5, [700.0, 0.3, 0.25]);
+    assert_eq!(gear.refused(300), None);
+}
+
+/// What is said of an effect on the second joint of an upright arm of two with nothing hidden; `count` columns of it.
+fn said_on_arm(kind: Kind, shapes: [f64; SHAPES], columns: usize) -> Option<&'static str> {
+    let made = ArmScenario {
+        seconds: [20.0, 15.0],
+        ..ArmScenario::new(Arm::Upright, None, 11)
+    }
+    .make()
+    .unwrap();
+    let stated = Stated::of(&made.robot);
+    let training: [&dyn Recording; 1] = [&made.train[0]];
+    let bench = Bench::of(&stated, &training).unwrap();
+    let loaded = bench.load(&training).unwrap();
+    let refit = Refit::of(&bench, &loaded.rows).unwrap();
+    let values = bench.anchor.values(&refit.before.values);
+    let search = Search::new(
+        bench.source(&loaded, &values).unwrap(),
+        library(&made.robot, &loaded.runs, &[]),
+        Vec::new(),
+        2,
+    );
+    let candidate = Candidate::on(kind, 1);
+    let follower = Follower::new(&bench, &loaded, &refit, &search);
+    let judge = Judge {
+        robot: bench.robot,
+        search: &search,
+        follower: &follower,
+        rows: &loaded.rows,
+        coordinates: &[Vec::new(), Vec::new()],
+        pairs: Vec::new(),
+        position_reading: PositionReading::of_noise(vec![0.0; 2]),
+        base: &refit.base,
+        seed: 1,
+    };
+    let mut own = search.source.columns(&candidate, &shapes).unwrap();
+    own.truncate(columns);
+    let profile = Profile {
+        candidate,
+        shapes,
+        columns: Arc::new(own),
+        evidence: Evidence::default(),
+        vanished: None,
+        followed: None,
+        otherwise: None,
+        heard: false,
+        doubled: false,
+    };
+    // A gear so soft that its motion cannot be followed has no column.
+    let fallen = unbelieved(&refit, &search, &judge, &[profile]).ok()?;
+    fallen.map(|(_, why)| why)
+}
+
+/// The second link of the arm puts some newton metres on its joint.
+#[test]
+fn an_arm_does_not_stand_on_a_soft_joint() {
+    let of = |stiffness: f64| said_on_arm(Kind::JointElasticity, shapes([stiffness, 1.0, 0.25]), 1);
+    let soft = [30.0, 50.0, 80.0, 120.0].map(of);
+    assert!(
+        soft.iter().flatten().any(|why| why.contains("sag")),
+        "{soft:?}"
+    );
+    let stiff = of(2e4);
+    assert!(stiff.is_none_or(|why| !why.contains("sag")), "{stiff:?}");
+}
+
+#[test]
+fn one_joint_of_a_recorder_has_no_clock_of_its_own() {
+    let said = said_on_arm(Kind::MeasurementDelay, [0.0; SHAPES], 1);
+    assert!(said.unwrap().contains("one clock"), "{said:?}");
+}
+
+/// Play of a thousandth of a degree on a rig without any.
+#[test]
+fn a_gap_that_may_be_none_is_none() {
+    on(None, 6, |bench, loaded, refit, search| {
+        let candidate = Candidate {
+            kind: Kind::Backlash,
+            ..GEAR
+        };
+        let shapes = [2e-5, 1500.0, 15.0, 0.25];
+        let follower = Follower::new(bench, loaded, refit, search);
+        let judge = Judge {
+            robot: bench.robot,
+            search,
+            follower: &follower,
+            rows: &loaded.rows,
+            coordinates: &[Vec::new()],
+            pairs: Vec::new(),
+            position_reading: PositionReading::of_noise(vec![0.0]),
+            base: &refit.base,
+            seed: 1,
+        };
+        let play = Profile {
+            candidate,
+            shapes,
+            columns: Arc::new(search.source.columns(&candidate, &shapes).unwrap()),
+            evidence: Evidence::default(),
+            vanished: None,
+            followed: None,
+            otherwise: None,
+            heard: false,
+            doubled: false,
+        };
+        let fallen = unbelieved(refit, search, &judge, &[play]).unwrap();
+        let why = fallen.map(|(_, why)| why);
+        assert!(why.unwrap().contains("its gap"), "{why:?}");
+    });
+}

@@ -1,0 +1,247 @@
+//! The joint as the experiments see it: limits, gravity, drive; the other joints stand.
+
+use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::trajectory::Trajectory;
+
+use super::super::DiagnoseError;
+use super::criterion::Held;
+use super::primitives::{Hands, Primitive};
+use rig_excite::COASTING;
+use rig_identify::chain_of;
+use rig_model::batch::ModelBatch;
+use rig_model::robot::{JointKind, Robot};
+use rig_plant::emulated::Nameplate;
+
+/// Nominal parameters of one joint while the others stand: inertia, gravity with cos q and with sin q, viscous and
+/// Coulomb friction, offset; SI.
+pub type Nominal = [f64; 6];
+
+/// Share of the torque limit that may be used.
+const TORQUE: f64 = 0.8;
+/// Steps of half a period of a joint that coasts.
+const COAST_STEPS: u32 = 10;
+/// Period in which such a joint is looked at, s.
+const COAST_PERIOD: f64 = 0.01;
+/// Share of the friction that is counted on to keep a joint within its range.
+const SURE_OF_FRICTION: f64 = 0.5;
+/// Instants at which the torque is looked at.
+const LOOKS: usize = 2000;
+
+/// One joint among joints that stand.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub(super) low: f64,
+    pub(super) high: f64,
+    pub(super) velocity: f64,
+    pub(super) acceleration: f64,
+    pub(super) torque: Option<f64>,
+    /// Torque per position error that the rig's controller answers with, where it is known; N·m/rad or N/m.
+    pub(super) stiffness: Option<f64>,
+    /// Whether the robot has no other joint.
+    pub(super) alone: bool,
+    /// Where all joints stand.
+    pub(super) stand: Vec<f64>,
+    /// Middle of the range.
+    pub(super) middle: f64,
+    /// Where gravity is strongest, with room to both sides.
+    pub(super) heavy: f64,
+    pub(super) revolute: bool,
+    /// Motor turns per joint turn; 0 where not stated.
+    pub(super) ratio: f64,
+    /// Inertia of the drive at the joint.
+    pub(super) drive_inertia: f64,
+    /// Torque of gravity per first moment along x: with cos q, with sin q, constant; m/s².
+    pub(super) pull: [f64; 3],
+    pub(super) nominal: Nominal,
+    /// What of it a refit leaves as described.
+    pub(super) held: Held,
+}
+
+impl Place {
+    /// Of a joint (from 0); none where the description states no finite limits of position and velocity.
+    pub(super) fn of(
+        robot: &Robot,
+        joint: usize,
+        nominal: Nominal,
+        held: Held,
+    ) -> Result<Option<Self>, DiagnoseError> {
+        let Some(own) = robot.joints.get(joint) else {
+            return Ok(None);
+        };
+        let Some(limits) = &own.limits else {
+            return Ok(None);
+        };
+        let revolute = own.kind == JointKind::Revolute;
+        // A joint that turns endlessly is asked for one turn.
+        let [low, high] = match limits.for_motions() {
+            [l, h] if l.is_finite() && h.is_finite() => [l, h],
+            _ if revolute => [-core::f64::consts::PI, core::f64::consts::PI],
+            _ => return Ok(None),
+        };
+        let stand: Vec<f64> = robot
+            .joints
+            .iter()
+            .map(|j| match j.limits.as_ref().map(|l| l.position) {
+                Some([l, h]) if l.is_finite() && h.is_finite() => 0.5 * (l + h),
+                _ => 0.0,
+            })
+            .collect();
+        let middle = 0.5 * (low + high);
+        let drive = own.drive.as_ref();
+        let ratio = drive.map_or(0.0, |d| d.gear_ratio);
+        let mut place = Self {
+            low,
+            high,
+            velocity: limits.velocity,
+            acceleration: limits
+                .acceleration
+                .unwrap_or(10.0 * limits.velocity * limits.velocity / (high - low)),
+            torque: limits.torque,
+            stiffness: stiffness(robot, joint),
+            alone: robot.joints.len() == 1,
+            stand,
+            middle,
+            heavy: middle,
+            revolute,
+            ratio,
+            drive_inertia: drive.map_or(0.0, |d| d.joint_inertia + d.rotor_inertia * ratio * ratio),
+            pull: [0.0; 3],
+            nominal,
+            held,
+        };
+        place.pull = place.gravity_of(robot, joint)?;
+        let quarter = 0.25 * (high - low);
+        place.heavy = (0..=40)
+            .map(|k| low + quarter + 0.05 * f64::from(k) * quarter)
+            .max_by(|a, b| place.weight(*a).abs().total_cmp(&place.weight(*b).abs()))
+            .unwrap_or(middle);
+        Ok(Some(place))
+    }
+
+    fn gravity_of(&self, robot: &Robot, joint: usize) -> Result<[f64; 3], DiagnoseError> {
+        let model = |e: &dyn ToString| DiagnoseError::Model(e.to_string());
+        let n = robot.joints.len();
+        let chain = chain_of(robot).map_err(|e| model(&e))?;
+        let mut parameters = vec![[0.0; COLUMNS]; n];
+        parameters[joint][column::FIRST_MOMENT] = 1.0;
+        let batch = ModelBatch::new(&chain, &parameters).map_err(|e| model(&e))?;
+        let quarter = core::f64::consts::FRAC_PI_2;
+        let q: Vec<Vec<f64>> = (0..n)
+            .map(|j| {
+                let at = [0.0, quarter, 2.0 * quarter];
+                at.iter()
+                    .map(|a| if j == joint { *a } else { self.stand[j] })
+                    .collect()
+            })
+            .collect();
+        let mut out = vec![0.0; 3 * n];
+        batch.gravity(&q, &mut out).map_err(|e| model(&e))?;
+        let [zero, up, half] = [out[3 * joint], out[3 * joint + 1], out[3 * joint + 2]];
+        let constant = 0.5 * (zero + half);
+        Ok([zero - constant, up - constant, constant])
+    }
+
+    pub(super) fn unit(&self) -> &'static str {
+        if self.revolute { "rad" } else { "m" }
+    }
+
+    pub(super) fn effort_unit(&self) -> &'static str {
+        if self.revolute { "N*m" } else { "N" }
+    }
+
+    /// Position, velocity and acceleration of the joint with its drive off at the middles of so many periods (s), with a share of
+    /// its dry and viscous friction: it stops where friction holds its weight.
+    pub(super) fn coast(
+        &self,
+        [mut position, mut velocity]: [f64; 2],
+        friction: f64,
+        period: f64,
+        count: usize,
+    ) -> Vec<[f64; 3]> {
+        let [inertia, _, _, viscous, coulomb, offset] = self.nominal;
+        let step = period / f64::from(2 * COAST_STEPS);
+        let mut tick = || {
+            let pull = self.weight(position) + offset;
+            let held = friction * coulomb.abs();
+            let direction = if velocity != 0.0 {
+                velocity.signum()
+            } else if pull.abs() <= held {
+                return [position, 0.0, 0.0];
+            } else {
+                -pull.signum()
+            };
+            let acceleration =
+                -(pull + friction * viscous.abs() * velocity + held * direction) / inertia;
+            let next = velocity + acceleration * step;
+            // Dry friction turns nothing round.
+            velocity = if next * direction < 0.0 { 0.0 } else { next };
+            position += velocity * step;
+            [position, velocity, acceleration]
+        };
+        let mut half = |count: u32| (0..count).map(|_| tick()).last().unwrap_or_default();
+        (0..count)
+            .map(|_| {
+                let middle = half(COAST_STEPS);
+                half(COAST_STEPS);
+                middle
+            })
+            .collect()
+    }
+
+    /// Whether a joint whose drive is switched off stays within its range on half its friction.
+    pub(super) fn stops(&self, primitive: &Primitive) -> bool {
+        let Some(off) = primitive.drive_off else {
+            return true;
+        };
+        let at = primitive.trajectory.at(off);
+        let begin = [primitive.start + at.position, at.velocity];
+        let rows = (COASTING / COAST_PERIOD) as usize;
+        let way = self.coast(begin, SURE_OF_FRICTION, COAST_PERIOD, rows);
+        self.nominal[0] > 0.0 && (way.iter()).all(|[q, ..]| (self.low..=self.high).contains(q))
+    }
+
+    /// Torque of gravity per first moment along x.
+    pub(super) fn pull_at(&self, q: f64) -> f64 {
+        let (sine, cosine) = q.sin_cos();
+        self.pull[0] * cosine + self.pull[1] * sine + self.pull[2]
+    }
+
+    /// Nominal torque of gravity.
+    pub(super) fn weight(&self, q: f64) -> f64 {
+        let (sine, cosine) = q.sin_cos();
+        if self.revolute {
+            self.nominal[1] * cosine + self.nominal[2] * sine
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether the torque limit allows the motion in every pass, Coulomb friction counted in full.
+    pub(super) fn bears(&self, motion: &Trajectory<f64>, start: f64, hands: Hands) -> bool {
+        let Some(limit) = self.torque else {
+            return true;
+        };
+        let [inertia, _, _, viscous, coulomb, offset] = self.nominal;
+        let duration = motion.duration();
+        hands.passes().iter().all(|[mass, gravity]| {
+            (0..=LOOKS).all(|k| {
+                let at = motion.at(duration * k as f64 / LOOKS as f64);
+                let needed = mass * inertia * at.acceleration
+                    + gravity * self.weight(start + at.position)
+                    + viscous * at.velocity
+                    + offset;
+                needed.abs() + coulomb.abs() <= TORQUE * limit
+            })
+        })
+    }
+}
+
+/// What the controller answers a position error with: as `rig record` tells the rig, else as the description states it.
+fn stiffness(robot: &Robot, joint: usize) -> Option<f64> {
+    let own = robot.joints.get(joint)?;
+    let told = Nameplate::from_robot(robot)
+        .map(|nameplate| f64::from(nameplate.settings.gains.proportional));
+    let stated =
+        (own.controller.as_ref()).map(|c| c.torque_gain * c.velocity_gain * c.position_gain);
+    told.ok().or(stated).filter(|gain| *gain > 0.0)
+}

@@ -1,0 +1,405 @@
+//! The motions to choose from: safe, within the limits, and such that the rig runs them from a file.
+
+use core::f64::consts::TAU;
+
+use rig_excite::COASTING;
+use rig_shared::safety::Limits;
+use rig_shared::trajectory::{
+    Chirp, Fourier, FrictionSweep, Reference, SlowReversals, Staircase, Sweep, Trajectory,
+};
+
+use super::place::Place;
+
+/// Share of each limit that is used.
+const SHARE: f64 = 0.8;
+/// Shares of the acceleration limit that are tried until the torque limit is kept.
+const BRISKNESS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
+/// Longest motion, s; the warm-up alone takes longer.
+const LONGEST: f64 = 120.0;
+const WARM_UP: f64 = 600.0;
+/// Shortest time at constant speed on either side of it, s: a host on a slow line is late by less.
+const CRUISE: f64 = 0.25;
+/// Share of the amplitude with which a chirp is repeated.
+const AGAIN: f64 = 0.3;
+/// Levels of a clamped joint, in shares of the torque that may be used: up and down on either side, so that what depends on
+/// the direction shows.
+const LEVELS: [f64; 13] = [
+    0.2, 0.5, 1.0, 0.5, 0.2, 0.05, -0.05, -0.2, -0.5, -1.0, -0.5, -0.2, -0.05,
+];
+/// Share of the torque limit that a clamp and a winding at rest are asked to bear.
+const CLAMPED: f64 = 0.4;
+/// Peaks of the quintic's velocity and acceleration, in distance over time and over time squared.
+const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
+
+/// What a motion is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Forth and back at each of several constant speeds.
+    ConstantSpeeds,
+    /// Slow triangles of ever smaller amplitude.
+    NestedReversals,
+    /// The same where gravity is strongest, so that it closes a gap.
+    ReversalsUnderLoad,
+    /// Swept sine, and again at a third of its amplitude.
+    Chirp,
+    /// A slow way to each of several levels after a rest.
+    RampsAfterRest,
+    /// A sine at one frequency.
+    Sine,
+    /// A sine repeated for ten minutes from cold.
+    WarmUp,
+    /// A constant speed, and in the middle of it the drive is switched off.
+    CoastDown,
+    /// Levels of the position that a clamped joint cannot reach, and so of the torque and the voltage.
+    LockedRotor,
+}
+
+impl Family {
+    /// All along which a joint moves.
+    pub const MOVING: [Self; 8] = [
+        Self::ConstantSpeeds,
+        Self::NestedReversals,
+        Self::ReversalsUnderLoad,
+        Self::Chirp,
+        Self::RampsAfterRest,
+        Self::Sine,
+        Self::WarmUp,
+        Self::CoastDown,
+    ];
+
+    /// Name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ConstantSpeeds => "constant-speed-pairs",
+            Self::NestedReversals => "nested-reversals",
+            Self::ReversalsUnderLoad => "reversals-under-load",
+            Self::Chirp => "two-amplitude-chirp",
+            Self::RampsAfterRest => "ramps-after-rest",
+            Self::Sine => "sine",
+            Self::WarmUp => "warm-up",
+            Self::CoastDown => "coast-down",
+            Self::LockedRotor => "locked-rotor-staircase",
+        }
+    }
+}
+
+/// What is done by hand between the passes of one motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hands {
+    /// Nothing: one pass.
+    None,
+    /// A second pass with a payload.
+    Payload,
+    /// A second pass with the base turned so that gravity does nothing.
+    BaseOnItsSide,
+}
+
+impl Hands {
+    /// Factors on inertia and gravity of the link in each pass.
+    pub(super) fn passes(self) -> &'static [[f64; 2]] {
+        match self {
+            Self::None => &[[1.0, 1.0]],
+            // A payload that adds half of what is there moves well within the limits' reserve.
+            Self::Payload => &[[1.0, 1.0], [1.5, 1.5]],
+            Self::BaseOnItsSide => &[[1.0, 1.0], [1.0, 0.0]],
+        }
+    }
+
+    /// What to do and how to use it, sentences.
+    pub(super) fn text(self) -> &'static str {
+        match self {
+            Self::None => "Give what it records with --data beside the others.",
+            Self::Payload => {
+                "Record it twice: as the robot is, and with a payload of about half the link's mass fixed to it. Diagnose each by itself, the second with the payload in its description."
+            }
+            Self::BaseOnItsSide => {
+                "Record it twice: as the robot stands, and with the base turned on its side so that the joint's axis is vertical. Diagnose each by itself, the second with `gravity` along that axis in its description."
+            }
+        }
+    }
+}
+
+/// A motion of one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Primitive {
+    pub(super) family: Family,
+    pub(super) hands: Hands,
+    /// Where it starts, rad or m.
+    pub(super) start: f64,
+    pub(super) trajectory: Trajectory<f64>,
+    /// When the drive is switched off, s after the start.
+    pub(super) drive_off: Option<f64>,
+    /// Its figures in words.
+    pub(super) figures: String,
+}
+
+impl Primitive {
+    /// How long one pass is recorded, s.
+    pub(super) fn duration(&self) -> f64 {
+        (self.drive_off).map_or_else(|| self.trajectory.duration(), |off| off + COASTING)
+    }
+
+    /// Position, velocity and acceleration from the start at the middles of so many pieces of one pass, and whether the drive is on.
+    pub(super) fn way(&self, place: &Place, rows: usize) -> Vec<(Reference<f64>, bool)> {
+        let period = self.duration() / rows as f64;
+        let time = |k: usize| (k as f64 + 0.5) * period;
+        let off = self.drive_off.unwrap_or(f64::INFINITY);
+        let mut way: Vec<_> = (0..rows)
+            .take_while(|k| time(*k) < off)
+            .map(|k| (self.trajectory.at(time(k)), true))
+            .collect();
+        if way.len() < rows {
+            let from = self.trajectory.at(off);
+            let begin = [self.start + from.position, from.velocity];
+            let coasted = place.coast(begin, 1.0, period, rows - way.len());
+            way.extend(
+                coasted
+                    .into_iter()
+                    .map(|[position, velocity, acceleration]| {
+                        let position = position - self.start;
+                        let at = Reference {
+                            position,
+                            velocity,
+                            acceleration,
+                        };
+                        (at, false)
+                    }),
+            );
+        }
+        way
+    }
+}
+
+fn micros(seconds: f64) -> Option<u32> {
+    let whole = (seconds * 1e6).ceil();
+    (whole >= 1.0 && whole <= f64::from(u32::MAX)).then_some(whole as u32)
+}
+
+/// What one motion may use.
+struct Allowance {
+    distance: f64,
+    velocity: f64,
+    acceleration: f64,
+}
+
+impl Allowance {
+    fn move_time(&self, distance: f64) -> f64 {
+        let by_velocity = QUINTIC[0] * distance / self.velocity;
+        by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
+    }
+
+    fn build(&self, family: Family, unit: &str) -> Option<(Trajectory<f64>, String)> {
+        let (a, v) = (self.distance, self.velocity);
+        match family {
+            Family::ConstantSpeeds => {
+                let slowest = v / 20.0;
+                let speeds: Vec<f64> = (0..8)
+                    .map(|k| slowest * 20f64.powf(f64::from(k) / 7.0))
+                    .collect();
+                let ramp = 1.5 * v / self.acceleration;
+                let travel = (2.0 * a - v * ramp).min(6.0 * slowest);
+                let half = 0.5 * (travel + v * ramp);
+                let sweep = FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half))?;
+                let text = format!(
+                    "eight constant speeds from {slowest:.4} to {v:.4} {unit}/s, both ways, over {:.3} {unit} in all",
+                    2.0 * sweep.half_span
+                );
+                Some((Trajectory::FrictionSweep(sweep), text))
+            }
+            Family::NestedReversals | Family::ReversalsUnderLoad => {
+                let turn = (3.0 * v / self.acceleration).max(0.05);
+                let least = 1.3 * v * turn;
+                let mut amplitudes: Vec<f64> =
+                    [1.0, 0.3, 0.1].iter().map(|s| (s * a).max(least)).collect();
+                amplitudes.dedup();
+                let motion = SlowReversals::new(v, turn, &amplitudes, 3)?;
+                let text = format!(
+                    "three slow triangles each of {} {unit} to either side at {v:.4} {unit}/s",
+                    amplitudes
+                        .iter()
+                        .map(|a| format!("{a:.4}"))
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                );
+                Some((Trajectory::SlowReversals(motion), text))
+            }
+            Family::Chirp => {
+                let start_hz = 0.25 * v / (TAU * a);
+                let end_hz = (4.0 * self.acceleration / (TAU * v)).max(8.0 * start_hz);
+                let duration = (5.0 * (end_hz / start_hz).log2() / start_hz).min(0.5 * LONGEST);
+                let text = format!(
+                    "a swept sine from {start_hz:.3} to {end_hz:.2} Hz of up to {a:.4} {unit}, and again at {AGAIN} of its amplitude"
+                );
+                Some((
+                    Trajectory::Chirp(Chirp {
+                        start_hz,
+                        end_hz,
+                        sweep: Sweep::Logarithmic,
+                        duration_us: micros(duration)?,
+                        ramp_us: micros((0.5 / start_hz).min(0.1 * duration))?,
+                        amplitude: a,
+                        velocity: v,
+                        acceleration: self.acceleration,
+                        again: AGAIN,
+                    }),
+                    text,
+                ))
+            }
+            Family::RampsAfterRest => {
+                let moving = self.move_time(0.5 * a);
+                let levels = [1.0, 2.0, 1.0, 0.0, -1.0, -2.0, -1.0];
+                let text = format!(
+                    "steps of {:.4} {unit} up and down in {moving:.2} s each, after rests of 4 s",
+                    0.5 * a
+                );
+                Some((
+                    Trajectory::Staircase(Staircase {
+                        levels: levels.iter().map(|l| 0.5 * a * l).collect(),
+                        move_us: micros(moving)?,
+                        dwell_us: 4_000_000,
+                    }),
+                    text,
+                ))
+            }
+            Family::CoastDown => {
+                let ramp = 1.5 * v / self.acceleration;
+                let travel = (2.0 * a - v * ramp).min(4.0 * CRUISE * v);
+                if travel < 2.0 * CRUISE * v {
+                    return None;
+                }
+                let half = 0.5 * (travel + v * ramp);
+                let sweep = FrictionSweep::new(&[v], travel, ramp, 0.2, self.move_time(half))?;
+                let text = format!(
+                    "a pass at {v:.4} {unit}/s, in the middle of which the drive is switched off and the joint coasts"
+                );
+                Some((Trajectory::FrictionSweep(sweep), text))
+            }
+            // A clamped joint has no speed.
+            Family::LockedRotor => None,
+            Family::Sine | Family::WarmUp => {
+                let omega = (v / a).min((self.acceleration / a).sqrt());
+                let period = TAU / omega;
+                let long = if family == Family::Sine {
+                    30.0
+                } else {
+                    WARM_UP
+                };
+                let periods = (long / period).clamp(5.0, f64::from(u16::MAX)) as u16;
+                // Leaves room for what the envelope adds at the ends.
+                let amplitude = 0.9 * a;
+                let text = format!(
+                    "{periods} periods of a sine of {amplitude:.4} {unit} at {:.3} Hz",
+                    1.0 / period
+                );
+                Some((
+                    Trajectory::Fourier(Fourier {
+                        period_us: micros(period)?,
+                        periods,
+                        ramp_us: micros(2.0 * period)?,
+                        sine: [amplitude].into_iter().collect(),
+                        cosine: core::iter::empty().collect(),
+                    }),
+                    text,
+                ))
+            }
+        }
+    }
+}
+
+/// When a coast-down's drive is switched off, s after the start: half way through its first pass.
+fn half_way(trajectory: &Trajectory<f64>) -> Option<f64> {
+    let Trajectory::FrictionSweep(sweep) = trajectory else {
+        return None;
+    };
+    let cruise = *sweep.cruise_us.first()?;
+    Some(f64::from(sweep.lead_us + sweep.ramp_us + cruise / 2) * 1e-6)
+}
+
+/// The staircase of a clamped joint; none where the controller's gain or the torque limit is not known.
+pub(super) fn clamped(place: &Place) -> Option<Primitive> {
+    let highest = CLAMPED * place.torque?;
+    let levels = LEVELS.map(|share| share * highest / place.stiffness.unwrap_or(0.0));
+    if !levels.iter().all(|level| level.is_finite()) {
+        return None;
+    }
+    Some(Primitive {
+        family: Family::LockedRotor,
+        hands: Hands::None,
+        start: place.middle,
+        trajectory: Trajectory::Staircase(Staircase {
+            levels: levels.into_iter().collect(),
+            move_us: 200_000,
+            dwell_us: 1_000_000,
+        }),
+        drive_off: None,
+        figures: format!(
+            "thirteen levels of up to {:.5} {} to either side, of which the controller makes up to {highest:.3} {} while the joint is clamped",
+            levels[2],
+            place.unit(),
+            place.effort_unit()
+        ),
+    })
+}
+
+/// All motions of a family at a place, over amplitudes and speeds.
+pub(super) fn of_family(place: &Place, family: Family, hands: Hands) -> Vec<Primitive> {
+    let heavy = family == Family::ReversalsUnderLoad;
+    let start = if heavy { place.heavy } else { place.middle };
+    let room = SHARE * (place.high - start).min(start - place.low);
+    let (distances, speeds): (&[f64], &[f64]) = match family {
+        Family::NestedReversals | Family::ReversalsUnderLoad => {
+            (&[0.5, 0.1, 0.02, 0.004], &[0.1, 0.03, 0.01, 0.003])
+        }
+        Family::Sine => (&[1.0, 0.3, 0.05], &[1.0, 0.3]),
+        Family::WarmUp => (&[1.0], &[1.0]),
+        Family::Chirp | Family::RampsAfterRest => (&[1.0, 0.2], &[1.0, 0.2]),
+        Family::ConstantSpeeds => (&[1.0], &[1.0, 0.4, 0.15, 0.05, 0.02]),
+        // What is done by hand between two passes is not done to a joint that coasts: weight may carry it anywhere then.
+        Family::CoastDown if place.alone && hands == Hands::None => (&[1.0], &[1.0, 0.4, 0.15]),
+        Family::CoastDown | Family::LockedRotor => (&[], &[]),
+    };
+    let limits = Limits {
+        position_low: place.low,
+        position_high: place.high,
+        velocity: place.velocity,
+        acceleration: place.acceleration,
+        ..Limits::default()
+    };
+    let mut list = Vec::new();
+    for distance in distances {
+        for speed in speeds {
+            let long = if family == Family::WarmUp {
+                1.2 * WARM_UP
+            } else {
+                LONGEST
+            };
+            // As briskly as the torque limit allows.
+            let found = BRISKNESS.iter().find_map(|brisk| {
+                let allowance = Allowance {
+                    distance: distance * room,
+                    velocity: speed * SHARE * place.velocity,
+                    acceleration: brisk * SHARE * place.acceleration,
+                };
+                let (trajectory, figures) = allowance.build(family, place.unit())?;
+                // In single precision, as the rig runs it.
+                let runs = trajectory.to_f32().to_f64().check(&limits, start).is_ok();
+                let fits = runs && trajectory.duration() <= long;
+                let drive_off = half_way(&trajectory).filter(|_| family == Family::CoastDown);
+                let primitive = Primitive {
+                    family,
+                    hands,
+                    start,
+                    trajectory,
+                    drive_off,
+                    figures,
+                };
+                (fits
+                    && place.bears(&primitive.trajectory, start, hands)
+                    && place.stops(&primitive))
+                .then_some(primitive)
+            });
+            list.extend(found);
+        }
+    }
+    list
+}

@@ -1,0 +1,62 @@
+//! The diagnosis of recordings that cannot be what they say.
+
+use super::outcome::{About, Before, DataFault, Diagnosis, Residual, Verdict};
+use super::sentences;
+use rig_data::prepare::PrepareError;
+use rig_model::robot::Robot;
+
+/// What keeps a recording from being prepared, where that is a fault of the recording.
+pub(super) fn of_preparing(error: &PrepareError) -> Option<DataFault> {
+    let (kind, label) = match error {
+        PrepareError::TooShort { label, .. } => ("too-short", label),
+        PrepareError::NotMoving { label, .. } => ("not-moving", label),
+        PrepareError::Broken { label, .. } | PrepareError::Irregular { label, .. } => {
+            ("clock", label)
+        }
+        _ => return None,
+    };
+    Some(DataFault {
+        kind: kind.into(),
+        about: About::Preparation,
+        recording: label.clone(),
+        joint: String::new(),
+        certain: true,
+        text: error.to_string(),
+    })
+}
+
+/// Says what is wrong and nothing else: no model means anything on such data.
+pub(super) fn faulty(robot: &Robot, data_faults: Vec<DataFault>) -> Diagnosis {
+    let mut diagnosis = Diagnosis {
+        schema: "rig-diagnosis/1".into(),
+        robot: robot.name.clone(),
+        verdict: Verdict::DataFault,
+        residual: Residual::Torque,
+        words: Vec::new(),
+        noise_floor_rms: Vec::new(),
+        noise_floor_from: Vec::new(),
+        left: Vec::new(),
+        noise_floor_how: String::new(),
+        motion_how: String::new(),
+        treatment: None,
+        torque_lead: Vec::new(),
+        places: Vec::new(),
+        described: Vec::new(),
+        steps: Vec::new(),
+        gap_closed: None,
+        absorbed: Vec::new(),
+        absorbed_before: Before::Described,
+        by_motion: None,
+        not_testable: Vec::new(),
+        detectable: Vec::new(),
+        next_experiment: None,
+        remainder: None,
+        data_faults,
+        waterfall: Vec::new(),
+        tried: Vec::new(),
+        maps: Vec::new(),
+        curves: Vec::new(),
+    };
+    diagnosis.words = sentences::verdict(&diagnosis, false);
+    diagnosis
+}

@@ -1,0 +1,181 @@
+//! How much earlier than it acts a torque was recorded, where that is less than a sample.
+//!
+//! A controller holds its torque until its next sample: what is recorded with a position acts, on average, half a period
+//! after it (Franklin, Powell and Workman 1998, section 4.3). Fast motion shows it as a residual that goes with the torque's
+//! rate of change, larger than many effects. It is a property of the recording, not of the rig, and taken out before anything
+//! is searched for. Torque that comes later than the mean over one sample does is an effect: `measurement_delay`.
+//!
+//! Leaves out: holds longer than the recording's period (a slower controller recorded faster).
+
+use rig_shared::effects::Kind;
+
+use super::DiagnoseError;
+use super::bench::{Bench, Loaded};
+use super::columns::{Candidate, Source};
+use super::fit::Fit;
+use rig_data::runs::{JointRun, Run};
+
+/// Standard deviations from which a lead counts.
+const SEEN: f64 = 4.0;
+/// Share of a sample below which it changes nothing.
+const LEAST: f64 = 0.05;
+/// Share of a sample by which a lead must have changed for another search.
+const WORTH_A_SEARCH: f64 = 0.2;
+/// Share of a sample that a torque may come late without being late: a reading that is the mean over the last sample, as of
+/// a current that is summed over it, is half a sample old; a tenth is for what the estimate is off by.
+const LATE: f64 = 0.6;
+/// … and no more than this, s: a board reads its sensors within it, however slowly they are recorded.
+const LATEST: f64 = 0.001;
+
+/// What the instants of sampling alone may make a torque late by, s.
+pub(super) fn slack(runs: &[Run]) -> f64 {
+    runs.first()
+        .map_or(0.0, |run| (LATE / run.rate).min(LATEST))
+}
+
+/// How long before it acts (negative: after) each joint's torque was recorded, s: the `present` lead with what `fit` still
+/// shows. Where that is more than the instants of sampling explain it is something else, and 0 here.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn leads(
+    source: &Source,
+    fit: &Fit,
+    present: &[f64],
+) -> Result<Vec<f64>, DiagnoseError> {
+    let Some(rate) = source.runs.first().map(|run| run.rate) else {
+        return Ok(present.to_vec());
+    };
+    let late = slack(source.runs);
+    (present.iter().enumerate())
+        .map(|(joint, &present)| {
+            let candidate = Candidate::on(Kind::MeasurementDelay, joint);
+            let columns = source.columns(&candidate, &Default::default())?;
+            let evidence = fit
+                .distinct(&columns)
+                .and_then(|own| fit.evidence(&own, &[[f64::NEG_INFINITY, f64::INFINITY]]));
+            let lead = match evidence {
+                Some(e) if e.gains[0].abs() > SEEN * e.stds[0] => present - e.gains[0],
+                _ => present,
+            };
+            let counts = lead.abs() * rate >= LEAST && (-late..=1.0 / rate).contains(&lead);
+            Ok(if counts { lead } else { 0.0 })
+        })
+        .collect()
+}
+
+/// Whether two sets of leads are worth another search.
+pub(super) fn differ(a: &[f64], b: &[f64], runs: &[Run]) -> bool {
+    let rate = runs.first().map_or(0.0, |run| run.rate);
+    a.iter()
+        .zip(b)
+        .any(|(a, b)| (a - b).abs() * rate >= WORTH_A_SEARCH)
+}
+
+/// The recordings with each joint's torque where it acts.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn moved(bench: &Bench, loaded: Loaded, by: &[f64]) -> Result<Loaded, DiagnoseError> {
+    if by.iter().all(|lead| *lead == 0.0) {
+        return Ok(loaded);
+    }
+    let mut runs = loaded.runs;
+    // A reading is late by a share of its sample: of a recording at another rate by as much of its own.
+    let rate = bench.rate();
+    for run in &mut runs {
+        for (joint, lead) in run.joints.iter_mut().zip(by) {
+            put_later(joint, lead * rate);
+        }
+    }
+    bench.rows(runs, &loaded.treatment)
+}
+
+/// A joint's torque `samples` later; what its reading varied by is kept, which this smooths.
+fn put_later(joint: &mut JointRun, samples: f64) {
+    joint.differences = Some(joint.differences());
+    joint.tau = later(&joint.tau, samples);
+    joint.taken_off = joint.taken_off.take().map(|held| later(&held, samples));
+}
+
+/// A signal `samples` (at most one, either way) later, by the cubic through the four nearest samples.
+fn later(signal: &[f64], samples: f64) -> Vec<f64> {
+    if samples == 0.0 {
+        return signal.to_vec();
+    }
+    let last = signal.len().saturating_sub(1) as isize;
+    let at = |k: isize| signal[k.clamp(0, last) as usize];
+    let whole = samples.floor();
+    // Between the sample before and the one after the place wanted, counted from the former.
+    let x = 1.0 - (samples - whole);
+    let before = |k: usize| k as isize - whole as isize - 1;
+    let weights = [
+        -x * (x - 1.0) * (x - 2.0) / 6.0,
+        (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0,
+        -(x + 1.0) * x * (x - 2.0) / 2.0,
+        (x + 1.0) * x * (x - 1.0) / 6.0,
+    ];
+    (0..signal.len())
+        .map(|k| {
+            (weights.iter().zip(-1..=2))
+                .map(|(w, place)| w * at(before(k) + place))
+                .sum()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::floor::of_reading;
+
+    #[test]
+    fn a_torque_that_was_moved_tells_its_readings_noise_as_before() {
+        let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(9);
+        let joint = JointRun {
+            tau: (0..5000).map(|_| rng.random::<f64>()).collect(),
+            ..JointRun::default()
+        };
+        let mut run = Run {
+            rate: 1000.0,
+            joints: vec![joint],
+            ..Run::default()
+        };
+        let before = of_reading(std::slice::from_ref(&run), 0, 0.01);
+        put_later(&mut run.joints[0], 0.4);
+        // Once more: a lead is found in two passes.
+        put_later(&mut run.joints[0], 0.1);
+        assert!(before.is_some());
+        assert_eq!(of_reading(&[run], 0, 0.01), before);
+    }
+
+    #[test]
+    fn no_more_than_half_a_sample_late_is_sampling() {
+        let late = |rate: f64| {
+            slack(&[Run {
+                rate,
+                ..Run::default()
+            }])
+        };
+        // Half a sample at 1 kHz is sampling; the three quarters that a filter of the current adds are not.
+        assert!(late(1000.0) > 0.0005 && late(1000.0) < 0.00075);
+        assert_eq!(late(100.0), LATEST);
+        assert_eq!(slack(&[]), 0.0);
+    }
+
+    #[test]
+    fn a_moved_wave_is_the_wave_later() {
+        let wave = |t: f64| (0.2 * t).sin() + 0.3 * (0.05 * t).cos();
+        let signal: Vec<f64> = (0..400).map(|k| wave(f64::from(k))).collect();
+        for samples in [0.5, 1.0, 0.1, -0.4, -1.0] {
+            let moved = later(&signal, samples);
+            for k in 5..395 {
+                let wanted = wave(f64::from(k as u32) - samples);
+                // The cubic's error: 3/128 of the fourth derivative, 0.2⁴.
+                assert!((moved[k] - wanted).abs() < 5e-5, "{samples} {k}");
+            }
+        }
+    }
+}

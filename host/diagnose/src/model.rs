@@ -1,0 +1,211 @@
+//! The description with what was found in it.
+//!
+//! Leaves out: second order in the angle of a tilted base where there is more than one joint.
+
+use nalgebra::{DVector, Rotation3, Vector3};
+use rig_shared::effects::{Effect, Kind, SHAPES};
+use rig_shared::multibody::{COLUMNS, column};
+
+use super::columns::Candidate;
+use super::profile::Profile;
+use super::refit::turn;
+use super::rows::Nominal;
+use super::search::is_gear;
+use rig_identify::{Combinations, described as standard, redistributed};
+use rig_model::robot::{Origin, Robot, RobotEffect, sane};
+use rig_output::{format_significant, format_unit};
+
+/// Share of the largest value of a kind that a parameter of that kind may at least move by in one unit of change.
+const LEAST_WEIGHT: f64 = 0.1;
+/// A transmission's share further from 1 than this is said.
+const UNEVEN: f64 = 0.1;
+
+/// An effect with its fitted gains (as many as its columns) and shapes.
+pub(super) struct Fitted<'a> {
+    /// Which, and where.
+    pub(super) candidate: Candidate,
+    /// In the order of its columns.
+    pub(super) gains: &'a [f64],
+    /// In the order of the registry.
+    pub(super) shapes: [f64; SHAPES],
+}
+
+/// `robot` with these base parameters, and what had to be said of it.
+pub(super) fn redistributed_over(
+    robot: &Robot,
+    nominal: &Nominal,
+    values: &[f64],
+) -> (Robot, Vec<String>) {
+    let base = Combinations {
+        combination: &nominal.base.combination,
+        columns: &nominal.base.columns,
+        values,
+    };
+    let weights = weights(robot, base.combination.ncols());
+    redistributed(robot, &base, Some(&weights))
+}
+
+/// Gravity turned as an effect among these says, and `values` for it.
+pub(super) fn gravity_with(
+    robot: &Robot,
+    nominal: &Nominal,
+    formed_at: &[f64],
+    effects: &[Fitted],
+    values: &mut [f64],
+) -> [f64; 3] {
+    (effects.iter())
+        .find(|e| e.candidate.kind == Kind::GravityTilt)
+        .map_or(robot.gravity, |tilt| {
+            turned(nominal, robot.gravity, tilt.gains, formed_at, values)
+        })
+}
+
+/// A description with new base parameters, `robot` the one given, and what had to be said of it: with gravity and effects.
+pub(super) fn completed(
+    (mut model, mut remarks): (Robot, Vec<String>),
+    robot: &Robot,
+    gravity: [f64; 3],
+    effects: &[Fitted],
+) -> (Robot, Vec<String>) {
+    model.gravity = gravity;
+    // What its values were identified from before says nothing about the new ones.
+    model.identified = None;
+    model.origin = Origin::Own;
+    for fitted in effects {
+        let kind = fitted.candidate.kind;
+        if kind == Kind::GravityTilt {
+            continue;
+        }
+        let transmission = is_gear(kind);
+        if let ([share], true) = (fitted.gains, transmission)
+            && (share - 1.0).abs() > UNEVEN
+        {
+            remarks.push(format!(
+                "The data show {share:.2} times the torque that the {} of joint {} gives with the description's inertia and load; the description holds it once.",
+                kind.about().title, robot.joints[fitted.candidate.joint].name
+            ));
+        }
+        let gains = if transmission { &[][..] } else { fitted.gains };
+        model
+            .effects
+            .push(within(robot, fitted, gains, &mut remarks));
+    }
+    (model, remarks)
+}
+
+/// Effects with their gains.
+pub(super) fn with_gains<'g>(chosen: &[Profile], mut gains: &'g [f64]) -> Vec<Fitted<'g>> {
+    let mut effects = Vec::new();
+    for profile in chosen {
+        let (own, rest) = gains.split_at(profile.columns.len());
+        gains = rest;
+        effects.push(Fitted {
+            candidate: profile.candidate,
+            gains: own,
+            shapes: profile.shapes,
+        });
+    }
+    effects
+}
+
+/// Gravity turned as the fitted angles say, and the first moments among `values` with it: what a fit calls turned is a part of
+/// gravity added across it, so that its moments are by the cosine too small. The torque of gravity is that of the fit, whose angle
+/// multiplies the moments that its column was formed with.
+fn turned(
+    nominal: &Nominal,
+    gravity: [f64; 3],
+    angles: &[f64],
+    formed_at: &[f64],
+    values: &mut [f64],
+) -> [f64; 3] {
+    let axes = nominal.tilt_axes();
+    let moments: Vec<usize> = (nominal.base.columns.iter().enumerate())
+        .filter(|(_, c)| (column::FIRST_MOMENT..column::INERTIA).contains(&(*c % COLUMNS)))
+        .map(|(k, _)| k)
+        .collect();
+    let length = |values: &[f64]| {
+        moments
+            .iter()
+            .map(|k| values[*k].powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    let (before, now) = (length(formed_at), length(values));
+    let mut sum = Vector3::zeros();
+    for (axis, angle) in axes.iter().zip(angles) {
+        let slope = if now > 0.0 {
+            angle * before / now
+        } else {
+            *angle
+        };
+        sum += Vector3::from(*axis) * slope;
+    }
+    for k in moments {
+        values[k] *= sum.norm().hypot(1.0);
+    }
+    let turned = Rotation3::from_scaled_axis(sum * turn(sum.as_slice()));
+    (turned.inverse() * Vector3::from(gravity)).into()
+}
+
+/// The effect as a table of the description, its values within what a description may hold.
+fn within(robot: &Robot, fitted: &Fitted, gains: &[f64], remarks: &mut Vec<String>) -> RobotEffect {
+    let Candidate {
+        kind, joint, other, ..
+    } = fitted.candidate;
+    let mut effect = Effect::new(kind, gains, &fitted.shapes);
+    let name = |j: usize| robot.joints[j].name.clone();
+    let about = kind.about();
+    let places = about.gains.iter().zip(&mut effect.gains);
+    for (p, value) in places.chain(about.shapes.iter().zip(&mut effect.shapes)) {
+        let [low, high] = sane(p);
+        let kept = value.clamp(low, high);
+        if kept != *value {
+            remarks.push(format!(
+                "{} of {} at joint {} came out as {} {}, which cannot be; {} stands in the description.",
+                p.name,
+                about.name,
+                name(joint),
+                format_significant(*value, 3),
+                format_unit(p.unit),
+                format_significant(kept, 3),
+            ));
+            *value = kept;
+        }
+    }
+    RobotEffect {
+        joint: Some(name(joint)),
+        other: other.map(name),
+        effect,
+    }
+}
+
+/// How easily each standard parameter moves: as large as it is, at least a share of the largest of its kind.
+pub(super) fn weights(robot: &Robot, columns: usize) -> DVector<f64> {
+    let prior = standard(robot, columns);
+    let links = robot.joints.len() * COLUMNS;
+    let kind = |c: usize| match c.checked_sub(links) {
+        None if (column::FIRST_MOMENT..column::INERTIA).contains(&(c % COLUMNS)) => {
+            column::FIRST_MOMENT
+        }
+        None if (column::INERTIA..=column::DRIVE_INERTIA).contains(&(c % COLUMNS)) => {
+            column::INERTIA
+        }
+        None => c % COLUMNS,
+        Some(motor) => COLUMNS + motor % rig_shared::transmission::MOTOR_COLUMNS,
+    };
+    DVector::from_fn(columns, |c, _| {
+        let largest = (0..prior.len())
+            .filter(|o| kind(*o) == kind(c))
+            .fold(0.0, |m: f64, o| m.max(prior[o].abs()));
+        let own = prior.get(c).map_or(0.0, |p| p.abs());
+        // Nothing of the kind is stated: all of it moves alike.
+        if largest > 0.0 {
+            own.max(LEAST_WEIGHT * largest)
+        } else {
+            1.0
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;

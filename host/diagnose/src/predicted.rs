@@ -1,0 +1,57 @@
+//! What the nominal model says of a run.
+
+use rig_shared::multibody::column;
+
+use super::DiagnoseError;
+use super::rows::{Nominal, motion_of};
+use rig_data::runs::Run;
+use rig_model::robot::Robot;
+
+/// What the present model says of a run at the full rate.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Predicted {
+    /// Torque, joint by joint.
+    pub(super) torque: Vec<Vec<f64>>,
+    /// Torque that the gear transmits: without friction and the drive's own inertia.
+    pub(super) load: Vec<Vec<f64>>,
+}
+
+/// What the nominal model with these base parameters says of a run, and of the load on the gears.
+///
+/// # Errors
+/// [`DiagnoseError::Model`].
+pub(super) fn predict(
+    nominal: &Nominal,
+    robot: &Robot,
+    values: &[f64],
+    run: &Run,
+) -> Result<Predicted, DiagnoseError> {
+    let n = nominal.joints();
+    let mut predicted = Predicted {
+        torque: vec![vec![0.0; run.len()]; n],
+        load: vec![vec![0.0; run.len()]; n],
+    };
+    let motion = motion_of(run);
+    nominal.columns([&motion[0], &motion[1], &motion[2]], &mut |k, j, column| {
+        for (to, y) in predicted.torque[j].iter_mut().zip(column) {
+            *to += values[k] * y;
+        }
+        if !nominal.is_drive(k) {
+            for (to, y) in predicted.load[j].iter_mut().zip(column) {
+                *to += values[k] * y;
+            }
+        }
+    })?;
+    let drives = robot.standard_parameters();
+    for j in 0..n {
+        // The drive's inertia is part of a combination with the link's: the description says how much is its own.
+        let own = drives[j][column::DRIVE_INERTIA];
+        let grouped = !nominal.has_own_drive_inertia(j);
+        if own != 0.0 && grouped {
+            for (to, a) in predicted.load[j].iter_mut().zip(&run.joints[j].qdd) {
+                *to -= own * a;
+            }
+        }
+    }
+    Ok(predicted)
+}

@@ -1,0 +1,62 @@
+//! A rotor that the description makes heavier than all that was seen to move.
+//!
+//! A rotor acts on its joint by the square of the gear ratio. Where a current was recorded a ratio k times too large makes the
+//! recorded torque, and with it all inertia, k times too large, and the described rotor k² times: sooner or later more than the
+//! whole joint shows. No change of the links, the friction or the payload does that; a description of the rotor that is wrong does.
+//!
+//! Leaves out: motors that move several joints, and ratios too small, which make the rotor lighter than it is.
+
+use super::super::DiagnoseError;
+use super::super::outcome::About;
+use super::model::Judge;
+use super::trial::Suspicion;
+use super::undo::Undo;
+use rig_model::robot::JointKind;
+use rig_output::format_significant;
+
+/// How many times the inertia of the whole joint the rotor's has to be.
+const HEAVIER: f64 = 1.5;
+/// Standard deviations of the joint's inertia between both.
+const CLEAR: f64 = 5.0;
+/// Share of the torque's variance that the model may leave.
+const LEFT: f64 = 0.2;
+
+impl Judge<'_> {
+    /// The described rotor of joint `j` that is more than the joint.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`] where the description is no chain.
+    pub(super) fn heavy_rotor(&self, j: usize) -> Result<Option<Suspicion>, DiagnoseError> {
+        let joint = &self.robot.joints[j];
+        let alone = (self.robot.joints.iter().filter_map(|j| j.drive.as_ref()))
+            .all(|drive| drive.couples.is_empty());
+        let Some((drive, fit)) =
+            (joint.drive.as_ref().filter(|_| alone)).zip(self.fits[j].as_ref())
+        else {
+            return Ok(None);
+        };
+        let rotor = drive.rotor_inertia * drive.gear_ratio * drive.gear_ratio;
+        let whole = fit.functional(&self.inertia(j)?);
+        let seen = whole.sigmas() > CLEAR && fit.unexplained() < LEFT;
+        if !seen || rotor < HEAVIER * whole.value || rotor - whole.value < CLEAR * whole.std {
+            return Ok(None);
+        }
+        let unit = match joint.kind {
+            JointKind::Revolute => "kg·m²",
+            JointKind::Prismatic => "kg",
+        };
+        let fault = self.say(
+            "ratio",
+            About::Torque,
+            j,
+            format!(
+                "The description makes the rotor of joint {} alone {} {unit} at the joint, by the square of the gear ratio {}; all that moves there was seen to have {} {unit}. Check the gear ratio, the rotor's inertia and the torque constant.",
+                joint.name,
+                format_significant(rotor, 3),
+                drive.gear_ratio,
+                format_significant(whole.value, 3),
+            ),
+        );
+        Ok(Some(Suspicion::new(fault, Undo::Rotor(j))))
+    }
+}

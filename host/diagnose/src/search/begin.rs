@@ -1,0 +1,183 @@
+//! A search that begins with the effects of a description.
+
+use std::sync::Arc;
+
+use rig_shared::effects::SHAPES;
+
+use super::{Profile, STAYS, Search, in_the_shadow, is_gear, with};
+use crate::DiagnoseError;
+use crate::columns::{Candidate, Source};
+use crate::fit::{Evidence, Fit};
+use crate::profile::LEAST_GAIN;
+use crate::stated::{candidate, is_one};
+
+impl<'a> Search<'a> {
+    /// Whether an effect is one that the description states.
+    pub(crate) fn is_described(&self, effect: &Candidate) -> bool {
+        self.described.iter().any(|placed| is_one(placed, effect))
+    }
+
+    /// The shapes of a gear that an encoder on the link has shown; none of anything else.
+    pub(crate) fn shapes_of(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
+        let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
+        self.measured.iter().find(own).map(|(_, shapes)| *shapes)
+    }
+
+    /// Whether an encoder on the link has shown it.
+    pub(crate) fn is_measured(&self, effect: &Candidate) -> bool {
+        self.shapes_of(effect).is_some()
+    }
+
+    /// The shapes of a gear that is not searched for any more.
+    pub(crate) fn fixed(&self, effect: &Candidate) -> Option<[f64; SHAPES]> {
+        let own = |(candidate, _): &&(Candidate, _)| candidate == effect;
+        let settled = self.settled.iter().find(own).map(|(_, shapes)| *shapes);
+        self.shapes_of(effect).or(settled)
+    }
+
+    /// Whether it is a gear of which the torque alone speaks: no encoder on the link says more.
+    pub(crate) fn is_gear_by_torque(&self, effect: &Candidate) -> bool {
+        is_gear(effect.kind) && !self.is_measured(effect)
+    }
+
+    /// Joints on which the torque has shown a gear.
+    pub(crate) fn loud(&self, chosen: &[Profile]) -> Vec<usize> {
+        (chosen.iter().map(|p| &p.candidate))
+            .filter(|c| self.is_gear_by_torque(c))
+            .map(|c| c.joint)
+            .collect()
+    }
+
+    /// Gears that the torque has shown get their shapes anew beside all else, rows counting as in `base`, and keep them from
+    /// there on.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(crate) fn settle_gears(
+        &mut self,
+        base: &Fit,
+        chosen: &mut [Profile],
+    ) -> Result<(), DiagnoseError> {
+        self.settled.clear();
+        let mut settled = Vec::new();
+        for i in 0..chosen.len() {
+            let Profile {
+                candidate, shapes, ..
+            } = chosen[i];
+            if !self.is_gear_by_torque(&candidate) {
+                continue;
+            }
+            let place = self.place(&candidate);
+            let beside = with(base, chosen, Some(i));
+            if let Some(c) = place
+                && let Some(better) = self.profile(&beside, c, Some(shapes))?
+            {
+                chosen[i] = better;
+            }
+            settled.push((candidate, chosen[i].shapes));
+        }
+        self.settled = settled;
+        Ok(())
+    }
+
+    /// The description's effects come first, then what encoders on the links have shown.
+    pub(crate) fn rank_of(&self, effect: &Candidate) -> u8 {
+        match (self.is_described(effect), self.is_measured(effect)) {
+            (true, _) => 0,
+            (false, true) => 1,
+            (false, false) => 2,
+        }
+    }
+
+    /// How many of the effects, in the order of their rank, no search by torque has found.
+    pub(crate) fn count_given(&self, chosen: &[Profile]) -> usize {
+        let given = |p: &&Profile| self.rank_of(&p.candidate) < 2;
+        chosen.iter().take_while(given).count()
+    }
+
+    /// How many of the effects, those of the description first, it states.
+    pub(crate) fn count_described(&self, chosen: &[Profile]) -> usize {
+        let described = |p: &&Profile| self.is_described(&p.candidate);
+        chosen.iter().take_while(described).count()
+    }
+
+    /// The effects of the description, refined from its shapes, as far as they stand.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn begun(
+        &mut self,
+        base: &Fit,
+        renew: &dyn Fn(&[Profile]) -> Result<Source<'a>, DiagnoseError>,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let mut chosen = Vec::new();
+        let described = self.described.iter().map(|placed| {
+            let own = candidate(placed);
+            (own, self.shapes_of(&own).unwrap_or(placed.effect.shapes))
+        });
+        let measured = (self.measured.iter().copied()).filter(|(c, _)| !self.is_described(c));
+        for (candidate, shapes) in described.chain(measured) {
+            chosen.push(Profile {
+                columns: Arc::new(self.source.columns(&candidate, &shapes)?),
+                candidate,
+                shapes,
+                evidence: Evidence::default(),
+                vanished: None,
+                followed: None,
+                otherwise: None,
+                heard: false,
+                doubled: false,
+            });
+        }
+        if chosen.is_empty() {
+            return Ok(chosen);
+        }
+        // Load, inertia and bent contacts as they are with the effects in, and as described: shapes that are refined beside columns
+        // without them run away.
+        for _ in 0..2 {
+            self.renewed(renew(&chosen)?);
+            for profile in &mut chosen {
+                let columns = self.source.columns(&profile.candidate, &profile.shapes)?;
+                profile.columns = Arc::new(columns);
+            }
+        }
+        for _ in 0..2 {
+            self.renewed(renew(&chosen)?);
+            self.refine_all(base, &mut chosen)?;
+        }
+        self.standing(base, &mut chosen)?;
+        Ok(chosen)
+    }
+
+    /// Drops what no longer stands by itself; gives what has vanished. What the description states needs no least size, and
+    /// is no stand-in for being small beside another.
+    pub(super) fn standing(
+        &self,
+        base: &Fit,
+        chosen: &mut Vec<Profile>,
+    ) -> Result<Vec<Candidate>, DiagnoseError> {
+        let mut vanished = Vec::new();
+        let mut i = 0;
+        while i < chosen.len() {
+            let e = &chosen[i].evidence;
+            let unsure = e.p_value > STAYS || chosen[i].in_too_few_blocks();
+            let weak = if self.rank_of(&chosen[i].candidate) < 2 {
+                unsure
+            } else {
+                chosen.len() > 1
+                    && (unsure
+                        || e.joint_gain < LEAST_GAIN.min(chosen[i].least_gain())
+                        || in_the_shadow(self.source.robot, chosen, i))
+            };
+            if weak || chosen[i].vanished.is_some() {
+                let gone = chosen.remove(i);
+                vanished.extend(gone.vanished.map(|_| gone.candidate));
+                self.refine_all(base, chosen)?;
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+        Ok(vanished)
+    }
+}

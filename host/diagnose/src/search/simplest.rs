@@ -1,0 +1,169 @@
+//! Of candidates that explain alike, the one that needs least.
+//!
+//! What holds another law wins by a hair wherever the other one is true: a spring's stiffness and preload hold every
+//! constant. Of two laws of which one holds the other, the larger is taken where what it adds stands by itself (Wald 1943; the
+//! covariance of the blocks as elsewhere) and is as large as an effect has to be; others are told apart by whether the data do.
+
+use rig_shared::effects::Kind;
+
+use super::{Search, is_gear, with};
+use crate::DiagnoseError;
+use crate::columns::Candidate;
+use crate::fit::Fit;
+use crate::judge::equal;
+use crate::profile::{LEAST_GAIN, Profile, SIGNIFICANT, about_its_middle};
+
+impl Search<'_> {
+    /// Gains and shapes of a candidate.
+    pub(super) fn size(&self, candidate: &Candidate) -> usize {
+        self.source.gains(candidate).len() + candidate.kind.about().shapes.len()
+    }
+
+    /// Which of `profiles`, best first, is taken: of those that pass, the best, or the smallest that the data support as
+    /// well on the same joint. `fit` holds everything else in the model.
+    pub(super) fn first_to_take(
+        &self,
+        fit: &Fit,
+        profiles: &[Profile],
+        trials: usize,
+    ) -> Option<Profile> {
+        let passing = || profiles.iter().filter(|p| p.refused(trials).is_none());
+        let best = passing().next()?;
+        // Of two transmissions the one without play unless play takes away clearly more.
+        if best.candidate.kind == Kind::Backlash {
+            let simpler = passing().find(|p| {
+                p.candidate.kind == Kind::JointElasticity
+                    && p.candidate.joint == best.candidate.joint
+            });
+            if let Some(simpler) = simpler
+                && best.evidence.beyond(&simpler.evidence) < LEAST_GAIN
+            {
+                return Some(simpler.clone());
+            }
+        }
+        let smallest = passing()
+            .filter(|p| self.as_good_and_smaller(fit, best, p, trials))
+            .min_by_key(|p| self.size(&p.candidate));
+        Some(smallest.unwrap_or(best).clone())
+    }
+
+    /// What the `i`-th effect gives way to beside all others as they are now, of `rivals`; none where it stays.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn smaller(
+        &self,
+        base: &Fit,
+        chosen: &[Profile],
+        i: usize,
+        rivals: &[Profile],
+        trials: usize,
+    ) -> Result<Option<Profile>, DiagnoseError> {
+        let own = &chosen[i];
+        let fit = with(base, chosen, Some(i));
+        let taken = |c: &Candidate| {
+            (chosen.iter().enumerate()).any(|(k, p)| k != i && super::rivals(&p.candidate, c))
+        };
+        let mut best: Option<Profile> = None;
+        for rival in rivals {
+            let c = &rival.candidate;
+            if c.joint != own.candidate.joint
+                || rival.refused(trials).is_some()
+                || self.size(c) >= self.size(&own.candidate)
+                || taken(c)
+            {
+                continue;
+            }
+            let Some(place) = self.place(c) else {
+                continue;
+            };
+            let Some(now) = self.profile(&fit, place, Some(rival.shapes))? else {
+                continue;
+            };
+            let smallest = best
+                .as_ref()
+                .map_or(usize::MAX, |b| self.size(&b.candidate));
+            if now.refused(trials).is_none()
+                && self.size(c) < smallest
+                && self.as_good_and_smaller(&fit, own, &now, trials)
+            {
+                best = Some(now);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Springs that were taken for what an effect found later explains give way to the constant that they hold. Says whether there
+    /// was one.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn springs(
+        &self,
+        base: &Fit,
+        chosen: &mut [Profile],
+        trials: usize,
+    ) -> Result<bool, DiagnoseError> {
+        let mut changed = false;
+        for i in 0..chosen.len() {
+            let own = chosen[i].candidate;
+            if own.kind != Kind::Spring || self.is_described(&own) {
+                continue;
+            }
+            let rivals = self.alternatives(base, chosen, i)?;
+            if let Some(smaller) = self.smaller(base, chosen, i, &rivals, trials)? {
+                chosen[i] = smaller;
+                changed = true;
+            }
+        }
+        Ok(changed)
+    }
+
+    /// Whether the data support a smaller candidate as well as `best`. What acts between motor and link only bends to what
+    /// has no gear; the search weighs them elsewhere.
+    fn as_good_and_smaller(
+        &self,
+        fit: &Fit,
+        best: &Profile,
+        other: &Profile,
+        trials: usize,
+    ) -> bool {
+        let gears = is_gear(best.candidate.kind) || is_gear(other.candidate.kind);
+        let as_good = || {
+            if holds(fit, best, other) {
+                !adds(fit, best, other, trials)
+            } else {
+                equal(best, other)
+            }
+        };
+        !gears
+            && best.candidate.joint == other.candidate.joint
+            && self.size(&other.candidate) < self.size(&best.candidate)
+            && as_good()
+    }
+}
+
+/// Whether the smaller one's columns are combinations of the larger one's and of what is in the model.
+fn holds(fit: &Fit, larger: &Profile, smaller: &Profile) -> bool {
+    let mut beside = fit.clone();
+    for column in larger.columns.iter() {
+        beside.push(column);
+    }
+    (smaller.columns.iter()).all(|c| beside.beside(std::slice::from_ref(c)).is_none())
+}
+
+/// Whether what the larger one has beside the smaller one stands by itself.
+fn adds(fit: &Fit, larger: &Profile, smaller: &Profile, trials: usize) -> bool {
+    let mut beside = fit.clone();
+    for column in smaller.columns.iter() {
+        beside.push(column);
+    }
+    let own = match larger.candidate.kind {
+        Kind::Spring => beside.span(about_its_middle(fit, &larger.columns).as_slice()),
+        _ => beside.span(&larger.columns),
+    };
+    let open = vec![[f64::NEG_INFINITY, f64::INFINITY]; own.len()];
+    !own.is_empty()
+        && (beside.evidence(&own, &open))
+            .is_some_and(|e| e.corrected(trials) < SIGNIFICANT && e.joint_gain >= LEAST_GAIN)
+}

@@ -1,0 +1,115 @@
+//! All candidates at once, each at its best beside a model.
+
+use rig_shared::effects::Kind;
+
+use super::kinds::{doubles, has_many_orders, is_searched};
+use super::{Search, is_first_law, rivals};
+use crate::DiagnoseError;
+use crate::columns::Candidate;
+use crate::fit::Fit;
+use crate::profile::Profile;
+use rig_model::batch::each_by;
+
+impl Search<'_> {
+    /// All candidates at their best, best gain first, but those that exclude one that is `present`, and the `impossible` ones.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn sweep(
+        &self,
+        fit: &Fit,
+        present: &[Candidate],
+        impossible: &[Candidate],
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        self.sweep_of(fit, present, impossible, &|_| true)
+    }
+
+    /// Those of one joint: what may stand in the place of an effect there.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn sweep_at(
+        &self,
+        joint: usize,
+        fit: &Fit,
+        present: &[Candidate],
+        impossible: &[Candidate],
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        // A tilt is one of all joints.
+        let there = |c: &Candidate| c.joint == joint || c.kind == Kind::GravityTilt;
+        self.sweep_of(fit, present, impossible, &there)
+    }
+
+    fn sweep_of(
+        &self,
+        fit: &Fit,
+        present: &[Candidate],
+        impossible: &[Candidate],
+        among: &dyn Fn(&Candidate) -> bool,
+    ) -> Result<Vec<Profile>, DiagnoseError> {
+        let open: Vec<usize> = (0..self.library.len())
+            .filter(|c| {
+                let candidate = &self.library[*c];
+                is_searched(candidate.kind)
+                    && among(candidate)
+                    && !present.iter().any(|w| rivals(w, candidate))
+                    && !impossible.contains(candidate)
+            })
+            .collect();
+        let taken = [present, impossible].concat();
+        let mut profiles = each_by(open.len(), self.threads, |k| {
+            self.profile_but(fit, open[k], None, &taken)
+        })
+        .into_iter()
+        .filter_map(Result::transpose)
+        .collect::<Result<Vec<_>, _>>()?;
+        better_laws(&mut profiles);
+        for profile in &mut profiles {
+            profile.doubled = present.iter().any(|p| doubles(p, &profile.candidate));
+        }
+        profiles.sort_by(|a, b| {
+            b.evidence
+                .gain
+                .total_cmp(&a.evidence.gain)
+                .then_with(|| a.candidate.kind.cmp(&b.candidate.kind))
+        });
+        Ok(profiles)
+    }
+
+    /// Number of trials of a sweep.
+    pub(crate) fn trials(&self) -> usize {
+        (self.library.iter())
+            .filter(|c| is_searched(c.kind))
+            .map(|c| {
+                let shown = self.grid(c).into_iter().filter(|s| self.shows(c, s));
+                // Of the orders beyond a grid the loudest were chosen from all.
+                let chosen_from = if has_many_orders(c.kind) {
+                    self.orders[c.joint].scanned
+                } else {
+                    0
+                };
+                shown.count() + chosen_from
+            })
+            .sum()
+    }
+}
+
+/// Leaves of the laws of one name that bend to as much the one that takes most away: a second law is no second effect.
+fn better_laws(profiles: &mut Vec<Profile>) {
+    let rank = |p: &Profile| (p.vanished.is_none(), p.evidence.gain);
+    let beaten: Vec<bool> = (profiles.iter())
+        .map(|own| {
+            (profiles.iter()).any(|other| {
+                let [a, b] = [own, other].map(|p| p.candidate.kind);
+                a != b
+                    && a.about().name == b.about().name
+                    && !(is_first_law(a) && is_first_law(b))
+                    && (own.candidate.joint, own.candidate.other)
+                        == (other.candidate.joint, other.candidate.other)
+                    && (rank(other) > rank(own) || rank(other) == rank(own) && is_first_law(b))
+            })
+        })
+        .collect();
+    let mut beaten = beaten.into_iter();
+    profiles.retain(|_| beaten.next() != Some(true));
+}

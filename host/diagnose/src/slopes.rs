@@ -1,0 +1,88 @@
+//! What errors of one joint's reading do to the torque of all joints.
+//!
+//! An error of the reading by e(t) is one of the velocity by ė and of the acceleration by ë. To first order the torque
+//! changes by its slopes along the three: they belong to the motion, and serve every wave that an error may have.
+
+use super::DiagnoseError;
+use super::columns::Source;
+use super::rows::{Column, motion_of};
+use rig_data::prepare::{central_difference, second_difference};
+use rig_data::runs::Run;
+
+/// Change at which slopes are taken, rad (rad/s, rad/s²), m on a slide: small against every wave of the motion, and so
+/// large that rounding stays below 10⁻¹⁰ of the torque's range.
+const NUDGE: f64 = 1e-5;
+
+/// Slopes of the torque of all joints along one joint's position, velocity and acceleration over a run.
+#[derive(Clone, Debug)]
+pub(super) struct Slopes {
+    /// By derivative, joint and sample.
+    along: [Vec<Vec<f64>>; 3],
+}
+
+impl Slopes {
+    /// Along joint `joint` over `run`.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Model`].
+    pub(super) fn of(source: &Source, joint: usize, run: &Run) -> Result<Self, DiagnoseError> {
+        let mut motion = motion_of(run);
+        let still = smooth_torque(source, &motion)?;
+        let mut along = [(); 3].map(|()| Vec::new());
+        for (derivative, along) in along.iter_mut().enumerate() {
+            let measured = motion[derivative][joint].clone();
+            for x in &mut motion[derivative][joint] {
+                *x += NUDGE;
+            }
+            let mut moved = smooth_torque(source, &motion)?;
+            motion[derivative][joint] = measured;
+            for (moved, still) in moved.iter_mut().zip(&still) {
+                for (m, s) in moved.iter_mut().zip(still) {
+                    *m = (*m - s) / NUDGE;
+                }
+            }
+            *along = moved;
+        }
+        Ok(Self { along })
+    }
+
+    /// What a reading that is off by `error`, samples `period` s apart, does to the torque: the true position is less.
+    pub(super) fn misread(&self, error: &[f64], period: f64) -> Column {
+        let changes = [
+            error.to_vec(),
+            central_difference(error, period),
+            second_difference(error, period),
+        ];
+        (0..self.along[0].len())
+            .map(|j| {
+                let mut torque = vec![0.0; error.len()];
+                for (along, change) in self.along.iter().zip(&changes) {
+                    for ((to, slope), e) in torque.iter_mut().zip(&along[j]).zip(change) {
+                        *to -= slope * e;
+                    }
+                }
+                Some(torque)
+            })
+            .collect()
+    }
+}
+
+/// Torque of the nominal model for a motion, without its jumps: the direction does not change with a small error of the
+/// reading.
+fn smooth_torque(
+    source: &Source,
+    motion: &[Vec<Vec<f64>>; 3],
+) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+    let samples = motion[0].first().map_or(0, Vec::len);
+    let mut torque = vec![vec![0.0; samples]; source.nominal.joints()];
+    let motion = [&motion[0][..], &motion[1][..], &motion[2][..]];
+    source.nominal.columns(motion, &mut |k, j, column| {
+        if source.nominal.is_coulomb(k) {
+            return;
+        }
+        for (to, y) in torque[j].iter_mut().zip(column) {
+            *to += source.values[k] * y;
+        }
+    })?;
+    Ok(torque)
+}

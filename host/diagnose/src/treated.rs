@@ -1,0 +1,40 @@
+//! How recordings were treated before anything was compared, as a report says it.
+
+use super::bench::Loaded;
+use super::outcome::{Rows, Treated};
+use super::rows::Rows as Regression;
+use rig_data::prepare::Treatment;
+use rig_model::robot::Robot;
+
+/// What was done to the training recordings and, where there is one, the hold-out.
+pub(super) fn treated(robot: &Robot, training: &Loaded, holdout: Option<&Loaded>) -> Treated {
+    let treatment = &training.treatment;
+    let rows = &training.rows;
+    Treated {
+        sample_rate: treatment.sample_rate,
+        position_cutoff: treatment.cutoff,
+        position_cutoff_why: treatment.cutoff_reason.clone(),
+        links_cutoff: rows.thinning.links_cutoff(),
+        band: band(treatment),
+        motion_frequency: treatment.motion_frequency,
+        row_rate: treatment.kept_rate(),
+        rows: (robot.joints.iter().enumerate())
+            .map(|(j, joint)| {
+                let speed = treatment.speed_threshold.get(j).copied();
+                let of = |rows: &Regression| [rows.used(j), rows.count];
+                Rows {
+                    joint: joint.name.clone(),
+                    least_speed: speed.unwrap_or(0.0),
+                    unit: format!("{}/s", joint.kind.units().0),
+                    train: of(rows),
+                    holdout: holdout.map(|held| of(&held.rows)),
+                }
+            })
+            .collect(),
+    }
+}
+
+/// Upper end of the rows' band, Hz: the lower of both filters'.
+fn band(treatment: &Treatment) -> f64 {
+    treatment.parallel_edge.min(treatment.cutoff)
+}

@@ -1,0 +1,131 @@
+//! The controllers that recordings of a voltage-driven joint show.
+
+use super::log::Log;
+use rig_model::robot::{AntiWindup, VoltageController};
+use rig_output::format_significant;
+
+/// Share by which the proportional gains of one controller differ from recording to recording at most. 10 %: on the XL330 recordings
+/// gains of one setting differed by 1 %, settings by 100 % (November 2026).
+const ONE: f64 = 0.1;
+
+/// One controller and how many recordings show it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shown {
+    /// Mean of the gains.
+    pub controller: VoltageController,
+    /// Recordings.
+    pub count: usize,
+}
+
+/// Controllers of recordings, that of the most recordings first; of equals the stiffer.
+pub(super) fn shown(logs: &[Log]) -> Vec<Shown> {
+    let mut groups: Vec<Vec<VoltageController>> = Vec::new();
+    for law in logs.iter().filter_map(|log| log.law) {
+        let near = |group: &&mut Vec<VoltageController>| {
+            let other = group[0].proportional;
+            (law.proportional - other).abs() <= ONE * law.proportional.max(other)
+        };
+        match groups.iter_mut().find(near) {
+            Some(group) => group.push(law),
+            None => groups.push(vec![law]),
+        }
+    }
+    let mut list: Vec<Shown> = (groups.iter())
+        .map(|group| Shown {
+            controller: merged(group),
+            count: group.len(),
+        })
+        .collect();
+    list.sort_by(|a, b| {
+        let stiffness = |s: &Shown| s.controller.proportional;
+        (b.count.cmp(&a.count)).then_with(|| stiffness(b).total_cmp(&stiffness(a)))
+    });
+    list
+}
+
+/// Means of gains; terms that only some recordings resolve count with all of them.
+fn merged(group: &[VoltageController]) -> VoltageController {
+    let mean =
+        |of: fn(&VoltageController) -> f64| group.iter().map(of).sum::<f64>() / group.len() as f64;
+    let first = group[0];
+    let clamps = |c: &&VoltageController| c.anti_windup == AntiWindup::Clamping;
+    VoltageController {
+        proportional: mean(|c| c.proportional),
+        integral: mean(|c| c.integral),
+        derivative: mean(|c| c.derivative),
+        velocity_feedforward: mean(|c| c.velocity_feedforward),
+        acceleration_feedforward: mean(|c| c.acceleration_feedforward),
+        // Beside an integral the constant is where that began in one recording.
+        bias: match group.iter().any(|c| c.integral != 0.0) {
+            true => 0.0,
+            false => mean(|c| c.bias),
+        },
+        limit: group
+            .iter()
+            .fold(first.limit, |most, c| match (most, c.limit) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                _ => None,
+            }),
+        anti_windup: match 2 * group.iter().filter(clamps).count() > group.len() {
+            true => AntiWindup::Clamping,
+            false => AntiWindup::None,
+        },
+        supply: [mean(|c| c.supply[0]), mean(|c| c.supply[1])],
+    }
+}
+
+/// A controller in words: its terms with their gains. `unit` is rad or m.
+pub fn terms(c: &VoltageController, unit: &str) -> String {
+    let mut list = vec![format!(
+        "proportional {} 1/{unit}",
+        format_significant(c.proportional, 3)
+    )];
+    for (name, gain, per) in [
+        ("integral", c.integral, format!("1/({unit}·s)")),
+        ("derivative", c.derivative, format!("s/{unit}")),
+        (
+            "velocity feed-forward",
+            c.velocity_feedforward,
+            format!("s/{unit}"),
+        ),
+        (
+            "acceleration feed-forward",
+            c.acceleration_feedforward,
+            format!("s²/{unit}"),
+        ),
+    ] {
+        if gain != 0.0 {
+            list.push(format!("{name} {} {per}", format_significant(gain, 3)));
+        }
+    }
+    list.join(", ")
+}
+
+/// Sentences on the controllers and the supply that recordings show; empty where they show none.
+pub(super) fn sentences(list: &[Shown], unit: &str) -> Vec<String> {
+    let Some(first) = list.first() else {
+        return Vec::new();
+    };
+    let each: Vec<String> = (list.iter())
+        .map(|shown| {
+            let s = if shown.count == 1 { "" } else { "s" };
+            format!(
+                "{} ({} recording{s})",
+                terms(&shown.controller, unit),
+                shown.count
+            )
+        })
+        .collect();
+    let [none, slope] = first.controller.supply.map(|x| format_significant(x, 3));
+    let mut words = vec![format!(
+        "The recordings show this controller, its output a share of the supply: {}. The supply is {none} V without load and changes by {slope} V up to a share of one.",
+        each.join("; ")
+    )];
+    if list.len() > 1 {
+        words.push(format!(
+            "model.toml has the controller with {}; change [joint.voltage_controller] to simulate another.",
+            terms(&first.controller, unit)
+        ));
+    }
+    words
+}

@@ -1,0 +1,410 @@
+//! The result of a voltage-driven diagnosis in words, numbers and as a description.
+
+use std::collections::BTreeMap;
+
+use super::controllers::{self, Shown};
+use super::free_run::FreeRun;
+use super::plant::{NAMES, NOMINAL, Plant};
+use super::search::{EQUAL, Model, Trial, on_the_voltage};
+use crate::judge::closed;
+use crate::outcome::{
+    Absorbed, Before, Curves, Described, Diagnosis, Remainder, Residual, Step, Tried, Value,
+    Verdict, Waterfall,
+};
+use crate::stated::{Now, Stated};
+use rig_model::robot::{Drive, JointFriction, Robot, RobotEffect, title_of};
+use rig_output::format_significant;
+use rig_shared::effects::Effect;
+
+/// Over this many floors something is left.
+const LEFT: f64 = 1.2;
+
+/// Everything that was found.
+pub(super) struct Told<'a> {
+    /// The description, and what became of its effects.
+    pub stated: &'a Stated,
+    /// To draw.
+    pub curves: Vec<Curves>,
+    /// rad or m
+    pub floor: f64,
+    /// Free runs over the training recordings, from model to model.
+    pub train: Vec<FreeRun>,
+    /// The same on the hold-out; empty without one.
+    pub holdout: Vec<FreeRun>,
+    /// The controllers that the training recordings show.
+    pub controllers: Vec<Shown>,
+    pub deviations: Vec<Option<Vec<f64>>>,
+    /// The nominal one first.
+    pub models: Vec<Model>,
+    pub rounds: Vec<Vec<Trial>>,
+    /// On recordings left out of the fit, before each round.
+    pub unseen: Vec<f64>,
+    /// Which voltage, in words.
+    pub driven: String,
+}
+
+impl Told<'_> {
+    fn joint(&self) -> String {
+        self.stated.robot.joints[0].name.clone()
+    }
+
+    /// How many effects every model has: those of the description.
+    fn described(&self) -> usize {
+        self.models.first().map_or(0, |model| model.effects.len())
+    }
+
+    /// What the description's effects are in the last model.
+    fn told(&self) -> Vec<Described> {
+        let last = self.models.len() - 1;
+        let effects = &self.models[last].effects[..self.described()];
+        // Of several under one name in their order.
+        let mut next = vec![true; effects.len()];
+        let now = self.stated.fitted().map(|kind| {
+            let place = (0..effects.len()).find(|k| next[*k] && Some(effects[*k]) == kind)?;
+            next[place] = false;
+            Some(Now {
+                kind: effects[place],
+                parameters: self.parameters(last, place),
+            })
+        });
+        self.stated.told(now.collect())
+    }
+
+    /// A position error as printed.
+    fn thousandths(&self, error: f64) -> String {
+        let unit = self.stated.robot.joints[0].kind.units().0;
+        format!("{:.2} m{unit}", 1e3 * error)
+    }
+
+    fn judged(&self) -> &[FreeRun] {
+        if self.holdout.is_empty() {
+            &self.train
+        } else {
+            &self.holdout
+        }
+    }
+
+    /// Standard deviation of parameter `p` of model `k`; 0 where it was not fitted.
+    fn std(&self, k: usize, p: usize) -> f64 {
+        let place = self.models[k].free.iter().position(|f| *f == p);
+        let list = self.deviations[k].as_ref();
+        place.and_then(|c| list?.get(c).copied()).unwrap_or(0.0)
+    }
+
+    /// As `diagnosis.json` has it.
+    pub(super) fn diagnosis(&self) -> Diagnosis {
+        let judged = self.judged();
+        let (first, last) = (&judged[0], &judged[judged.len() - 1]);
+        let steps: Vec<Step> = (1..self.models.len()).map(|k| self.step(k)).collect();
+        let left = last.rms().is_none_or(|rms| rms > LEFT * self.floor);
+        let verdict = match (left, steps.is_empty()) {
+            (true, _) => Verdict::Remainder,
+            (false, true) => Verdict::NothingMissing,
+            (false, false) => Verdict::Explained,
+        };
+        let on = if self.holdout.is_empty() {
+            "the recordings it was fitted to"
+        } else {
+            "the recordings held back"
+        };
+        let mut words = vec![format!(
+            "No torque or current was recorded: the model was driven by the motor voltage, {}, from the first row of each recording to its last, and its position was compared. {}",
+            self.driven,
+            self.on_the_whole(on)
+        )];
+        words.extend(controllers::sentences(
+            &self.controllers,
+            self.stated.robot.joints[0].kind.units().0,
+        ));
+        if self
+            .models
+            .iter()
+            .flat_map(|m| &m.effects)
+            .any(|k| on_the_voltage(*k))
+        {
+            words.push("An effect on the voltage and friction at rest can pass for each other; a measured current would tell.".into());
+        }
+        words.extend(self.rotor_remark());
+        let described = self.told();
+        words.extend(described.iter().map(|d| d.text.clone()));
+        let numbers = |runs: &[FreeRun]| runs.iter().map(FreeRun::number).collect::<Vec<f64>>();
+        Diagnosis {
+            schema: "rig-diagnosis/1".into(),
+            robot: self.stated.robot.name.clone(),
+            verdict,
+            residual: Residual::Position,
+            words,
+            noise_floor_rms: vec![self.floor],
+            noise_floor_from: Vec::new(),
+            left: Vec::new(),
+            noise_floor_how: "The encoder's smallest step over √12, of the position: a lower bound, as no repeated runs are compared here.".into(),
+            motion_how: format!(
+                "The motor voltage drives each model, {}.",
+                self.driven
+            ),
+            treatment: None,
+            torque_lead: Vec::new(),
+            places: Vec::new(),
+            gap_closed: (first.rms().zip(last.rms()).filter(|_| !steps.is_empty()))
+                .map(|(first, last)| closed([first, last], self.floor)),
+            described,
+            steps,
+            absorbed: self.absorbed(),
+            absorbed_before: Before::WithoutEffects,
+            by_motion: None,
+            not_testable: Vec::new(),
+            detectable: Vec::new(),
+            next_experiment: None,
+            remainder: left.then(|| self.remainder()),
+            data_faults: Vec::new(),
+            waterfall: vec![Waterfall {
+                joint: self.joint(),
+                unit: self.stated.robot.joints[0].kind.units().0.into(),
+                models: std::iter::once("refitted".to_owned())
+                    .chain(self.models.last().into_iter().flat_map(|m| m.effects[self.described()..].iter().map(|k| title_of(*k))))
+                    .collect(),
+                train: numbers(&self.train),
+                holdout: numbers(&self.holdout),
+                floor: self.floor,
+                holdout_floor: self.floor,
+            }],
+            tried: self.tried(),
+            maps: Vec::new(),
+            curves: self.curves.clone(),
+        }
+    }
+
+    /// What became of the free runs of the last model `on` the recordings that it is judged by, a sentence.
+    fn on_the_whole(&self, on: &str) -> String {
+        let judged = self.judged();
+        let (first, last) = (&judged[0], &judged[judged.len() - 1]);
+        match last {
+            FreeRun::Diverged { .. } => self.diverged(last),
+            FreeRun::Followed {
+                rms, mean_absolute, ..
+            } => format!(
+                "On {on} it is off by {} (RMS; {} in the mean of the absolute error); before any effect {}.",
+                self.thousandths(*rms),
+                self.thousandths(*mean_absolute),
+                match first.rms() {
+                    Some(rms) => format!("it was off by {}", self.thousandths(rms)),
+                    None => "the free run diverged".to_owned(),
+                }
+            ),
+        }
+    }
+
+    /// Says of a run that it diverged, where and why; empty where it did not.
+    fn diverged(&self, run: &FreeRun) -> String {
+        let FreeRun::Diverged {
+            recording,
+            time,
+            why,
+        } = run
+        else {
+            return String::new();
+        };
+        let mend = match self.controllers.is_empty() {
+            true => {
+                "Record the reference (ref1) as well, so that the loop can be closed, or give shorter recordings."
+            }
+            false => {
+                "The motion asks more of the drive than the training recordings; give a recording of such a motion to learn from."
+            }
+        };
+        format!(
+            "The free run diverges in {recording} at {time:.2} s: {why}. It says nothing of the model. {mend}"
+        )
+    }
+
+    /// What the last model leaves; a run that diverged leaves no number.
+    fn remainder(&self) -> Remainder {
+        let last = &self.judged()[self.judged().len() - 1];
+        let excess = |rms: f64| (rms * rms - self.floor * self.floor).max(0.0).sqrt();
+        Remainder {
+            joint: self.joint(),
+            rms: last.rms().map_or(f64::NAN, excess),
+            unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
+            ratio: last.number() / self.floor.max(f64::MIN_POSITIVE),
+            places: Vec::new(),
+            text: self.left_over(),
+            doubt: false,
+        }
+    }
+
+    /// What the last model leaves, a sentence.
+    fn left_over(&self) -> String {
+        let last = &self.judged()[self.judged().len() - 1];
+        match last.rms() {
+            None => self.diverged(last),
+            Some(rms) => format!(
+                "The simulated position is off by {}, {:.0} times the encoder's noise; no further effect helps recordings that it was not fitted to. A recording with the current, or the same motion twice, would say how much of it is the model's.",
+                self.thousandths(rms),
+                rms / self.floor.max(f64::MIN_POSITIVE)
+            ),
+        }
+    }
+
+    /// Says that less inertia of the drive was found than the description gives the rotor, where that is so.
+    fn rotor_remark(&self) -> Option<String> {
+        let drive = self.stated.robot.joints[0].drive.as_ref()?;
+        let found = self.models.last()?.theta[0] / drive.gear_ratio.powi(2);
+        (found < drive.rotor_inertia).then(|| {
+            let [stated, found] = [drive.rotor_inertia, found].map(|x| format_significant(x, 3));
+            format!(
+                "The rotor's inertia of {stated} kg·m² in the description is more than the motion shows of the drive, {found} kg·m², which stands in model.toml."
+            )
+        })
+    }
+
+    fn step(&self, k: usize) -> Step {
+        let model = &self.models[k];
+        let place = self.described() + k - 1;
+        let kind = model.effects[place];
+        let round = &self.rounds[k - 1];
+        let own = round.iter().find(|t| t.kind == kind);
+        let best = own.and_then(|t| t.unseen).unwrap_or(self.train[k].number());
+        let rival =
+            |t: &&Trial| t.kind != kind && t.p_value <= own.map_or(0.0, |o| o.p_value.max(0.05));
+        let near = |t: &&Trial| t.unseen.is_some_and(|rms| rms <= (1.0 + EQUAL) * best);
+        let mut set = vec![kind.about().name.to_owned()];
+        set.extend(
+            round
+                .iter()
+                .filter(rival)
+                .filter(near)
+                .map(|t| t.kind.about().name.to_owned()),
+        );
+        let other = (round.iter().filter(|t| t.kind != kind && !near(t)))
+            .filter_map(|t| Some((t, t.unseen?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let pair = |list: &[FreeRun]| [list[k - 1].number(), list[k].number()];
+        let holdout = (!self.holdout.is_empty()).then(|| pair(&self.holdout));
+        let judged = pair(self.judged());
+        let last = self.models.len() - 1;
+        Step {
+            effect: kind.about().name.into(),
+            law: kind.about().law.map(str::to_owned),
+            joint: self.joint(),
+            set,
+            parameters: self.parameters(last, place),
+            p_value: own.map_or(1.0, |t| t.p_value),
+            name_probability: f64::NAN,
+            runner_up: other.map(|(t, _)| title_of(t.kind)),
+            runner_up_gap_closed: other
+                .map(|(_, rms)| closed([self.train[k - 1].number(), rms], self.floor)),
+            rms_unit: self.stated.robot.joints[0].kind.units().0.to_owned(),
+            train_rms: pair(&self.train),
+            holdout_rms: holdout,
+            motion_rms: Some(judged),
+            gap_closed: closed(judged, self.floor),
+            why: format!(
+                "The simulated position of recordings that it was not fitted to is off by {} with it, {} before.",
+                self.thousandths(best),
+                self.thousandths(self.unseen[k - 1])
+            ),
+        }
+    }
+
+    /// Of the `effect`-th effect of model `k`.
+    fn parameters(&self, k: usize, effect: usize) -> BTreeMap<String, Value> {
+        let model = &self.models[k];
+        let count =
+            |kind: &rig_shared::effects::Kind| kind.about().gains.len() + kind.about().shapes.len();
+        let at = NOMINAL + model.effects[..effect].iter().map(count).sum::<usize>();
+        let about = model.effects[effect].about();
+        (about.gains.iter().chain(about.shapes).enumerate())
+            .map(|(p, parameter)| {
+                let value = Value {
+                    value: model.theta[at + p],
+                    std: self.std(k, at + p),
+                    unit: parameter.unit.into(),
+                };
+                (parameter.name.to_owned(), value)
+            })
+            .collect()
+    }
+
+    fn absorbed(&self) -> Vec<Absorbed> {
+        let last = self.models.len() - 1;
+        if last == 0 {
+            return Vec::new();
+        }
+        let mut list: Vec<Absorbed> = (self.models[last].free.iter().filter(|p| **p < NOMINAL))
+            .map(|p| {
+                let [before, after] = [0, last].map(|k| self.models[k].theta[*p]);
+                Absorbed {
+                    parameter: NAMES[*p].0.into(),
+                    unit: NAMES[*p].1.into(),
+                    before,
+                    after,
+                    sigmas: (after - before).abs() / self.std(last, *p).max(f64::MIN_POSITIVE),
+                }
+            })
+            .collect();
+        list.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        list
+    }
+
+    fn tried(&self) -> Vec<Tried> {
+        let of = |(step, round): (usize, &Vec<Trial>)| {
+            let before = self.unseen[step];
+            let one = |t: &Trial| Tried {
+                effect: title_of(t.kind),
+                joint: self.joint(),
+                step,
+                gain: 1.0 - t.unseen.unwrap_or(before) / before,
+                gain_sigmas: 0.0,
+                p_value: t.p_value,
+                refused: t.refused.clone(),
+            };
+            round.iter().map(one).collect::<Vec<_>>()
+        };
+        self.rounds.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The description with what was found.
+    pub(super) fn robot(&self, plant: &Plant) -> Robot {
+        let mut robot = self.stated.robot.clone();
+        robot.effects = self.stated.undriven();
+        // What its values were identified from before says nothing about the new ones.
+        robot.identified = None;
+        let (Some(model), Some(joint)) = (self.models.last(), robot.joints.first_mut()) else {
+            return robot;
+        };
+        let t = &model.theta;
+        joint.friction = Some(JointFriction {
+            coulomb: t[3],
+            viscous: t[4],
+            offset: t[5],
+        });
+        let drive = joint.drive.get_or_insert_with(|| Drive {
+            gear_ratio: 1.0,
+            ..Drive::default()
+        });
+        let square = plant.ratio * plant.ratio;
+        // No part of a drive has less inertia than none.
+        drive.rotor_inertia = drive.rotor_inertia.min(t[0] / square);
+        drive.joint_inertia = (t[0] - square * drive.rotor_inertia).max(0.0);
+        // Torque and voltage constant of a motor are one number in SI.
+        drive.torque_constant = t[2] / plant.ratio.abs();
+        drive.resistance = Some(t[2] / t[1]);
+        joint.voltage_controller = (self.controllers.first())
+            .map(|shown| shown.controller)
+            .or(joint.voltage_controller);
+        let mut at = NOMINAL;
+        for kind in &model.effects {
+            let about = kind.about();
+            let gains = &t[at..at + about.gains.len()];
+            at += about.gains.len();
+            let shapes = &t[at..at + about.shapes.len()];
+            at += about.shapes.len();
+            robot.effects.push(RobotEffect {
+                joint: Some(self.joint()),
+                other: None,
+                effect: Effect::new(*kind, gains, shapes),
+            });
+        }
+        robot
+    }
+}

@@ -1,0 +1,192 @@
+//! Recordings of a voltage-driven joint that cannot be what they say.
+
+use super::fit::WINDOW;
+use super::free_run::travel;
+use super::log::Log;
+use super::plant::Plant;
+use super::start::{left_of_voltage, start};
+use super::{DiagnoseError, floor};
+use crate::outcome::{About, DataFault};
+use crate::sanity::names;
+use rig_data::prepare::{Recording, first_block};
+use rig_data::{Implausible, JUDGED_ROWS, plausibility};
+use rig_model::robot::{Joint, JointKind, Robot};
+use rig_output::{format_significant, format_trimmed};
+
+/// Windows of a fit that the training recordings have to give.
+const FEWEST_WINDOWS: f64 = 5.0;
+/// Steps of the encoder that the joint has to move by at least.
+const FEWEST_STEPS: f64 = 20.0;
+
+/// Share of the travel that each sense has at least where the joint turns both ways.
+const BOTH_WAYS: f64 = 0.1;
+/// Share of its largest value by which a voltage changes that is a supply's.
+const STEADY: f64 = 0.1;
+/// Another factor is believed where it leaves less than this share of what the recorded position leaves.
+const BETTER: f64 = 0.35;
+/// A factor within this ratio of a thousand is one: friction adds to the back-EMF, and the torque constant is known to a factor.
+const THOUSAND: f64 = 5.0;
+
+/// What is wrong with the recordings `given` (training, held back), whose rows are `read`; empty where all is well.
+///
+/// # Errors
+/// What reading gives.
+pub(super) fn faults(
+    robot: &Robot,
+    plant: &Plant,
+    given: &[&[&dyn Recording]; 2],
+    read: &[&[Log]; 2],
+) -> Result<Vec<DataFault>, DiagnoseError> {
+    let joint = &robot.joints[0].name;
+    let fault = |kind: &str, recording: String, text: String| DataFault {
+        kind: kind.into(),
+        about: About::Recording,
+        recording,
+        joint: joint.clone(),
+        certain: true,
+        text,
+    };
+    let mut found = Vec::new();
+    for source in given.iter().copied().flatten() {
+        let first = first_block(*source, JUDGED_ROWS)?;
+        let wrong = first.map(|block| plausibility(&block, robot));
+        found.extend(wrong.into_iter().flatten().map(|what| {
+            let kind = match what {
+                Implausible::NotSeconds { .. } => "clock",
+                Implausible::Jump { .. } => "jump",
+                _ => "unit",
+            };
+            fault(kind, source.label(), format!("{what}."))
+        }));
+    }
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let train = read[0];
+    let all = || {
+        let labels = given[0].iter().map(|source| source.label());
+        labels.collect::<Vec<_>>().join(", ")
+    };
+    let duration: f64 = train.iter().map(Log::duration).sum();
+    if duration < FEWEST_WINDOWS * WINDOW {
+        found.push(fault(
+            "too-short",
+            all(),
+            format!(
+                "The recordings give {duration:.2} s of motion; without torque or current at least {} s are needed.",
+                FEWEST_WINDOWS * WINDOW
+            ),
+        ));
+        return Ok(found);
+    }
+    let least = FEWEST_STEPS * 12.0_f64.sqrt() * floor(train);
+    if !(travel(train) > least) {
+        found.push(fault(
+            "not-moving",
+            all(),
+            format!("The joint does not move by {FEWEST_STEPS} steps of its encoder; record a motion, or check that the position column is alive."),
+        ));
+        return Ok(found);
+    }
+    let of_train = |(kind, text): (&str, String)| fault(kind, all(), text);
+    if let Some(dead) = dead(train) {
+        found.push(of_train(dead));
+        return Ok(found);
+    }
+    let turned: Vec<Log> = (train.iter().cloned())
+        .map(|log| Log {
+            u: log.u.iter().map(|u| -u).collect(),
+            ..log
+        })
+        .collect();
+    // A voltage that drives nothing has no sense to be wrong.
+    if start(plant, train, true).is_none() && start(plant, &turned, true).is_some() {
+        found.push(fault(
+            "sign",
+            all(),
+            "u1 drives the joint against its sense: the torque per volt comes out negative. Turn the sign of u1 (or of the duty cycle), or that of q1.".into(),
+        ));
+        return Ok(found);
+    }
+    found.extend(position_scale(&robot.joints[0], train).map(of_train));
+    if found.is_empty() {
+        found.extend(voltage_scale(&robot.joints[0], plant, train).map(of_train));
+    }
+    Ok(found)
+}
+
+/// A voltage that is none: zero throughout, or one value while the joint turns both ways.
+fn dead(logs: &[Log]) -> Option<(&'static str, String)> {
+    let all = || logs.iter().flat_map(|log| &log.u);
+    let most = all().fold(0.0_f64, |most, u| most.max(u.abs()));
+    if most == 0.0 {
+        return Some((
+            "unit",
+            "u1 is 0 in every row while the joint moves; check that the column is the motor's voltage and was recorded.".into(),
+        ));
+    }
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| {
+        (low.min(*u), high.max(*u))
+    });
+    let travel = |sense: f64| -> f64 {
+        let steps = logs.iter().flat_map(|log| log.q.windows(2));
+        steps.map(|q| (sense * (q[1] - q[0])).max(0.0)).sum()
+    };
+    let (forth, back) = (travel(1.0), travel(-1.0));
+    let both = forth.min(back) > BOTH_WAYS * (forth + back);
+    let text = || {
+        let number = |x: f64| format_trimmed(x, 4);
+        let stays = match number(low) == number(high) {
+            true => format!("at {} V", number(low)),
+            false => format!("between {} and {} V", number(low), number(high)),
+        };
+        format!(
+            "u1 stays {stays} while the joint turns both ways: it looks like the supply. Give the voltage at the motor, or the duty cycle as duty1 with the supply as supply."
+        )
+    };
+    (both && high - low < STEADY * most).then(|| ("unit", text()))
+}
+
+/// A position of which gravity's period says that it is a multiple of the joint's.
+fn position_scale(joint: &Joint, logs: &[Log]) -> Option<(&'static str, String)> {
+    if joint.kind == JointKind::Prismatic {
+        return None;
+    }
+    let recorded = left_of_voltage(logs, 1.0)?;
+    let (factor, own) = (names::factors_of_position(joint).into_iter())
+        .filter_map(|factor| Some((factor, left_of_voltage(logs, factor)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let name = names::of_position(joint, factor)?;
+    (own < BETTER * recorded).then(|| {
+        let percent = |share: f64| format_significant(100.0 * share, 2);
+        let text = format!(
+            "q1 fits its voltage {} times as large (the model then leaves {} % of the voltage's squares, as recorded {} %): {}.",
+            format_trimmed(factor, 4),
+            percent(own),
+            percent(recorded),
+            name.text
+        );
+        (name.kind(), text)
+    })
+}
+
+/// A voltage whose back-EMF is a thousand times what the description makes it.
+fn voltage_scale(joint: &Joint, plant: &Plant, logs: &[Log]) -> Option<(&'static str, String)> {
+    let emf = joint.drive.as_ref()?.torque_constant * plant.ratio.abs();
+    let found = start(plant, logs, false)?[2];
+    let factor = found / emf;
+    let what = match factor {
+        f if (f / 1e3).ln().abs() < THOUSAND.ln() => "mV",
+        f if (f * 1e3).ln().abs() < THOUSAND.ln() => "kV",
+        _ => return None,
+    };
+    let number = |x: f64| format_significant(x, 3);
+    Some((
+        "unit",
+        format!(
+            "u1 looks like {what}: the back-EMF comes out at {} V·s/rad, where the description's torque constant and gear ratio make {}; give it in V.",
+            number(found),
+            number(emf)
+        ),
+    ))
+}

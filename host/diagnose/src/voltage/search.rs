@@ -1,0 +1,545 @@
+//! Which effects a voltage-driven joint lacks: one at a time, by what the free-running motion of recordings not fitted to
+//! gains.
+
+use rig_shared::effects::{Channel, Effect, Kind, Parameter, Scale};
+
+use super::LONGEST;
+use super::fit::{Problem, WINDOW, segments};
+use super::free_run::{FreeRun, travel};
+use super::halt::Cause;
+use super::log::{Log, Segment};
+use super::plant::{NOMINAL, Plant};
+use super::start::start;
+use rig_data::prepare::each_of;
+use rig_model::robot::Robot;
+
+/// Folds of the cross-validation at most: up to so many recordings each is left out once.
+const FOLDS: usize = 8;
+/// Blocks at least: fewer recordings are cut into pieces, so that a test over them can say something.
+const BLOCKS: usize = 8;
+/// Length of the pieces whose errors are compared, s.
+const PIECE: f64 = 2.0;
+/// Share of the error on recordings not fitted to that an effect has to take away.
+pub(super) const LEAST_GAIN: f64 = 0.03;
+/// Level of the signed-rank test over the pieces.
+pub(super) const LEVEL: f64 = 0.05;
+/// Candidates within this share of the best on recordings not fitted to are as good.
+pub(super) const EQUAL: f64 = 0.03;
+/// Candidates of a round that go to the cross-validation, the best by training error first.
+const SHORT_LIST: usize = 3;
+/// Times at most that a model that came in is fitted again.
+const POLISHES: usize = 5;
+/// Share of the RMS that another fit has to win to be followed by one more.
+const POLISHED: f64 = 1.0e-5;
+/// Share of the RMS residual by which steps half as long may change the positions.
+const STEP_SHARE: f64 = 0.1;
+/// Times at most that steps are halved.
+const HALVINGS: usize = 5;
+/// Effects at most.
+const MOST: usize = 5;
+
+/// A model and its parameters: the nominal ones, then gains and shapes of each effect.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Model {
+    pub effects: Vec<Kind>,
+    pub theta: Vec<f64>,
+    pub bounds: Vec<[f64; 2]>,
+    pub free: Vec<usize>,
+}
+
+/// One that was tried.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    pub kind: Kind,
+    /// Fitted to all recordings; none where it could not be simulated.
+    pub model: Option<Model>,
+    /// RMS on them.
+    pub train: f64,
+    /// RMS on blocks not fitted to; none where it did not come so far.
+    pub unseen: Option<f64>,
+    /// Signed-rank test; candidates are tested in a fixed sequence, which needs no correction for their number.
+    pub p_value: f64,
+    /// Why it was not taken; empty for the one that was.
+    pub refused: String,
+}
+
+/// What the search works on.
+pub(super) struct Search<'a> {
+    pub plant: &'a Plant,
+    pub logs: &'a [Log],
+    pub library: Vec<Kind>,
+    pub threads: usize,
+}
+
+/// Effects whose laws the simulation of one voltage-driven joint has; in the closed loop no recorded voltage can be late.
+pub(super) fn library(without: &[Kind], closed: bool) -> Vec<Kind> {
+    [
+        Kind::Stribeck,
+        Kind::AsymmetricCoulomb,
+        Kind::QuadraticDrag,
+        Kind::LoadFriction,
+        Kind::PreslidingDahl,
+        Kind::TorqueSaturation,
+        Kind::MeasurementDelay,
+        Kind::DriveDeadzone,
+        Kind::GravityTilt,
+        Kind::Spring,
+    ]
+    .into_iter()
+    .filter(|kind| !(without.contains(kind) || closed && *kind == Kind::MeasurementDelay))
+    .collect()
+}
+
+impl Search<'_> {
+    fn problem<'b>(&'b self, model: &'b Model, list: Vec<(usize, Segment)>) -> Problem<'b> {
+        Problem {
+            plant: self.plant,
+            logs: self.logs,
+            segments: list,
+            effects: &model.effects,
+            free: &model.free,
+            bounds: &model.bounds,
+        }
+    }
+
+    /// Whole recordings, or pieces where they are few.
+    pub(super) fn blocks(&self) -> Vec<(usize, Segment)> {
+        let whole = segments(self.logs, |_| true, f64::INFINITY);
+        if whole.len() >= BLOCKS || whole.is_empty() {
+            return whole;
+        }
+        let all: f64 = self.logs.iter().map(Log::duration).sum();
+        segments(self.logs, |_| true, all / (BLOCKS + whole.len()) as f64)
+    }
+
+    /// RMS of the free-running position over the blocks.
+    pub(super) fn rms(&self, model: &Model) -> f64 {
+        self.problem(model, self.blocks()).rms(&model.theta)
+    }
+
+    /// The plant with steps so fine that halving them changes the positions of the nominal model by less than a tenth of their
+    /// residual: where the residual is near the encoder's steps, those of the simulation must not look like an effect.
+    pub(super) fn in_fine_steps(&self) -> Plant {
+        match self.nominal() {
+            Some(model) => in_fine_steps(self.plant, self.logs, &model.effects, &model.theta),
+            None => *self.plant,
+        }
+    }
+
+    /// What becomes of the free runs over whole recordings.
+    pub(super) fn freely(&self, model: &Model) -> FreeRun {
+        let travel = travel(self.logs);
+        let mut errors = Vec::new();
+        for (k, segment) in segments(self.logs, |_| true, LONGEST) {
+            let log = &self.logs[k];
+            let run = match self
+                .problem(model, vec![(k, segment)])
+                .residual(&model.theta)
+            {
+                Ok(run) => run,
+                Err(halt) => return FreeRun::diverged(&log.label, halt.time, halt.cause),
+            };
+            if let Some(row) = run.iter().position(|error| !(error.abs() <= travel)) {
+                let time = log.t[segment.from + row];
+                return FreeRun::diverged(&log.label, time, Cause::LeftTravel);
+            }
+            errors.extend(run);
+        }
+        FreeRun::followed(&errors)
+    }
+
+    /// Simulated positions of one recording; empty where it cannot be simulated.
+    pub(super) fn simulated(&self, model: &Model, log: usize) -> Vec<f64> {
+        let whole = segments(self.logs, |k| k == log, LONGEST);
+        let error = self.problem(model, whole).residual(&model.theta);
+        let pairs = error.iter().flatten().zip(&self.logs[log].q);
+        pairs.map(|(error, q)| q + error).collect()
+    }
+
+    /// Standard deviations in the order of the free parameters.
+    pub(super) fn deviations(&self, model: &Model) -> Option<Vec<f64>> {
+        self.problem(model, self.blocks()).deviations(&model.theta)
+    }
+
+    /// `starts`, which differ in their parameters alone, fitted to pieces of the recordings from the best of them.
+    fn fitted(&self, starts: &[&Model], list: Vec<(usize, Segment)>) -> Model {
+        let thetas: Vec<&[f64]> = starts.iter().map(|model| model.theta.as_slice()).collect();
+        let theta = self.problem(starts[0], list).fit(&thetas);
+        Model {
+            theta,
+            ..starts[0].clone()
+        }
+    }
+
+    /// A model fitted to whole recordings from several starts. Whole recordings alone end in the nearest of many valleys, windows
+    /// alone weigh what windows show: each start is taken as it is and fitted to windows.
+    fn settled(&self, starts: &[Model]) -> Model {
+        let windows = || segments(self.logs, |_| true, WINDOW);
+        let near: Vec<Model> = starts
+            .iter()
+            .map(|start| self.fitted(&[start], windows()))
+            .collect();
+        let all: Vec<&Model> = starts.iter().chain(&near).collect();
+        self.fitted(&all, self.blocks())
+    }
+
+    /// A model fitted again from where its fit ended, until that wins nothing: a fit ends early where joints stick.
+    fn polished(&self, mut model: Model) -> Model {
+        for _ in 0..POLISHES {
+            let before = self.rms(&model);
+            model = self.fitted(&[&model], self.blocks());
+            if !(self.rms(&model) < (1.0 - POLISHED) * before) {
+                break;
+            }
+        }
+        model
+    }
+
+    /// The nominal model, from several starts; none where the motion does not excite it.
+    pub(super) fn nominal(&self) -> Option<Model> {
+        let viscous = (self.logs.iter()).any(|log| log.on.iter().any(|on| !on));
+        let theta = start(self.plant, self.logs, viscous)?;
+        let infinity = f64::INFINITY;
+        let model = Model {
+            effects: Vec::new(),
+            theta,
+            bounds: vec![
+                [0.0, infinity],
+                [1.0e-9, infinity],
+                [0.0, infinity],
+                [0.0, infinity],
+                [0.0, infinity],
+                [-infinity, infinity],
+            ],
+            // With the drive always on, viscous friction and back-EMF are one.
+            free: (0..NOMINAL).filter(|p| viscous || *p != 4).collect(),
+        };
+        let starts = [1.0, 0.5, 2.0].map(|factor| {
+            let mut one = model.clone();
+            one.theta[3] *= factor;
+            one
+        });
+        Some(self.polished(self.settled(&starts)))
+    }
+
+    /// `nominal` with the effects of a description, those that are marked fitted again; none where that cannot be simulated.
+    pub(super) fn with_described(
+        &self,
+        nominal: Model,
+        parts: &[(Effect<f64>, bool)],
+        robot: &Robot,
+    ) -> Option<Model> {
+        if parts.is_empty() {
+            return Some(nominal);
+        }
+        let mut model = nominal;
+        for (effect, fitted) in parts {
+            let about = effect.kind.about();
+            model.effects.push(effect.kind);
+            for (gain, value) in about.gains.iter().zip(effect.gains) {
+                model.free.extend(fitted.then_some(model.theta.len()));
+                model.theta.push(value);
+                model.bounds.push(gain.bounds);
+            }
+            for (shape, value) in about.shapes.iter().zip(effect.shapes) {
+                let [low, high] = shape.range;
+                let held = !fitted || effect.kind.optional().contains(&shape.name);
+                model.free.extend((!held).then_some(model.theta.len()));
+                model.theta.push(value);
+                // What is described stands, however far from what rigs have.
+                model
+                    .bounds
+                    .push([value.min(0.1 * low), value.max(10.0 * high)]);
+            }
+        }
+        // The nominal values may have been bent by what was not in the model: those of the description are tried as well.
+        let mut starts = vec![model.clone()];
+        if let Some(own) = self.plant.described(robot) {
+            model.theta[..NOMINAL].copy_from_slice(&own);
+            starts.push(model);
+        }
+        Some(self.settled(&starts)).filter(|model| self.rms(model).is_finite())
+    }
+
+    /// Of each model the sum of squares and number of rows of every piece of the recordings, of the model fitted to other blocks;
+    /// infinite where that cannot be simulated.
+    fn unseen(&self, models: &[&Model]) -> Vec<Vec<[f64; 2]>> {
+        let blocks = self.blocks();
+        let folds = FOLDS.min(blocks.len()).max(1);
+        let mut tasks: Vec<(usize, usize, Vec<(usize, Vec<[f64; 2]>)>)> = (0..models.len() * folds)
+            .map(|k| (k / folds, k % folds, Vec::new()))
+            .collect();
+        each_of(self.threads, &mut tasks, &|_, (model, fold, found)| {
+            *found = self.left_out(models[*model], &blocks, [*fold, folds]);
+        });
+        let mut all = vec![vec![Vec::new(); blocks.len()]; models.len()];
+        for (model, _, found) in tasks {
+            for (at, sums) in found {
+                all[model][at] = sums;
+            }
+        }
+        all.into_iter().map(|pieces| pieces.concat()).collect()
+    }
+
+    /// The pieces of the blocks of one fold, for a model fitted to the blocks of the others: the number of each block with the
+    /// sums of its pieces.
+    fn left_out(
+        &self,
+        model: &Model,
+        blocks: &[(usize, Segment)],
+        [fold, folds]: [usize; 2],
+    ) -> Vec<(usize, Vec<[f64; 2]>)> {
+        let kept = |at: &usize| at % folds == fold;
+        let rest = (0..blocks.len()).filter(|at| !kept(at));
+        let fitted = self.fitted(&[model], rest.map(|at| blocks[at]).collect());
+        (0..blocks.len())
+            .filter(kept)
+            .map(|at| {
+                let (log, segment) = blocks[at];
+                let t = &self.logs[log].t[segment.from..segment.to];
+                let residual = self
+                    .problem(model, vec![blocks[at]])
+                    .residual(&fitted.theta);
+                let place = |k: usize| ((t[k] - t[0]) / PIECE) as usize;
+                let mut sums = vec![[0.0; 2]; place(t.len() - 1) + 1];
+                for k in 0..t.len() {
+                    let error = residual.as_ref().map_or(f64::INFINITY, |r| r[k]);
+                    let sum = &mut sums[place(k)];
+                    *sum = [sum[0] + error * error, sum[1] + 1.0];
+                }
+                (at, sums)
+            })
+            .collect()
+    }
+
+    /// `model` with one more effect, fitted to all recordings from several starts.
+    fn with(&self, model: &Model, kind: Kind) -> Option<Model> {
+        let mut starts = Vec::new();
+        for share in [0.25, 0.75] {
+            let mut more = model.clone();
+            more.effects.push(kind);
+            let about = kind.about();
+            for gain in about.gains {
+                more.theta.push(self.first_gain(gain, model));
+                more.bounds.push(gain.bounds);
+            }
+            more.free.extend(model.theta.len()..more.theta.len());
+            let mut shaped = false;
+            for shape in about.shapes {
+                let [low, high] = shape.range;
+                // How friction parts between the sides of a gear is more than such a motion tells.
+                if kind.optional().contains(&shape.name) {
+                    more.theta.push(0.0);
+                    more.bounds.push(shape.bounds);
+                    continue;
+                }
+                shaped = true;
+                more.free.push(more.theta.len());
+                more.theta.push(match shape.scale {
+                    Scale::Linear | Scale::Whole => low + share * (high - low),
+                    Scale::Logarithmic => low * (high / low).powf(share),
+                });
+                // What is far outside of what rigs have is another effect.
+                more.bounds.push([0.1 * low, 10.0 * high]);
+            }
+            starts.push(more);
+            if !shaped {
+                break;
+            }
+        }
+        Some(self.settled(&starts)).filter(|found| self.rms(found).is_finite())
+    }
+
+    /// A small size for this joint, by the unit.
+    fn first_gain(&self, gain: &Parameter, model: &Model) -> f64 {
+        let weight = self.plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let torque = weight.max(model.theta[3]);
+        match gain.unit {
+            "1" => 0.1,
+            "s" => 1.0e-3,
+            "V" => 0.02 * self.largest_voltage(),
+            "1/(N*m)^2" => 0.1 / (torque * torque),
+            "N*m*s^2/rad^2" => 0.01 * model.theta[1] * model.theta[2],
+            _ if gain.name == "coulomb" => 0.5 * model.theta[3],
+            _ => 0.02 * torque,
+        }
+    }
+
+    fn largest_voltage(&self) -> f64 {
+        (self.logs.iter().flat_map(|log| &log.u)).fold(0.0, |m, u| m.max(u.abs()))
+    }
+
+    /// Adds effects while they are worth it. `report` is told of every round: its number, the error on recordings left out of
+    /// the fit before it, and all trials.
+    pub(super) fn run(
+        &self,
+        nominal: &Model,
+        report: &mut dyn FnMut(usize, f64, &[Trial]),
+    ) -> Vec<Model> {
+        let mut models = vec![nominal.clone()];
+        while models.len() <= MOST {
+            let Some(model) = models.last().cloned() else {
+                break;
+            };
+            let mut trials = self.trials(&model);
+            let whole = self.judge(&model, &mut trials);
+            let count = SHORT_LIST.min(trials.len());
+            in_sequence(&mut trials[..count]);
+            let best = taken(&trials);
+            for (k, trial) in trials.iter_mut().enumerate() {
+                if trial.refused.is_empty() && Some(k) != best {
+                    trial.refused = "another takes away more".into();
+                }
+            }
+            report(models.len() - 1, whole, &trials);
+            match best.and_then(|k| trials.swap_remove(k).model) {
+                Some(next) => models.push(self.polished(next)),
+                None => break,
+            }
+        }
+        models
+    }
+
+    /// Every effect that `model` does not have, fitted to all recordings, the best first.
+    fn trials(&self, model: &Model) -> Vec<Trial> {
+        let has = |kind: &Kind| {
+            let same = |e: &Kind| e.about().name == kind.about().name;
+            model.effects.iter().any(same)
+        };
+        let mut trials: Vec<Trial> = (self.library.iter())
+            .filter(|kind| !has(kind))
+            .map(|kind| Trial {
+                kind: *kind,
+                model: None,
+                train: f64::INFINITY,
+                unseen: None,
+                p_value: 1.0,
+                refused: "cannot be simulated with these parameters".into(),
+            })
+            .collect();
+        each_of(self.threads, &mut trials, &|_, trial| {
+            trial.model = self.with(model, trial.kind);
+            if let Some(found) = &trial.model {
+                trial.train = self.rms(found);
+                trial.refused = "others take away more".into();
+            }
+        });
+        trials.sort_by(|a, b| a.train.total_cmp(&b.train));
+        trials
+    }
+
+    /// Judges the trials that fit best by recordings left out of the fit, and gives the error of `model` on those.
+    fn judge(&self, model: &Model, trials: &mut [Trial]) -> f64 {
+        let short: Vec<usize> = (0..SHORT_LIST.min(trials.len()))
+            .filter(|k| trials[*k].model.is_some())
+            .collect();
+        let tried = short.iter().filter_map(|k| trials[*k].model.as_ref());
+        let unseen = self.unseen(&std::iter::once(model).chain(tried).collect::<Vec<_>>());
+        let before = &unseen[0];
+        let whole = pooled(before);
+        for (k, after) in short.into_iter().zip(&unseen[1..]) {
+            let trial = &mut trials[k];
+            let rms = pooled(after);
+            let gains: Vec<f64> = (before.iter().zip(after))
+                .map(|(b, a)| (b[0] / a[0]).ln())
+                .collect();
+            let wins = gains.iter().filter(|g| **g > 0.0).count();
+            trial.unseen = Some(rms);
+            trial.p_value = signed_rank(&gains);
+            trial.refused = if trial.p_value > LEVEL {
+                format!(
+                    "helps in {wins} of {} pieces of recordings not fitted to, which may be chance",
+                    gains.len()
+                )
+            } else if !(rms <= (1.0 - LEAST_GAIN) * whole) {
+                "takes less than 3 % off the motion of recordings it was not fitted to".into()
+            } else {
+                String::new()
+            };
+        }
+        whole
+    }
+}
+
+/// A plant with steps so fine that halving them changes the positions of a model by less than [`STEP_SHARE`] of their residual.
+pub(super) fn in_fine_steps(plant: &Plant, logs: &[Log], effects: &[Kind], theta: &[f64]) -> Plant {
+    let run = |plant: &Plant| {
+        let problem = Problem {
+            plant,
+            logs,
+            segments: segments(logs, |_| true, LONGEST),
+            effects,
+            free: &[],
+            bounds: &[],
+        };
+        problem.residual(theta)
+    };
+    let squares = |list: &mut dyn Iterator<Item = f64>| list.map(|x| x * x).sum::<f64>();
+    let mut plant = *plant;
+    let Ok(mut coarse) = run(&plant) else {
+        return plant;
+    };
+    for _ in 0..HALVINGS {
+        let finer = plant.finer();
+        let Ok(fine) = run(&finer) else { break };
+        let change = squares(&mut fine.iter().zip(&coarse).map(|(a, b)| a - b));
+        if change <= STEP_SHARE.powi(2) * squares(&mut fine.iter().copied()) {
+            break;
+        }
+        (plant, coarse) = (finer, fine);
+    }
+    plant
+}
+
+/// Each candidate is tested at the full level as long as all before it, which fit better, have passed: so the chance of any
+/// false one stays at that level (fixed sequence; Maurer, Hothorn and Lehmacher 1995). The order is that of the training error,
+/// of which the pieces not fitted to know little.
+pub(super) fn in_sequence(trials: &mut [Trial]) {
+    let chance = trials.iter().position(|trial| trial.p_value > LEVEL);
+    for trial in trials.iter_mut().skip(chance.map_or(usize::MAX, |k| k + 1)) {
+        if trial.refused.is_empty() {
+            trial.refused = "one that fits better may be chance".into();
+        }
+    }
+}
+
+/// Which of the candidates that passed comes in: of those about as good on what they were not fitted to, the one that fits best.
+pub(super) fn taken(trials: &[Trial]) -> Option<usize> {
+    let passed = || (trials.iter().enumerate()).filter(|(_, t)| t.refused.is_empty());
+    let of = |t: &Trial| t.unseen.unwrap_or(f64::INFINITY);
+    let least = passed().map(|(_, t)| of(t)).fold(f64::INFINITY, f64::min);
+    let near = passed().filter(|(_, t)| of(t) <= (1.0 + EQUAL) * least);
+    near.min_by(|(_, a), (_, b)| a.train.total_cmp(&b.train))
+        .map(|(k, _)| k)
+}
+
+/// RMS over pieces.
+fn pooled(pieces: &[[f64; 2]]) -> f64 {
+    let [sum, rows] = (pieces.iter()).fold([0.0; 2], |a, p| [a[0] + p[0], a[1] + p[1]]);
+    (sum / f64::max(rows, 1.0)).sqrt()
+}
+
+/// Chance of such gains where each is as likely to be a loss of its size: Wilcoxon's signed-rank test (1945), one-sided, its
+/// distribution exact. `gains` are logarithms of error before over after; those of zero, or of no number, say nothing.
+pub(super) fn signed_rank(gains: &[f64]) -> f64 {
+    let mut gains: Vec<f64> = gains.iter().copied().filter(|g| g.abs() > 0.0).collect();
+    gains.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let largest = gains.len() * (gains.len() + 1) / 2;
+    // Chance of each sum of the ranks of gains.
+    let mut chance = vec![0.0; largest + 1];
+    chance[0] = 1.0;
+    for rank in 1..=gains.len() {
+        for sum in (0..=largest).rev() {
+            let with = if sum >= rank { chance[sum - rank] } else { 0.0 };
+            chance[sum] = 0.5 * (chance[sum] + with);
+        }
+    }
+    let ranks = gains.iter().enumerate().filter(|(_, g)| **g > 0.0);
+    let observed: usize = ranks.map(|(k, _)| k + 1).sum();
+    chance[observed..].iter().sum::<f64>().min(1.0)
+}
+
+/// Whether the effect acts on the voltage.
+pub(super) fn on_the_voltage(kind: Kind) -> bool {
+    kind.about().channel == Channel::Voltage || kind == Kind::MeasurementDelay
+}

@@ -1,0 +1,169 @@
+//! Nominal parameters of a voltage-driven joint without a simulation: the start of a fit.
+//!
+//! The equation of motion is linear in them. Multiplied by a bump that vanishes with its slope at both ends of a short piece, and
+//! integrated by parts, it needs no derivative of the measured position (weak form; Shinbrot 1954, Preisig and Rippin 1993), so that
+//! the steps of the encoder do not bias the inertia, and no simulation can diverge.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::log::Log;
+use super::plant::{NOMINAL, Plant};
+use crate::sanity::nnls::nnls;
+
+/// Length of a piece, s: a few steps of a coarse encoder, short beside a swing.
+const PIECE: f64 = 0.3;
+/// Rows of a piece at least.
+const FEWEST: usize = 12;
+/// Share of the RMS velocity below which dry friction may hold the joint.
+const SLOW: f64 = 0.1;
+/// Share of slow rows above which a piece says nothing of Coulomb friction.
+const MOSTLY_SLOW: f64 = 0.25;
+/// Rounds of the least squares at most, many times what five bounded unknowns need.
+const ROUNDS: usize = 100;
+
+/// Columns of a joint under gravity: inertia, back-EMF, dry friction, a constant, and gravity's two.
+const OF_GRAVITY: usize = 6;
+/// Singular values below this are rounding.
+const TINY: f64 = 1e-12;
+
+/// Drive inertia, torque per volt, its product with the back-EMF, Coulomb and viscous friction: none is negative. The offset may be.
+const NOT_NEGATIVE: usize = 5;
+
+/// Nominal parameters by least squares, none of them negative; none where the voltage does not drive the joint. Viscous friction is
+/// told from the back-EMF only where `viscous`, by rows with the drive off.
+pub(super) fn start(plant: &Plant, logs: &[Log], viscous: bool) -> Option<Vec<f64>> {
+    let velocities: Vec<Vec<f64>> = (logs.iter())
+        .map(|log| (0..log.t.len()).map(|k| log.slope(k)[0]).collect())
+        .collect();
+    let rows = velocities.iter().map(Vec::len).sum::<usize>().max(1);
+    let squares: f64 = velocities.iter().flatten().map(|v| v * v).sum();
+    let slow = SLOW * (squares / rows as f64).sqrt();
+    let mut normal = DMatrix::<f64>::zeros(NOMINAL, NOMINAL);
+    let mut right = DVector::<f64>::zeros(NOMINAL);
+    for (log, velocity) in logs.iter().zip(&velocities) {
+        for [from, to] in pieces(log) {
+            let still = velocity[from..to].iter().filter(|v| v.abs() < slow).count();
+            let switched = log.on[from..to].windows(2).any(|pair| pair[0] != pair[1]);
+            if switched || still as f64 > MOSTLY_SLOW * (to - from) as f64 {
+                continue;
+            }
+            let (row, known) = equation(plant, log, velocity, [from, to], viscous);
+            for i in 0..NOMINAL {
+                right[i] += row[i] * known;
+                for j in 0..NOMINAL {
+                    normal[(i, j)] += row[i] * row[j];
+                }
+            }
+        }
+    }
+    for i in 0..NOMINAL {
+        normal[(i, i)] += 1.0e-15 + 1.0e-9 * normal[(i, i)];
+    }
+    let bounded: Vec<bool> = (0..NOMINAL).map(|k| k < NOT_NEGATIVE).collect();
+    let x = nnls(&normal, &right, &bounded, &mut [true; NOMINAL], ROUNDS)?;
+    let weight = plant.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let gain = if x[1] > 0.0 { x[1] } else { return None };
+    Some(vec![
+        x[0].max(0.05 * plant.inertia),
+        gain,
+        (x[2] / gain).max(1.0e-3),
+        x[3].max(0.01 * weight),
+        if viscous {
+            x[4].max(1.0e-3 * weight)
+        } else {
+            0.0
+        },
+        x[5],
+    ])
+}
+
+/// Share of the voltage's squares that a joint under gravity leaves, its position `factor` times what was recorded: of the factors
+/// the one whose gravity has the right period leaves least. Inertia, friction, back-EMF and gravity are fitted, whatever the
+/// description says of them.
+pub(super) fn left_of_voltage(logs: &[Log], factor: f64) -> Option<f64> {
+    let (mut rows, mut right) = (Vec::new(), Vec::new());
+    for log in logs {
+        for [from, to] in pieces(log) {
+            let length = log.t[to - 1] - log.t[from];
+            let (mut row, mut volts) = ([0.0; OF_GRAVITY], 0.0);
+            for k in from..to {
+                let [before, after] = [k.max(from + 1) - 1, (k + 1).min(to - 1)];
+                let width = 0.5 * (log.t[after] - log.t[before]);
+                let [bump, slope, bend] = bump((log.t[k] - log.t[from]) / length, length);
+                let q = log.q[k] - log.q[from];
+                let (sin, cos) = (factor * log.q[k]).sin_cos();
+                let own = [
+                    bend * q,
+                    -slope * q,
+                    bump * log.slope(k)[0].signum(),
+                    bump,
+                    bump * cos,
+                    bump * sin,
+                ];
+                for (to, x) in row.iter_mut().zip(own) {
+                    *to += width * x;
+                }
+                volts += width * bump * f64::from(u8::from(log.on[k])) * log.u[k];
+            }
+            rows.extend(row);
+            right.push(volts);
+        }
+    }
+    let squares: f64 = right.iter().map(|v| v * v).sum();
+    let x = DMatrix::from_row_slice(right.len(), OF_GRAVITY, &rows);
+    let y = DVector::from_vec(right);
+    let fit = x.clone().svd(true, true).solve(&y, TINY).ok()?;
+    (squares > 0.0).then(|| (y - x * fit).norm_squared() / squares)
+}
+
+/// x³(1 − x)³ at a share of a piece, and its derivatives by time, of a piece of that length, s.
+fn bump(x: f64, length: f64) -> [f64; 3] {
+    let rest = 1.0 - x;
+    [
+        (x * rest).powi(3),
+        3.0 * (x * rest).powi(2) * (rest - x) / length,
+        6.0 * x * rest * (1.0 - 5.0 * x * rest) / (length * length),
+    ]
+}
+
+/// Rows of overlapping pieces, the last one past the end.
+fn pieces(log: &Log) -> Vec<[usize; 2]> {
+    let mut list = Vec::new();
+    let mut from = 0;
+    while let Some(to) = (from..log.t.len()).find(|k| log.t[*k] > log.t[from] + PIECE) {
+        if to - from >= FEWEST {
+            list.push([from, to]);
+        }
+        from += ((to - from) / 2).max(1);
+    }
+    list
+}
+
+/// Coefficients of the nominal parameters in one piece, and what the description knows of it.
+fn equation(
+    plant: &Plant,
+    log: &Log,
+    velocity: &[f64],
+    [from, to]: [usize; 2],
+    viscous: bool,
+) -> ([f64; NOMINAL], f64) {
+    let length = log.t[to - 1] - log.t[from];
+    let mut row = [0.0; NOMINAL];
+    let mut known = 0.0;
+    for k in from..to {
+        let [before, after] = [k.max(from + 1) - 1, (k + 1).min(to - 1)];
+        let width = 0.5 * (log.t[after] - log.t[before]);
+        let [bump, slope, bend] = bump((log.t[k] - log.t[from]) / length, length);
+        let q = log.q[k] - log.q[from];
+        let on = f64::from(u8::from(log.on[k]));
+        let [acceleration, speed] = [bend * q, -slope * q];
+        row[0] -= width * acceleration;
+        row[1] += width * bump * on * log.u[k];
+        row[2] -= width * on * speed;
+        row[3] -= width * bump * velocity[k].signum();
+        row[4] -= if viscous { width * speed } else { 0.0 };
+        row[5] -= width * bump;
+        known += width * (plant.inertia * acceleration + bump * plant.weight(log.q[k]));
+    }
+    (row, known)
+}

@@ -1,0 +1,142 @@
+//! Waves along a joint's position: which of them a motion shows.
+//!
+//! Over less than its length a wave is a parabola, or less: offset, Coulomb friction and the wave then hold each other up, each
+//! of them far from what it is. Friction that varies with the position of a revolute joint is left out of this: it repeats with
+//! the turn by its nature, and changes its sign with the direction.
+
+use core::f64::consts::TAU;
+
+use rig_shared::effects::{Kind, Periodic, SHAPES};
+
+use super::profile::grid;
+use rig_data::runs::Run;
+use rig_model::robot::{Joint, JointKind};
+
+/// Lengths of a wave that a motion has to span before the wave is looked for: one to know it, the rest to see that it repeats.
+pub(super) const SPANNED: f64 = 1.5;
+
+/// Lowest to highest position of a joint, rad or m.
+pub(super) fn span(runs: &[Run], joint: usize) -> f64 {
+    let all = || {
+        (runs.iter())
+            .filter_map(|run| run.joints.get(joint))
+            .flat_map(|j| j.q.iter().copied())
+    };
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
+        (low.min(q), high.max(q))
+    });
+    (high - low).max(0.0)
+}
+
+/// Whether an effect repeats with the motor's angle.
+pub(super) fn is_of_the_motor(kind: Kind) -> bool {
+    matches!(
+        kind.periodic(),
+        Some(Periodic::Motor | Periodic::MotorTimesDrive)
+    )
+}
+
+/// Whether the motor's angle is known: a turn of a joint is at least one of a motor that drives it directly, a way is no turn.
+pub(super) fn motor_is_known(joint: &Joint) -> bool {
+    ratio_is_described(joint) || joint.kind == JointKind::Revolute
+}
+
+/// Whether the description says how far the motor turns; else the angle of a revolute joint stands for its motor's.
+pub(super) fn ratio_is_described(joint: &Joint) -> bool {
+    (joint.drive.as_ref()).is_some_and(|drive| drive.gear_ratio != 0.0)
+}
+
+/// Length of the wave of an effect on a joint, rad or m; none of what is none.
+fn length(kind: Kind, joint: &Joint, order: f64) -> Option<f64> {
+    let ratio = if is_of_the_motor(kind) {
+        joint.gear_ratio().abs()
+    } else if kind == Kind::PositionFriction && joint.kind == JointKind::Prismatic {
+        1.0
+    } else {
+        return None;
+    };
+    Some(TAU / (ratio * order))
+}
+
+/// Whether a motion that spans so much shows an effect with these shapes; true of all that is no wave.
+pub(super) fn shown(kind: Kind, joint: &Joint, shapes: &[f64; SHAPES], span: f64) -> bool {
+    length(kind, joint, shapes[0]).is_none_or(|length| span >= SPANNED * length)
+        && (motor_is_known(joint) || !is_of_the_motor(kind))
+}
+
+/// The length of the shortest wave that is looked for, where a motion that spans so much shows none of them.
+pub(super) fn none_shown(kind: Kind, joint: &Joint, span: f64) -> Option<f64> {
+    let points = grid(kind);
+    let lengths = (points.iter()).filter_map(|shapes| length(kind, joint, shapes[0]));
+    let shortest = lengths.fold(f64::INFINITY, f64::min);
+    (shortest.is_finite() && span < SPANNED * shortest).then_some(shortest)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use rig_model::robot::{EMPS, ONE_LINK_TEMPLATE, Robot};
+
+    fn joint(text: &str) -> Joint {
+        let robot = Robot::from_toml(text, "robot.toml".as_ref()).unwrap();
+        robot.joints[0].clone()
+    }
+
+    fn order(order: f64) -> [f64; SHAPES] {
+        [order, 0.0, 0.0, 0.0]
+    }
+
+    const OF_THE_MOTOR: [Kind; 4] = [
+        Kind::Cogging,
+        Kind::TorqueRipple,
+        Kind::GearEccentricity,
+        Kind::EncoderEccentricityMotor,
+    ];
+
+    #[test]
+    fn a_slide_without_a_drive_has_no_motor_angle() {
+        let mut slide = joint(EMPS);
+        for kind in OF_THE_MOTOR {
+            assert!(!shown(kind, &slide, &order(84.0), 100.0), "{kind:?}");
+        }
+        // A screw with a lead of 20 mm: 12 turns over the axis.
+        slide.drive = joint(ONE_LINK_TEMPLATE)
+            .drive
+            .map(|drive| rig_model::robot::Drive {
+                gear_ratio: TAU / 0.02,
+                ..drive
+            });
+        for kind in OF_THE_MOTOR {
+            assert!(shown(kind, &slide, &order(1.0), 0.25), "{kind:?}");
+            assert!(!shown(kind, &slide, &order(1.0), 0.025), "{kind:?}");
+            assert!(shown(kind, &slide, &order(2.0), 0.025), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn friction_along_a_slide_is_no_wave_longer_than_the_way() {
+        let slide = joint(EMPS);
+        let kind = Kind::PositionFriction;
+        assert!(!shown(kind, &slide, &order(4.0), 0.25));
+        assert_eq!(none_shown(kind, &slide, 0.25), Some(TAU / 4.0));
+        assert!(shown(kind, &slide, &order(4.0), 3.0));
+        // Of a turn, part of it shows the rest.
+        assert!(shown(kind, &joint(ONE_LINK_TEMPLATE), &order(1.0), 3.0));
+        assert_eq!(none_shown(kind, &joint(ONE_LINK_TEMPLATE), 3.0), None);
+    }
+
+    #[test]
+    fn a_geared_link_shows_a_turn_of_its_motor_and_a_direct_drive_only_as_much_as_it_turns() {
+        let mut link = joint(ONE_LINK_TEMPLATE);
+        let kind = Kind::GearEccentricity;
+        assert!(shown(kind, &link, &order(1.0), 0.5));
+        link.drive = None;
+        assert!(!shown(kind, &link, &order(1.0), 3.4));
+        assert!(!shown(kind, &link, &order(1.0), TAU));
+        assert!(shown(kind, &link, &order(2.0), 5.0));
+        // What is no wave is not measured by it.
+        assert!(shown(Kind::Stribeck, &link, &order(0.01), 0.0));
+    }
+}

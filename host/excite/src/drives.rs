@@ -1,0 +1,188 @@
+//! Coupled drives and cranks in a design: the motors' columns, their torque, and limits on combinations of joints.
+
+use rig_shared::dual::Dual;
+use rig_shared::scalar::Real;
+use rig_shared::transmission::{MOTOR_COLUMNS, Transmission, TransmissionError, motor_column};
+
+use super::interval::Interval;
+use super::problem::{L, SIGN_WIDTH};
+use super::{ExciteError, frame::Bounds};
+use rig_model::robot::Robot;
+use rig_model::simulate::{Motors, SimulateError};
+
+/// Derivatives that one pass over dual numbers gives.
+const AT_ONCE: usize = 4;
+type D = Dual<L, AT_ONCE>;
+
+/// Drives that move more than their own joint or do it at a changing ratio, over every scalar that a design needs.
+pub(super) struct Drives {
+    pub plain: Transmission<f64>,
+    lanes: Transmission<L>,
+    dual: Transmission<D>,
+    pub enclosing: Transmission<Interval>,
+    /// Prior parameters, 3 a motor.
+    pub parameters: Vec<f64>,
+    /// Per motor the speed within which the optimiser rounds the sign of its velocity off.
+    widths: Vec<f64>,
+}
+
+fn wrong(e: TransmissionError) -> ExciteError {
+    SimulateError::from(e).into()
+}
+
+impl Drives {
+    /// Those of a robot; none where every drive moves its own joint at a constant ratio.
+    pub(super) fn of(
+        robot: &Robot,
+        motors: Option<Motors>,
+        bounds: &[Bounds],
+    ) -> Result<Option<Self>, ExciteError> {
+        let Some(motors) = motors else {
+            return Ok(None);
+        };
+        let n = bounds.len();
+        let mut directions = vec![0.0; n * n];
+        motors
+            .transmission
+            .motor_directions(&robot.middle_position(), &mut directions)
+            .map_err(wrong)?;
+        let fastest = |row: &[f64]| -> f64 {
+            row.iter()
+                .zip(bounds)
+                .map(|(d, b)| d.abs() * b.velocity)
+                .sum()
+        };
+        Ok(Some(Self {
+            widths: directions
+                .chunks_exact(n)
+                // A simple drive has no direction, nor columns.
+                .map(|row| (SIGN_WIDTH * fastest(row)).max(f64::MIN_POSITIVE.sqrt()))
+                .collect(),
+            plain: motors.transmission,
+            lanes: robot.transmission_of().map_err(wrong)?,
+            dual: robot.transmission_of().map_err(wrong)?,
+            enclosing: robot.transmission_of().map_err(wrong)?,
+            parameters: motors.parameters.as_flattened().to_vec(),
+        }))
+    }
+
+    /// Columns of the motors, n × 3n, with the signs of their velocities rounded off.
+    pub(super) fn columns(&self, state: [&[L]; 3], out: &mut [L]) -> Result<(), ExciteError> {
+        smooth_columns(&self.lanes, state, &self.widths, out)
+    }
+
+    /// Adds the derivatives of Σ weight·column by positions, velocities and accelerations; `weights` is n × 3n.
+    pub(super) fn add_gradient(
+        &self,
+        state: [&[L]; 3],
+        weights: &[L],
+        by: &mut [Vec<L>; 3],
+    ) -> Result<(), ExciteError> {
+        let n = state[0].len();
+        let mut columns = vec![D::ZERO; n * n * MOTOR_COLUMNS];
+        for first in (0..3 * n).step_by(AT_ONCE) {
+            let lifted = [0, 1, 2].map(|order| -> Vec<D> {
+                let lift = |(j, value): (usize, &L)| match (order * n + j)
+                    .checked_sub(first)
+                    .filter(|k| *k < AT_ONCE)
+                {
+                    Some(k) => D::variable(*value, k),
+                    None => D::constant(*value),
+                };
+                state[order].iter().enumerate().map(lift).collect()
+            });
+            let [q, qd, qdd] = &lifted;
+            smooth_columns(&self.dual, [q, qd, qdd], &self.widths, &mut columns)?;
+            for k in 0..AT_ONCE.min(3 * n - first) {
+                let (order, j) = ((first + k) / n, (first + k) % n);
+                for (weight, column) in weights.iter().zip(&columns) {
+                    by[order][j] += *weight * column.derivative[k];
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The columns with Coulomb friction on s/√(s² + width²) instead of the sign of s.
+fn smooth_columns<T: Real>(
+    transmission: &Transmission<T>,
+    [q, qd, qdd]: [&[T]; 3],
+    widths: &[f64],
+    out: &mut [T],
+) -> Result<(), ExciteError> {
+    let n = q.len();
+    transmission.motor_columns(q, qd, qdd, out).map_err(wrong)?;
+    let mut speeds = vec![T::ZERO; n];
+    let mut directions = vec![T::ZERO; n * n];
+    transmission
+        .motor_speeds(q, qd, &mut speeds)
+        .map_err(wrong)?;
+    transmission
+        .motor_directions(q, &mut directions)
+        .map_err(wrong)?;
+    for (k, (speed, width)) in speeds.iter().zip(widths).enumerate() {
+        let sign = *speed / (speed.squared() + T::from_f64(width * width)).sqrt();
+        for i in 0..n {
+            out[(i * n + k) * MOTOR_COLUMNS + motor_column::COULOMB] = directions[k * n + i] * sign;
+        }
+    }
+    Ok(())
+}
+
+/// A crank's range: a limit on Σ c_j·q_j.
+pub(super) struct Combined {
+    /// c, one a joint.
+    pub weights: Vec<f64>,
+    pub low: f64,
+    pub high: f64,
+    /// The joint that is named where nothing fits: that of the drive.
+    pub joint: usize,
+}
+
+impl Combined {
+    pub(super) fn of(robot: &Robot) -> Vec<Self> {
+        let cranks = robot.joints.iter().enumerate().filter(|(_, j)| {
+            let screw = j.drive.as_ref().and_then(|d| d.screw.as_ref());
+            screw.is_some_and(|s| s.range.is_some())
+        });
+        cranks
+            .zip(robot.combined_limits())
+            .map(|((joint, _), (weights, [low, high]))| Self {
+                weights,
+                low,
+                high,
+                joint,
+            })
+            .collect()
+    }
+
+    pub(super) fn at(&self, q: impl Iterator<Item = f64>) -> f64 {
+        self.weights.iter().zip(q).map(|(c, x)| c * x).sum()
+    }
+
+    pub(super) fn half(&self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+
+    pub(super) fn middle(&self) -> f64 {
+        0.5 * (self.high + self.low)
+    }
+}
+
+/// `q` moved by the smallest steps, one crank after the other, until each is within `share` of its range about the
+/// middle; a few rounds, as cranks share joints.
+pub(super) fn into_cranks(combined: &[Combined], q: &mut [f64], share: f64) {
+    for _ in 0..20 {
+        for limit in combined {
+            let square: f64 = limit.weights.iter().map(|c| c * c).sum();
+            let now = limit.at(q.iter().copied()) - limit.middle();
+            let within = now.clamp(-share * limit.half(), share * limit.half());
+            if square > 0.0 {
+                for (x, c) in q.iter_mut().zip(&limit.weights) {
+                    *x += (within - now) * c / square;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! What can be wrong with a design or a trajectory file.
+
+use std::path::PathBuf;
+
+use rig_shared::multibody::MultibodyError;
+
+use rig_data::DataError;
+use rig_identify::IdentifyError;
+use rig_model::robot::Place;
+use rig_model::simulate::SimulateError;
+use rig_output::WriteError;
+
+/// Why there is no trajectory.
+#[derive(Debug, thiserror::Error)]
+pub enum ExciteError {
+    /// Joints without limits.
+    #[error(
+        "{} no limits, and a motion is only designed within limits; give position and velocity at least, as [joint.limits] in TOML, as <limit lower=\"…\" upper=\"…\" velocity=\"…\" effort=\"…\"/> in a URDF",
+        limitless(joints)
+    )]
+    NoLimits {
+        /// Their names.
+        joints: Vec<String>,
+    },
+    /// Limits that bound nothing.
+    #[error(
+        "the limits of joint \"{joint}\" let it move at {velocity:e} (SI units), and a motion is sized by them; give the velocity, or the acceleration, that its drive can do"
+    )]
+    Boundless {
+        /// Its name.
+        joint: String,
+        /// What the limits allow, rad/s or m/s.
+        velocity: f64,
+    },
+    /// An option outside its range.
+    #[error("the {name} is {value}, but {right}")]
+    Option {
+        /// Which.
+        name: &'static str,
+        /// What was given.
+        value: String,
+        /// What would be right.
+        right: String,
+    },
+    /// No motion fits.
+    #[error(
+        "no motion was found within the limits: the {limit} limit of joint \"{joint}\" is too tight; widen it, choose another start position, or a longer period"
+    )]
+    Infeasible {
+        /// Its name.
+        joint: String,
+        /// position, velocity, acceleration, torque, crank or workspace
+        limit: &'static str,
+    },
+    /// A staged motion that the limits leave no room for.
+    #[error("no {kind} fits joint \"{joint}\": {why}")]
+    NoRoom {
+        /// The kind of motion.
+        kind: &'static str,
+        /// The joint's name.
+        joint: String,
+        /// Why, and what would help.
+        why: String,
+    },
+    /// The base parameters cannot be found.
+    #[error(transparent)]
+    Base(#[from] IdentifyError),
+    /// The model cannot be built or simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Lengths that do not fit the chain.
+    #[error(transparent)]
+    Multibody(#[from] MultibodyError),
+    /// A sampled trajectory cannot be read or written.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A file cannot be read.
+    #[error("cannot read the trajectory {}: {source}; give the path of a .toml or .csv file that `rig excite` wrote", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// An ending that says nothing.
+    #[error("{} ends neither in .toml (the trajectory's parameters) nor in .csv (its samples); name one of them", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file too large to be a parametric trajectory.
+    #[error("{} is larger than 1 MiB, but a trajectory file is a short text; is this a recording?", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// TOML that does not parse or does not describe trajectories.
+    #[error("{}:{place}: {message}", path.display())]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// One sentence: what is there and what would be right.
+        message: String,
+    },
+    /// The file belongs to another robot.
+    #[error("{} moves {found}, but robot \"{robot}\" has {expected}; design a trajectory for this robot with `rig excite`", path.display())]
+    OtherRobot {
+        /// The file.
+        path: PathBuf,
+        /// The robot's name.
+        robot: String,
+        /// The joints in the file.
+        found: String,
+        /// The robot's joints.
+        expected: String,
+    },
+    /// A sampled trajectory that is not evenly sampled.
+    #[error("{}, row {row}: the samples of a trajectory must be evenly spaced in time, without gaps; sample it at one rate", path.display())]
+    Uneven {
+        /// The file.
+        path: PathBuf,
+        /// Line, or number of the message, from 1.
+        row: u64,
+    },
+}
+
+/// The joints, and that they have.
+fn limitless(joints: &[String]) -> String {
+    let list = joints.join("\", \"");
+    match joints.len() {
+        1 => format!("joint \"{list}\" has"),
+        _ => format!("joints \"{list}\" have"),
+    }
+}

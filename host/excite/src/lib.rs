@@ -1,0 +1,227 @@
+//! Motions that tell the parameters of a robot apart.
+//!
+//! [`design`] finds Fourier series (Swevers et al. 1997) that are optimal for the base parameters within the limits
+//! on position, velocity, acceleration and torque, and within the regions of the base frame that points of the links
+//! must not leave; [`staged`] makes chirps, staircases, slow reversals and friction sweeps from the same limits of the
+//! joints; [`TrajectoryFile`] keeps either; [`replay`] runs one through the simulated closed loop.
+//!
+//! # Scaling
+//! The columns of the regressor have different units, so that its condition number means nothing by itself. With
+//! [`Scaling::Sizes`] each column is divided by its own size: its root mean square over states drawn evenly from
+//! within the limits. A singular value is then how well a combination of parameters is excited, relative to what the
+//! limits would let any motion do for a column alone. No prior value of a parameter enters, so that an offset expected
+//! to be zero counts as much as any other.
+//!
+//! Each joint's rows are divided by the standard deviation of its torque ([`Options::torque_noise`]); where that is
+//! not given, by its torque limit, if several joints all have one.
+//!
+//! ```
+//! use rig_excite::{Options, design};
+//! use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let robot = Robot::from_toml(ONE_LINK_TEMPLATE, "one-link.toml".as_ref())?;
+//! let design = design(&robot, &Options::default(), |_, _| ())?;
+//! println!("{}", design.file.to_toml(&robot));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Leaves out: collisions; [`rig_model::robot::Robot::effects`]; errors of the controller (the limits hold for the
+//! reference). [`staged`] does not look at the regions of the workspace and says so.
+
+mod certificate;
+mod criterion;
+mod drives;
+mod error;
+mod fit;
+mod frame;
+mod interval;
+mod optimise;
+mod problem;
+mod replay;
+mod schedule;
+mod search;
+mod stages;
+mod trajectory_file;
+mod workspace;
+
+#[cfg(test)]
+mod tests;
+
+use rig_model::robot::Robot;
+
+pub use certificate::Reach;
+pub use criterion::{Criterion, Values};
+pub use error::ExciteError;
+pub use frame::default_period;
+pub use replay::STEP as REPLAY_STEP;
+pub use replay::{Noise, Replay, SETTLING, drawn, replay};
+pub use stages::{StagedKind, StagedOptions, staged};
+pub use trajectory_file::{
+    COASTING, DesignRecord, JointTrajectory, SampledReference, TrajectoryFile, load_reference,
+};
+
+use frame::frame_of;
+use search::search;
+
+/// Which parameters a motion is to tell apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Parameters {
+    /// All that identification finds: links, drive inertias, friction and offsets.
+    #[default]
+    All,
+    /// Inertial parameters of the links alone, as papers that leave friction out count them.
+    Links,
+}
+
+/// By what the columns of the regressor are divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scaling {
+    /// By their sizes, see [`self`].
+    #[default]
+    Sizes,
+    /// By nothing: the regressor in SI units, as much of the literature judges it.
+    None,
+}
+
+/// Settings of a design. The default uses the limits to their end; `rig excite` leaves room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// What is optimised.
+    pub criterion: Criterion,
+    /// Which parameters count.
+    pub parameters: Parameters,
+    /// By what columns are divided.
+    pub scaling: Scaling,
+    /// Standard deviation of each joint's torque, N·m or N: the rows are divided by it.
+    pub torque_noise: Option<Vec<f64>>,
+    /// Harmonics per joint, 1 to [`HARMONICS`](rig_shared::trajectory::HARMONICS).
+    pub harmonics: usize,
+    /// Period of the fundamental, s; chosen from the limits where absent, see [`default_period`].
+    pub period: Option<f64>,
+    /// Whole periods at full amplitude.
+    pub periods: u16,
+    /// Length of the ramp before and after them, s; one period where absent.
+    pub ramp: Option<f64>,
+    /// Where the joints start, rad or m; free where absent.
+    pub start: Option<Vec<f64>>,
+    /// Share of the position range that is kept free, half of it at each end: what the controller is off by at a turning
+    /// point must fit in there. The limits of cranks and regions of the workspace have none.
+    pub margin: f64,
+    /// Share of the velocity limits that is used, and its square of the acceleration limits, as if time ran slower.
+    pub speed_share: f64,
+    /// Random starts of the optimiser.
+    pub starts: u32,
+    /// Seed of them.
+    pub seed: u64,
+    /// Threads; as many as the machine offers where absent. The result does not depend on it.
+    pub threads: Option<usize>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            criterion: Criterion::default(),
+            parameters: Parameters::default(),
+            scaling: Scaling::default(),
+            torque_noise: None,
+            harmonics: 5,
+            period: None,
+            periods: 5,
+            ramp: None,
+            start: None,
+            margin: 0.0,
+            speed_share: 1.0,
+            starts: 24,
+            seed: 1,
+            threads: None,
+        }
+    }
+}
+
+/// How close a point comes to the edge of its region.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clearance {
+    /// Name of the joint whose link carries the point.
+    pub joint: String,
+    /// Unit normal of the edge towards the inside, in the base frame.
+    pub normal: [f64; 3],
+    /// Lower bound of the distance, m.
+    pub distance: f64,
+}
+
+/// An optimal motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    /// The motion, ready to be saved and run.
+    pub file: TrajectoryFile,
+    /// How well it does.
+    pub values: Values,
+    /// The base parameters that it is optimal for, as a paper prints them.
+    pub base_parameters: Vec<String>,
+    /// Upper bounds of how far each joint goes.
+    pub reach: Vec<Reach>,
+    /// Lower bounds of how close points come to the edges of their regions.
+    pub clearances: Vec<Clearance>,
+    /// Criterion reached from each start that was refined to the end and is within the limits, in order of the starts.
+    pub reached: Vec<f64>,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Finds the motion that is best by the criterion within the robot's limits.
+///
+/// Random starts are improved with exact gradients in parallel threads; the most promising are refined on a finer grid,
+/// proved to stay within the limits at every instant, and compared by what they are then worth; the best is
+/// returned. The result depends on robot and options alone, not on the number of threads. `progress` is told how many
+/// units of work are done, and of how many.
+///
+/// # Errors
+/// [`ExciteError`]: limits that are missing, options out of range, a robot without a model, or no motion within the
+/// limits (the joint and the limit at fault are named).
+pub fn design(
+    robot: &Robot,
+    options: &Options,
+    progress: impl FnMut(u64, u64),
+) -> Result<Design, ExciteError> {
+    let (frame, base, notes) = frame_of(robot, options)?;
+    let (best, reached) = search(robot, &frame, options, progress)?;
+    Ok(Design {
+        file: TrajectoryFile {
+            robot: robot.name.clone(),
+            design: Some(DesignRecord {
+                criterion: options.criterion,
+                value: options.criterion.of(&best.values),
+                condition_number: best.values.condition_number,
+                seed: options.seed,
+            }),
+            drive_off: None,
+            joints: robot
+                .joints
+                .iter()
+                .zip(&best.motions)
+                .map(|(joint, motion)| JointTrajectory {
+                    name: joint.name.clone(),
+                    start: motion.base,
+                    trajectory: frame.schedule.trajectory(&motion.coefficients),
+                })
+                .collect(),
+        },
+        values: best.values,
+        base_parameters: (0..base.len()).map(|k| base.expression(k)).collect(),
+        clearances: frame
+            .planes
+            .iter()
+            .zip(&best.reached.heights)
+            .map(|(plane, height)| Clearance {
+                joint: robot.joints[plane.link].name.clone(),
+                normal: plane.normal,
+                distance: height - plane.least,
+            })
+            .collect(),
+        reach: best.reached.joints,
+        reached,
+        notes,
+    })
+}

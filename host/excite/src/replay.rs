@@ -1,0 +1,292 @@
+//! A trajectory run through the simulated closed loop, as a recording would show it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::{ExciteError, SampledReference};
+use rig_data::{Column, RecordingWriter};
+use rig_model::robot::Robot;
+use rig_model::simulate::{Inputs, Model, Motion, STAND_IN_BANDWIDTH, closed_loop, controllers};
+
+/// The model stands in its controller for so long before the recording begins that gravity has found its balance, s.
+pub const SETTLING: f64 = 1.0;
+/// Time constant of the stand-in's feedback, s.
+const TIME_CONSTANT: f64 = 1.0 / (core::f64::consts::TAU * STAND_IN_BANDWIDTH);
+/// Share of a joint's motion by which it may be off its reference, RMS, before that is said.
+const OFF: f64 = 0.1;
+/// Longest step of the simulation, s: a hundredth of the fastest time constant that the controllers here have.
+pub const STEP: f64 = 0.25e-3;
+
+/// White normal noise of the measured columns, standard deviations; 0 for none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// rad or m
+    pub position: f64,
+    /// rad/s or m/s
+    pub velocity: f64,
+    /// N·m or N
+    pub torque: f64,
+}
+
+/// What the simulated rig did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replay {
+    /// Sample period, s.
+    pub period: f64,
+    /// Per joint, reference positions.
+    pub reference: Vec<Vec<f64>>,
+    /// Position, velocity and torque as measured, noise included.
+    pub motion: Motion,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Simulates the robot of a description following `reference`, which is at rest where it begins.
+///
+/// The recording begins when the model has stood at the first reference for one second. The controllers run at every step of the
+/// simulation, 0.25 ms at most, whatever the rate of the recording: a loop that runs once a recorded sample, at 250 Hz, was not
+/// stable in all poses of an arm and made bursts of torque from limit to limit. A controller that is described has the reference
+/// alone; a stand-in gets the described torque of the reference, too, without which dry friction holds a light link. `progress` is
+/// told how many steps are done, and of how many.
+///
+/// # Errors
+/// [`ExciteError`]: noise that is not 0 or more, a robot without inertial parameters, gains that do not fit it.
+pub fn replay(
+    robot: &Robot,
+    reference: &SampledReference,
+    noise: Noise,
+    seed: u64,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Replay, ExciteError> {
+    for (name, value) in [
+        ("position noise", noise.position),
+        ("velocity noise", noise.velocity),
+        ("torque noise", noise.torque),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(ExciteError::Option {
+                name,
+                value: value.to_string(),
+                right: "it is a standard deviation: 0 or more".into(),
+            });
+        }
+    }
+    let model = Model::from_robot(robot)?;
+    let start: Vec<f64> = reference
+        .position
+        .iter()
+        .map(|q| q.first().copied().unwrap_or(0.0))
+        .collect();
+    let (controllers, stand_ins) = controllers(robot, &model, &start)?;
+    let mut notes = Vec::new();
+    if !stand_ins.is_empty() {
+        notes.push(format!(
+            "No [joint.controller] is described for {}; a stand-in of {STAND_IN_BANDWIDTH} Hz bandwidth with feed-forward \
+             of the reference ran {}.",
+            stand_ins.join(", "),
+            if stand_ins.len() == 1 { "it" } else { "each" }
+        ));
+    }
+    notes.extend(model.effects.unsimulated());
+    let (step, cells) = cells(reference.period);
+    let settling = (SETTLING / reference.period).ceil() as usize * cells;
+    let asked: Vec<Vec<f64>> = reference
+        .position
+        .iter()
+        .zip(&start)
+        .map(|(q, first)| {
+            let rest = std::iter::repeat_n(*first, settling);
+            rest.chain(refined(q, cells)).collect()
+        })
+        .collect();
+    let total = asked.iter().map(Vec::len).min().unwrap_or(0);
+    let gains = controllers.iter().zip(&robot.joints).map(|(own, joint)| {
+        let stand_in = joint.controller.is_none();
+        stand_in.then_some(own.torque_gain * own.velocity_gain)
+    });
+    let gains: Vec<Option<f64>> = gains.collect();
+    let feed_forward = feed_forward(&model, &gains, &asked, step)?;
+    let inputs = Inputs {
+        period: step,
+        reference: &asked,
+        feed_forward: &feed_forward,
+        added: &[],
+        q: &start,
+        v: &vec![0.0; start.len()],
+        substeps: (step / STEP).ceil().max(1.0) as u32,
+        held: false,
+    };
+    let mut motion = closed_loop(robot, &model, &controllers, &inputs, |done| {
+        progress(done as u64, total as u64);
+    })?;
+    for (joint, cut) in robot.joints.iter().zip(&motion.saturated) {
+        if *cut > 0 {
+            notes.push(format!(
+                "The torque limit of joint \"{}\" cut in for {:.3} of {:.3} s; there the motion is not the reference's.",
+                joint.name,
+                *cut as f64 * step,
+                total as f64 * step,
+            ));
+        }
+    }
+    for ((joint, q), asked) in robot.joints.iter().zip(&motion.q).zip(&asked) {
+        let (off, moved) = followed(q, asked);
+        if off > OFF * moved {
+            notes.push(format!(
+                "Joint \"{}\" is off its reference by {off:.3e} {unit} RMS, {:.0} % of the motion that was asked for: the recording \
+                 shows what it did, not what was designed.",
+                joint.name,
+                100.0 * off / moved,
+                unit = joint.kind.units().0,
+            ));
+        }
+    }
+    for series in [&mut motion.q, &mut motion.qd, &mut motion.tau] {
+        for list in series {
+            *list = list.iter().skip(settling).step_by(cells).copied().collect();
+        }
+    }
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut disturb = |series: &mut Vec<Vec<f64>>, deviation: f64| {
+        for list in series {
+            for value in list.iter_mut() {
+                *value += drawn(&mut random, deviation);
+            }
+        }
+    };
+    disturb(&mut motion.q, noise.position);
+    disturb(&mut motion.qd, noise.velocity);
+    disturb(&mut motion.tau, noise.torque);
+    Ok(Replay {
+        period: reference.period,
+        reference: reference.position.clone(),
+        motion,
+        notes,
+    })
+}
+
+/// Noise of a deviation. Drawn also where that is 0: one noise must not change the other's numbers.
+pub fn drawn(random: &mut Pcg64, deviation: f64) -> f64 {
+    let unit: f64 = StandardNormal.sample(random);
+    deviation * unit
+}
+
+/// RMS of what a joint was off by, and of what it was asked to move about its mean.
+fn followed(q: &[f64], asked: &[f64]) -> (f64, f64) {
+    let count = asked.len() as f64;
+    let mean = asked.iter().sum::<f64>() / count;
+    let (mut off, mut moved) = (0.0, 0.0);
+    for (q, asked) in q.iter().zip(asked) {
+        off += (q - asked).powi(2);
+        moved += (asked - mean).powi(2);
+    }
+    ((off / count).sqrt(), (moved / count).sqrt())
+}
+
+/// A sample period in cells no longer than a sixteenth of the stand-in's time constant: length of a cell in s, and how many there are.
+/// References and feed-forward of a slow recorder would else come in steps that a fast one's do not have.
+fn cells(period: f64) -> (f64, usize) {
+    let cells = (16.0 * period / TIME_CONSTANT).ceil().max(1.0);
+    (period / cells, cells as usize)
+}
+
+/// The series with `cells` values a sample, on the cubics through the samples whose slopes are those of their neighbours (Catmull and
+/// Rom 1974); it is at rest before it begins, and where it ends its second difference stays.
+fn refined(list: &[f64], cells: usize) -> Vec<f64> {
+    let count = list.len().saturating_sub(1) * cells + list.len().min(1);
+    let value = |cell: usize| {
+        let [a, b, c, d] = around(list, cell / cells);
+        let u = (cell % cells) as f64 / cells as f64;
+        b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
+    };
+    (0..count).map(value).collect()
+}
+
+/// Sample `k` and its neighbours, one before and two behind it.
+fn around(list: &[f64], k: usize) -> [f64; 4] {
+    let (before, now) = (list[k.saturating_sub(1)], list[k]);
+    let next = list.get(k + 1).copied().unwrap_or(now);
+    let last = before + 3.0 * (next - now);
+    [before, now, next, list.get(k + 2).copied().unwrap_or(last)]
+}
+
+/// Torques that `model` needs for its reference, and what the speed of the reference makes of each `gain` that the controller has on
+/// its own; one list a joint, empty where there is no gain. The torques are inverse dynamics with friction, all as the mean over a
+/// time constant of the stand-in on either side, so that corners of the reference and the steps of dry friction are as smooth as what
+/// the feedback can follow. Effects beyond the standard model are left to the feedback.
+fn feed_forward(
+    model: &Model,
+    gains: &[Option<f64>],
+    reference: &[Vec<f64>],
+    step: f64,
+) -> Result<Vec<Vec<f64>>, ExciteError> {
+    let samples = reference.iter().map(Vec::len).min().unwrap_or(0);
+    let mut sums = vec![vec![0.0]; gains.len()];
+    let [mut q, mut qd, mut qdd, mut torque] = [(); 4].map(|()| vec![0.0; gains.len()]);
+    for k in 0..samples.saturating_sub(1) {
+        for (j, list) in reference.iter().enumerate() {
+            let [a, b, c, d] = around(list, k);
+            q[j] = 0.5 * (b + c);
+            qd[j] = (c - b) / step;
+            qdd[j] = 0.5 * (a - b - c + d) / step.powi(2);
+        }
+        model.inverse_dynamics(&q, &qd, &qdd, &mut torque)?;
+        for (j, sum) in sums.iter_mut().enumerate() {
+            sum.push(sum[k] + torque[j] + gains[j].unwrap_or(0.0) * qd[j]);
+        }
+    }
+    let reach = (TIME_CONSTANT / step).round() as usize;
+    let mean = |sum: &[f64], k: usize| {
+        let (low, high) = (k.saturating_sub(reach), (k + reach).min(sum.len() - 1));
+        (sum[high] - sum[low]) / (high - low) as f64
+    };
+    let smooth = |(sum, gain): (&Vec<f64>, &Option<f64>)| match gain {
+        Some(_) if sum.len() > 1 => (0..samples).map(|k| mean(sum, k)).collect(),
+        _ => Vec::new(),
+    };
+    Ok(sums.iter().zip(gains).map(smooth).collect())
+}
+
+impl Replay {
+    /// Writes the recording: t, and per joint q, qd, tau and ref. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`ExciteError::Data`].
+    pub fn save(&self, path: &Path, robot: &Robot) -> Result<(), ExciteError> {
+        let mut columns = vec![Column::new("t", "s")];
+        for (k, joint) in robot.joints.iter().enumerate() {
+            let (length, force) = joint.kind.units();
+            let speed = format!("{length}/s");
+            for (name, unit) in [
+                ("q", length),
+                ("qd", &speed),
+                ("tau", force),
+                ("ref", length),
+            ] {
+                columns.push(Column::new(&format!("{name}{}", k + 1), unit));
+            }
+        }
+        let metadata = BTreeMap::from([
+            ("robot".to_owned(), robot.name.clone()),
+            ("source".to_owned(), "simulation".to_owned()),
+        ]);
+        let mut writer = RecordingWriter::create(path, &columns, &metadata)?;
+        for row in 0..self.motion.q.first().map_or(0, Vec::len) {
+            let mut values = vec![row as f64 * self.period];
+            for j in 0..robot.joints.len() {
+                values.extend([
+                    self.motion.q[j][row],
+                    self.motion.qd[j][row],
+                    self.motion.tau[j][row],
+                    self.reference[j][row],
+                ]);
+            }
+            writer.push_row(&values)?;
+        }
+        Ok(writer.finish()?)
+    }
+}

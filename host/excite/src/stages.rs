@@ -1,0 +1,593 @@
+//! Motions of one joint with a purpose other than identification at large, sized by the robot's limits.
+
+use core::f64::consts::TAU;
+
+use rig_shared::multibody::{column, inverse_dynamics};
+use rig_shared::safety::Limits;
+use rig_shared::trajectory::{
+    Chirp, Extremes, FrictionSweep, SPEEDS, SlowReversals, Staircase, Sweep, Trajectory,
+};
+use rig_shared::transmission::{MOTOR_COLUMNS, motor_column};
+
+use super::drives::{Combined, into_cranks};
+use super::frame::{Bounds, Room, bounds_of, prior};
+use super::{ExciteError, JointTrajectory, TrajectoryFile};
+use rig_model::robot::{JointKind, Robot};
+use rig_model::simulate::{Model, SimulateError};
+
+/// Fastest speed of a sweep over the slowest. Friction of gears weakens below 0.01 to 0.3 rad/s (Armstrong-Hélouvry, Dupont
+/// & Canudas de Wit 1994), and joints reach some rad/s: the slowest passes have to lie below the one, the fastest at the
+/// other. Over the 40 of before, the sweep of the one-link rig began at 0.12 rad/s and could not show weakening at
+/// 0.025 rad/s.
+const SPEED_SPAN: f64 = 200.0;
+/// Time at constant speed of the fastest pass, s: 0.05 s in which the controller settles and twice that to take a mean of. All passes
+/// have the same ends, so that more of it makes the slow ones longer.
+const FASTEST_PASS: f64 = 0.15;
+/// Share of each limit that these motions use where nothing else is asked for, of positions from the start to the limit.
+const SHARE: f64 = 0.8;
+/// Factor by which velocity and acceleration are lowered until the torque fits, and how often.
+const SLOWER: f64 = 0.85;
+const ATTEMPTS: usize = 30;
+/// Instants at which the torque is looked at; [`SHARE`] leaves room for what lies between them.
+const TORQUE_SAMPLES: usize = 50_000;
+/// Peaks of the quintic's velocity and acceleration, in distance over time and over time squared.
+const QUINTIC: [f64; 2] = [1.875, 5.773_502_691_896_26];
+
+/// What the motion is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StagedKind {
+    /// Swept sine: frequency response, resonances.
+    Chirp,
+    /// Steps with dwell: gravity, holding torque, settling.
+    Staircase,
+    /// Slow triangles: presliding, breakaway, backlash.
+    Reversals,
+    /// Pairs of constant speeds: the friction map.
+    Sweep,
+}
+
+impl StagedKind {
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Chirp => "chirp",
+            Self::Staircase => "staircase",
+            Self::Reversals => "reversals",
+            Self::Sweep => "sweep",
+        }
+    }
+}
+
+/// What is asked of a motion; what is absent follows from the limits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StagedOptions {
+    /// The joint that moves; the first where absent.
+    pub joint: Option<String>,
+    /// Where the joints stand, rad or m; in the middle of their ranges where absent.
+    pub start: Option<Vec<f64>>,
+    /// Share of the position range that is kept free, half of it at each end; where absent the motion uses 80 % of the way
+    /// from its start to the nearer limit.
+    pub margin: Option<f64>,
+    /// Share of the velocity limit that is used, and its square of the acceleration limit; 80 % of both where absent.
+    pub speed_share: Option<f64>,
+    /// Distance to either side of the start, rad or m.
+    pub amplitude: Option<f64>,
+    /// Reversals: the speed. Sweep: the slowest and the fastest. rad/s or m/s.
+    pub speeds: Option<Vec<f64>>,
+    /// Sweep: number of speeds.
+    pub count: Option<usize>,
+    /// Chirp: first and last frequency, Hz.
+    pub band: Option<[f64; 2]>,
+    /// Reversals: triangles, of two reversals each, at every amplitude.
+    pub cycles: Option<u16>,
+}
+
+impl StagedOptions {
+    /// The speeds of a sweep, none where not given.
+    fn span(&self) -> Option<[f64; 2]> {
+        match self.speeds.as_deref() {
+            Some(&[slowest, fastest]) => Some([slowest, fastest]),
+            _ => None,
+        }
+    }
+
+    /// Refuses numbers that no motion has, and such as the kind does not use.
+    fn check(&self, kind: StagedKind, unit: &str) -> Result<(), ExciteError> {
+        let option = |name, value: String, right: &str| {
+            Err(ExciteError::Option {
+                name,
+                value,
+                right: right.to_owned(),
+            })
+        };
+        let positive = |v: f64| v > 0.0 && v.is_finite();
+        if let Some(amplitude) = self.amplitude.filter(|a| !positive(*a)) {
+            return option(
+                "amplitude",
+                amplitude.to_string(),
+                &format!("it must be above 0 {unit}"),
+            );
+        }
+        if let Some(speeds) = &self.speeds {
+            let given = format!("{speeds:?}");
+            let fits = match (kind, speeds.as_slice()) {
+                (StagedKind::Sweep, [slow, fast]) => {
+                    positive(*slow) && slow < fast && positive(*fast)
+                }
+                (StagedKind::Reversals, [speed]) => positive(*speed),
+                _ => false,
+            };
+            if !fits {
+                return option(
+                    "speed",
+                    given,
+                    &match kind {
+                        StagedKind::Sweep => format!(
+                            "a sweep takes two above 0, the slowest and the fastest, with a comma between them, {unit}/s"
+                        ),
+                        StagedKind::Reversals => {
+                            format!("slow reversals take one above 0, {unit}/s")
+                        }
+                        _ => format!("a {} has none of its own", kind.name()),
+                    },
+                );
+            }
+        }
+        if let Some([low, high]) = self
+            .band
+            .filter(|[low, high]| !(positive(*low) && low < high && positive(*high)))
+        {
+            return option(
+                "band",
+                format!("{low},{high}"),
+                "it must be two frequencies above 0 Hz, the lower one first",
+            );
+        }
+        if let Some(count) = self.count.filter(|n| !(2..=SPEEDS).contains(n)) {
+            return option(
+                "number of speeds",
+                count.to_string(),
+                &format!("it must be between 2 and {SPEEDS}"),
+            );
+        }
+        if self.cycles == Some(0) {
+            return option("number of cycles", "0".into(), "there must be at least one");
+        }
+        Ok(())
+    }
+}
+
+/// What a motion may use.
+struct Allowance<'a> {
+    /// To either side of the start.
+    distance: f64,
+    velocity: f64,
+    acceleration: f64,
+    /// What was asked for.
+    asked: &'a StagedOptions,
+}
+
+/// Whole microseconds that are at least so long; none beyond 32 bits.
+fn micros(seconds: f64) -> Option<u32> {
+    let whole = (seconds * 1e6).ceil();
+    (whole >= 1.0 && whole <= f64::from(u32::MAX)).then_some(whole as u32)
+}
+
+impl Allowance<'_> {
+    /// Time of a quintic move.
+    fn move_time(&self, distance: f64) -> f64 {
+        let by_velocity = QUINTIC[0] * distance / self.velocity;
+        by_velocity.max((QUINTIC[1] * distance / self.acceleration).sqrt())
+    }
+
+    fn build(&self, kind: StagedKind) -> Option<Trajectory<f64>> {
+        match kind {
+            StagedKind::Chirp => self.chirp(),
+            StagedKind::Staircase => self.staircase(),
+            StagedKind::Reversals => self.reversals(),
+            StagedKind::Sweep => self.sweep(),
+        }
+    }
+
+    fn chirp(&self) -> Option<Trajectory<f64>> {
+        // From where the amplitude is bounded by the range to well beyond where acceleration bounds it.
+        let [start_hz, end_hz] = self.asked.band.unwrap_or_else(|| {
+            let start_hz = 0.25 * self.velocity / (TAU * self.distance);
+            let end_hz = 4.0 * self.acceleration / (TAU * self.velocity);
+            [start_hz, end_hz.max(8.0 * start_hz)]
+        });
+        // About five turns in the slowest octave, so that the sweep is slow against its own frequency.
+        let octaves = (end_hz / start_hz).log2();
+        let duration = 5.0 * octaves / start_hz;
+        Some(Trajectory::Chirp(Chirp {
+            start_hz,
+            end_hz,
+            sweep: Sweep::Logarithmic,
+            duration_us: micros(duration)?,
+            ramp_us: micros(0.5 / start_hz)?,
+            amplitude: self.distance,
+            velocity: self.velocity,
+            acceleration: self.acceleration,
+            again: 0.0,
+        }))
+    }
+
+    fn staircase(&self) -> Option<Trajectory<f64>> {
+        // Up to one end, down to the other, back up: every level but the ends from both sides.
+        let quarters = [1, 2, 3, 4, 3, 2, 1, 0, -1, -2, -3, -4, -3, -2, -1];
+        Some(Trajectory::Staircase(Staircase {
+            levels: quarters
+                .iter()
+                .map(|k| self.distance * f64::from(*k) / 4.0)
+                .collect(),
+            move_us: micros(self.move_time(0.25 * self.distance))?,
+            dwell_us: 1_000_000,
+        }))
+    }
+
+    fn reversals(&self) -> Option<Trajectory<f64>> {
+        // A hundredth of the velocity limit is below the Stribeck velocity of usual gears.
+        let asked = self.asked.speeds.as_ref().and_then(|s| s.first().copied());
+        let speed = asked.unwrap_or(0.01 * self.velocity);
+        // The turn's acceleration peaks at 3/2 of twice the speed over its length.
+        let turn = (3.0 * speed / self.acceleration).max(0.1);
+        let least = 2.0 * speed * turn;
+        // The largest is 30 % of the room, or what was asked for.
+        let largest = self.asked.amplitude.unwrap_or(0.3 * self.distance);
+        let amplitudes: Vec<f64> = [1.0 / 15.0, 1.0 / 3.0, 1.0]
+            .into_iter()
+            .map(|share| (share * largest).max(least))
+            .collect();
+        let cycles = self.asked.cycles.unwrap_or(2);
+        SlowReversals::new(speed, turn, &amplitudes, cycles).map(Trajectory::SlowReversals)
+    }
+
+    fn sweep(&self) -> Option<Trajectory<f64>> {
+        let default = [self.velocity / SPEED_SPAN, self.velocity];
+        let [slowest, fastest] = self.asked.span().unwrap_or(default);
+        let count = self.asked.count.unwrap_or(12).max(2);
+        let ratio = (fastest / slowest).powf(1.0 / (count - 1) as f64);
+        let speeds: Vec<f64> = (0..count).map(|k| slowest * ratio.powi(k as i32)).collect();
+        // The acceleration of a ramp peaks at 3/2 of speed over length.
+        let ramp = 1.5 * fastest / self.acceleration;
+        let whole = 2.0 * self.distance - fastest * ramp;
+        // The map needs levels, not distance.
+        let travel = if self.asked.amplitude.is_some() {
+            whole
+        } else {
+            whole.min(FASTEST_PASS * fastest)
+        };
+        let half_span = 0.5 * (travel + fastest * ramp);
+        FrictionSweep::new(&speeds, travel, ramp, 0.2, self.move_time(half_span))
+            .map(Trajectory::FrictionSweep)
+    }
+}
+
+/// Largest share of a torque limit that is used, Coulomb friction counted in full; none where it is not known.
+fn torque_share(
+    model: &Model,
+    bounds: &[Bounds],
+    start: &[f64],
+    moving: usize,
+    trajectory: &Trajectory<f64>,
+) -> Result<f64, ExciteError> {
+    let n = bounds.len();
+    let (mut q, mut qd, mut qdd) = (start.to_vec(), vec![0.0; n], vec![0.0; n]);
+    let mut rows = model.parameters.clone();
+    for row in &mut rows {
+        row[column::COULOMB] = 0.0;
+    }
+    let mut tau = vec![0.0; n];
+    let mut share = 0.0_f64;
+    // Coulomb friction of the motors counts in full as well.
+    let width = n * MOTOR_COLUMNS;
+    let mut motors = vec![0.0; n * width];
+    let duration = trajectory.duration();
+    for k in 0..=TORQUE_SAMPLES {
+        let at = trajectory.at(duration * k as f64 / TORQUE_SAMPLES as f64);
+        q[moving] = start[moving] + at.position;
+        (qd[moving], qdd[moving]) = (at.velocity, at.acceleration);
+        inverse_dynamics(&model.chain, &rows, &q, &qd, &qdd, &mut tau)?;
+        let mut coulomb: Vec<f64> = model
+            .parameters
+            .iter()
+            .map(|row| row[column::COULOMB].abs())
+            .collect();
+        if let Some(drives) = &model.motors {
+            let at = |e| ExciteError::from(SimulateError::from(e));
+            let t = &drives.transmission;
+            t.motor_columns(&q, &qd, &qdd, &mut motors).map_err(at)?;
+            for (c, value) in drives.parameters.as_flattened().iter().enumerate() {
+                if c % MOTOR_COLUMNS != motor_column::COULOMB {
+                    for (j, torque) in tau.iter_mut().enumerate() {
+                        *torque += motors[j * width + c] * value;
+                    }
+                }
+            }
+            t.motor_directions(&q, &mut motors[..n * n]).map_err(at)?;
+            for (row, own) in motors[..n * n].chunks_exact(n).zip(&drives.parameters) {
+                for (sum, along) in coulomb.iter_mut().zip(row) {
+                    *sum += (along * own[motor_column::COULOMB]).abs();
+                }
+            }
+        }
+        for j in 0..n {
+            if let Some(limit) = bounds[j].torque {
+                share = share.max((tau[j].abs() + coulomb[j]) / limit);
+            }
+        }
+    }
+    Ok(share)
+}
+
+/// Motions longer than this get a word, s.
+const LONG: f64 = 400.0;
+
+/// The joint that moves.
+fn moving_joint(robot: &Robot, joint: Option<&str>) -> Result<usize, ExciteError> {
+    let Some(name) = joint else {
+        return Ok(0);
+    };
+    robot.joint_index(name).ok_or_else(|| ExciteError::Option {
+        name: "joint",
+        value: format!("\"{name}\""),
+        right: format!(
+            "the robot's joints are {}",
+            robot
+                .joints
+                .iter()
+                .map(|j| j.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    })
+}
+
+/// Where the joints stand.
+fn start_of(
+    given: Option<&[f64]>,
+    bounds: &[Bounds],
+    combined: &[Combined],
+) -> Result<Vec<f64>, ExciteError> {
+    match given {
+        None => {
+            let mut middle: Vec<f64> = bounds.iter().map(|b| 0.5 * (b.low + b.high)).collect();
+            into_cranks(combined, &mut middle, 0.5);
+            Ok(middle)
+        }
+        Some(given) if given.len() == bounds.len() => Ok(given.to_vec()),
+        Some(given) => Err(ExciteError::Option {
+            name: "start",
+            value: format!("{} numbers", given.len()),
+            right: format!("the robot has {} joints", bounds.len()),
+        }),
+    }
+}
+
+/// How far the joint may go to either side of its start, and why it may not where that is nowhere.
+fn distance_of(
+    options: &StagedOptions,
+    bounds: &Bounds,
+    combined: &[Combined],
+    start: &[f64],
+    moving: usize,
+) -> Result<f64, String> {
+    let at = start[moving];
+    let mut room = (bounds.high - at).min(at - bounds.low);
+    for limit in combined {
+        let now = limit.at(start.iter().copied());
+        let turn = limit.weights[moving].abs();
+        if turn > 0.0 {
+            room = room.min((limit.high - now).min(now - limit.low) / turn);
+        }
+    }
+    // A margin is already taken off the bounds.
+    let share = if options.margin.is_some() { 1.0 } else { SHARE };
+    let most = share * room;
+    if most.is_nan() || most <= 0.0 {
+        return Err(format!(
+            "it starts at {at}, which leaves nothing between {} and {} or within the range of a crank; start it elsewhere",
+            bounds.low, bounds.high
+        ));
+    }
+    match options.amplitude {
+        Some(asked) if asked > most => Err(format!(
+            "the amplitude is {asked}, but from its start at {at} it may go {most:.4} to either side (position limits less the margin); give less, another --start or --margin"
+        )),
+        Some(asked) => Ok(asked),
+        None => Ok(most),
+    }
+}
+
+/// Refuses speeds beyond what the limits allow.
+fn refuse_fast(options: &StagedOptions, bounds: &Bounds) -> Result<(), ExciteError> {
+    let fastest = options.speeds.iter().flatten().copied().fold(0.0, f64::max);
+    if fastest <= bounds.velocity {
+        return Ok(());
+    }
+    Err(ExciteError::Option {
+        name: "speed",
+        value: fastest.to_string(),
+        right: format!(
+            "the velocity limit, times the speed share, is {:.4}",
+            bounds.velocity
+        ),
+    })
+}
+
+/// A motion of one joint, the others holding their place, within 80 % of the limits or what `options` ask for.
+///
+/// Returns the file and what the user should know. Torque is looked at at samples, with the prior parameters, where
+/// there are any; the optimal motions of [`super::design`] are proved instead.
+///
+/// # Errors
+/// [`ExciteError`]: no limits, no such joint, options out of range, or no room.
+pub fn staged(
+    robot: &Robot,
+    kind: StagedKind,
+    options: &StagedOptions,
+) -> Result<(TrajectoryFile, Vec<String>), ExciteError> {
+    let moving = moving_joint(robot, options.joint.as_deref())?;
+    let unit = match robot.joints.get(moving).map(|j| j.kind) {
+        Some(JointKind::Prismatic) => "m",
+        _ => "rad",
+    };
+    options.check(kind, unit)?;
+    let room = Room::new(
+        options.margin.unwrap_or(0.0),
+        options.speed_share.unwrap_or(1.0),
+    )?;
+    let (bounds, mut notes) = bounds_of(robot, room, options.start.as_deref())?;
+    let combined = Combined::of(robot);
+    if !robot.workspace.is_empty() {
+        notes.push(
+            "The regions in [[workspace]] were not checked: only a motion of kind fourier is designed within them."
+                .into(),
+        );
+    }
+    let start = start_of(options.start.as_deref(), &bounds, &combined)?;
+    let no_room = |why: String| ExciteError::NoRoom {
+        kind: kind.name(),
+        joint: robot.joints[moving].name.clone(),
+        why,
+    };
+    let b = bounds[moving];
+    refuse_fast(options, &b)?;
+    let distance = distance_of(options, &b, &combined, &start, moving).map_err(no_room)?;
+    let within = Within {
+        robot,
+        moving,
+        bounds: &bounds,
+        start: &start,
+    };
+    let trajectory = within.fastest(kind, options, distance, &mut notes)?;
+    let file = file_of(robot, moving, &start, trajectory);
+    if file.duration() > LONG {
+        notes.push(format!(
+            "The motion lasts {:.0} s, as long as slow motion over this range takes; --amplitude{} it.",
+            file.duration(),
+            match kind {
+                StagedKind::Chirp => " or a --band that begins higher shortens",
+                StagedKind::Staircase => " shortens",
+                StagedKind::Reversals | StagedKind::Sweep => " or a higher --speed shortens",
+            }
+        ));
+    }
+    Ok((file, notes))
+}
+
+/// One joint of a robot that stands, and what its motion may use.
+struct Within<'a> {
+    robot: &'a Robot,
+    moving: usize,
+    bounds: &'a [Bounds],
+    start: &'a [f64],
+}
+
+impl Within<'_> {
+    /// The fastest motion of a kind whose reference keeps all limits; `notes` hears of a torque that is not known.
+    fn fastest(
+        &self,
+        kind: StagedKind,
+        options: &StagedOptions,
+        distance: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<Trajectory<f64>, ExciteError> {
+        let b = self.bounds[self.moving];
+        let model = Model::from_robot(self.robot)?;
+        let limited = self.bounds.iter().any(|b| b.torque.is_some());
+        let known = prior(self.robot, &model);
+        if let (Err(joint), true) = (&known, limited) {
+            notes.push(format!(
+                "The torque limit was not checked: joint \"{joint}\" has no [joint.inertial], so that its torque is not known beforehand."
+            ));
+        }
+        // Without an acceleration limit: the velocity limit is reached within a tenth of the way.
+        let acceleration = b
+            .acceleration
+            .unwrap_or(5.0 * b.velocity * b.velocity / distance);
+        // A margin that is left free need not be kept to the last bit of single precision; a limit has to.
+        let rounding = match options.margin {
+            Some(margin) if margin > 0.0 => 1e-6 * (b.high - b.low),
+            _ => 0.0,
+        };
+        let limits = Limits {
+            position_low: b.low - rounding,
+            position_high: b.high + rounding,
+            velocity: b.velocity,
+            acceleration: b.acceleration.unwrap_or(f64::MAX),
+            ..Limits::default()
+        };
+        let stated = options.speed_share.is_some();
+        let mut factor = if stated { 1.0 } else { SHARE };
+        let mut why = String::new();
+        for _ in 0..ATTEMPTS {
+            let allowance = Allowance {
+                distance,
+                velocity: factor * b.velocity,
+                acceleration: factor * acceleration,
+                asked: options,
+            };
+            factor *= SLOWER;
+            let Some(trajectory) = allowance.build(kind) else {
+                why = "its distances, speeds and times do not fit each other".into();
+                continue;
+            };
+            // In single precision, as the rig runs it.
+            let checked: Result<Extremes<f64>, _> = trajectory
+                .to_f32()
+                .to_f64()
+                .check(&limits, self.start[self.moving]);
+            if let Err(error) = checked {
+                why = error.to_string();
+                continue;
+            }
+            if known.is_ok() && limited {
+                let share =
+                    torque_share(&model, self.bounds, self.start, self.moving, &trajectory)?;
+                if share.is_nan() || share > 1.0 {
+                    why = format!(
+                        "even slowly it needs {:.0} % of a torque limit; start it where gravity is weaker",
+                        100.0 * share
+                    );
+                    continue;
+                }
+            }
+            return Ok(trajectory);
+        }
+        Err(ExciteError::NoRoom {
+            kind: kind.name(),
+            joint: self.robot.joints[self.moving].name.clone(),
+            why,
+        })
+    }
+}
+
+/// The motion of one joint beside others that stand.
+fn file_of(
+    robot: &Robot,
+    moving: usize,
+    start: &[f64],
+    trajectory: Trajectory<f64>,
+) -> TrajectoryFile {
+    let hold = trajectory.duration_micros().min(u64::from(u32::MAX)) as u32;
+    let joints = robot
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| JointTrajectory {
+            name: joint.name.clone(),
+            start: start[j],
+            trajectory: if j == moving {
+                trajectory.clone()
+            } else {
+                Trajectory::Hold(hold)
+            },
+        });
+    TrajectoryFile {
+        robot: robot.name.clone(),
+        design: None,
+        drive_off: None,
+        joints: joints.collect(),
+    }
+}

@@ -1,0 +1,119 @@
+//! Trajectories in files: their parameters as TOML, their samples as CSV.
+
+mod read;
+mod samples;
+mod write;
+
+use std::path::Path;
+
+use rig_shared::trajectory::Trajectory;
+
+use super::{Criterion, ExciteError};
+use rig_model::robot::Robot;
+use rig_output::write_whole;
+
+pub use samples::{SampledReference, load_reference};
+
+/// Largest trajectory file; a thousand joints would fit.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Time recorded after the drive is switched off, s: a geared joint comes to rest within one, a free link swings some times.
+pub const COASTING: f64 = 5.0;
+
+/// The motion of all joints of a robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryFile {
+    /// Name of the robot it was made for.
+    pub robot: String,
+    /// How it was optimised, where it was.
+    pub design: Option<DesignRecord>,
+    /// When the drive is switched off in the middle of the motion, so that the joint coasts, s after the start.
+    pub drive_off: Option<f64>,
+    /// One entry a joint, in the robot's order.
+    pub joints: Vec<JointTrajectory>,
+}
+
+/// How a motion was optimised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DesignRecord {
+    /// What was optimised.
+    pub criterion: Criterion,
+    /// The criterion's value.
+    pub value: f64,
+    /// Condition number of the regressor as it was judged, see [`Values`](crate::Values).
+    pub condition_number: f64,
+    /// Seed of the starts.
+    pub seed: u64,
+}
+
+/// The motion of one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointTrajectory {
+    /// Name of the joint.
+    pub name: String,
+    /// Position at which it starts and ends, rad or m; the trajectory is relative to it.
+    pub start: f64,
+    /// The motion.
+    pub trajectory: Trajectory<f64>,
+}
+
+impl TrajectoryFile {
+    /// Length of the longest joint's motion, s.
+    pub fn duration(&self) -> f64 {
+        self.joints
+            .iter()
+            .map(|j| j.trajectory.duration())
+            .fold(0.0, f64::max)
+    }
+
+    /// Reads a `.toml` trajectory.
+    ///
+    /// # Errors
+    /// [`ExciteError`] with line and column of what is wrong.
+    pub fn load(path: &Path) -> Result<Self, ExciteError> {
+        let failed = |source| ExciteError::Read {
+            path: path.into(),
+            source,
+        };
+        if std::fs::metadata(path).map_err(failed)?.len() > MAX_BYTES {
+            return Err(ExciteError::TooLarge { path: path.into() });
+        }
+        let text = std::fs::read_to_string(path).map_err(failed)?;
+        Self::from_toml(&text, path)
+    }
+
+    /// Writes `.toml` (parameters) or `.csv` (samples at `rate`, Hz): columns t, and per joint q, qd, qdd and the
+    /// same positions again as ref, so that it reads as a recording too. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`ExciteError`]: another ending, or what the system says.
+    pub fn save(&self, path: &Path, robot: &Robot, rate: f64) -> Result<(), ExciteError> {
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase);
+        match extension.as_deref() {
+            Some("toml") => Ok(write_whole(path, self.to_toml(robot).as_bytes())?),
+            Some("csv") => self.save_samples(path, robot, rate),
+            _ => Err(ExciteError::UnknownFormat { path: path.into() }),
+        }
+    }
+
+    /// Whether the file's joints are the robot's, by name and in order.
+    ///
+    /// # Errors
+    /// [`ExciteError::OtherRobot`]; `path` names the file in it.
+    pub fn fits(&self, robot: &Robot, path: &Path) -> Result<(), ExciteError> {
+        let found: Vec<&str> = self.joints.iter().map(|j| j.name.as_str()).collect();
+        let expected: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+        if found == expected {
+            return Ok(());
+        }
+        Err(ExciteError::OtherRobot {
+            path: path.into(),
+            robot: robot.name.clone(),
+            found: format!("the joints {}", found.join(", ")),
+            expected: expected.join(", "),
+        })
+    }
+}

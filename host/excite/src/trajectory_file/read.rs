@@ -1,0 +1,315 @@
+//! The TOML text of a trajectory, read.
+
+use std::path::Path;
+
+use rig_shared::trajectory::{
+    AMPLITUDES, Chirp, Fourier, FrictionSweep, HARMONICS, LEVELS, SPEEDS, SlowReversals, Staircase,
+    Sweep, Trajectory,
+};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{DesignRecord, JointTrajectory, TrajectoryFile};
+use crate::{Criterion, ExciteError};
+use rig_model::robot::Place;
+
+/// The file as TOML has it; all times in seconds.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileText {
+    robot: String,
+    #[serde(default)]
+    design: Option<Spanned<DesignText>>,
+    #[serde(default)]
+    drive_off: Option<Spanned<f64>>,
+    #[serde(rename = "joint")]
+    joints: Vec<JointText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DesignText {
+    criterion: String,
+    value: f64,
+    condition_number: f64,
+    seed: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointText {
+    name: String,
+    start: Spanned<f64>,
+    trajectory: Spanned<MotionText>,
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+enum MotionText {
+    Hold {
+        duration: f64,
+    },
+    Fourier {
+        period: f64,
+        periods: u16,
+        ramp: f64,
+        sine: Vec<f64>,
+        cosine: Vec<f64>,
+    },
+    Chirp {
+        start_hz: f64,
+        end_hz: f64,
+        sweep: String,
+        duration: f64,
+        ramp: f64,
+        amplitude: f64,
+        velocity: f64,
+        acceleration: f64,
+        #[serde(default)]
+        again: f64,
+    },
+    Staircase {
+        levels: Vec<f64>,
+        #[serde(rename = "move")]
+        moving: f64,
+        dwell: f64,
+    },
+    Reversals {
+        speed: f64,
+        half_turn: f64,
+        quarter: Vec<f64>,
+        cycles: u16,
+    },
+    Sweep {
+        half_span: f64,
+        cruise: Vec<f64>,
+        ramp: f64,
+        dwell: f64,
+        lead: f64,
+    },
+}
+
+/// Whole microseconds of a time in a file, exactly.
+fn micros(name: &str, seconds: f64) -> Result<u32, String> {
+    let whole = (seconds * 1e6).round();
+    if !(0.0..=f64::from(u32::MAX)).contains(&whole) {
+        return Err(format!(
+            "{name} is {seconds} s, but times lie between 0 and 4294 s"
+        ));
+    }
+    // Rounding of the decimal number itself is far below a thousandth of a microsecond.
+    if (seconds * 1e6 - whole).abs() > 1e-3 {
+        return Err(format!(
+            "{name} is {seconds} s, but the rig counts whole microseconds; round it to 6 decimals"
+        ));
+    }
+    Ok(whole as u32)
+}
+
+fn at_most<T>(name: &str, list: &[T], most: usize) -> Result<(), String> {
+    if list.len() <= most {
+        Ok(())
+    } else {
+        Err(format!(
+            "{name} has {} entries, but at most {most} are possible",
+            list.len()
+        ))
+    }
+}
+
+impl MotionText {
+    fn trajectory(&self) -> Result<Trajectory<f64>, String> {
+        let all = |name: &str, list: &[f64]| {
+            list.iter()
+                .map(|s| micros(name, *s))
+                .collect::<Result<Vec<u32>, String>>()
+        };
+        let trajectory = match self {
+            Self::Hold { duration } => Trajectory::Hold(micros("duration", *duration)?),
+            Self::Fourier {
+                period,
+                periods,
+                ramp,
+                sine,
+                cosine,
+            } => {
+                at_most("sine", sine, HARMONICS)?;
+                at_most("cosine", cosine, HARMONICS)?;
+                Trajectory::Fourier(Fourier {
+                    period_us: micros("period", *period)?,
+                    periods: *periods,
+                    ramp_us: micros("ramp", *ramp)?,
+                    sine: sine.iter().copied().collect(),
+                    cosine: cosine.iter().copied().collect(),
+                })
+            }
+            Self::Chirp {
+                start_hz,
+                end_hz,
+                sweep,
+                duration,
+                ramp,
+                amplitude,
+                velocity,
+                acceleration,
+                again,
+            } => Trajectory::Chirp(Chirp {
+                start_hz: *start_hz,
+                end_hz: *end_hz,
+                sweep: match sweep.as_str() {
+                    "linear" => Sweep::Linear,
+                    "logarithmic" => Sweep::Logarithmic,
+                    other => {
+                        return Err(format!(
+                            "sweep is \"{other}\", but it must be \"linear\" or \"logarithmic\""
+                        ));
+                    }
+                },
+                duration_us: micros("duration", *duration)?,
+                ramp_us: micros("ramp", *ramp)?,
+                amplitude: *amplitude,
+                velocity: *velocity,
+                acceleration: *acceleration,
+                again: *again,
+            }),
+            Self::Staircase {
+                levels,
+                moving,
+                dwell,
+            } => {
+                at_most("levels", levels, LEVELS)?;
+                Trajectory::Staircase(Staircase {
+                    levels: levels.iter().copied().collect(),
+                    move_us: micros("move", *moving)?,
+                    dwell_us: micros("dwell", *dwell)?,
+                })
+            }
+            Self::Reversals {
+                speed,
+                half_turn,
+                quarter,
+                cycles,
+            } => {
+                at_most("quarter", quarter, AMPLITUDES)?;
+                Trajectory::SlowReversals(SlowReversals {
+                    speed: *speed,
+                    half_turn_us: micros("half_turn", *half_turn)?,
+                    quarter_us: all("quarter", quarter)?.into_iter().collect(),
+                    cycles: *cycles,
+                })
+            }
+            Self::Sweep {
+                half_span,
+                cruise,
+                ramp,
+                dwell,
+                lead,
+            } => {
+                at_most("cruise", cruise, SPEEDS)?;
+                Trajectory::FrictionSweep(FrictionSweep {
+                    half_span: *half_span,
+                    cruise_us: all("cruise", cruise)?.into_iter().collect(),
+                    ramp_us: micros("ramp", *ramp)?,
+                    dwell_us: micros("dwell", *dwell)?,
+                    lead_us: micros("lead", *lead)?,
+                })
+            }
+        };
+        trajectory.validate().map_err(|e| {
+            format!(
+                "{e}; times and amplitudes must be finite, above zero and fit each other (see `rig excite --help`)"
+            )
+        })?;
+        Ok(trajectory)
+    }
+}
+
+impl TrajectoryFile {
+    /// Reads TOML text; `path` only names the source in messages.
+    ///
+    /// # Errors
+    /// [`ExciteError::Toml`].
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self, ExciteError> {
+        let wrong = |offset: usize, message: String| ExciteError::Toml {
+            path: path.into(),
+            place: Place::of(text, offset),
+            message,
+        };
+        let file: FileText = toml::from_str(text).map_err(|e| {
+            let said = e.message().lines().collect::<Vec<_>>().join(", ");
+            wrong(
+                e.span().map_or(0, |s| s.start),
+                format!(
+                    "{}; `rig excite` writes an example of a trajectory file",
+                    said.replace("expected f64", "expected a number")
+                ),
+            )
+        })?;
+        if file.joints.is_empty() {
+            return Err(wrong(
+                0,
+                "there is no [[joint]]; a trajectory moves at least one".into(),
+            ));
+        }
+        let design = match &file.design {
+            None => None,
+            Some(spanned) => {
+                let d = spanned.get_ref();
+                let criterion = Criterion::from_name(&d.criterion).ok_or_else(|| {
+                    wrong(
+                        spanned.span().start,
+                        format!(
+                            "criterion is \"{}\", but it must be cond, min-singular or d-optimal",
+                            d.criterion
+                        ),
+                    )
+                })?;
+                Some(DesignRecord {
+                    criterion,
+                    value: d.value,
+                    condition_number: d.condition_number,
+                    seed: d.seed,
+                })
+            }
+        };
+        let mut joints = Vec::new();
+        for joint in &file.joints {
+            let start = *joint.start.get_ref();
+            if !start.is_finite() {
+                return Err(wrong(
+                    joint.start.span().start,
+                    format!("start is {start}, but it must be a finite number, in rad or m"),
+                ));
+            }
+            let trajectory = joint.trajectory.get_ref().trajectory().map_err(|message| {
+                wrong(
+                    joint.trajectory.span().start,
+                    format!("in the trajectory of joint \"{}\", {message}", joint.name),
+                )
+            })?;
+            joints.push(JointTrajectory {
+                name: joint.name.clone(),
+                start,
+                trajectory,
+            });
+        }
+        let found = Self {
+            robot: file.robot,
+            design,
+            drive_off: file.drive_off.as_ref().map(|off| *off.get_ref()),
+            joints,
+        };
+        if let Some(off) = &file.drive_off {
+            let (value, end) = (*off.get_ref(), found.duration());
+            if !(value > 0.0 && value < end) {
+                return Err(wrong(
+                    off.span().start,
+                    format!(
+                        "drive_off is {value} s, but it must lie within the motion, between 0 and {end} s"
+                    ),
+                ));
+            }
+        }
+        Ok(found)
+    }
+}

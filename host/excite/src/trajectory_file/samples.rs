@@ -1,0 +1,182 @@
+//! Trajectories as samples.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::TrajectoryFile;
+use crate::ExciteError;
+use rig_data::{Column, EffortNeed, RecordingWriter, Source};
+use rig_model::robot::{JointKind, Robot};
+
+/// Reference positions at evenly spaced instants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledReference {
+    /// Sample period, s.
+    pub period: f64,
+    /// Per joint, rad or m.
+    pub position: Vec<Vec<f64>>,
+    /// Per joint, rad/s or m/s; empty where the file does not say.
+    pub velocity: Vec<Vec<f64>>,
+    /// Per joint, rad/s² or m/s²; empty where the file does not say.
+    pub acceleration: Vec<Vec<f64>>,
+}
+
+impl SampledReference {
+    /// Positions alone: `way(joint, t)` from the middle of each joint's range.
+    pub fn about_middle(
+        robot: &Robot,
+        period: f64,
+        seconds: f64,
+        way: impl Fn(usize, f64) -> f64,
+    ) -> Self {
+        let rows = (seconds / period).round() as usize;
+        let position = (robot.middle_position().iter().enumerate())
+            .map(|(j, middle)| {
+                let instants = (0..rows).map(|k| k as f64 * period);
+                instants.map(|t| middle + way(j, t)).collect()
+            })
+            .collect();
+        Self {
+            period,
+            position,
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+        }
+    }
+
+    /// `count` sines of `size` rad or m a joint, the slowest of `slowest` seconds and of `phase(joint, harmonic)` rad, eased
+    /// in over two seconds: at rest in the middle where it begins.
+    pub fn eased_sines(
+        robot: &Robot,
+        [period, seconds]: [f64; 2],
+        (count, size, slowest): (u32, f64, f64),
+        phase: impl Fn(usize, u32) -> f64,
+    ) -> Self {
+        let turn = core::f64::consts::TAU / slowest;
+        Self::about_middle(robot, period, seconds, |j, t| {
+            let share = (t / 2.0).min(1.0);
+            let sines = (1..=count).map(|h| {
+                let phase = phase(j, h);
+                (turn * f64::from(h) * t + phase).sin() - phase.sin()
+            });
+            share.powi(2) * (3.0 - 2.0 * share) * size * sines.sum::<f64>()
+        })
+    }
+}
+
+impl TrajectoryFile {
+    /// The reference at evenly spaced instants, from the first to the last within the motion and one beyond, where
+    /// all joints stand again.
+    ///
+    /// # Errors
+    /// [`ExciteError::Option`] for a rate that is not between 1 Hz and 1 MHz, and a motion in which the drive is switched off:
+    /// how the joint coasts is the rig's to say.
+    pub fn sampled(&self, rate: f64) -> Result<SampledReference, ExciteError> {
+        if !(1.0..=1e6).contains(&rate) {
+            return Err(ExciteError::Option {
+                name: "rate",
+                value: format!("{rate} Hz"),
+                right: "it must be between 1 and 1000000 Hz".into(),
+            });
+        }
+        if let Some(off) = self.drive_off {
+            return Err(ExciteError::Option {
+                name: "time of drive_off",
+                value: format!("{off} s"),
+                right: "samples are of a motion that is driven to its end; run this file with `rig record`, which switches the drive off".into(),
+            });
+        }
+        // A duration that is a whole number of samples must not gain one by rounding.
+        let last = (self.duration() * rate - 1e-6).ceil().max(0.0) as usize;
+        let each = |pick: fn(&rig_shared::trajectory::Reference<f64>) -> f64, offset: bool| {
+            self.joints
+                .iter()
+                .map(|j| {
+                    let base = if offset { j.start } else { 0.0 };
+                    (0..=last)
+                        .map(|k| base + pick(&j.trajectory.at(k as f64 / rate)))
+                        .collect()
+                })
+                .collect::<Vec<Vec<f64>>>()
+        };
+        Ok(SampledReference {
+            period: 1.0 / rate,
+            position: each(|r| r.position, true),
+            velocity: each(|r| r.velocity, false),
+            acceleration: each(|r| r.acceleration, false),
+        })
+    }
+
+    pub(super) fn save_samples(
+        &self,
+        path: &Path,
+        robot: &Robot,
+        rate: f64,
+    ) -> Result<(), ExciteError> {
+        let samples = self.sampled(rate)?;
+        let mut columns = vec![Column::new("t", "s")];
+        for k in 1..=self.joints.len() {
+            let unit = match robot.joints.get(k - 1).map(|j| j.kind) {
+                Some(JointKind::Prismatic) => "m",
+                _ => "rad",
+            };
+            for (name, over) in [("q", ""), ("qd", "/s"), ("qdd", "/s^2"), ("ref", "")] {
+                columns.push(Column::new(&format!("{name}{k}"), &format!("{unit}{over}")));
+            }
+        }
+        let mut writer = RecordingWriter::create(path, &columns, &BTreeMap::new())?;
+        for row in 0..samples.position.first().map_or(0, Vec::len) {
+            let mut values = vec![row as f64 / rate];
+            for j in 0..self.joints.len() {
+                let q = samples.position[j][row];
+                values.extend([q, samples.velocity[j][row], samples.acceleration[j][row], q]);
+            }
+            writer.push_row(&values)?;
+        }
+        Ok(writer.finish()?)
+    }
+}
+/// Reads a trajectory as samples: a `.toml` trajectory sampled at `rate` (Hz), or the `ref` columns of a sampled one
+/// (its `q` columns where there are none) at the rate it has.
+///
+/// # Errors
+/// [`ExciteError`] with the place of what is wrong.
+pub fn load_reference(
+    path: &Path,
+    robot: &Robot,
+    rate: f64,
+) -> Result<SampledReference, ExciteError> {
+    let extension = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .map(str::to_ascii_lowercase);
+    if extension.as_deref() == Some("toml") {
+        let file = TrajectoryFile::load(path)?;
+        file.fits(robot, path)?;
+        return file.sampled(rate);
+    }
+    let source = Source::open_with(path, robot, EffortNeed::Optional)?;
+    let mut sampled = SampledReference {
+        period: source.sampling().period,
+        position: vec![Vec::new(); robot.joints.len()],
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+    };
+    let uneven = |row| ExciteError::Uneven {
+        path: path.into(),
+        row,
+    };
+    for (k, block) in source.read_all()?.0.iter().enumerate() {
+        if source.sampling().irregular || k > 0 {
+            return Err(uneven(block.first_line));
+        }
+        for (to, from) in sampled.position.iter_mut().zip(&block.joints) {
+            to.extend(from.reference.as_ref().unwrap_or(&from.q));
+        }
+    }
+    // One sample has no period.
+    if sampled.period <= 0.0 {
+        return Err(uneven(1));
+    }
+    Ok(sampled)
+}

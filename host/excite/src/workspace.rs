@@ -1,0 +1,114 @@
+//! Limits on where points of the links go, as planes.
+
+use rig_shared::multibody::JointKind;
+
+use super::interval::Interval;
+use rig_model::robot::Robot;
+
+/// One side of a plane that a point of a link must stay on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Plane {
+    /// The link that carries the point, from 0.
+    pub link: usize,
+    /// The point in its frame, m.
+    pub point: [f64; 3],
+    /// Unit normal towards the allowed side, in the base frame.
+    pub normal: [f64; 3],
+    /// How far along the normal the point must be at least, m.
+    pub least: f64,
+    /// Upper bound of the distance between the point and the base frame's origin, m: the unit of violations.
+    pub reach: f64,
+    /// Of each joint up to the link: its kind, and the length of the way from its predecessor's frame (for a prismatic
+    /// joint the part of it across the joint), m.
+    segments: Vec<(JointKind, f64, f64)>,
+}
+
+impl Plane {
+    /// Distance along the normal.
+    pub(super) fn height(&self, at: [f64; 3]) -> f64 {
+        self.normal.iter().zip(at).map(|(n, x)| n * x).sum()
+    }
+
+    /// Upper bound of the point's acceleration, m/s², for velocities and accelerations (`state[j][1]`, `state[j][2]`)
+    /// and positions of prismatic joints (`state[j][0]`) within intervals.
+    ///
+    /// The point is the sum of the segments, each turning with its link: |r̈| ≤ |r|·(|ω̇| + |ω|²) + 2·|ω|·|ḋ| + |d̈|,
+    /// |ω| at most the sum of the joints' speeds below it, |ω̇| at most that of their accelerations and ½|ω|².
+    pub(super) fn acceleration_bound(&self, state: &[[Interval; 3]]) -> f64 {
+        let (mut turning, mut swinging, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let around = |length: f64, w: f64, a: f64| length * (a + 1.5 * w * w);
+        for ((kind, across, along), [q, qd, qdd]) in self.segments.iter().zip(state) {
+            let (speed, change) = (qd.magnitude(), qdd.magnitude());
+            match kind {
+                JointKind::Revolute => {
+                    sum += around(across.hypot(*along), turning, swinging);
+                    turning += speed;
+                    swinging += change;
+                }
+                JointKind::Prismatic => {
+                    let length = across.hypot(along + q.magnitude());
+                    sum += around(length, turning, swinging) + 2.0 * turning * speed + change;
+                }
+            }
+        }
+        let [x, y, z] = self.point;
+        sum + around(x.hypot(y).hypot(z), turning, swinging)
+    }
+}
+
+/// The planes of all regions of a robot.
+pub(super) fn planes_of(robot: &Robot) -> Vec<Plane> {
+    let geometry = robot.geometry();
+    let mut planes = Vec::new();
+    for region in &robot.workspace {
+        // The loader has refused names that are none.
+        let Some(link) = robot.joint_index(&region.joint) else {
+            continue;
+        };
+        let segments: Vec<_> = geometry[..=link]
+            .iter()
+            .map(|g| (g.kind, g.a.abs(), g.d.abs()))
+            .collect();
+        let [x, y, z] = region.point;
+        let travel = |j: usize| {
+            let limits = robot.joints[j].limits.as_ref();
+            limits.map_or(0.0, |l| l.position[0].abs().max(l.position[1].abs()))
+        };
+        let reach = x.hypot(y).hypot(z)
+            + segments
+                .iter()
+                .enumerate()
+                .map(|(j, (kind, across, along))| match kind {
+                    JointKind::Revolute => across.hypot(*along),
+                    JointKind::Prismatic => across.hypot(along + travel(j)),
+                })
+                .sum::<f64>();
+        let mut add = |normal: [f64; 3], least: f64| {
+            if least.is_finite() {
+                planes.push(Plane {
+                    link,
+                    point: region.point,
+                    normal,
+                    least,
+                    reach: reach.max(1e-3),
+                    segments: segments.clone(),
+                });
+            }
+        };
+        for axis in 0..3 {
+            let mut unit = [0.0; 3];
+            unit[axis] = 1.0;
+            if let Some(min) = region.min {
+                add(unit, min[axis]);
+            }
+            if let Some(max) = region.max {
+                add(unit.map(|v| -v), -max[axis]);
+            }
+        }
+        if let (Some(normal), Some(beyond)) = (region.normal, region.beyond) {
+            let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+            add(normal.map(|v| v / length), beyond);
+        }
+    }
+    planes
+}

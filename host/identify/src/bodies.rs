@@ -1,0 +1,72 @@
+//! Base parameters that were found elsewhere, as those of bodies that can exist.
+//!
+//! A fit that is free to gives an arm links that no body is, and an inertia matrix that is not positive: nothing can be
+//! simulated with it. The set taken is the physically consistent one ([`super::consistent`]) that is nearest in the measure
+//! of the data.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::IdentifyError;
+use super::consistent::{Quadratic, consistent};
+use super::describe::{Combinations, written};
+use super::prior::Prior;
+use super::standard::hints;
+use rig_model::robot::{DESCRIBED, Robot};
+
+/// RMS values of each joint, SI.
+pub struct Sizes {
+    /// Of the torque.
+    pub torque: Vec<f64>,
+    /// Of the speed.
+    pub speed: Vec<f64>,
+    /// Of the acceleration.
+    pub acceleration: Vec<f64>,
+}
+
+/// `robot` with links that can exist.
+pub struct Bodies {
+    /// With them.
+    pub robot: Robot,
+    /// Their base parameters.
+    pub values: Vec<f64>,
+    /// What had to be said, sentences.
+    pub remarks: Vec<String>,
+}
+
+/// The bodies nearest to base parameters of which the data tell `information`, the inverse of their covariance.
+///
+/// # Errors
+/// [`IdentifyError::Inconsistent`].
+pub fn as_bodies(
+    robot: &Robot,
+    base: &Combinations,
+    information: DMatrix<f64>,
+    sizes: Sizes,
+) -> Result<Bodies, IdentifyError> {
+    let columns = base.combination.ncols();
+    let prior = Prior::of(
+        robot,
+        columns,
+        &hints(columns, (base.columns, base.values), sizes),
+        DESCRIBED,
+    );
+    // R with RᵀR the information, which may lack rank.
+    let SymmetricEigen {
+        eigenvalues,
+        eigenvectors,
+    } = information.symmetric_eigen();
+    let root = DMatrix::from_diagonal(&eigenvalues.map(|e| e.max(0.0).sqrt()));
+    let r = root * eigenvectors.transpose();
+    let data = Quadratic {
+        right: &r * DVector::from_column_slice(base.values),
+        matrix: r * base.combination,
+    };
+    let pi = DVector::from_vec(consistent(&data, &prior)?.parameters);
+    let values = (base.combination * &pi).as_slice().to_vec();
+    let (robot, remarks) = written(robot, &pi, prior.remarks);
+    Ok(Bodies {
+        robot,
+        values,
+        remarks,
+    })
+}

@@ -1,0 +1,82 @@
+//! How many rows are kept, judged by how well stretches that were left out are predicted.
+//!
+//! Noise of the position passes into the acceleration with the square of the frequency, and least squares, which takes its columns
+//! for exact, then finds inertias too small (errors in variables; Söderström 2018, ch. 2). Torque and regressor pass one low-pass
+//! before rows are dropped: a narrower band drops that noise and, with it, part of what a lively motion says of inertia. Which of
+//! the two weighs more is for the data to say: each band is fitted without a stretch of time, and predicts that stretch in the
+//! narrowest band, in which noise of the position bends the comparison least.
+//!
+//! Leaves out: a band for each joint; noise below the narrowest band.
+
+use super::IdentifyError;
+use super::cutoff::{beginnings, kept};
+use super::left_out::{BETTER, Stretches};
+use super::model::Plan;
+use rig_data::prepare::{PrepareError, Recording, Treatment};
+
+/// Ratio of neighbouring bands.
+const STEP: f64 = std::f64::consts::SQRT_2;
+/// The narrowest band as a multiple of the frequency of the joints' swings: it holds the swing and its torque.
+const HEADROOM: f64 = 4.0;
+
+/// Treatments of narrower and narrower bands, from `first` on. `narrowed` gives that of a band in Hz, or the widest possible one.
+///
+/// # Errors
+/// What `narrowed` gives.
+pub(super) fn candidates(
+    first: Treatment,
+    narrowed: &dyn Fn(f64) -> Result<Treatment, PrepareError>,
+) -> Result<Vec<Treatment>, PrepareError> {
+    let swing = (first.spectra.iter())
+        .map(|s| s.swing())
+        .fold(0.0, f64::max);
+    let mut band = 0.4 * first.kept_rate() / STEP;
+    let mut list = vec![first];
+    while band > HEADROOM * swing {
+        let next = narrowed(band)?;
+        if next.decimation > list[list.len() - 1].decimation {
+            list.push(next);
+        }
+        band /= STEP;
+    }
+    Ok(list)
+}
+
+/// The treatment of the one of `plans`, from the widest band to the narrowest, that predicts best what it was not fitted to; the
+/// widest one of equals.
+///
+/// # Errors
+/// [`IdentifyError`]: recordings that cannot be read.
+pub(super) fn best(
+    training: &[&dyn Recording],
+    widest: &Treatment,
+    plans: &[Plan],
+) -> Result<Treatment, IdentifyError> {
+    if plans.len() < 2 {
+        return Ok(widest.clone());
+    }
+    let beginnings = beginnings(training, widest);
+    let beginnings: Vec<&dyn Recording> = beginnings.iter().map(|b| b as _).collect();
+    let sorted = (plans.iter())
+        .map(|plan| Stretches::of(&beginnings, plan, &kept))
+        .collect::<Result<Vec<_>, _>>()?;
+    // The last is of the narrowest band.
+    let errors: Vec<f64> = (sorted.iter())
+        .map(|own| sorted.last().map_or(f64::NAN, |judge| own.error(judge)))
+        .collect();
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = errors.iter().position(|e| *e <= least + BETTER);
+    let Some(k) = best.filter(|k| *k > 0) else {
+        return Ok(widest.clone());
+    };
+    let mut treatment = plans[k].treatment.clone();
+    treatment.decimation_reason = format!(
+        "One row in {}: of {} bands, the low-pass before it up to {:.3} Hz predicts what is left out of the fit best. With one row in {} it is {:.0} % further off.",
+        treatment.decimation,
+        plans.len(),
+        treatment.parallel_edge,
+        widest.decimation,
+        100.0 * (errors[0] - errors[k]).exp_m1(),
+    );
+    Ok(treatment)
+}

@@ -1,0 +1,218 @@
+//! Passes over recordings with fitted parameters: covariance and residuals.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::base::Independent;
+use super::covariance::{Estimate, Groups, Memory};
+use super::factor::TriangularFactor;
+use super::linear::{classical, kept_columns, product, spread};
+use super::model::{Plan, Rows, each_rows};
+use super::residual::{Ranges, ResidualReport, ResidualStream};
+use super::{IdentifyError, ModelKind, Options};
+use rig_data::prepare::{PrepareError, Recording, Survey};
+
+/// The estimate with its covariance, from one pass over the rows that were fitted; `beside` is what the identified
+/// combinations' covariance has besides.
+pub(super) fn covariance(
+    training: &[&dyn Recording],
+    plan: &Plan,
+    options: &Options,
+    factor: &TriangularFactor,
+    data: &Independent,
+    beta: &[f64],
+    weights: &[f64],
+    loss: Option<(super::Loss, &[f64])>,
+    instants: u64,
+    beside: Option<&DMatrix<f64>>,
+) -> Result<Estimate, IdentifyError> {
+    let (classical_std, inverse) = classical(factor, data, beta)?;
+    let full = spread(beta, &data.kept, factor.columns());
+    let (p, size) = (full.len(), beta.len());
+    let mut groups = Groups::new(size, instants);
+    let mut memories = vec![Memory::default(); weights.len()];
+    let mut index = 0u64;
+    let whiten = inverse.transpose();
+    let mut x_kept = DVector::zeros(size);
+    let mut z = DVector::zeros(size);
+    for (r, recording) in training.iter().enumerate() {
+        each_rows(*recording, plan, options.model, &mut |rows| {
+            for i in 0..rows.t.len() {
+                for (k, equation) in rows.equations.iter().enumerate() {
+                    if !equation.keep[i] {
+                        continue;
+                    }
+                    let x = &equation.x[i * p..(i + 1) * p];
+                    let e = equation.y[i] - product(x, &full);
+                    memories[k].push(e);
+                    let mut weight = options.row_weight(r) * weights[k];
+                    if let Some((loss, scale)) = loss {
+                        weight *= loss.weight(e / scale[k].max(f64::MIN_POSITIVE)).sqrt();
+                    }
+                    for (to, &c) in x_kept.iter_mut().zip(&data.kept) {
+                        *to = weight * x[c];
+                    }
+                    z.gemv(1.0, &whiten, &x_kept, 0.0);
+                    groups.push(index, &z, weight * e);
+                }
+                index += 1;
+            }
+            Ok(())
+        })?;
+    }
+    let memory = memories.iter().map(Memory::length).fold(1.0, f64::max);
+    let rows: u64 = memories.iter().map(Memory::seen).sum();
+    let (white, count) = groups.jackknife(memory).ok_or_else(|| {
+        let seconds = training.len() as f64
+            * instants as f64
+            * plan.treatment.decimation as f64
+            * plan.treatment.dt();
+        IdentifyError::TooShortForIntervals {
+            rows,
+            memory,
+            needed: (2.0 * seconds).ceil() as u64,
+        }
+    })?;
+    let mut covariance = &inverse * white * inverse.transpose();
+    if let Some(beside) = beside {
+        covariance += beside;
+    }
+    let (regressor, _) = kept_columns(factor, data);
+    Ok(Estimate::of(
+        beta,
+        &covariance,
+        count - 1,
+        classical_std,
+        &regressor,
+        rows,
+        memory,
+    ))
+}
+
+/// A recording whose torque is compared with the model's, and how its rows are formed.
+#[derive(Clone, Copy)]
+pub struct Planned<'a> {
+    /// The recording.
+    pub recording: &'a dyn Recording,
+    /// How its rows are formed.
+    pub plan: &'a Plan<'a>,
+}
+
+impl<'a> Planned<'a> {
+    /// Recordings of one plan.
+    pub fn all(list: &[&'a dyn Recording], plan: &'a Plan<'a>) -> Vec<Self> {
+        list.iter()
+            .map(|&recording| Self { recording, plan })
+            .collect()
+    }
+
+    /// Its rows, torque against motion.
+    pub(super) fn each_rows(
+        &self,
+        take: &mut dyn FnMut(&Rows) -> Result<(), PrepareError>,
+    ) -> Result<(), IdentifyError> {
+        each_rows(self.recording, self.plan, ModelKind::Differential, take).map(|_| ())
+    }
+}
+
+/// Residuals of the torque, joint by joint, in the differential form whatever model was fitted: so that models
+/// can be compared. `by_position` is the torque (of a joint at a position) that was taken off
+/// before the fit without being stated: measured and predicted torque are shown with it. Where effects were taken off
+/// the recordings, `measured` are these as they were: errors are relative to the whole torque.
+pub fn torque_residuals(
+    recordings: &[Planned],
+    surveys: &[Survey],
+    full: &[f64],
+    by_position: &dyn Fn(usize, f64) -> f64,
+    measured: Option<&[Planned]>,
+) -> Result<Vec<ResidualReport>, IdentifyError> {
+    let total: u64 = surveys
+        .iter()
+        .zip(recordings)
+        .map(|(s, r)| s.rows / r.plan.treatment.decimation as u64)
+        .sum();
+    let joints = surveys.first().map_or(0, |s| s.joints.len());
+    let extremes = |j: usize, of: &dyn Fn(&rig_data::prepare::JointSurvey) -> [f64; 2]| {
+        surveys
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| {
+                let [low, high] = of(&s.joints[j]);
+                [l.min(low), h.max(high)]
+            })
+    };
+    let p = full.len();
+    // The survey's peak speed is that of raw differences, noise included; the filtered one needs a look.
+    let mut speed = vec![0.0f64; joints];
+    for recording in recordings {
+        recording.each_rows(&mut |rows| {
+            for (s, qd) in speed.iter_mut().zip(&rows.qd) {
+                *s = qd.iter().fold(*s, |m, v| m.max(v.abs()));
+            }
+            Ok(())
+        })?;
+    }
+    let mut streams: Vec<ResidualStream> = (0..joints)
+        .map(|j| {
+            ResidualStream::new(
+                total,
+                Ranges {
+                    position: extremes(j, &|s| s.position),
+                    speed: speed[j],
+                    torque: extremes(j, &|s| s.torque),
+                },
+            )
+        })
+        .collect();
+    let mut index = 0u64;
+    for recording in recordings {
+        recording.each_rows(&mut |rows| {
+            for i in 0..rows.t.len() {
+                for (j, (stream, equation)) in streams.iter_mut().zip(&rows.equations).enumerate() {
+                    let known = by_position(j, rows.q[j][i]);
+                    let predicted = product(&equation.x[i * p..(i + 1) * p], full);
+                    stream.push(
+                        index,
+                        rows.t[i],
+                        rows.q[j][i],
+                        rows.qd[j][i],
+                        equation.y[i] + known,
+                        predicted + known,
+                        equation.keep[i],
+                    );
+                }
+                index += 1;
+            }
+            Ok(())
+        })?;
+    }
+    let mut reports: Vec<ResidualReport> =
+        streams.into_iter().map(ResidualStream::report).collect();
+    if let Some(measured) = measured {
+        for (report, [rms, all]) in reports.iter_mut().zip(torque_rms(measured, joints)?) {
+            report.torque_rms = rms;
+            report.relative_error = report.rms / rms.max(f64::MIN_POSITIVE);
+            report.all.relative_error = report.all.rms / all.max(f64::MIN_POSITIVE);
+        }
+    }
+    Ok(reports)
+}
+
+/// Per joint, RMS of the torque over the rows that count, and over all.
+fn torque_rms(recordings: &[Planned], joints: usize) -> Result<Vec<[f64; 2]>, IdentifyError> {
+    let mut sums = vec![[(0u64, 0.0); 2]; joints];
+    for recording in recordings {
+        recording.each_rows(&mut |rows| {
+            for ([used, all], equation) in sums.iter_mut().zip(&rows.equations) {
+                for (y, keep) in equation.y.iter().zip(&equation.keep) {
+                    let counting = [Some(&mut *all), keep.then_some(&mut *used)];
+                    for sum in counting.into_iter().flatten() {
+                        sum.0 += 1;
+                        sum.1 += y * y;
+                    }
+                }
+            }
+            Ok(())
+        })?;
+    }
+    let rms = |(count, squares): (u64, f64)| (squares / count.max(1) as f64).sqrt();
+    Ok(sums.into_iter().map(|both| both.map(rms)).collect())
+}

@@ -1,0 +1,143 @@
+//! What the data tell apart, and what they do not.
+
+use nalgebra::DMatrix;
+use rig_shared::multibody::{COLUMNS, column};
+use rig_shared::transmission::MOTOR_COLUMNS;
+
+use super::NotExcited;
+use super::base::{Base, Independent, independent_columns, preference};
+use super::factor::TriangularFactor;
+use super::least::triangle;
+use super::prior::Prior;
+use rig_model::robot::JointKind;
+
+/// A base parameter counts as not excited when its column, scaled to length one, differs from a combination of
+/// the others by less than this: its value would rest on a thousandth of the torque, which is the order of
+/// what filters and sensors distort.
+const EXCITED: f64 = 1e-3;
+
+/// Columns of the accumulated regressor that the data tell apart, and what the others join.
+pub(super) fn excited(base: &Base, factor: &TriangularFactor) -> Independent {
+    let (excitation, _) = factor.system();
+    without_traces(
+        independent_columns(&excitation, &data_order(base), EXCITED),
+        &excitation,
+    )
+}
+
+/// Base columns in the order in which they are kept when the data cannot tell all of them apart.
+fn data_order(base: &Base) -> Vec<usize> {
+    let preferred = preference(&base.kinds);
+    let rank = |c: usize| preferred.iter().position(|&x| x == c).unwrap_or(usize::MAX);
+    let mut order: Vec<usize> = (0..base.len()).collect();
+    // Motor columns are not in the list of preference: they come last, in their order.
+    order.sort_by_key(|&k| rank(base.columns[k]));
+    order
+}
+
+/// Leaves out of the combinations what is too small for these data to show, so that a parameter is not printed
+/// with a hundred-thousandth of another beside it.
+fn without_traces(mut data: Independent, excitation: &DMatrix<f64>) -> Independent {
+    for k in 0..excitation.ncols() {
+        let length = excitation.column(k).norm();
+        for (row, &c) in data.kept.iter().enumerate() {
+            let share = data.combination[(row, k)].abs() * excitation.column(c).norm();
+            if c != k && share < EXCITED * length {
+                data.combination[(row, k)] = 0.0;
+            }
+        }
+    }
+    data
+}
+
+/// What is not identified on its own, with the reason and a motion that would help.
+pub(super) fn not_excited(base: &Base, data: &Independent) -> Vec<NotExcited> {
+    (0..base.len())
+        .filter(|k| !data.kept.contains(k))
+        .map(|k| {
+            let partners: Vec<String> = data
+                .kept
+                .iter()
+                .enumerate()
+                .filter(|(row, _)| data.combination[(*row, k)].abs() > 1e-6)
+                .map(|(_, &c)| base.column_name(base.columns[c]))
+                .collect();
+            let why = if partners.is_empty() {
+                "It has no effect on the torque in these data.".to_owned()
+            } else {
+                format!(
+                    "In these data its torque is, to within {:.2} % of itself, a combination of that of {}; their sum is identified instead.",
+                    100.0 * data.remainder[k],
+                    partners.join(", ")
+                )
+            };
+            NotExcited {
+                combination: base.expression(k),
+                why,
+                motion: motion(base, k),
+            }
+        })
+        .collect()
+}
+
+/// A motion that would show base parameter `k` better.
+fn motion(base: &Base, k: usize) -> String {
+    let links = base.kinds.len() * COLUMNS;
+    let motor = base.columns[k].checked_sub(links);
+    let joint = motor.map_or(base.columns[k] / COLUMNS, |m| m / MOTOR_COLUMNS) + 1;
+    let revolute = base.kinds[joint - 1] == JointKind::Revolute;
+    match base.columns[k] % COLUMNS {
+        _ if motor.is_some() => format!(
+            "Move joint {joint} and the joints that its drive is coupled to together and against each other, at several speeds and with changing accelerations."
+        ),
+        column::VISCOUS => {
+            format!("Move joint {joint} at several clearly different speeds, in both directions.")
+        }
+        column::COULOMB => format!("Move joint {joint} slowly in both directions, with reversals."),
+        column::OFFSET => format!(
+            "Move joint {joint} in both directions and, where it lifts, over a wider range of positions."
+        ),
+        1..=3 if revolute => {
+            format!("Move joint {joint} over a wider range of positions, at best half a turn.")
+        }
+        _ => format!("Accelerate joint {joint} and its neighbours harder, in different postures."),
+    }
+}
+
+/// What is identified on its own, but of which the data alone know less than is known without them: more than half of
+/// an estimate that allows for both would be prior. `factor` has the residual's noise as unit, its memory allowed for.
+pub(super) fn hardly_excited(
+    base: &Base,
+    data: &Independent,
+    prior: &Prior,
+    factor: &TriangularFactor,
+    names: &[(String, String)],
+) -> Vec<NotExcited> {
+    let Some(inverse) = triangle(factor, data).try_inverse() else {
+        return Vec::new();
+    };
+    let own = prior.own(&(&data.combination * &base.combination));
+    (0..data.kept.len())
+        .filter_map(|k| {
+            let known = inverse.row(k).norm();
+            let plausible = own
+                .row(k)
+                .iter()
+                .enumerate()
+                .map(|(c, share)| {
+                    let u = prior.uncertainty[c];
+                    (share * prior.size[c] * if u.is_finite() { u } else { 1.0 }).powi(2)
+                })
+                .sum::<f64>()
+                .sqrt();
+            let (name, unit) = names.get(k)?;
+            (known > plausible).then(|| NotExcited {
+                combination: name.clone(),
+                why: format!(
+                    "These data alone know it to {known:.2e} {unit} (standard deviation), less well than the {plausible:.2e} {unit} within which it is plausible without them."
+                ),
+                motion: motion(base, data.kept[k]),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,326 @@
+//! What an identification holds beyond least squares: the other estimators, the essential and the physically
+//! consistent parameters, the comparison.
+
+use nalgebra::DMatrix;
+
+use super::beyond::{Beyond, Together, beyond, together};
+use super::compare::{Comparison, Held, compare, fit, judge};
+use super::consistent::consistent;
+use super::covariance::Estimate;
+use super::essential::{EssentialSet, Known, essential};
+use super::evaluate::Planned;
+use super::excitation::hardly_excited;
+use super::factor::TriangularFactor;
+use super::linear::{classical, spread};
+use super::parts::{LeaveOut, Parts};
+use super::prior::Prior;
+use super::problem::{Fitted, Problem};
+use super::standard::{Judges, StandardSet, prior_of, quadratic, quadratic_about, standard_set};
+use super::{BaseParameter, Estimator, IdentifyError, ModelKind, NotExcited, Options};
+use rig_model::robot::Robot;
+
+/// Weights of recordings: beyond it the other recordings are lost in rounding.
+const WEIGHTS: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+/// Standard deviations to either side that hold 95 % of a normal distribution.
+const NORMAL_95: f64 = 1.96;
+/// A residual that is so many times that of the weighted fit calls for a warning.
+const MUCH_MORE: f64 = 1.2;
+
+/// Refuses settings that mean nothing, or nothing beside the others.
+pub(super) fn check(robot: &Robot, options: &Options) -> Result<(), IdentifyError> {
+    if let Some(&weight) = options
+        .recording_weights
+        .iter()
+        .find(|w| !WEIGHTS.contains(w))
+    {
+        return Err(IdentifyError::Weight(weight));
+    }
+    match options.prior_uncertainty {
+        Some(u) if !(u.is_finite() && u > 0.0) => return Err(IdentifyError::PriorUncertainty(u)),
+        // The standard parameters of several joints have the description's values as their prior, whichever the estimator.
+        Some(uncertainty) if robot.joints.len() == 1 && !options.estimator.has_prior() => {
+            return Err(IdentifyError::UnusedUncertainty {
+                uncertainty,
+                estimator: options.estimator.name(),
+            });
+        }
+        _ => {}
+    }
+    match (options.window, options.model) {
+        (Some(window), ModelKind::Differential) => Err(IdentifyError::UnusedWindow(window)),
+        _ => Ok(()),
+    }
+}
+
+/// The fit of an estimator beyond the three least squares.
+pub(super) struct Own {
+    /// Values of all base columns and more.
+    pub fitted: Fitted,
+    /// The estimate.
+    pub estimate: Estimate,
+    parts: Parts,
+}
+
+/// Fits with the estimator asked for; `None` where that is one of the three least squares.
+/// `beside` is the covariance that terms beyond the description add.
+pub(super) fn own(
+    problem: &Problem,
+    beside: Option<&DMatrix<f64>>,
+) -> Result<Option<Own>, IdentifyError> {
+    let estimator = problem.options.estimator;
+    if matches!(
+        estimator,
+        Estimator::Ols | Estimator::Weighted | Estimator::Robust
+    ) {
+        return Ok(None);
+    }
+    let parts = Parts::collect(problem)?;
+    let all = LeaveOut::of(&parts.weighted(&problem.tempered(&parts)));
+    let fitted = fit(
+        estimator,
+        problem,
+        &parts,
+        &prior_beside(problem, &all.whole),
+    )?;
+    Ok(Some(Own {
+        estimate: fitted.estimate(&parts, problem, beside),
+        fitted,
+        parts,
+    }))
+}
+
+/// What the data show beyond the description. That is asked with the description as the prior, whichever the estimator:
+/// without one, torques with position cannot be told from inertia. `factors` are those of the fitted equations.
+pub(super) fn beyond_description(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+) -> Result<Beyond, IdentifyError> {
+    if problem.options.look_beyond && problem.robot.joints.len() > 1 {
+        beyond(problem, factors, &prior(problem))
+    } else {
+        Ok(Beyond::default())
+    }
+}
+
+/// The terms that were found with all parameters at once; `described` is gravity as the description states it.
+pub(super) fn together_with(
+    problem: &Problem,
+    factors: &[TriangularFactor],
+    known: &Beyond,
+    described: [f64; 3],
+) -> Result<Together, IdentifyError> {
+    together(problem, factors, &prior(problem), known, described)
+}
+
+fn prior(problem: &Problem) -> Prior {
+    prior_of(
+        problem.robot,
+        problem.base,
+        problem.surveys,
+        &problem.start_full(),
+        problem.options.prior_uncertainty,
+    )
+}
+
+/// The same without what the data contradict; `factor` has the residual's noise as unit, its memory allowed for.
+fn prior_beside(problem: &Problem, factor: &TriangularFactor) -> Prior {
+    // A worth that the user states is what the description is worth.
+    if problem.options.prior_uncertainty.is_some() {
+        return prior(problem);
+    }
+    let data = quadratic(factor, problem.base);
+    prior(problem).without_contradicted(&data.matrix, &data.right, problem.robot)
+}
+
+/// What stands beside the estimate.
+#[derive(Default)]
+pub(super) struct Further {
+    pub essential: Option<EssentialSet>,
+    pub standard: Option<StandardSet>,
+    pub comparison: Option<Comparison>,
+    pub hardly_excited: Vec<NotExcited>,
+    /// [`super::Details::free`].
+    pub free: Vec<[f64; 3]>,
+    pub procedure: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+/// Base columns whose values the estimate gives, its equations and itself.
+pub(super) struct Outcome<'a> {
+    pub estimate: &'a Estimate,
+    pub full: &'a [f64],
+    /// By equation, rows unweighted.
+    pub factors: &'a [TriangularFactor],
+    /// By equation, rows that the residual remembers.
+    pub memory: Vec<f64>,
+    pub parameters: &'a [BaseParameter],
+    /// RMS torques of training data and hold-out by joint, where effects were taken off the rows.
+    pub measured: Option<[Vec<f64>; 2]>,
+}
+
+/// What it means that an estimator leaves much more than the weighted fit; `trusted` where the comparison recommends it.
+fn what_it_means(estimator: Estimator, trusted: bool) -> &'static str {
+    match estimator {
+        Estimator::Consistent => {
+            "The weighted fit is free to follow what the model lacks with values that no body has, and another motion need not bear them out."
+        }
+        Estimator::Ridge => {
+            "The weighted fit is free to follow what the model lacks with values far from the description's, and another motion need not bear them out."
+        }
+        _ if trusted => "Noise in the motion hides as much from the weighted fit.",
+        _ => {
+            "What it assumes of the noise does not hold here, so do not take its values for better ones."
+        }
+    }
+}
+
+/// Computes it.
+pub(super) fn further(
+    problem: &Problem,
+    own: Option<Own>,
+    result: &Outcome,
+    holdout: &[Planned],
+) -> Result<Further, IdentifyError> {
+    let Problem { base, data, .. } = *problem;
+    let mut further = Further::default();
+    let memory = result.estimate.memory_rows;
+    let combine = |scale: &dyn Fn(usize) -> f64| {
+        let mut all = TriangularFactor::new(base.len());
+        for (k, (factor, weight)) in result.factors.iter().zip(problem.weights).enumerate() {
+            all.merge(factor, weight * scale(k));
+        }
+        all
+    };
+    let names: Vec<(String, String)> = result
+        .parameters
+        .iter()
+        .map(|p| (p.expression.clone(), p.unit.clone()))
+        .collect();
+    let weighted = combine(&|_| 1.0);
+    let known = match &own {
+        None => Known::of_rows(&weighted, &data.kept, memory),
+        // A jackknife of sixteen stretches has no inverse: there the rows say how well each value is known.
+        Some(own) => match &own.fitted.covariance {
+            Some(_) => {
+                let estimate = result.estimate;
+                let size = estimate.values.len();
+                let covariance = DMatrix::from_fn(size, size, |i, j| estimate.covariance[i][j]);
+                Known::of_estimate(&estimate.values, &covariance, estimate.effective_rows)
+            }
+            None => Known::about(&result.estimate.values, &weighted, &data.kept, memory),
+        },
+    };
+    let left = |values: &[f64]| {
+        weighted
+            .residual_squares(&spread(values, &data.kept, base.len()))
+            .sqrt()
+    };
+    further.essential = known.and_then(|known| essential(&known, &names, &left));
+    let estimator = problem.options.estimator;
+    let wanted = problem.robot.joints.len() > 1
+        || matches!(estimator, Estimator::Consistent | Estimator::Ridge);
+    let compared = !problem.options.compare.is_empty();
+    let held = if wanted || compared {
+        Held::of(problem, holdout)?
+    } else {
+        None
+    };
+    let tempered = combine(&|k| 1.0 / result.memory.get(k).unwrap_or(&memory).sqrt());
+    let prior = prior_beside(problem, &tempered);
+    let (std, _) = classical(&tempered, data, problem.start)?;
+    further.free = (problem.start.iter().zip(&std))
+        .map(|(value, std)| [*value, value - NORMAL_95 * std, value + NORMAL_95 * std])
+        .collect();
+    if problem.robot.joints.len() > 1 {
+        further.hardly_excited = hardly_excited(base, data, &prior, &tempered, &names);
+    }
+    if wanted {
+        let found = match own.as_ref().and_then(|o| o.fitted.standard.as_ref()) {
+            Some(standard) if estimator == Estimator::Consistent => Ok(standard.clone()),
+            _ => {
+                let problem = match estimator {
+                    // Rows know a little of what counts as not excited, too.
+                    Estimator::Ols | Estimator::Weighted => quadratic(&tempered, base),
+                    _ => quadratic_about(&tempered, base, result.full),
+                };
+                consistent(&problem, &prior).map(|found| found.parameters)
+            }
+        };
+        match found {
+            Ok(found) => {
+                let of_momentum = match problem.options.model {
+                    ModelKind::Differential => None,
+                    ModelKind::Integral => {
+                        judge(problem, &Planned::all(problem.training, problem.plan))?
+                    }
+                };
+                further.standard = Some(standard_set(
+                    problem,
+                    &prior,
+                    &found,
+                    &Judges {
+                        fitted: result.factors,
+                        training: of_momentum.as_deref().unwrap_or(result.factors),
+                        holdout: held.as_ref().map(|held| held.all.as_slice()),
+                        measured: result.measured.as_ref(),
+                    },
+                ));
+            }
+            Err(e) => further.warnings.push(format!(
+                "No physically consistent set of standard parameters is given: {e}"
+            )),
+        }
+    }
+    if compared {
+        let collected;
+        let parts = match &own {
+            Some(own) => &own.parts,
+            None => {
+                collected = Parts::collect(problem)?;
+                &collected
+            }
+        };
+        let names: Vec<String> = names.iter().map(|(name, _)| name.clone()).collect();
+        further.comparison = Some(compare(
+            problem,
+            parts,
+            &prior,
+            held.as_ref(),
+            &problem.options.compare,
+            &names,
+            result.measured.as_ref(),
+        )?);
+    }
+    if let Some(own) = own {
+        let plain = problem.start_full();
+        let squares = |full: &[f64]| -> Vec<f64> {
+            result
+                .factors
+                .iter()
+                .map(|f| f.residual_squares(full).sqrt())
+                .collect()
+        };
+        let mut more: Vec<String> = Vec::new();
+        for (k, (own, plain)) in squares(result.full).iter().zip(squares(&plain)).enumerate() {
+            if *own > MUCH_MORE * plain {
+                let joint = problem.robot.joints.get(k).map_or("", |j| j.name.as_str());
+                more.push(format!("{:.1} times at joint {joint}", own / plain));
+            }
+        }
+        if !more.is_empty() {
+            let trusted = further
+                .comparison
+                .as_ref()
+                .is_some_and(|compared| compared.recommended == estimator);
+            further.warnings.push(format!(
+                "On the training data {} leaves more than the weighted fit: {}. {}",
+                estimator.name(),
+                more.join(", "),
+                what_it_means(estimator, trusted)
+            ));
+        }
+        further.procedure = own.fitted.said;
+        further.warnings.extend(own.fitted.warnings);
+    }
+    Ok(further)
+}

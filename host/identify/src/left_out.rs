@@ -1,0 +1,80 @@
+//! Ways to treat the recordings compared by how well they predict stretches of time that they were not fitted to.
+
+use super::factor::TriangularFactor;
+use super::linear::by_noise;
+use super::model::{Plan, Rows, each_rows};
+use super::parts::LeaveOut;
+use super::{IdentifyError, ModelKind};
+use rig_data::prepare::Recording;
+
+/// Stretches of time that are left out in turn.
+const STRETCHES: usize = 8;
+/// Reduction of the mean logarithm of the joints' errors from which a treatment that uses fewer rows is better.
+pub(super) const BETTER: f64 = 0.02;
+
+/// By stretch, then by joint, the rows of the equation.
+pub(super) struct Stretches(Vec<Vec<TriangularFactor>>);
+
+impl Stretches {
+    /// Sorts the rows of the recordings for which `used` (of the rows, joint, row) is true.
+    ///
+    /// # Errors
+    /// [`IdentifyError`]: recordings that cannot be read.
+    pub(super) fn of(
+        recordings: &[&dyn Recording],
+        plan: &Plan,
+        used: &dyn Fn(&Rows, usize, usize) -> bool,
+    ) -> Result<Self, IdentifyError> {
+        let p = plan.columns.len();
+        let empty = vec![TriangularFactor::new(p); plan.loudness.len()];
+        let mut sorted = vec![empty; STRETCHES];
+        for recording in recordings {
+            let [mut start, mut end] = [f64::INFINITY, f64::NEG_INFINITY];
+            each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+                start = rows.t.first().map_or(start, |t| start.min(*t));
+                end = rows.t.last().map_or(end, |t| end.max(*t));
+                Ok(())
+            })?;
+            let length = (end - start).max(f64::MIN_POSITIVE) / STRETCHES as f64;
+            each_rows(*recording, plan, ModelKind::Differential, &mut |rows| {
+                for (i, t) in rows.t.iter().enumerate() {
+                    let stretch = (((t - start) / length) as usize).min(STRETCHES - 1);
+                    let factors = sorted[stretch].iter_mut().zip(&rows.equations);
+                    for (j, (factor, equation)) in factors.enumerate() {
+                        if used(rows, j, i) {
+                            factor.push(&equation.x[i * p..(i + 1) * p], equation.y[i], 1.0);
+                        }
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(Self(sorted))
+    }
+
+    /// Mean over the joints of the logarithm of the RMS that fits to all of these stretches but one leave of that one in `judge`.
+    pub(super) fn error(&self, judge: &Self) -> f64 {
+        let joints = self.0.first().map_or(0, Vec::len);
+        let without = |j: usize| {
+            let own: Vec<TriangularFactor> = self.0.iter().map(|list| list[j].clone()).collect();
+            LeaveOut::of(&own).without
+        };
+        let without: Vec<Vec<TriangularFactor>> = (0..joints).map(without).collect();
+        let (mut squares, mut rows) = (vec![0.0; joints], vec![0u64; joints]);
+        for (out, judge) in judge.0.iter().enumerate() {
+            let rest: Vec<TriangularFactor> = without.iter().map(|own| own[out].clone()).collect();
+            let Some(beta) = by_noise(&rest) else {
+                return f64::INFINITY;
+            };
+            for (j, factor) in judge.iter().enumerate().filter(|(_, f)| f.rows() > 0) {
+                squares[j] += factor.residual_squares(&beta);
+                rows[j] += factor.rows();
+            }
+        }
+        let moving: Vec<f64> = (squares.iter().zip(&rows))
+            .filter(|(s, rows)| **rows > 0 && **s > 0.0)
+            .map(|(s, rows)| 0.5 * (s / *rows as f64).ln())
+            .collect();
+        moving.iter().sum::<f64>() / moving.len().max(1) as f64
+    }
+}

@@ -1,0 +1,153 @@
+//! Recordings whose position has noise that is not white: the cut-off must follow what moves, not what is noisy.
+
+use super::made::{TRUTH, swing};
+use super::*;
+use rig_data::prepare::{PrepareOptions, Survey, Treatment};
+
+/// A flaw of a recorder, put into the position of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Flaw {
+    /// White noise of this standard deviation behind a low-pass of the drive: means over 10 rows, three times.
+    Filtered(f64),
+    /// Rows taken up to 0.3 ms off their time stamps.
+    Jitter,
+    /// An encoder of this many counts a turn.
+    Counts(f64),
+    /// White noise of this standard deviation.
+    White(f64),
+}
+
+/// Means over `reach` rows to both sides.
+fn smooth(x: &[f64], reach: usize) -> Vec<f64> {
+    (0..x.len())
+        .map(|k| {
+            let part = &x[k.saturating_sub(reach)..(k + reach + 1).min(x.len())];
+            part.iter().sum::<f64>() / part.len() as f64
+        })
+        .collect()
+}
+
+fn flawed(flaw: Flaw, seed: u64) -> InMemory {
+    let mut recording = swing(seed, 30.0, false);
+    let mut g = rand_pcg::Pcg64::seed_from_u64(1000 + seed);
+    let mut normal = move || (0..12).map(|_| g.random::<f64>()).sum::<f64>() - 6.0;
+    let q = &mut recording.blocks[0].joints[0].q;
+    match flaw {
+        Flaw::Filtered(sigma) => {
+            let white: Vec<f64> = q.iter().map(|_| sigma * normal()).collect();
+            let noise = smooth(&smooth(&smooth(&white, 5), 5), 5);
+            q.iter_mut().zip(noise).for_each(|(q, e)| *q += e);
+        }
+        Flaw::White(sigma) => q.iter_mut().for_each(|q| *q += sigma * normal()),
+        Flaw::Counts(counts) => {
+            let step = std::f64::consts::TAU / counts;
+            q.iter_mut().for_each(|q| *q = (*q / step).round() * step);
+        }
+        Flaw::Jitter => {
+            let speed: Vec<f64> = (0..q.len())
+                .map(|k| {
+                    let (a, b) = (k.saturating_sub(1), (k + 1).min(q.len() - 1));
+                    (q[b] - q[a]) / (2e-3 * (b - a) as f64)
+                })
+                .collect();
+            // Of this standard deviation: even between -0.3 and 0.3 ms has the same.
+            let late = 0.3e-3 / 3f64.sqrt();
+            (q.iter_mut().zip(speed)).for_each(|(q, v)| *q += late * normal() * v);
+        }
+    }
+    recording
+}
+
+#[test]
+fn noise_that_is_not_white_is_not_taken_for_motion() {
+    let robot = pendulum();
+    for (flaw, seed) in [
+        (Flaw::Filtered(2e-3), 1),
+        (Flaw::Filtered(1e-2), 2),
+        (Flaw::Jitter, 3),
+        (Flaw::Counts(4096.0), 4),
+        (Flaw::Counts(1024.0), 5),
+    ] {
+        let recording = flawed(flaw, seed);
+        let found = identify(&robot, &[&recording], &[], &Options::default()).unwrap();
+        show(&format!("{flaw:?}"), &found);
+        let inertia = found.details.estimate.values[2];
+        assert!(
+            (inertia / TRUTH[2] - 1.0).abs() < 0.03,
+            "{flaw:?}: inertia {inertia}"
+        );
+        // The reference has three sines, the fastest of 0.84 Hz.
+        let motion = found.details.treatment.motion_frequency;
+        assert!(motion < 5.0, "{flaw:?}: motion up to {motion} Hz");
+        let slow = found.details.treatment.speed_threshold[0];
+        assert!(slow < 0.9, "{flaw:?}: rows below {slow} rad/s left out");
+    }
+}
+
+/// The first of these recordings with the cut-off of the spectrum: what the choice by the torque is for.
+#[test]
+fn the_spectrum_alone_takes_filtered_noise_for_motion() {
+    let recording = flawed(Flaw::Filtered(1e-2), 2);
+    let survey = Survey::take(&recording, 1).unwrap();
+    let by_spectrum = Treatment::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
+    let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
+    let treatment = &found.details.treatment;
+    assert_eq!(treatment.spectral_cutoff, Some(by_spectrum.cutoff));
+    assert!(
+        treatment.cutoff < 0.5 * by_spectrum.cutoff,
+        "{} for {}",
+        treatment.cutoff,
+        by_spectrum.cutoff
+    );
+    assert!(
+        found.warnings[0].contains("chosen by the torque"),
+        "{:?}",
+        found.warnings
+    );
+}
+
+#[test]
+fn white_noise_leaves_the_cut_off_to_the_spectrum() {
+    for (sigma, seed) in [(1e-5, 1), (1e-4, 2)] {
+        let recording = flawed(Flaw::White(sigma), seed);
+        let survey = Survey::take(&recording, 1).unwrap();
+        let by_spectrum =
+            Treatment::decide(&[survey], &PrepareOptions::default(), &[None]).unwrap();
+        let found = identify(&pendulum(), &[&recording], &[], &Options::default()).unwrap();
+        let treatment = &found.details.treatment;
+        assert_eq!(treatment.spectral_cutoff, None);
+        assert_eq!(treatment.cutoff, by_spectrum.cutoff);
+        assert!(treatment.trials.len() > 8);
+    }
+}
+
+/// A decimation that lets itself grow asks for no more rows than there are.
+#[test]
+fn no_decimation_refuses_its_own_recording() {
+    let recording = |rows: usize| {
+        let t: Vec<f64> = (0..rows).map(|k| k as f64 * 1e-3).collect();
+        // Slow: ten times its frequency would keep one row in hundreds.
+        let q: Vec<f64> = t.iter().map(|t| (0.6 * t).sin()).collect();
+        let tau = t.iter().map(|t| 2.0 * (0.6 * t).cos().signum()).collect();
+        let joint = JointColumns {
+            q,
+            tau,
+            ..Default::default()
+        };
+        InMemory {
+            label: "slow".into(),
+            blocks: vec![Block {
+                t,
+                joints: vec![joint],
+                first_line: 2,
+                ..Default::default()
+            }],
+        }
+    };
+    for rows in [1000, 2000, 5000, 20_000] {
+        let survey = Survey::take(&recording(rows), 1).unwrap();
+        let decided = Treatment::decide(&[survey], &PrepareOptions::default(), &[None]);
+        let treatment = decided.unwrap_or_else(|e| panic!("{rows} rows: {e}"));
+        assert!(50 * treatment.decimation + 2 * treatment.trimmed <= rows);
+    }
+}

@@ -1,0 +1,43 @@
+//! The line to the rig: ports, the conversation over them, and recording.
+//!
+//! [`port`] is the seam: a [`serial`] device, a debug probe (feature `probe`), an [`emulated`] rig in this process, or either of
+//! them behind a [`lossy`] line. [`session`] greets the rig and has requests carried out exactly once; [`recorder`] runs a stream
+//! and counts what is missing; [`recorded_run`] writes one experiment to a file; [`convert`] turns samples into rows of SI
+//! quantities; [`fault`] says in words what stopped the rig.
+//!
+//! ```no_run
+//! use rig_link::{SerialLine, Session, SessionSettings};
+//!
+//! # fn main() -> Result<(), rig_link::LinkError> {
+//! let session = Session::open(SerialLine::open("/dev/ttyACM0", 921_600)?, SessionSettings::default())?;
+//! println!("{} Hz", session.greeting().control_rate_hz);
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod convert;
+pub mod emulated;
+pub mod error;
+pub mod experiment;
+pub mod fault;
+pub mod lossy;
+pub mod port;
+#[cfg(feature = "probe")]
+pub mod probe;
+pub mod recorded_run;
+pub mod recorder;
+pub mod serial;
+pub mod session;
+
+pub use convert::{COLUMNS, Converter, Row, UNITS};
+pub use emulated::{Device, EmulatedPort};
+pub use error::LinkError;
+pub use fault::describe_fault;
+pub use lossy::{Disturbance, Lossy};
+pub use port::Port;
+#[cfg(feature = "probe")]
+pub use probe::ProbeLine;
+pub use recorded_run::{RecordedRun, RunError};
+pub use recorder::{Event, LossReport, RecordSettings, record};
+pub use serial::SerialLine;
+pub use session::{Session, SessionSettings};

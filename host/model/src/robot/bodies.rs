@@ -1,0 +1,218 @@
+//! Inertial values that no body has, said before they are used.
+//!
+//! They are not refused: identified values are often fixed up to combinations only, and what a link cannot show in its
+//! motion is often left at zero. Judged is what the link's motion shows: of links that only slide the mass, of links that
+//! turn about one direction the moment of inertia about it, of all others the whole inertia.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::dh::step;
+use super::urdf::SpatialInertia;
+use super::{JointKind, Original, Robot};
+use rig_output::format_significant;
+
+/// Axes closer to parallel than this turn a link about one direction, as the sine of the angle between them.
+const PARALLEL: f64 = 1e-6;
+/// Principal moments may break the triangle inequality by this share: what rounding to two or three digits does.
+const ROUNDED: f64 = 0.02;
+
+/// What of a link's inertia its motion shows.
+enum Shown {
+    Mass,
+    About(Vector3<f64>),
+    All,
+}
+
+impl Robot {
+    /// One sentence for each link whose inertial values no body has, by joint and, where it was read from a URDF file, by link.
+    pub fn implausible_bodies(&self, urdf: Option<&Original>) -> Vec<String> {
+        (0..self.joints.len())
+            .filter_map(|k| {
+                let inertial = self.joints[k].inertial.as_ref()?;
+                let why = strange(&SpatialInertia::of(inertial), &self.shown(k))?;
+                let joint = &self.joints[k].name;
+                let link = match urdf.and_then(|original| original.link(k)) {
+                    Some(link) => format!("Link `{link}`, moved by joint `{joint}`,"),
+                    None => format!("The link of joint `{joint}`"),
+                };
+                Some(format!(
+                    "{link} {why}. No body is like that: `rig identify` takes a uniform block for what is known of it, a simulation takes it as it stands."
+                ))
+            })
+            .collect()
+    }
+
+    /// Directions about which link `k` turns, all in frame k at zero position. Neighbouring axes keep their angle at
+    /// every position, so that axes that are parallel here are so everywhere or have one between them that is not.
+    fn shown(&self, k: usize) -> Shown {
+        let mut direction: Option<Vector3<f64>> = None;
+        for joint in &self.joints[..=k] {
+            let turn = step(joint.alpha, joint.a, joint.theta, joint.d).rotation;
+            direction = direction.map(|own| turn.inverse() * own);
+            if joint.kind == JointKind::Revolute {
+                match direction {
+                    Some(own) if own.cross(&Vector3::z()).norm() > PARALLEL => return Shown::All,
+                    _ => direction = Some(Vector3::z()),
+                }
+            }
+        }
+        direction.map_or(Shown::Mass, Shown::About)
+    }
+}
+
+/// What is strange about a body, as the rest of a sentence about its link; none where nothing is.
+fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
+    let about_origin_is_zero = body.inertia == Matrix3::zeros();
+    if body.mass <= 0.0 {
+        return Some(
+            if about_origin_is_zero && body.first_moment == Vector3::zeros() {
+                "has neither mass nor inertia".into()
+            } else {
+                "has mass 0, but a first moment or an inertia".into()
+            },
+        );
+    }
+    let (_, inertia) = body.about_centre()?;
+    let unit = |value: f64| format!("{} kg·m²", format_significant(value, 4));
+    // Against what rounding leaves of the difference between both inertias.
+    let rounding = 1e-13 * body.inertia.amax();
+    match shown {
+        Shown::Mass => None,
+        Shown::About(direction) => {
+            let own = direction.dot(&(inertia * direction));
+            (own < -rounding).then(|| {
+                format!(
+                    "has a moment of inertia of {} about its centre of mass along the axis that it turns about: the inertia about the joint is smaller than its mass and centre of mass demand",
+                    unit(own)
+                )
+            })
+        }
+        Shown::All if inertia.amax() <= rounding => {
+            Some("has no inertia about its centre of mass, as a point would".into())
+        }
+        Shown::All => {
+            let mut principal: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
+            principal.sort_by(f64::total_cmp);
+            let [small, middle, large] = principal[..] else {
+                return None;
+            };
+            if small < -ROUNDED * large.abs().max(-small) {
+                return Some(format!(
+                    "has a principal moment of inertia below zero about its centre of mass, {}",
+                    unit(small)
+                ));
+            }
+            (large > (1.0 + ROUNDED) * (small + middle)).then(|| {
+                format!(
+                    "has principal moments of inertia {}, {} and {} about its centre of mass, of which the largest is above the sum of the others",
+                    format_significant(small, 4),
+                    format_significant(middle, 4),
+                    unit(large)
+                )
+            })
+        }
+    }
+}
+
+/// Radius of gyration of a body whose inertia its motion does not show, m.
+const RADIUS: f64 = 0.05;
+/// Moments across the axis as a share of the one about it, where the motion shows that one alone. Above one half, so that the
+/// largest moment is below the sum of the others.
+const ACROSS: f64 = 0.6;
+/// Least principal moment as a share of the largest of a body that simulators take. MuJoCo refuses what is not positive.
+const POSITIVE: f64 = 1e-9;
+
+impl Robot {
+    /// The description with bodies that MuJoCo and Gazebo take, as far as no motion shows the difference, and what was done.
+    ///
+    /// Both refuse a moving link without mass, or whose principal moments of inertia about its centre are not all positive with
+    /// the largest below the sum of the others. A description of what a motion shows need not be such a body: of a link that
+    /// turns about one direction only the moment about it counts, of one that only slides the mass. What does not count is
+    /// chosen here. Where all counts nothing is changed, and the sentence says what will be refused.
+    pub(super) fn with_bodies(&self) -> (Self, Vec<String>) {
+        let mut robot = self.clone();
+        let mut remarks = Vec::new();
+        for k in 0..self.joints.len() {
+            let Some(inertial) = &self.joints[k].inertial else {
+                continue;
+            };
+            let body = SpatialInertia::of(inertial);
+            if is_taken(&body) {
+                continue;
+            }
+            let name = &self.joints[k].name;
+            let shown = self.shown(k);
+            match body_like(&body, &shown, k == 0) {
+                Some(new) => {
+                    robot.joints[k].inertial = Some(new.inertial());
+                    remarks.push(format!(
+                        "The link of joint {name}: inertia that no motion of this robot shows was chosen so that the link is a body, as MuJoCo and Gazebo demand. Its motion is the same."
+                    ));
+                }
+                None => {
+                    let why = strange(&body, &Shown::All)
+                        .or_else(|| strange(&body, &shown))
+                        .unwrap_or_else(|| "has moments of inertia that no body has".to_owned());
+                    remarks.push(format!(
+                        "MuJoCo and Gazebo will refuse the link of joint {name}: it {why}. Values of combinations (base parameters) are no bodies; give each link its own, or take identified.urdf of `rig identify` with --estimator consistent."
+                    ));
+                }
+            }
+        }
+        (robot, remarks)
+    }
+}
+
+/// Whether simulators take it: mass, and moments that a body of some extent has.
+fn is_taken(body: &SpatialInertia) -> bool {
+    let Some((_, inertia)) = body.about_centre().filter(|_| body.mass > 0.0) else {
+        return false;
+    };
+    let mut principal: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
+    principal.sort_by(f64::total_cmp);
+    match principal[..] {
+        [small, middle, large] => {
+            small > POSITIVE * large.abs() && large <= (1.0 + POSITIVE) * (small + middle)
+        }
+        _ => false,
+    }
+}
+
+/// A body of the same motion that simulators take; none where there is none. `first`: the joint stands on the base.
+fn body_like(body: &SpatialInertia, shown: &Shown, first: bool) -> Option<SpatialInertia> {
+    let direction = match shown {
+        Shown::All => return None,
+        Shown::Mass => None,
+        Shown::About(direction) => Some(*direction),
+    };
+    let mut mass = body.mass;
+    if let (true, Some(axis)) = (first, direction) {
+        // About a fixed axis the mass is free where first moment and moment of inertia are kept: the centre of mass moves towards
+        // the axis until half of the moment is the body's own.
+        let across = body.first_moment - axis * axis.dot(&body.first_moment);
+        let moment = axis.dot(&(body.inertia * axis));
+        let own = moment - across.norm_squared() / mass.max(f64::MIN_POSITIVE);
+        if moment > 0.0 && (mass <= 0.0 || own <= POSITIVE * moment) {
+            mass = (2.0 * across.norm_squared() / moment).max(moment / RADIUS.powi(2));
+        }
+    }
+    let (centre, about) = SpatialInertia { mass, ..*body }
+        .about_centre()
+        .filter(|_| mass > 0.0)?;
+    let own = match direction {
+        None => Matrix3::identity() * (mass * RADIUS.powi(2)),
+        Some(axis) => {
+            let moment = axis.dot(&(about * axis));
+            if moment <= 0.0 {
+                return None;
+            }
+            let along = axis * axis.transpose();
+            (along + (Matrix3::identity() - along) * ACROSS) * moment
+        }
+    };
+    Some(SpatialInertia::from_centre(mass, centre, own))
+}
+
+#[cfg(test)]
+#[path = "bodies_test.rs"]
+mod tests;

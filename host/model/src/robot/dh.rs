@@ -1,0 +1,201 @@
+//! A chain of arbitrary joint axes → modified Denavit–Hartenberg frames.
+//!
+//! z of frame i is the joint's own axis, so that q keeps its sense and, through the offsets theta and d,
+//! its zero. x of frame i lies along the common normal to the next axis; frame 0 takes z from the base
+//! link, so that gravity stays (0, 0, −g).
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::angles::{ROUNDING, angle_about, right_angle, squared_poses, squared_theta};
+use super::urdf::{Body, Chain};
+use super::{Drive, Joint, JointKind, Origin, Robot};
+use rig_output::format_significant;
+
+/// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
+/// base link, the customary rounded value that robot descriptions and simulators are used with.
+pub(super) const GRAVITY: f64 = 9.81;
+
+/// Axes closer to parallel than this are parallel, rad: between this and the angles that [`squared_poses`] leaves there is
+/// nothing.
+const PARALLEL: f64 = 1e-6;
+
+/// A frame this many times further away than all links together reach stands where no mass is.
+const FAR: f64 = 30.0;
+
+/// The converted robot and where its frames lie, for whoever must relate it to the URDF's frames.
+pub(super) struct Converted {
+    pub robot: Robot,
+    /// Frame 0 in the base link's frame.
+    pub base: Isometry3<f64>,
+    /// Each body's own frame (that of the link its joint moves) in frame i.
+    pub links: Vec<Isometry3<f64>>,
+    /// Angles that are taken as others, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// Modified DH step without the joint's own motion.
+pub(super) fn step(alpha: f64, a: f64, theta: f64, d: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha),
+    ) * Translation3::new(a, 0.0, 0.0)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta)
+        * Translation3::new(0.0, 0.0, d)
+}
+
+/// A line in the base link's frame.
+#[derive(Clone, Copy)]
+struct Line {
+    point: Vector3<f64>,
+    direction: Vector3<f64>,
+}
+
+/// Origin on `line` and direction x of the common normal to `next`. Where there is freedom, keeps
+/// `foot` as origin and `x` as direction as well as it can.
+fn common_normal(
+    line: Line,
+    next: Line,
+    foot: Vector3<f64>,
+    x: Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let z = line.direction;
+    let cross = z.cross(&next.direction);
+    let sine = cross.norm();
+    if sine < PARALLEL {
+        let to_next = next.point - foot;
+        let across = to_next - z * to_next.dot(&z);
+        return match across.try_normalize(ROUNDING) {
+            Some(direction) => (foot, direction),
+            None => (foot, x),
+        };
+    }
+    // Foot of the common normal on `line`: solve line.point + s·z + u·cross = next.point + v·next.direction for s.
+    let s = (next.point - line.point).cross(&next.direction).dot(&cross) / (sine * sine);
+    let origin = line.point + z * s;
+    let normal = cross / sine;
+    let distance = (next.point - origin).dot(&normal);
+    let forward = if distance.abs() > ROUNDING {
+        distance > 0.0
+    } else {
+        normal.dot(&x) >= -ROUNDING
+    };
+    (origin, if forward { normal } else { -normal })
+}
+
+fn snap_angle(angle: f64) -> f64 {
+    right_angle(angle, ROUNDING).unwrap_or(angle)
+}
+
+fn snap_length(length: f64) -> f64 {
+    if length.abs() < ROUNDING { 0.0 } else { length }
+}
+
+/// Converts a URDF chain; never fails, as every chain of axes has such frames.
+pub(super) fn convert(chain: &Chain) -> Converted {
+    let (poses, mut remarks) = squared_poses(chain);
+    let reach: f64 = chain
+        .bodies
+        .iter()
+        .map(|b| b.origin.translation.vector.norm())
+        .sum();
+    let axis_of = |i: usize| Line {
+        point: poses[i].translation.vector,
+        direction: poses[i].rotation * chain.bodies[i].axis,
+    };
+    let base_line = Line {
+        point: Vector3::zeros(),
+        direction: Vector3::z(),
+    };
+    let (origin, x) = common_normal(base_line, axis_of(0), Vector3::zeros(), Vector3::x());
+    let y = Vector3::z().cross(&x);
+    let rotation = UnitQuaternion::from_basis_unchecked(&[x, y, Vector3::z()]);
+    let base = Isometry3::from_parts(origin.into(), rotation);
+
+    // Each frame is placed relative to the one that the parameters so far really produce, so that
+    // neither the snapping above nor the file's rounding adds up along the chain.
+    let mut frame = base;
+    let mut joints = Vec::new();
+    let mut links = Vec::new();
+    for (i, body) in chain.bodies.iter().enumerate() {
+        let line = axis_of(i);
+        let x_before = frame.rotation * Vector3::x();
+        let z_before = frame.rotation * Vector3::z();
+        let alpha = snap_angle(angle_about(z_before, line.direction, x_before));
+        let a = snap_length((line.point - frame.translation.vector).dot(&x_before));
+        let bent = frame * step(alpha, a, 0.0, 0.0);
+        let z = bent.rotation * Vector3::z();
+        // Where the normal meets the axis: the natural origin if the next axis leaves the choice.
+        let foot = bent.translation.vector;
+        let (origin, x) = if i + 1 < chain.bodies.len() {
+            common_normal(
+                Line {
+                    point: foot,
+                    direction: z,
+                },
+                axis_of(i + 1),
+                foot,
+                x_before,
+            )
+        } else {
+            (foot, x_before)
+        };
+        let mut theta = snap_angle(angle_about(x_before, x, z));
+        if body.kind == JointKind::Prismatic
+            && let Some((exact, said)) = squared_theta(&chain.file, body, theta)
+        {
+            theta = exact;
+            remarks.extend(said);
+        }
+        let d = snap_length((origin - foot).dot(&z));
+        if a.abs().max(d.abs()) > FAR * reach {
+            remarks.push(format!(
+                "{}:{}: about joint `{}` axes are so little off parallel that their common normal lies {} m away; parameters there cannot be told apart. Where the axes are meant parallel, write them so.",
+                chain.file,
+                body.place,
+                body.joint,
+                format_significant(a.abs().max(d.abs()), 3)
+            ));
+        }
+        frame = bent * step(0.0, 0.0, theta, d);
+        let link = frame.inverse() * poses[i];
+        joints.push(joint(body, [alpha, a, theta, d], &link));
+        links.push(link);
+    }
+    let robot = Robot {
+        origin: Origin::Urdf,
+        last_link: links.last().copied().unwrap_or_default(),
+        ..Robot::new(&chain.name, joints)
+    };
+    Converted {
+        robot,
+        base,
+        links,
+        remarks,
+    }
+}
+
+fn joint(body: &Body, geometry: [f64; 4], link_in_frame: &Isometry3<f64>) -> Joint {
+    Joint {
+        inertial: Some(body.inertia.seen_from(link_in_frame).inertial()),
+        limits: body.limits.clone(),
+        friction: body.friction.clone(),
+        drive: body.reduction.map(|gear_ratio| Drive {
+            gear_ratio,
+            ..Drive::default()
+        }),
+        ..Joint::new(&body.joint, body.kind, geometry)
+    }
+}
+
+/// Pose of frame i in frame i−1 at joint coordinate `q`.
+#[cfg(test)]
+pub(super) fn joint_pose(joint: &Joint, q: f64) -> Isometry3<f64> {
+    match joint.kind {
+        JointKind::Revolute => step(joint.alpha, joint.a, joint.theta + q, joint.d),
+        JointKind::Prismatic => step(joint.alpha, joint.a, joint.theta, joint.d + q),
+    }
+}
+
+#[cfg(test)]
+#[path = "dh_test.rs"]
+pub(in crate::robot) mod tests;

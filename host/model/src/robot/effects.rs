@@ -1,0 +1,404 @@
+//! The `[[effect]]` tables of a description: read, checked, written.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+
+use rig_shared::effects::{Channel, Effect, Kind, Parameter};
+use serde::{Deserialize, Serialize};
+
+use super::check::{EFFECT_NAMES, Fault, Step};
+use super::sizes::LARGEST_LINK;
+use super::written::{float, line, quoted};
+use super::{JointKind, Robot};
+
+/// An effect beyond the standard model, as a description states it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "toml::Table", into = "toml::Table")]
+pub struct RobotEffect {
+    /// The joint that it acts on; may be absent where the robot has only one.
+    pub joint: Option<String>,
+    /// The other joint, where the law has terms of another joint's motion.
+    pub other: Option<String>,
+    /// Which, with its parameters in the units of [`Kind::about`] (m for rad and N for N·m where the joint slides).
+    pub effect: Effect<f64>,
+}
+
+/// An effect with its joints as indices from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// The joint that it acts on.
+    pub joint: usize,
+    /// The other joint, where the law has terms of one.
+    pub other: Option<usize>,
+    /// Which, with its parameters.
+    pub effect: Effect<f64>,
+}
+
+/// What is wrong with one table.
+pub(super) struct Refusal {
+    /// The key at fault; none for the table as a whole.
+    key: Option<String>,
+    what: String,
+    found: String,
+    right: String,
+}
+
+impl Refusal {
+    /// As the fault of effect `index` of a description.
+    pub(super) fn at(self, index: usize) -> Fault {
+        let mut way = vec![Step::Key("effect"), Step::At(index)];
+        way.extend(self.key.map(Step::Name));
+        Fault {
+            way,
+            what: format!("{} of effect {}", self.what, index + 1),
+            found: self.found,
+            right: self.right,
+        }
+    }
+}
+
+/// Unit of a parameter on a joint of that kind, ASCII.
+pub fn unit_of(parameter: &Parameter, kind: JointKind) -> String {
+    match kind {
+        JointKind::Revolute => parameter.unit.to_owned(),
+        JointKind::Prismatic => parameter
+            .unit
+            .replace("kg*m^2", "kg")
+            .replace("(N*m)", "N")
+            .replace("N*m", "N")
+            .replace("rad", "m"),
+    }
+}
+
+/// Name of an effect with its law, as `name (law)`.
+pub fn title_of(kind: Kind) -> String {
+    let about = kind.about();
+    match about.law {
+        Some(law) => format!("{} ({law})", about.name),
+        None => about.name.to_owned(),
+    }
+}
+
+/// Whether the law has terms of another joint's motion.
+fn has_other(kind: Kind) -> bool {
+    kind == Kind::InertiaCoupling
+}
+
+fn parameters(kind: Kind) -> impl Iterator<Item = &'static Parameter> {
+    kind.about().gains.iter().chain(kind.about().shapes)
+}
+
+/// Laws under a name, empty where it has one only.
+fn laws(name: &str) -> Vec<&'static str> {
+    Kind::ALL
+        .iter()
+        .filter(|kind| kind.about().name == name)
+        .filter_map(|kind| kind.about().law)
+        .collect()
+}
+
+/// A value that should have been a name, for a message.
+fn name_found(value: Option<&toml::Value>) -> String {
+    match value {
+        None => "missing".into(),
+        Some(toml::Value::String(text)) => format!("`{text}`"),
+        Some(other) => other.to_string(),
+    }
+}
+
+/// Largest magnitudes of parameters by their unit: beyond what any machine has by orders of magnitude, so that a value is in
+/// another unit or mistyped. By judgement, but for a link's length.
+const LARGEST: [(&str, f64); 12] = [
+    ("kg", 1.0e4),
+    ("m", LARGEST_LINK),
+    ("s", 1.0e6),
+    ("V", 1.0e4),
+    ("rad", 1.0),
+    ("rad/s", 1.0e4),
+    ("kg*m^2", 1.0e6),
+    ("N*m", 1.0e6),
+    ("N*m*s/rad", 1.0e6),
+    ("N*m*s/(rad*K)", 1.0e6),
+    ("N*m*s^2/rad^2", 1.0e6),
+    ("N*m/rad", 1.0e9),
+];
+/// Likewise of orders, per turn …
+const LARGEST_ORDER: f64 = 1.0e4;
+/// … and of shares.
+const LARGEST_SHARE: f64 = 1.0;
+
+/// What a description may hold: within what physics allows, what machines have.
+pub fn sane(parameter: &Parameter) -> [f64; 2] {
+    let of_unit = LARGEST.iter().find(|(unit, _)| *unit == parameter.unit);
+    let largest = match (of_unit, parameter.unit, parameter.name) {
+        (Some((_, largest)), ..) => *largest,
+        (None, "1", "order") => LARGEST_ORDER,
+        // A bound that physics states is the narrower one.
+        (None, "1", _) if parameter.bounds[1].is_infinite() => LARGEST_SHARE,
+        _ => f64::INFINITY,
+    };
+    let [low, high] = parameter.bounds;
+    [low.max(-largest), high.min(largest)]
+}
+
+/// The rest of a sentence on what a parameter must be.
+fn allowed(parameter: &Parameter) -> String {
+    let number = |x: f64| {
+        if x == f64::MIN_POSITIVE {
+            "above 0".to_owned()
+        } else {
+            format!("at least {x}")
+        }
+    };
+    let [low, high] = sane(parameter);
+    let range = match (low.is_finite(), high.is_finite()) {
+        (false, false) => "a finite number".to_owned(),
+        (true, false) => number(low),
+        (false, true) => format!("at most {high}"),
+        (true, true) => format!("{} and at most {high}", number(low)),
+    };
+    match parameter.unit {
+        "1" => format!("it must be {range}"),
+        unit => format!("it must be {range}, in {unit}"),
+    }
+}
+
+impl RobotEffect {
+    /// Reads a table; its keys and values are checked, its joints are not.
+    pub(super) fn from_table(table: &toml::Table) -> Result<Self, Refusal> {
+        let refuse = |key: Option<&str>, what: &str, found: String, right: String| Refusal {
+            key: key.map(str::to_owned),
+            what: what.to_owned(),
+            found,
+            right,
+        };
+        let text = |key: &str| match table.get(key) {
+            None => Ok(None),
+            Some(toml::Value::String(text)) => Ok(Some(text.clone())),
+            Some(other) => Err(refuse(
+                Some(key),
+                &format!("the {key}"),
+                other.to_string(),
+                "it must be a name in quotes".into(),
+            )),
+        };
+        let missing = || "missing".to_owned();
+        let name = text("kind")?;
+        let law = text("law")?;
+        let Some(name) = name.filter(|name| EFFECT_NAMES.contains(&name.as_str())) else {
+            return Err(refuse(
+                Some("kind"),
+                "the kind",
+                name_found(table.get("kind")),
+                format!("it must be one of {}", EFFECT_NAMES.join(", ")),
+            ));
+        };
+        let laws = laws(&name);
+        let kind = Kind::named(&name, law.as_deref());
+        let Some(kind) = kind.filter(|kind| kind.about().law.is_some() == law.is_some()) else {
+            return Err(refuse(
+                Some("law"),
+                "the law",
+                law.map_or_else(missing, |law| format!("`{law}`")),
+                if laws.is_empty() {
+                    format!("{name} has one law only; remove this key")
+                } else {
+                    let plain = Kind::named(&name, None).is_some_and(|k| k.about().law.is_none());
+                    let or = if plain {
+                        ", or none where this key is missing"
+                    } else {
+                        ""
+                    };
+                    format!("{name} has the laws {}{or}", laws.join(", "))
+                },
+            ));
+        };
+        let mut known: HashSet<&str> = HashSet::from(["kind", "joint"]);
+        known.extend((!laws.is_empty()).then_some("law"));
+        known.extend(has_other(kind).then_some("other"));
+        known.extend(parameters(kind).map(|p| p.name));
+        if let Some(key) = table.keys().find(|key| !known.contains(key.as_str())) {
+            let names: Vec<&str> = parameters(kind).map(|p| p.name).collect();
+            return Err(refuse(
+                Some(key),
+                "a key",
+                format!("`{key}`"),
+                format!("{name} has the parameters {}", names.join(", ")),
+            ));
+        }
+        let value = |p: &Parameter| {
+            let number = match table.get(p.name) {
+                None if kind.optional().contains(&p.name) => Some(0.0),
+                Some(toml::Value::Float(x)) => Some(*x),
+                Some(toml::Value::Integer(x)) => Some(*x as f64),
+                _ => None,
+            };
+            let [low, high] = sane(p);
+            number.filter(|x| (low..=high).contains(x)).ok_or_else(|| {
+                refuse(
+                    Some(p.name),
+                    &format!("the {}", p.name),
+                    table.get(p.name).map_or_else(missing, ToString::to_string),
+                    allowed(p),
+                )
+            })
+        };
+        let gains: Vec<f64> = (kind.about().gains.iter().map(value)).collect::<Result<_, _>>()?;
+        let shapes: Vec<f64> = (kind.about().shapes.iter().map(value)).collect::<Result<_, _>>()?;
+        Ok(Self {
+            joint: text("joint")?,
+            other: text("other")?,
+            effect: Effect::new(kind, &gains, &shapes),
+        })
+    }
+
+    /// Values by name, gains first.
+    pub fn values(&self) -> impl Iterator<Item = (&'static Parameter, f64)> {
+        let about = self.effect.kind.about();
+        let gains = about.gains.iter().zip(self.effect.gains);
+        gains.chain(about.shapes.iter().zip(self.effect.shapes))
+    }
+
+    /// As `name (law)`.
+    pub fn title(&self) -> String {
+        title_of(self.effect.kind)
+    }
+}
+
+impl TryFrom<toml::Table> for RobotEffect {
+    type Error = String;
+
+    fn try_from(table: toml::Table) -> Result<Self, String> {
+        Self::from_table(&table).map_err(|r| format!("{} is {}, but {}", r.what, r.found, r.right))
+    }
+}
+
+impl From<RobotEffect> for toml::Table {
+    fn from(effect: RobotEffect) -> Self {
+        let about = effect.effect.kind.about();
+        let mut table = Self::new();
+        let named = [
+            ("kind", Some(about.name.to_owned())),
+            ("law", about.law.map(str::to_owned)),
+            ("joint", effect.joint.clone()),
+            ("other", effect.other.clone()),
+        ];
+        for (key, value) in named {
+            if let Some(value) = value {
+                table.insert(key.into(), value.into());
+            }
+        }
+        for (p, value) in effect.values() {
+            table.insert(p.name.into(), value.into());
+        }
+        table
+    }
+}
+
+/// The first fault of the effect tables themselves.
+pub(super) fn check_tables(tables: &[toml::Value]) -> Result<(), Fault> {
+    for (i, table) in tables.iter().enumerate() {
+        if let Some(table) = table.as_table() {
+            RobotEffect::from_table(table).map_err(|refusal| refusal.at(i))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether the joints of all effects exist and can have them.
+pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
+    let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let names = format!("this robot's joints are {}", joints.join(", "));
+    let (mut elastic, mut presliding) = (HashSet::new(), HashSet::new());
+    for (i, effect) in robot.effects.iter().enumerate() {
+        let table = toml::Table::from(effect.clone());
+        RobotEffect::from_table(&table).map_err(|refusal| refusal.at(i))?;
+        let kind = effect.effect.kind;
+        let refuse = |key: &str, found: &Option<String>, right: &str| {
+            Refusal {
+                key: Some(key.to_owned()),
+                what: format!("the {key}"),
+                found: found
+                    .as_ref()
+                    .map_or_else(|| "missing".into(), |name| format!("`{name}`")),
+                right: right.to_owned(),
+            }
+            .at(i)
+        };
+        let Some(joint) = robot.joint_of(effect) else {
+            return Err(refuse("joint", &effect.joint, &names));
+        };
+        if has_other(kind) {
+            let other = effect.other.as_deref().and_then(|n| robot.joint_index(n));
+            if other.is_none_or(|other| other == joint) {
+                let right = format!("it must name another joint; {names}");
+                return Err(refuse("other", &effect.other, &right));
+            }
+        }
+        let found = Some(kind.about().name.to_owned());
+        if kind.about().channel == Channel::Transmission && !elastic.insert(joint) {
+            let right = "the joint has another effect between motor and link; state one of them, backlash with the stiffness of both";
+            return Err(refuse("kind", &found, right));
+        }
+        if kind.is_presliding() && !presliding.insert(joint) {
+            let right = "the joint has another presliding, and one contact through which its friction acts; state one of them";
+            return Err(refuse("kind", &found, right));
+        }
+    }
+    Ok(())
+}
+
+impl Robot {
+    fn joint_of(&self, effect: &RobotEffect) -> Option<usize> {
+        match &effect.joint {
+            Some(name) => self.joint_index(name),
+            None => (self.joints.len() == 1).then_some(0),
+        }
+    }
+
+    /// The effects with their joints as indices. What names no joint of this robot is left out; a description that was
+    /// loaded has none such.
+    pub fn placed_effects(&self) -> Vec<Placed> {
+        self.effects
+            .iter()
+            .filter_map(|effect| {
+                Some(Placed {
+                    joint: self.joint_of(effect)?,
+                    other: effect.other.as_deref().and_then(|n| self.joint_index(n)),
+                    effect: effect.effect,
+                })
+            })
+            .collect()
+    }
+}
+
+/// Writes one table, with units in comments.
+pub(super) fn write_effect(out: &mut String, robot: &Robot, effect: &RobotEffect) {
+    let about = effect.effect.kind.about();
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "\n[[effect]]");
+    line(out, "kind", &quoted(about.name), about.title);
+    if let Some(law) = about.law {
+        line(out, "law", &quoted(law), about.source);
+    }
+    let joints = [
+        ("joint", &effect.joint, "on which it acts"),
+        ("other", &effect.other, "whose motion it depends on"),
+    ];
+    for (key, name, comment) in joints {
+        if let Some(name) = name {
+            line(out, key, &quoted(name), comment);
+        }
+    }
+    let kind = robot
+        .joint_of(effect)
+        .map_or(JointKind::Revolute, |j| robot.joints[j].kind);
+    for (p, value) in effect.values() {
+        let comment = format!("{}, {}", unit_of(p, kind), p.meaning);
+        line(out, p.name, &float(value), &comment);
+    }
+}
+
+#[cfg(test)]
+#[path = "effects_test.rs"]
+mod tests;

@@ -1,0 +1,138 @@
+//! What can be wrong with a robot description.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// A place in a text file, 1-based.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Line.
+    pub line: usize,
+    /// Column, in characters.
+    pub column: usize,
+}
+
+impl Place {
+    /// The place of a byte offset in `text`.
+    pub fn of(text: &str, offset: usize) -> Self {
+        let mut end = offset.min(text.len());
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        let before = &text[..end];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Self {
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.line, self.column)
+    }
+}
+
+/// Why a robot description could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotError {
+    /// The file cannot be opened or read.
+    #[error("cannot read the robot description {}: {source}; give the path of a .toml or .urdf file", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The path is a directory.
+    #[error("{} is a directory, but a robot description is one .toml or .urdf file", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The file is larger than any description.
+    #[error("{} is larger than {} MiB, but a robot description is a short text (.toml or .urdf); is this a recording?", path.display(), super::MAX_BYTES >> 20)]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is not text.
+    #[error("{}:{line}: this line is not text (byte {offset} of the file is neither UTF-8 nor printable, nor of the encoding that the file declares), but a robot description is TOML or URDF text; save it as UTF-8", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// Offset of the first byte that is not text, counted from 0.
+        offset: usize,
+        /// Line, from 1.
+        line: usize,
+    },
+    /// The file has no content.
+    #[error("{} is empty, but a robot description needs at least one joint; `rig init one-link` writes one to start from", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// TOML that does not parse or does not have the keys and types of a robot description.
+    #[error("{}:{place}: {message}", path.display())]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// One sentence: what is there and what would be right.
+        message: String,
+    },
+    /// A value that parses but cannot be right.
+    #[error("{}:{place}: {what} is {found}, but {right}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// The quantity.
+        what: String,
+        /// The value found.
+        found: String,
+        /// What would be right.
+        right: String,
+    },
+    /// XML or URDF that does not describe a serial robot.
+    #[error("{}:{place}: {message}", path.display())]
+    Urdf {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        place: Place,
+        /// One sentence: what is there and what would be right.
+        message: String,
+    },
+    /// A link that a joint moves has no inertial parameters.
+    #[error("{}:{place}: link `{link}` is moved by joint `{joint}` but has no <inertial>; give its mass, centre of mass and inertia, or describe the robot in TOML, where inertial parameters may be left out", path.display())]
+    NoInertial {
+        /// The file.
+        path: PathBuf,
+        /// Where the link begins.
+        place: Place,
+        /// The link.
+        link: String,
+        /// The joint that moves it.
+        joint: String,
+    },
+    /// The description holds an effect that could not be read back.
+    #[error("robot `{robot}` cannot be written: {message}")]
+    Write {
+        /// The robot.
+        robot: String,
+        /// What is wrong with which effect, and what would be right.
+        message: String,
+    },
+    /// The description cannot be put into URDF.
+    #[error("joint `{joint}` {why}; the robot cannot be written as URDF")]
+    NotUrdf {
+        /// The joint.
+        joint: String,
+        /// What is missing, as the rest of a sentence about the joint.
+        why: String,
+    },
+}

@@ -1,0 +1,367 @@
+//! Which elements and attributes a URDF has: what stands twice or is misspelt is refused by line.
+//!
+//! Elements of other programs (Gazebo, Drake, ros2_control) may stand anywhere and are not looked into.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::reader::{Reader, Xml};
+use crate::robot::error::{Place, RobotError};
+use rig_output::listed;
+
+/// An element that is read: its name, its children that may stand once, those that may stand more often, and its attributes.
+struct Element {
+    name: &'static str,
+    once: &'static [&'static str],
+    often: &'static [&'static str],
+    attributes: &'static [&'static str],
+}
+
+/// The elements that enter a robot's dynamics (https://wiki.ros.org/urdf/XML).
+const ELEMENTS: [Element; 14] = [
+    element("robot", &[], &["name", "version"]),
+    Element {
+        often: &["visual", "collision"],
+        ..element("link", &["inertial"], &["name", "type"])
+    },
+    element("inertial", &["origin", "mass", "inertia"], &[]),
+    element("origin", &[], &["xyz", "rpy"]),
+    element("mass", &[], &["value"]),
+    element("inertia", &[], &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]),
+    element(
+        "joint",
+        &[
+            "origin",
+            "parent",
+            "child",
+            "axis",
+            "limit",
+            "dynamics",
+            "mimic",
+            "safety_controller",
+            "calibration",
+        ],
+        &["name", "type"],
+    ),
+    element("parent", &[], &["link"]),
+    element("child", &[], &["link"]),
+    element("axis", &[], &["xyz"]),
+    element("limit", &[], &["lower", "upper", "velocity", "effort"]),
+    element("dynamics", &[], &["damping", "friction"]),
+    element("mimic", &[], &["joint", "multiplier", "offset"]),
+    element(
+        "safety_controller",
+        &[],
+        &[
+            "soft_lower_limit",
+            "soft_upper_limit",
+            "k_position",
+            "k_velocity",
+        ],
+    ),
+];
+
+const fn element(
+    name: &'static str,
+    once: &'static [&'static str],
+    attributes: &'static [&'static str],
+) -> Element {
+    Element {
+        name,
+        once,
+        often: &[],
+        attributes,
+    }
+}
+
+/// Attributes that are not read, by the name of their element: where the first stands, their names, and the number of elements.
+type Unread<'a> = BTreeMap<&'static str, (Place, BTreeSet<&'a str>, usize)>;
+
+impl<'a> Reader<'a> {
+    /// Refuses elements that stand twice, and elements and attributes that are misspelt; remarks on attributes that are not read.
+    ///
+    /// # Errors
+    /// The first of them, by line.
+    pub(super) fn as_described(&self) -> Result<(), RobotError> {
+        let root = self.document.root_element();
+        let mut unread = Unread::new();
+        self.element(root, &mut unread)?;
+        for tag in ["link", "joint"] {
+            for node in root.children().filter(|node| node.has_tag_name(tag)) {
+                self.element(node, &mut unread)?;
+                for own in node.children().filter(Xml::is_element) {
+                    // What they hold is drawn, and enters no dynamics.
+                    if own.has_tag_name("visual") || own.has_tag_name("collision") {
+                        continue;
+                    }
+                    self.element(own, &mut unread)?;
+                    for part in own.children().filter(Xml::is_element) {
+                        self.element(part, &mut unread)?;
+                    }
+                }
+            }
+        }
+        for (tag, (place, names, elements)) in unread {
+            let names: Vec<String> = names.into_iter().map(|name| format!("`{name}`")).collect();
+            let more = match elements {
+                1 => String::new(),
+                n => format!(", here and in {} more elements", n - 1),
+            };
+            self.remarks.borrow_mut().push(format!(
+                "{}:{place}: {} of <{tag}> {} not read{more}: no attribute of URDF.",
+                self.path.display(),
+                listed(&names),
+                if names.len() == 1 { "is" } else { "are" },
+            ));
+        }
+        Ok(())
+    }
+
+    /// One element against its description; one that is not described is not looked into.
+    fn element(&self, node: Xml<'a>, unread: &mut Unread<'a>) -> Result<(), RobotError> {
+        let name = node.tag_name().name();
+        let Some(known) = ELEMENTS.iter().find(|element| element.name == name) else {
+            return Ok(());
+        };
+        // Names with another prefix than the robot's own are of other programs.
+        let own = self.document.root_element().tag_name().namespace();
+        let is_own = |node: &Xml<'a>| node.tag_name().namespace() == own;
+        if !is_own(&node) {
+            return Ok(());
+        }
+        let children: Vec<Xml<'a>> = (node.children())
+            .filter(|child| child.is_element() && is_own(child))
+            .collect();
+        for (k, child) in children.iter().enumerate() {
+            let tag = child.tag_name().name();
+            let first = children[..k].iter().find(|other| other.has_tag_name(tag));
+            if let (Some(first), true) = (first, known.once.contains(&tag)) {
+                let text = format!(
+                    "this is a second <{tag}> of {}, whose first stands at {}",
+                    self.called(node),
+                    self.place(*first)
+                );
+                // Most fixed joints carry what no dynamics asks for, such as the stand of the base.
+                if node.attribute("type") != Some("fixed") {
+                    return Err(self.error(*child, format!("{text}; give one")));
+                }
+                let place = format!("{}:{}", self.path.display(), self.place(*child));
+                (self.remarks.borrow_mut()).push(format!("{place}: {text}; the first counts."));
+                continue;
+            }
+            let names = known.once.iter().chain(known.often);
+            let is_known = names.clone().any(|other| *other == tag);
+            let missing =
+                names.filter(|other| !children.iter().any(|own| own.has_tag_name(**other)));
+            if let (Some(meant), false) = (nearest(tag, missing), is_known) {
+                return Err(self.error(
+                    *child,
+                    format!(
+                        "<{tag}> of {} is no element of URDF; is <{meant}> meant?",
+                        self.called(node)
+                    ),
+                ));
+            }
+        }
+        self.attributes_of(node, known, unread)
+    }
+
+    fn attributes_of(
+        &self,
+        node: Xml<'a>,
+        known: &Element,
+        unread: &mut Unread<'a>,
+    ) -> Result<(), RobotError> {
+        let own = node.attributes().filter(|own| own.namespace().is_none());
+        let mut counted = false;
+        for attribute in own.filter(|own| !known.attributes.contains(&own.name())) {
+            let (name, tag) = (attribute.name(), known.name);
+            let missing = known
+                .attributes
+                .iter()
+                .filter(|other| !node.has_attribute(**other));
+            if let Some(meant) = nearest(name, missing) {
+                return Err(self.error(
+                    node,
+                    format!("`{name}` is no attribute of <{tag}>; is `{meant}` meant?"),
+                ));
+            }
+            let first = || (self.place(node), BTreeSet::new(), 0);
+            let (_, names, elements) = unread.entry(tag).or_insert_with(first);
+            names.insert(name);
+            *elements += usize::from(!counted);
+            counted = true;
+        }
+        Ok(())
+    }
+
+    /// "joint `elbow`", or "<inertial>" where it has no name.
+    fn called(&self, node: Xml<'a>) -> String {
+        let tag = node.tag_name().name();
+        match node.attribute("name") {
+            Some(name) => format!("{tag} `{name}`"),
+            None => format!("<{tag}>"),
+        }
+    }
+}
+
+/// The name that one with up to two slips stands for: letters left out, doubled, exchanged for others, or in another case. Of names
+/// of up to four letters one slip.
+fn nearest<'n>(
+    written: &str,
+    names: impl Iterator<Item = &'n &'static str>,
+) -> Option<&'static str> {
+    let apart = |name: &str| slips(&written.to_lowercase(), name);
+    let near = names.map(|name| (apart(name), *name));
+    let most = if written.len() <= 4 { 1 } else { 2 };
+    near.filter(|(slips, _)| *slips <= most)
+        .min_by_key(|(slips, _)| *slips)
+        .map(|(_, name)| name)
+}
+
+/// Letters that have to be put in, taken out or exchanged to make `a` of `b` (Levenshtein 1966).
+fn slips(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut corner = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let exchanged = corner + usize::from(x != *y);
+            corner = row[j + 1];
+            row[j + 1] = exchanged.min(row[j] + 1).min(corner + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use crate::robot::{Original, Robot};
+
+    /// A robot of one joint with these parts of its link and its joint.
+    fn read(link: &str, joint: &str) -> Result<Robot, String> {
+        let text = format!(
+            "<robot name='r'>\n<link name='base'/>\n<link name='arm'>\n{link}\n</link>\n<joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>\n{joint}\n</joint>\n</robot>"
+        );
+        Robot::from_urdf(&text, Path::new("r.urdf")).map_err(|error| error.to_string())
+    }
+
+    const INERTIAL: &str = "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>";
+    const LIMIT: &str = "<limit lower='-1' upper='1' velocity='2' effort='3'/>";
+
+    #[test]
+    fn elements_that_stand_twice_are_refused_by_line() {
+        assert!(read(INERTIAL, LIMIT).is_ok());
+        let twice = |link: &str, joint: &str, words: &str| {
+            let said = read(link, joint).unwrap_err();
+            assert!(
+                said.contains(words) && said.contains("whose first stands at"),
+                "{said}"
+            );
+        };
+        twice(&format!("{INERTIAL}\n{INERTIAL}"), LIMIT, "r.urdf:5");
+        twice(
+            INERTIAL,
+            &format!("{LIMIT}\n{LIMIT}"),
+            "second <limit> of joint `turn`",
+        );
+        twice(
+            INERTIAL,
+            &format!("{LIMIT}<axis xyz='0 0 1'/><axis xyz='1 0 0'/>"),
+            "second <axis>",
+        );
+        let masses = INERTIAL.replace("<inertia ", "<mass value='2'/><inertia ");
+        twice(&masses, LIMIT, "second <mass> of <inertial>");
+        let drawn = "<visual/><visual/><collision/><collision/>";
+        assert!(read(&format!("{INERTIAL}{drawn}"), LIMIT).is_ok());
+    }
+
+    /// The stand of a published arm has two origins.
+    #[test]
+    fn the_first_counts_at_a_fixed_joint() {
+        let text = format!(
+            "<robot name='r'>\n<link name='stand'/>\n<link name='base'/>\n<link name='arm'>{INERTIAL}</link>\n<joint name='foot' type='fixed'><parent link='stand'/><child link='base'/><origin xyz='0 0 1'/>\n<origin xyz='0 0 2'/></joint>\n<joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{LIMIT}</joint>\n</robot>"
+        );
+        let original = Original::read(text, Path::new("r.urdf")).unwrap();
+        let said = original.remarks();
+        assert!(
+            said.iter()
+                .any(|own| own.contains("r.urdf:6") && own.contains("the first counts"))
+        );
+    }
+
+    #[test]
+    fn attributes_that_are_not_read_are_remarked_once() {
+        let dynamics = format!("{LIMIT}<dynamics damping='1' mu_viscous='2' D='1'/>");
+        let text = format!(
+            "<robot name='r'>\n<link name='base'/><link name='arm'>{INERTIAL}</link><link name='hand'>{INERTIAL}</link>\n<joint name='a' type='revolute'><parent link='base'/><child link='arm'/>{dynamics}</joint>\n<joint name='b' type='revolute'><parent link='arm'/><child link='hand'/>{dynamics}<origin quat_xyzw='0 0 0 1'/></joint></robot>"
+        );
+        let original = Original::read(text, Path::new("r.urdf")).unwrap();
+        let said: Vec<&String> = (original.remarks().iter())
+            .filter(|own| own.contains("not read"))
+            .collect();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said[0].contains("r.urdf:3:") && said[0].contains("here and in 1 more elements"));
+        assert!(
+            said[0].contains("`D` and `mu_viscous` of <dynamics> are"),
+            "{said:?}"
+        );
+        assert!(said[1].contains("`quat_xyzw` of <origin> is"), "{said:?}");
+    }
+
+    #[test]
+    fn misspelt_elements_and_attributes_are_refused_with_what_is_meant() {
+        let meant = |link: &str, joint: &str, words: &str| {
+            let said = read(link, joint).unwrap_err();
+            assert!(said.contains(words), "{said}");
+        };
+        meant(
+            INERTIAL,
+            &LIMIT.replace("upper", "uper"),
+            "is `upper` meant?",
+        );
+        meant(
+            INERTIAL,
+            &LIMIT.replace("velocity", "Velocity"),
+            "is `velocity` meant?",
+        );
+        meant(
+            INERTIAL,
+            &format!("{LIMIT}<dynamics dampin='1'/>"),
+            "is `damping` meant?",
+        );
+        meant(
+            INERTIAL,
+            &format!("{LIMIT}<dynamic damping='1'/>"),
+            "is <dynamics> meant?",
+        );
+        meant(
+            INERTIAL,
+            &format!("{LIMIT}<axes xyz='1 0 0'/>"),
+            "is <axis> meant?",
+        );
+        meant(
+            &INERTIAL.replace("inertial>", "inertail>"),
+            LIMIT,
+            "is <inertial> meant?",
+        );
+        meant(
+            INERTIAL,
+            &LIMIT.replace("limit", "limits"),
+            "is <limit> meant?",
+        );
+        // So are they where the file has a namespace of its own.
+        let text = format!(
+            "<robot name='r' xmlns='http://www.ros.org'><link name='base'/><link name='arm'>{INERTIAL}</link><joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{}</joint></robot>",
+            LIMIT.replace("upper", "uper")
+        );
+        let said = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap_err();
+        assert!(said.to_string().contains("is `upper` meant?"), "{said}");
+        // Elements of other programs stay.
+        let more = "<hardwareInterface/><gazebo/><sensor name='s'/>";
+        assert!(read(&format!("{INERTIAL}{more}"), &format!("{LIMIT}{more}")).is_ok());
+    }
+}

@@ -1,0 +1,284 @@
+//! Values of links and joints in a URDF file: inertia, limits, friction, gear ratios.
+
+use std::collections::HashMap;
+
+use nalgebra::Matrix3;
+
+use super::reader::{Reader, Xml, child};
+use super::spatial::SpatialInertia;
+use crate::robot::error::RobotError;
+use crate::robot::sizes::too_wide;
+use crate::robot::{JointFriction, JointLimits};
+use rig_output::format_significant;
+
+/// Round effort limits from here on are taken for placeholders, N·m or N.
+const UNKNOWN_EFFORT: f64 = 1e4;
+
+impl<'a> Reader<'a> {
+    pub(super) fn inertial(&self, link: Xml<'a>) -> Result<Option<SpatialInertia>, RobotError> {
+        let Some(node) = child(link, "inertial") else {
+            return Ok(None);
+        };
+        let name = link.attribute("name").unwrap_or_default();
+        let part = |tag: &str| {
+            child(node, tag).ok_or_else(|| {
+                self.error(
+                    node,
+                    format!(
+                        "<inertial> of link `{name}` has no <{tag}>; it needs <mass> and <inertia>"
+                    ),
+                )
+            })
+        };
+        let mass_node = part("mass")?;
+        let mass = self.number(mass_node, "value")?;
+        if mass < 0.0 {
+            return Err(self.error(
+                mass_node,
+                format!("the mass of link `{name}` is {mass}, but it must be 0 or greater, in kg"),
+            ));
+        }
+        let i = part("inertia")?;
+        let [ixx, ixy, ixz, iyy, iyz, izz] = {
+            let mut values = [0.0; 6];
+            for (value, key) in values
+                .iter_mut()
+                .zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"])
+            {
+                *value = self.number(i, key)?;
+            }
+            values
+        };
+        let inertia = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
+        if let Some(why) = too_wide(inertia.amax(), mass) {
+            return Err(self.error(
+                i,
+                format!(
+                    "the inertia of link `{name}` is up to {} kg·m², but {why}",
+                    format_significant(inertia.amax(), 4)
+                ),
+            ));
+        }
+        let pose = self.origin(node)?;
+        let r = pose.rotation.to_rotation_matrix();
+        let about_centre = r * inertia * r.transpose();
+        Ok(Some(SpatialInertia::from_centre(
+            mass,
+            pose.translation.vector,
+            about_centre,
+        )))
+    }
+
+    pub(super) fn limits(
+        &self,
+        joint: Xml<'a>,
+        name: &str,
+        endless: bool,
+    ) -> Result<Option<JointLimits>, RobotError> {
+        let Some(node) = child(joint, "limit") else {
+            return Ok(None);
+        };
+        let position = if endless {
+            [f64::NEG_INFINITY, f64::INFINITY]
+        } else {
+            let bound = |key| self.optional_number(node, key);
+            let (lower, upper) = (bound("lower")?, bound("upper")?);
+            if lower.is_some() != upper.is_some() {
+                let missing = if lower.is_none() { "lower" } else { "upper" };
+                let place = format!("{}:{}", self.path.display(), self.place(node));
+                self.remarks.borrow_mut().push(format!(
+                    "{place}: <limit> of joint `{name}` has no `{missing}`, which counts as 0."
+                ));
+            }
+            [lower.unwrap_or(0.0), upper.unwrap_or(0.0)]
+        };
+        let remark = |text: String| {
+            let place = format!("{}:{}", self.path.display(), self.place(node));
+            self.remarks.borrow_mut().push(format!("{place}: {text}"));
+        };
+        let velocity = self.number(node, "velocity")?;
+        let stated = self.optional_number(node, "effort")?;
+        if stated.is_none() {
+            remark(format!(
+                "<limit> of joint `{name}` has no `effort`; its torque limit counts as not known."
+            ));
+        }
+        let effort = stated.unwrap_or(0.0);
+        if velocity == 0.0 && effort == 0.0 && position[0] == position[1] {
+            // What exporters of CAD programs write where nothing was entered.
+            remark(format!(
+                "<limit> of joint `{name}` is zero throughout, a placeholder; its limits count as not known."
+            ));
+            return Ok(None);
+        }
+        if position[0] >= position[1] {
+            return Err(self.error(node, format!("the lower limit of joint `{name}` is {} and the upper limit {}, but lower must be below upper", position[0], position[1])));
+        }
+        if velocity <= 0.0 {
+            return Err(self.error(node, format!("the velocity limit of joint `{name}` is {velocity}, but it must be greater than 0; remove <limit> where the limits are not known")));
+        }
+        if effort < 0.0 {
+            return Err(self.error(node, format!("the effort limit of joint `{name}` is {effort}, but it must be greater than 0, or 0 where it is not known")));
+        }
+        let placeholder = is_placeholder(effort, UNKNOWN_EFFORT);
+        if placeholder && stated.is_some() {
+            remark(format!(
+                "the effort limit {effort} of joint `{name}` looks like a placeholder; its torque limit counts as not known."
+            ));
+        }
+        Ok(Some(JointLimits {
+            position,
+            soft_position: self.soft_limits(joint, name, position)?,
+            velocity,
+            acceleration: None,
+            torque: (!placeholder).then_some(effort),
+        }))
+    }
+
+    /// The range within which the robot's own controller keeps the joint: `<safety_controller soft_lower_limit
+    /// soft_upper_limit>`. A side that is not stated, or lies beyond the limit, is the limit.
+    fn soft_limits(
+        &self,
+        joint: Xml<'a>,
+        name: &str,
+        [low, high]: [f64; 2],
+    ) -> Result<Option<[f64; 2]>, RobotError> {
+        let Some(node) = child(joint, "safety_controller") else {
+            return Ok(None);
+        };
+        let lower = self.optional_number(node, "soft_lower_limit")?;
+        let upper = self.optional_number(node, "soft_upper_limit")?;
+        let soft = [
+            lower.map_or(low, |v| v.max(low)),
+            upper.map_or(high, |v| v.min(high)),
+        ];
+        if soft == [low, high] || !soft.iter().all(|v| v.is_finite()) {
+            return Ok(None);
+        }
+        if soft[0] >= soft[1] {
+            // The element's own defaults, both 0, say nothing.
+            let place = format!("{}:{}", self.path.display(), self.place(node));
+            self.remarks.borrow_mut().push(format!(
+                "{place}: <safety_controller> of joint `{name}` leaves no range within {low} to {high}; its soft limits are not used."
+            ));
+            return Ok(None);
+        }
+        Ok(Some(soft))
+    }
+
+    pub(super) fn friction(&self, joint: Xml<'a>) -> Result<Option<JointFriction>, RobotError> {
+        let Some(node) = child(joint, "dynamics") else {
+            return Ok(None);
+        };
+        let value = |key: &str| -> Result<f64, RobotError> {
+            let value = self.optional_number(node, key)?.unwrap_or(0.0);
+            if value >= 0.0 {
+                return Ok(value);
+            }
+            let name = joint.attribute("name").unwrap_or_default();
+            Err(self.error(node, format!("the {key} of joint `{name}` is {value}, but friction below zero would drive the joint; it must be 0 or greater")))
+        };
+        Ok(Some(JointFriction {
+            coulomb: value("friction")?,
+            viscous: value("damping")?,
+            offset: 0.0,
+        }))
+    }
+
+    /// Gear ratio by joint name; 1 is the customary placeholder for "none" and says nothing.
+    pub(super) fn reductions(
+        &self,
+        known: &[(&'a str, Xml<'a>)],
+    ) -> Result<HashMap<&'a str, f64>, RobotError> {
+        let mut found: HashMap<&str, (f64, Xml<'a>)> = HashMap::new();
+        // Of ROS 1 and Drake beside the joints, of ROS 2 within <ros2_control>.
+        for transmission in self
+            .document
+            .root_element()
+            .descendants()
+            .filter(|n| n.has_tag_name("transmission"))
+        {
+            let joints: Vec<Xml<'a>> = transmission
+                .children()
+                .filter(|n| n.has_tag_name("joint"))
+                .collect();
+            let of_ros_2 = (transmission.ancestors()).any(|n| n.has_tag_name("ros2_control"));
+            for joint in &joints {
+                let name = self.attribute(*joint, "name")?;
+                // Controllers of ROS 2 may move what another file describes.
+                if !of_ros_2 && known.iter().all(|(other, _)| *other != name) {
+                    return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
+                }
+            }
+            for (reduction, what, text) in reductions(transmission) {
+                let value = self.parse_number(reduction, &what, text)?;
+                if value == 0.0 {
+                    return Err(self.error(
+                        reduction,
+                        format!(
+                            "{what} is 0, but it must be motor turns per joint turn, different from 0"
+                        ),
+                    ));
+                }
+                match joints.as_slice() {
+                    [joint] if value != 1.0 => {
+                        let name = self.attribute(*joint, "name")?;
+                        let first = found.insert(name, (value, reduction));
+                        if let Some((other, first)) = first.filter(|(other, _)| *other != value) {
+                            return Err(self.error(
+                                reduction,
+                                format!(
+                                    "{what} of joint `{name}` is {value}, and {other} at {}; give a joint one reduction",
+                                    self.place(first)
+                                ),
+                            ));
+                        }
+                    }
+                    [_] => {}
+                    // Of ROS 2's controllers, which may couple joints that move by themselves here.
+                    _ if of_ros_2 => {
+                        let place = format!("{}:{}", self.path.display(), self.place(transmission));
+                        self.remarks.borrow_mut().push(format!(
+                            "{place}: this <transmission> names {} joints; only those of one joint each are read.",
+                            joints.len()
+                        ));
+                        break;
+                    }
+                    _ => return Err(self.error(transmission, format!("this <transmission> names {} joints, but only transmissions of one joint each can be read", joints.len()))),
+                }
+            }
+        }
+        Ok(found
+            .into_iter()
+            .map(|(name, (value, _))| (name, value))
+            .collect())
+    }
+}
+
+/// The reductions that a transmission states: where each stands, what it is called there, and its text. ROS 1 has
+/// `<mechanicalReduction>`, ROS 2 `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
+fn reductions<'a>(transmission: Xml<'a>) -> impl Iterator<Item = (Xml<'a>, String, &'a str)> {
+    let is_name = |name: &str| ["mechanicalReduction", "mechanical_reduction"].contains(&name);
+    (transmission.descendants().filter(Xml::is_element)).filter_map(move |node| {
+        let tag = node.tag_name().name();
+        let text = node.text().unwrap_or_default();
+        let name = node.attribute("name").unwrap_or_default();
+        match tag {
+            _ if is_name(tag) => Some((node, format!("<{tag}>"), text)),
+            "param" if is_name(name) => Some((node, format!("`{name}`"), text)),
+            "gear_ratio" => {
+                let value = node.attribute("value")?;
+                Some((node, "<drake:gear_ratio>".to_owned(), value))
+            }
+            _ => None,
+        }
+    })
+}
+
+/// Whether an effort limit stands for "none": 0, powers of ten and rows of nines from `least` (N·m or N) on, and whatever
+/// is a million or more.
+pub fn is_placeholder(effort: f64, least: f64) -> bool {
+    let power = |x: f64| (x.log10() - x.log10().round()).abs() < 1e-12;
+    let round = power(effort) || (effort.fract() == 0.0 && power(effort + 1.0));
+    effort == 0.0 || effort >= 1e6 || (effort + 1.0 >= least && round)
+}

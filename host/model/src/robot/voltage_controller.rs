@@ -1,0 +1,157 @@
+//! The controller of a joint whose output is a share of the supply voltage, and the supply.
+
+use serde::{Deserialize, Serialize};
+
+use super::Joint;
+use super::check::{Fault, Must, Step, number};
+
+/// What the integral of the position error does while the output is at its limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AntiWindup {
+    /// It grows as elsewhere.
+    #[default]
+    None,
+    /// It stands still while the error drives the output further beyond the limit (conditional integration).
+    Clamping,
+}
+
+/// PID controller with feed-forward of the reference whose output is a share of the supply voltage:
+/// share = proportional·e + integral·∫e − derivative·q̇ + velocity_feedforward·ṙ + acceleration_feedforward·r̈ + bias with
+/// e = r − q, within ± `limit`; voltage = share·(supply\[0\] + supply\[1\]·|share|).
+///
+/// Gains per rad, or per m where the joint is prismatic.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VoltageController {
+    /// 1/rad
+    pub proportional: f64,
+    /// 1/(rad·s)
+    #[serde(default)]
+    pub integral: f64,
+    /// s/rad, on the velocity of the joint
+    #[serde(default)]
+    pub derivative: f64,
+    /// s/rad, on the velocity of the reference
+    #[serde(default)]
+    pub velocity_feedforward: f64,
+    /// s²/rad, on the acceleration of the reference
+    #[serde(default)]
+    pub acceleration_feedforward: f64,
+    /// Constant share of the supply.
+    #[serde(default)]
+    pub bias: f64,
+    /// Largest share of the supply; absent where there is no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
+    /// What the integral does at the limit.
+    #[serde(default)]
+    pub anti_windup: AntiWindup,
+    /// Supply without load, V, and its change from there to a share of one, V.
+    pub supply: [f64; 2],
+}
+
+/// What a [`VoltageController`] answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    /// Reference less position, rad or m.
+    pub error: f64,
+    /// Its integral over time, rad·s or m·s.
+    pub integral: f64,
+    /// Velocity of the joint, rad/s or m/s.
+    pub velocity: f64,
+    /// Velocity of the reference, rad/s or m/s.
+    pub reference_velocity: f64,
+    /// Acceleration of the reference, rad/s² or m/s².
+    pub reference_acceleration: f64,
+}
+
+impl VoltageController {
+    /// Share of the supply that the gains ask for, before the limit.
+    pub fn wish(&self, at: &Demand) -> f64 {
+        self.proportional * at.error + self.integral * at.integral - self.derivative * at.velocity
+            + self.velocity_feedforward * at.reference_velocity
+            + self.acceleration_feedforward * at.reference_acceleration
+            + self.bias
+    }
+
+    /// What the integral of the error grows by over `dt`, s, at a wish and an error.
+    pub fn integrated(&self, wish: f64, error: f64, dt: f64) -> f64 {
+        let beyond = self.limit.is_some_and(|limit| wish.abs() > limit);
+        let stands = beyond && self.anti_windup == AntiWindup::Clamping && wish * error > 0.0;
+        if stands { 0.0 } else { error * dt }
+    }
+
+    /// Voltage at a wish, V.
+    pub fn voltage(&self, wish: f64) -> f64 {
+        let limit = self.limit.unwrap_or(f64::INFINITY);
+        let share = wish.clamp(-limit, limit);
+        share * (self.supply[0] + self.supply[1] * share.abs())
+    }
+
+    /// Supply while it gives a voltage, V: where share·(supply\[0\] + supply\[1\]·|share|) is that voltage.
+    pub fn supply_at(&self, voltage: f64) -> f64 {
+        let [none, slope] = self.supply;
+        // The root of slope·share² + none·share = |voltage| that is |voltage| / none without a slope.
+        let root = (none * none + 4.0 * slope * voltage.abs()).max(0.0).sqrt();
+        let share = 2.0 * voltage.abs() / (none + root);
+        none + slope * share
+    }
+}
+
+/// Refuses values that no controller has.
+pub(super) fn check_voltage_controller(joint: &Joint, c: &VoltageController) -> Result<(), Fault> {
+    use Must::{Finite, NotNegative, Positive};
+    let way = |key| [Step::Key("voltage_controller"), Step::Key(key)];
+    let unit = joint.kind.units().0;
+    for (key, what, per, must, value) in [
+        (
+            "proportional",
+            "proportional gain",
+            "1/",
+            NotNegative,
+            c.proportional,
+        ),
+        ("integral", "integral gain", "1/s/", NotNegative, c.integral),
+        ("derivative", "derivative gain", "s/", Finite, c.derivative),
+        (
+            "velocity_feedforward",
+            "velocity feed-forward",
+            "s/",
+            Finite,
+            c.velocity_feedforward,
+        ),
+        (
+            "acceleration_feedforward",
+            "acceleration feed-forward",
+            "s^2/",
+            Finite,
+            c.acceleration_feedforward,
+        ),
+    ] {
+        number(joint, &way(key), what, &format!("{per}{unit}"), must, value)?;
+    }
+    number(joint, &way("bias"), "constant share", "1", Finite, c.bias)?;
+    if let Some(limit) = c.limit {
+        number(
+            joint,
+            &way("limit"),
+            "largest share of the supply",
+            "1",
+            Positive,
+            limit,
+        )?;
+    }
+    for (place, what, must) in [
+        (0, "supply without load", Positive),
+        (1, "change of the supply", Finite),
+    ] {
+        let way = [
+            Step::Key("voltage_controller"),
+            Step::Key("supply"),
+            Step::At(place),
+        ];
+        number(joint, &way, what, "V", must, c.supply[place])?;
+    }
+    Ok(())
+}

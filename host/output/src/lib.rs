@@ -1,0 +1,18 @@
+//! Numbers as text, sentences that occur once, and files that appear whole or not at all.
+//!
+//! The other crates use it for messages and results. It knows nothing of robots.
+//!
+//! ```
+//! assert_eq!(rig_output::format_value(1.23456, 0.02), "1.235 ± 0.020");
+//! ```
+
+mod files;
+mod finding;
+mod format;
+
+pub use files::{WriteError, can_take, data_dir, folder, persist, temporary, write_whole};
+pub use finding::{Finding, one_a_kind, worst_first};
+pub use format::{
+    fixed, format_interval, format_p_value, format_short, format_significant, format_time,
+    format_trimmed, format_unit, format_value, listed, power_of_ten,
+};

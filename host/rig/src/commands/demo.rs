@@ -1,0 +1,78 @@
+//! `rig demo`: the main job with no hardware.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::input::command_line;
+use super::overwrite::{DEMONSTRATION, free_folder, refuse_folder};
+use super::pictures;
+use super::ui::Ui;
+use crate::demo;
+use rig_output::write_whole;
+
+/// Where the demonstration goes.
+const FOLDER: &str = "rig-demo";
+
+/// Shows the whole way without hardware: excite, record, identify, compensate, report.
+#[derive(Clone, Debug, ClapArgs)]
+pub(crate) struct Args {
+    /// Folder for recordings, results and the report [default: rig-demo, or rig-demo-2 and so on where that holds results]
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
+    /// Seed: which rig is emulated, and its noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Default for Args {
+    fn default() -> Self {
+        Self {
+            out: None,
+            force: false,
+            seed: 1,
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming what went wrong.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    let begin = Instant::now();
+    let out = match &args.out {
+        Some(out) => {
+            refuse_folder(out, &DEMONSTRATION, args.force)?;
+            out.clone()
+        }
+        None if args.force => PathBuf::from(FOLDER),
+        None => free_folder(FOLDER, &DEMONSTRATION),
+    };
+    let mut progress = ui.progress("emulated rig", 1000);
+    let demo = demo::run(&out, args.seed, |share| {
+        progress.at((1000.0 * share) as u64)
+    })?;
+    drop(progress);
+    let path = out.join("report.html");
+    rig_report::write(&path, &demo.page(&command_line())?)?;
+    let found = out.join("diagnosis.html");
+    rig_report::write(&found, &demo.diagnosis_page(&command_line())?)?;
+    let json = serde_json::to_string_pretty(&demo.diagnosis).map_err(|error| {
+        CommandError::Sentence(format!("The diagnosis cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&out.join("diagnosis.json"), (json + "\n").as_bytes())?;
+    rig_report::write_svg(&out.join("tracking.svg"), &demo.picture())?;
+    pictures::write(&out, &demo.diagnosis)?;
+    for line in demo.summary()? {
+        ui.say(&line);
+    }
+    ui.remark(&format!("done in {:.1} s", begin.elapsed().as_secs_f64()));
+    ui.say(&format!("report: {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,419 @@
+//! `rig excite`: a motion that tells the robot's parameters apart, within its limits.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+use super::error::CommandError;
+use super::input::described;
+use super::overwrite::refuse_file;
+use super::ui::Ui;
+use rig_excite::{
+    Criterion, Design, Options, Parameters, Scaling, StagedKind, StagedOptions, design, staged,
+};
+use rig_model::robot::Robot;
+
+/// What is optimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CriterionArg {
+    /// Condition number: errors spread evenly over the parameters
+    Cond,
+    /// Smallest singular value: the worst combination known as well as possible
+    MinSingular,
+    /// Determinant of the information: the smallest confidence ellipsoid
+    DOptimal,
+}
+
+/// Which parameters count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ParametersArg {
+    /// All that `rig identify` finds: links, drive inertias, friction, offsets
+    All,
+    /// Inertial parameters of the links alone
+    Links,
+}
+
+/// By what the columns of the regressor are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ScalingArg {
+    /// By what the limits would let any motion do for the column alone
+    Sizes,
+    /// By nothing: SI units as they are
+    None,
+}
+
+/// Kind of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum KindArg {
+    /// Optimal periodic motion, for identification
+    Fourier,
+    /// Swept sine, for resonances and frequency response
+    Chirp,
+    /// Steps with rests, for gravity and holding torque
+    Staircase,
+    /// Slow triangles, for breakaway, presliding and backlash
+    Reversals,
+    /// Pairs of constant speeds, for the friction map
+    Sweep,
+}
+
+impl KindArg {
+    /// The motions of one joint.
+    const STAGED: [Self; 4] = [Self::Chirp, Self::Staircase, Self::Reversals, Self::Sweep];
+
+    /// The motion of one joint that it is; none for the optimal one of all joints.
+    fn staged(self) -> Option<StagedKind> {
+        match self {
+            Self::Fourier => None,
+            Self::Chirp => Some(StagedKind::Chirp),
+            Self::Staircase => Some(StagedKind::Staircase),
+            Self::Reversals => Some(StagedKind::Reversals),
+            Self::Sweep => Some(StagedKind::Sweep),
+        }
+    }
+}
+
+/// Share of each position range that an optimal motion keeps free, half of it at each end.
+///
+/// A loop with natural frequency ω₀ misses a turning point of a motion at ω by about (ω/ω₀)² of its amplitude. At the default
+/// period the fundamental sweeps the range at the velocity limit, ω = velocity/half range, about 1.4 rad/s for an arm of
+/// 2.2 rad/s and ±1.6 rad; harmonic k has at most 1/k of the amplitude at that speed, so it misses k times as much. With
+/// ω₀ of 2 Hz (12.6 rad/s) this is 1.2 % of the amplitude for the fundamental and 6 % for the fifth harmonic. The 5 % of the
+/// range at each end are 10 % of the amplitude.
+const MARGIN: f64 = 0.1;
+/// Share of the velocity limit that an optimal motion uses, and its square of the acceleration limit: a loop with damping 0.7
+/// overshoots a sinusoid by less than 5 %, and noise of the measured velocity comes on top.
+const SPEED_SHARE: f64 = 0.9;
+/// Condition number from which on a motion is called a poor one. Schröer 1993 asks for 100; at ten times that, noise of 1 % of
+/// the torque is 10 times the part of it that the worst combination has.
+const POOR_CONDITION: f64 = 1e3;
+
+/// Designs a motion within the robot's limits that tells its parameters apart.
+///
+/// The limits stand in the robot description under [joint.limits], and [[workspace]] for points of the links. The
+/// torque limit is kept by the inertia and friction written there, where they are. The same seed gives the same file.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Robot description (.toml or .urdf)
+    #[arg(long)]
+    pub(crate) robot: PathBuf,
+    /// File to write: .toml holds the motion's parameters (for the rig), .csv its samples
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Kind of motion; all but fourier move one joint
+    #[arg(long, value_enum, default_value_t = KindArg::Fourier)]
+    pub(crate) kind: KindArg,
+    /// What is optimised [default: cond] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) criterion: Option<CriterionArg>,
+    /// Which parameters the motion is to tell apart [default: all] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) parameters: Option<ParametersArg>,
+    /// By what the columns of the regressor are divided before it is judged [default: sizes] (fourier)
+    #[arg(long, value_enum)]
+    pub(crate) scaling: Option<ScalingArg>,
+    /// Standard deviation of each joint's torque, comma between them, N*m or N [default: taken as a share of its
+    /// torque limit that is the same for all joints] (fourier)
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) torque_noise: Option<Vec<f64>>,
+    /// Harmonics per joint, 1 to 8 [default: 5] (fourier)
+    #[arg(long)]
+    pub(crate) harmonics: Option<usize>,
+    /// Period of the slowest harmonic, s [default: from the limits, 1 s at least] (fourier)
+    #[arg(long)]
+    pub(crate) period: Option<f64>,
+    /// Rise from rest to full amplitude and fall back to rest, each, s [default: one period] (fourier)
+    #[arg(long)]
+    pub(crate) ramp: Option<f64>,
+    /// Whole periods at full amplitude [default: 5] (fourier)
+    #[arg(long)]
+    pub(crate) periods: Option<u16>,
+    /// Joint positions at the beginning, comma between them, rad or m [default: free for fourier, else mid-range]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) start: Option<Vec<f64>>,
+    /// The joint that moves [default: the first] (all but fourier)
+    #[arg(long)]
+    pub(crate) joint: Option<String>,
+    /// Share of each position range that is kept free, half of it at each end, for what the controller is off by
+    /// [default: 0.1 for fourier; else the motion uses 80 % of the way from its start to the nearer limit]
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) margin: Option<f64>,
+    /// Share of the velocity limits that is used, and its square of the acceleration limits [default: 0.9 for fourier;
+    /// else 0.8 of both]. Begin with a small one on a robot that this motion is new to
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) speed_share: Option<f64>,
+    /// Distance to either side of the start, rad or m [default: from the limits] (all but fourier)
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) amplitude: Option<f64>,
+    /// Speed of reversals, or slowest and fastest of a sweep with a comma between them, rad/s or m/s [default: 0.8 % of the
+    /// limit; 0.4 to 80 %]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) speed: Option<Vec<f64>>,
+    /// Number of speeds, 2 to 16 [default: 12] (sweep)
+    #[arg(long)]
+    pub(crate) speeds: Option<usize>,
+    /// First and last frequency with a comma between them, Hz [default: from the limits] (chirp)
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) band: Option<Vec<f64>>,
+    /// Triangles, two reversals each, at each of three amplitudes [default: 2] (reversals)
+    #[arg(long)]
+    pub(crate) cycles: Option<u16>,
+    /// Random starts of the optimiser: more find better motions and take longer [default: 24] (fourier)
+    #[arg(long)]
+    pub(crate) starts: Option<u32>,
+    /// Seed of the random starts [default: 1] (fourier)
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Samples a second in a .csv, Hz
+    #[arg(long, default_value_t = 1000.0)]
+    pub(crate) rate: f64,
+    /// Replace the file if it exists
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Design the motion although the limits look like degrees
+    #[arg(long)]
+    pub(crate) even_if_wrong: bool,
+}
+
+impl Args {
+    /// Refuses what this kind of motion would leave unused.
+    fn refuse_unused(&self) -> Result<(), CommandError> {
+        let of_fourier = [
+            ("--criterion", self.criterion.is_some()),
+            ("--parameters", self.parameters.is_some()),
+            ("--scaling", self.scaling.is_some()),
+            ("--torque-noise", self.torque_noise.is_some()),
+            ("--harmonics", self.harmonics.is_some()),
+            ("--period", self.period.is_some()),
+            ("--ramp", self.ramp.is_some()),
+            ("--periods", self.periods.is_some()),
+            ("--starts", self.starts.is_some()),
+            ("--seed", self.seed.is_some()),
+        ];
+        let unused = of_fourier.iter().find(|(_, given)| *given);
+        let staged = [
+            (
+                "--amplitude",
+                self.amplitude.is_some(),
+                &KindArg::STAGED[..],
+            ),
+            (
+                "--speed",
+                self.speed.is_some(),
+                &[KindArg::Reversals, KindArg::Sweep],
+            ),
+            ("--speeds", self.speeds.is_some(), &[KindArg::Sweep]),
+            ("--band", self.band.is_some(), &[KindArg::Chirp]),
+            ("--cycles", self.cycles.is_some(), &[KindArg::Reversals]),
+        ];
+        if let Some((option, _, kinds)) =
+            (staged.iter()).find(|(_, given, kinds)| *given && !kinds.contains(&self.kind))
+        {
+            let names: Vec<String> = kinds
+                .iter()
+                .filter_map(|kind| kind.to_possible_value())
+                .map(|value| value.get_name().to_owned())
+                .collect();
+            return Err(CommandError::Sentence(format!(
+                "{option} belongs to --kind {}; leave it out, or give that kind.",
+                names.join(", ")
+            )));
+        }
+        match (self.kind.staged(), &self.joint, unused) {
+            (None, Some(joint), _) => Err(CommandError::Sentence(format!(
+                "--joint {joint} names the one joint that moves, but --kind fourier moves all of them; give --kind chirp, staircase, reversals or sweep, or leave --joint out."
+            ))),
+            (Some(kind), _, Some((option, _))) => Err(CommandError::Sentence(format!(
+                "{option} belongs to --kind fourier, but a {} is sized by the limits and its own options; leave it out, or give --kind fourier.",
+                kind.name()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is asked of a motion of one joint.
+    ///
+    /// # Errors
+    /// A band that is no pair.
+    fn staged_options(&self) -> Result<StagedOptions, CommandError> {
+        let band = match self.band.as_deref() {
+            None => None,
+            Some(&[low, high]) => Some([low, high]),
+            Some(other) => {
+                return Err(CommandError::Sentence(format!(
+                    "--band has {} numbers; give two, the first and the last frequency in Hz, as 0.5,20.",
+                    other.len()
+                )));
+            }
+        };
+        Ok(StagedOptions {
+            joint: self.joint.clone(),
+            start: self.start.clone(),
+            margin: self.margin,
+            speed_share: self.speed_share,
+            amplitude: self.amplitude,
+            speeds: self.speed.clone(),
+            count: self.speeds,
+            band,
+            cycles: self.cycles,
+        })
+    }
+}
+
+/// Condition number beyond which a combination of parameters is lost in the rounding of single precision, in which the rig and
+/// many loggers hold torques: 1/2⁻²³.
+const TELLS_NOTHING: f64 = 1.0 / f32::EPSILON as f64;
+/// What mends that.
+const MORE_MOTION: &str = "give a longer --period, more range or more --harmonics";
+
+/// What a motion is not checked against; printed with each.
+const NOT_LOOKED_AT: &str = "Not looked at: self-collision, table and other objects, cables. The limits hold for the reference alone; a controller goes beyond it (--margin and --speed-share leave it room). Watch a first run at low speed, as with --speed-share 0.2, and keep the emergency stop at hand.";
+
+/// Runs the command.
+///
+/// # Errors
+/// A description or options that do not serve, no motion within the limits, a file that cannot be written.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    args.refuse_unused()?;
+    refuse_file(&args.out, args.force)?;
+    let robot = described(&args.robot, ui)?.robot;
+    if !args.even_if_wrong && !robot.limits_in_degrees().is_empty() {
+        return Err(CommandError::Implausible(
+            "A motion sized by limits that look like degrees may break the robot, so none was designed; correct the limits, or give --even-if-wrong where they are right.".to_owned(),
+        ));
+    }
+    let Some(kind) = args.kind.staged() else {
+        return optimal(args, &robot, ui);
+    };
+    let (file, notes) = staged(&robot, kind, &args.staged_options()?)?;
+    file.save(&args.out, &robot, args.rate)?;
+    for note in notes {
+        ui.remark(&note);
+    }
+    ui.say(&format!(
+        "{}: the motion, {} of {:.1} s.",
+        args.out.display(),
+        kind.name(),
+        file.duration()
+    ));
+    ui.say(NOT_LOOKED_AT);
+    Ok(())
+}
+
+fn optimal(args: &Args, robot: &Robot, ui: &Ui) -> Result<(), CommandError> {
+    let default = Options::default();
+    let options = Options {
+        criterion: match args.criterion {
+            None => default.criterion,
+            Some(CriterionArg::Cond) => Criterion::ConditionNumber,
+            Some(CriterionArg::MinSingular) => Criterion::SmallestSingularValue,
+            Some(CriterionArg::DOptimal) => Criterion::Determinant,
+        },
+        parameters: match args.parameters {
+            None => default.parameters,
+            Some(ParametersArg::All) => Parameters::All,
+            Some(ParametersArg::Links) => Parameters::Links,
+        },
+        scaling: match args.scaling {
+            None => default.scaling,
+            Some(ScalingArg::Sizes) => Scaling::Sizes,
+            Some(ScalingArg::None) => Scaling::None,
+        },
+        torque_noise: args.torque_noise.clone(),
+        harmonics: args.harmonics.unwrap_or(default.harmonics),
+        period: args.period,
+        periods: args.periods.unwrap_or(default.periods),
+        ramp: args.ramp,
+        start: args.start.clone(),
+        margin: args.margin.unwrap_or(MARGIN),
+        speed_share: args.speed_share.unwrap_or(SPEED_SHARE),
+        starts: args.starts.unwrap_or(default.starts),
+        seed: args.seed.unwrap_or(default.seed),
+        threads: None,
+    };
+    let mut progress = ui.progress("designing the motion", 1);
+    let found = design(robot, &options, |done, total| progress.at_of(done, total))?;
+    drop(progress);
+    for note in &found.notes {
+        ui.remark(note);
+    }
+    let condition = found.values.condition_number;
+    if condition > TELLS_NOTHING {
+        return Err(CommandError::Sentence(format!(
+            "This motion identifies nothing: its condition number is {}, so that some combination of parameters moves the torque that many times less than the others. Nothing was written; {MORE_MOTION}.",
+            number(condition)
+        )));
+    }
+    found.file.save(&args.out, robot, args.rate)?;
+    for line in summary(&found, robot) {
+        ui.say(&line);
+    }
+    ui.say(&format!(
+        "{}: the motion, {:.1} s from rest to rest. Try it with `rig simulate --robot {} --trajectory {} --out run.csv`, or run it on the robot and record.",
+        args.out.display(),
+        found.file.duration(),
+        args.robot.display(),
+        args.out.display()
+    ));
+    ui.say(NOT_LOOKED_AT);
+    Ok(())
+}
+
+/// A condition number with the digits that mean something.
+fn number(condition: f64) -> String {
+    if condition < 1e6 {
+        format!("{condition:.3}")
+    } else {
+        format!("{condition:.1e}")
+    }
+}
+
+/// What the condition number means.
+fn verdict(condition: f64) -> String {
+    if condition < 100.0 {
+        "good (below 100)".into()
+    } else if condition < POOR_CONDITION {
+        "usable (100 to 1000)".into()
+    } else {
+        format!(
+            "poor: some combination of parameters moves the torque {condition:.0e} times less than the others and will not be identified; {MORE_MOTION}"
+        )
+    }
+}
+
+/// What the design achieves, line by line.
+fn summary(found: &Design, robot: &Robot) -> Vec<String> {
+    let values = &found.values;
+    let mut lines = vec![
+        format!(
+            "For the {} base parameters {}:",
+            found.base_parameters.len(),
+            found.base_parameters.join(", ")
+        ),
+        format!(
+            "condition number {} with columns scaled by their sizes ({} in SI units), {}; smallest singular value {:.3}, mean {:.3}.",
+            number(values.condition_number),
+            number(values.si_condition_number),
+            verdict(values.condition_number),
+            values.smallest_singular_value,
+            values.mean_singular_value
+        ),
+    ];
+    for (joint, reach) in robot.joints.iter().zip(&found.reach) {
+        let torque = reach
+            .torque
+            .map_or(String::new(), |t| format!(", torque {t:.3}"));
+        lines.push(format!(
+            "Joint \"{}\" stays within position {:.3} to {:.3}, velocity {:.3}, acceleration {:.3}{torque} (SI units).",
+            joint.name, reach.position[0], reach.position[1], reach.velocity, reach.acceleration
+        ));
+    }
+    for edge in &found.clearances {
+        let [x, y, z] = edge.normal;
+        lines.push(format!(
+            "The point of joint \"{}\" keeps {:.4} m from the edge of its region (normal {x:.3}, {y:.3}, {z:.3}).",
+            edge.joint, edge.distance
+        ));
+    }
+    lines
+}

@@ -1,0 +1,196 @@
+//! `rig friction-map`: friction over speed, from a sweep of constant speeds.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args as ClapArgs;
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line, recordings, refuse_faults};
+use super::overwrite::refuse_folder;
+use super::ui::Ui;
+use crate::pages;
+use crate::pages::Context;
+use rig_identify::{DroppedPass, FrictionMap, FrictionMapOptions, Options, friction_map, identify};
+use rig_model::robot::{JointKind, Robot};
+use rig_output::format_significant;
+use rig_output::{can_take, folder, write_whole};
+
+/// Draws friction over speed from a recording of a friction sweep.
+///
+/// Gravity and inertia are taken from an identification on the recordings given with --data; the sweep's
+/// stretches of constant speed give one point each. They come from the recorded reference (ref<k>), without one from the
+/// position. The sweep may have another sample rate. Stretches that give no point are listed with the reason.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording of an excitation, from which gravity and inertia are identified
+    #[arg(long, required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// Recording of the friction sweep
+    #[arg(long)]
+    sweep: PathBuf,
+    /// Joint, by name or counted from 1
+    #[arg(long, default_value = "1")]
+    joint: String,
+    /// Draw the map although columns of the recordings look wrong (sign, unit, ratio, clock, swapped); says what looks wrong
+    #[arg(long)]
+    even_if_wrong: bool,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
+/// The joint of that name or number.
+fn joint_of(robot: &Robot, given: &str) -> Result<usize, CommandError> {
+    let by_number = || {
+        let number = given.parse::<usize>().ok()?.checked_sub(1)?;
+        (number < robot.joints.len()).then_some(number)
+    };
+    robot.joint_index(given).or_else(by_number).ok_or_else(|| {
+        let names: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+        CommandError::Sentence(format!(
+            "--joint {given} does not exist: the joints of {} are {}, or 1 to {}.",
+            robot.name,
+            names.join(", "),
+            names.len()
+        ))
+    })
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming the file, line or value at fault.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &["friction-map.json", "report.html"])?;
+    refuse_folder(&args.out, &[], args.force)?;
+    let robot = args.robot.load(ui)?;
+    let joint = joint_of(&robot, &args.joint)?;
+    let training = Inputs::read(&robot, &args.data)?;
+    let sweep = Inputs::read(&robot, std::slice::from_ref(&args.sweep))?;
+    for warning in training.warnings().chain(sweep.warnings()) {
+        ui.remark(&warning);
+    }
+    refuse_faults(
+        &robot,
+        &[&training, &sweep],
+        sweep.strange_references(&robot)?,
+        args.even_if_wrong,
+        ui,
+    )?;
+    let identification = identify(
+        &robot,
+        &recordings(&training.listened()),
+        &[],
+        &Options::default(),
+    )?;
+    for source in recordings(&sweep.listened()) {
+        let drawn = friction_map(
+            &robot,
+            &identification,
+            source,
+            joint,
+            FrictionMapOptions::default(),
+        );
+        if drawn.is_err() {
+            // Rows that are missing may be why.
+            sweep.heard().iter().for_each(|warning| ui.remark(warning));
+        }
+        let map = drawn?;
+        if !map.doubts.is_empty() && !args.even_if_wrong {
+            return Err(CommandError::Implausible(format!(
+                "{} Nothing was written; --even-if-wrong draws the map all the same.",
+                map.doubts.join(" ")
+            )));
+        }
+        let mut heard = [training.heard(), sweep.heard(), map.doubts.clone()].concat();
+        heard.extend([training.outside(), sweep.outside()].concat());
+        heard.extend(map.note.clone());
+        for warning in &heard {
+            ui.remark(warning);
+        }
+        let warnings = training.warnings().chain(sweep.warnings()).chain(heard);
+        write(&args.out, &robot, &map, warnings.collect())?;
+        for line in lines(&map, robot.joints[joint].kind) {
+            ui.say(&line);
+        }
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// Writes the map as JSON and as a page into a folder.
+///
+/// # Errors
+/// What the system says of a file.
+fn write(
+    out: &Path,
+    robot: &Robot,
+    map: &FrictionMap,
+    warnings: Vec<String>,
+) -> Result<(), CommandError> {
+    let context = Context {
+        command: command_line(),
+        warnings,
+        ..Context::default()
+    };
+    folder(out)?;
+    let json = serde_json::to_string_pretty(map).map_err(|error| {
+        CommandError::Sentence(format!("The map cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&out.join("friction-map.json"), (json + "\n").as_bytes())?;
+    rig_report::write(
+        &out.join("report.html"),
+        &pages::friction_map(robot, map, &context),
+    )?;
+    Ok(())
+}
+
+/// What is printed: which stretches gave points, which not and why, the law, the decision.
+fn lines(map: &FrictionMap, kind: JointKind) -> Vec<String> {
+    let (velocity, torque, viscous) = match kind {
+        JointKind::Revolute => ("rad/s", "N·m", "N·m·s/rad"),
+        JointKind::Prismatic => ("m/s", "N", "N·s/m"),
+    };
+    let speeds = map.points.iter().map(|p| p.speed.abs());
+    let (slow, fast) = speeds.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+    let mut lines = vec![format!(
+        "{} of {} stretches of constant speed, from {}, give points from {} to {} {velocity}.",
+        map.points.len(),
+        map.points.len() + map.dropped.len(),
+        if map.from_reference {
+            "the reference"
+        } else {
+            "the position (no ref column with such stretches was recorded)"
+        },
+        format_significant(slow, 3),
+        format_significant(fast, 3),
+    )];
+    lines.extend(map.dropped.iter().map(|pass: &DroppedPass| {
+        format!(
+            "left out: {} {velocity} at {:.2} s, {}.",
+            format_significant(pass.speed, 3),
+            pass.start,
+            pass.why
+        )
+    }));
+    let fit = map.stribeck.as_ref().unwrap_or(&map.simple);
+    let value = |value: f64, k: usize| {
+        let half = fit.half_interval.get(k).copied().unwrap_or(f64::NAN);
+        rig_output::format_value(value, half)
+    };
+    lines.push(format!(
+        "Coulomb {} {torque}, viscous {} {viscous} (± half the 95 % interval).",
+        value(fit.coulomb, 0),
+        value(fit.viscous, 1)
+    ));
+    lines.push(map.text.clone());
+    lines
+}

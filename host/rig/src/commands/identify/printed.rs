@@ -1,0 +1,136 @@
+//! What `rig identify` says on the terminal.
+
+use super::super::ui::Ui;
+use rig_identify::{Estimator, Identification, NotExcited, StandardSet};
+use rig_output::{format_interval, format_value};
+
+/// Share of rows from which on a figure is over as good as all of them.
+const ALL_BUT_A_FEW: f64 = 0.985;
+
+/// The result at a glance.
+pub(super) fn print(ui: &Ui, result: &Identification) {
+    let width = result
+        .base_parameters
+        .iter()
+        .map(|p| p.expression.chars().count())
+        .max()
+        .unwrap_or(0);
+    for parameter in &result.base_parameters {
+        ui.say(&format!(
+            "{:width$}  {} {}  (95 %: {})",
+            parameter.expression,
+            format_value(parameter.value, parameter.std),
+            parameter.unit,
+            format_interval(parameter.interval, parameter.value, parameter.std),
+        ));
+    }
+    for joint in &result.joints {
+        let held = (
+            joint.holdout_relative_error,
+            joint.holdout_rows_share,
+            joint.holdout_relative_error_all_rows,
+        );
+        let holdout = match held {
+            (Some(error), ..) if error.is_nan() => {
+                ", no row of the hold-out left to judge by".to_owned()
+            }
+            (Some(error), Some(share), Some(all)) => {
+                format!(", on the hold-out {}", left(error, share, all))
+            }
+            _ => String::new(),
+        };
+        if joint.train_residual_rms.is_nan() {
+            ui.say(&format!(
+                "{}: none of its torque was used{holdout}",
+                joint.name
+            ));
+            continue;
+        }
+        ui.say(&format!(
+            "{}: residual {:.4} rms, {}{holdout}",
+            joint.name,
+            joint.train_residual_rms,
+            left(
+                joint.train_relative_error,
+                joint.train_rows_share,
+                joint.train_relative_error_all_rows
+            ),
+        ));
+    }
+    if result.estimator != Estimator::Consistent
+        && let Some(set) = &result.standard_parameters
+    {
+        ui.say(&of_the_files(set));
+    }
+    for line in not_excited(&result.not_excited) {
+        ui.say(&line);
+    }
+    for sentence in &result.procedure {
+        ui.say(sentence);
+    }
+    if let Some(comparison) = &result.comparison {
+        ui.say(&comparison.recommendation);
+    }
+    for warning in &result.warnings {
+        ui.remark(warning);
+    }
+}
+
+/// How much of the torque is left, over how many of the rows, and over all of them.
+fn left(error: f64, share: f64, all: f64) -> String {
+    let error = format!("{:.2} % of the torque", 100.0 * error);
+    match share {
+        // A few rows at reversals change nothing that is worth a word.
+        ALL_BUT_A_FEW.. => error,
+        _ => format!(
+            "{error} on {:.0} % of the rows, {:.2} % on all",
+            100.0 * share,
+            100.0 * all
+        ),
+    }
+}
+
+/// What the set that is written leaves, where that is not what was fitted.
+fn of_the_files(set: &StandardSet) -> String {
+    let percent = |errors: &[f64]| {
+        let list: Vec<String> = errors.iter().map(|e| format!("{:.1}", 100.0 * e)).collect();
+        list.join(", ")
+    };
+    let held = set.holdout_relative_error.as_ref();
+    let held = held.map_or(String::new(), |errors| {
+        format!(", on the hold-out {} %", percent(errors))
+    });
+    format!(
+        "identified.toml and identified.urdf hold the nearest set that bodies can have (--estimator consistent fits it): it leaves {} % of the torque{held}.",
+        percent(&set.train_relative_error)
+    )
+}
+
+/// One line for each motion that would show more, with all that it would show.
+fn not_excited(list: &[NotExcited]) -> Vec<String> {
+    let mut by_motion: Vec<(&str, Vec<&NotExcited>)> = Vec::new();
+    for missing in list {
+        match by_motion
+            .iter_mut()
+            .find(|(motion, _)| *motion == missing.motion)
+        {
+            Some((_, own)) => own.push(missing),
+            None => by_motion.push((&missing.motion, vec![missing])),
+        }
+    }
+    let lines = by_motion.iter().map(|(motion, own)| match own.as_slice() {
+        [missing] => format!(
+            "not excited: {} ({}); {motion}",
+            missing.combination, missing.why
+        ),
+        several => {
+            let names: Vec<&str> = several.iter().map(|m| m.combination.as_str()).collect();
+            format!("not excited: {}; {motion}", names.join("; "))
+        }
+    });
+    let mut lines: Vec<String> = lines.collect();
+    if by_motion.iter().any(|(_, own)| own.len() > 1) {
+        lines.push("How well these data alone know each of them stands in the report.".into());
+    }
+    lines
+}

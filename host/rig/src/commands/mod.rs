@@ -1,0 +1,79 @@
+//! The program's verbs, one file each: arguments in, library called, results named.
+
+mod base;
+mod board;
+mod demo;
+mod diagnose;
+mod error;
+mod excite;
+mod flash;
+mod friction_map;
+mod identify;
+mod init;
+mod input;
+mod interrupts;
+mod overwrite;
+mod pictures;
+mod record;
+mod simulate;
+mod ui;
+mod urdf;
+mod validate;
+
+use clap::{Parser, Subcommand};
+
+pub use error::CommandError;
+use ui::Ui;
+
+/// Identifies a robot's dynamics and friction: record, identify, validate, diagnose, compensate.
+///
+/// Without a command: the demonstration, which needs no hardware.
+#[derive(Debug, Parser)]
+#[command(name = "rig", version)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Init(init::Args),
+    Record(record::Args),
+    Board(board::Args),
+    Flash(flash::Args),
+    Excite(excite::Args),
+    Simulate(simulate::Args),
+    Base(base::Args),
+    Urdf(urdf::Args),
+    Identify(identify::Args),
+    FrictionMap(friction_map::Args),
+    Validate(validate::Args),
+    Diagnose(diagnose::Args),
+}
+
+impl Cli {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// The sentence for the person at the terminal.
+    pub fn run(self) -> Result<(), CommandError> {
+        let ui = Ui::new();
+        match self.command {
+            None => demo::run(&demo::Args::default(), &ui),
+            Some(Command::Demo(args)) => demo::run(&args, &ui),
+            Some(Command::Init(args)) => init::run(&args, &ui),
+            Some(Command::Record(args)) => record::run(&args, &ui),
+            Some(Command::Board(args)) => board::run(&args, &ui),
+            Some(Command::Flash(args)) => flash::run(&args, &ui),
+            Some(Command::Excite(args)) => excite::run(&args, &ui),
+            Some(Command::Simulate(args)) => simulate::run(&args, &ui),
+            Some(Command::Base(args)) => base::run(&args, &ui),
+            Some(Command::Urdf(args)) => urdf::run(&args, &ui),
+            Some(Command::Identify(args)) => identify::run(&args, &ui),
+            Some(Command::FrictionMap(args)) => friction_map::run(&args, &ui),
+            Some(Command::Validate(args)) => validate::run(&args, &ui),
+            Some(Command::Diagnose(args)) => diagnose::run(&args, &ui),
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! One rule for all commands: nothing is overwritten without `--force`.
+
+use std::path::{Path, PathBuf};
+
+use super::error::CommandError;
+
+/// Whatever commands write into a folder of results under a fixed name.
+///
+/// A folder that holds any of them is refused by all commands: results of two commands side by side share the name
+/// report.html, and a file that a later run does not write again would be taken for one of its own.
+const RESULTS: [&str; 10] = [
+    "report.html",
+    "identified.toml",
+    "identified.urdf",
+    "identification.json",
+    "validation.json",
+    "model.toml",
+    "diagnosis.json",
+    "diagnosis.html",
+    "next_experiment.toml",
+    "friction-map.json",
+];
+
+/// What the demonstration writes besides. Other commands leave such files alone, which may be the user's own recordings.
+pub(crate) const DEMONSTRATION: [&str; 7] = [
+    "train.csv",
+    "train-again.csv",
+    "holdout.csv",
+    "sweep.csv",
+    "slow-without.csv",
+    "slow-with.csv",
+    "tracking.svg",
+];
+
+/// Refuses a file that exists.
+///
+/// # Errors
+/// [`CommandError::Exists`].
+pub(crate) fn refuse_file(path: &Path, force: bool) -> Result<(), CommandError> {
+    // A link to nothing is there, too.
+    if path.symlink_metadata().is_ok() && !force {
+        return Err(CommandError::Exists { path: path.into() });
+    }
+    Ok(())
+}
+
+/// Refuses a folder that holds results of any command, or a file of the names in `besides`.
+///
+/// # Errors
+/// [`CommandError::Results`].
+pub(crate) fn refuse_folder(
+    path: &Path,
+    besides: &[&'static str],
+    force: bool,
+) -> Result<(), CommandError> {
+    match held(path, besides) {
+        Some(file) if !force => Err(CommandError::Results {
+            folder: path.into(),
+            file,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The first result that a folder holds.
+fn held(folder: &Path, besides: &[&'static str]) -> Option<&'static str> {
+    (RESULTS.iter().chain(besides).copied())
+        .find(|name| folder.join(name).symlink_metadata().is_ok())
+}
+
+/// `name`, or where that holds results or files of the names in `besides` `name-2`, `name-3` and so on.
+pub(crate) fn free_folder(name: &str, besides: &[&'static str]) -> PathBuf {
+    let numbered = (2u32..).map(|k| PathBuf::from(format!("{name}-{k}")));
+    std::iter::once(PathBuf::from(name))
+        .chain(numbered)
+        .find(|folder| held(folder, besides).is_none())
+        .unwrap_or_else(|| PathBuf::from(name))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_a_command_wrote_is_in_the_way_of_every_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        assert!(refuse_folder(&path.join("new"), &[], false).is_ok());
+        std::fs::write(path.join("notes.txt"), "mine").unwrap();
+        assert!(refuse_folder(path, &[], false).is_ok());
+        for name in RESULTS {
+            std::fs::write(path.join(name), "").unwrap();
+            let refused = refuse_folder(path, &[], false).unwrap_err().to_string();
+            assert!(
+                refused.contains(name) && refused.contains("--force"),
+                "{refused}"
+            );
+            assert!(refuse_folder(path, &[], true).is_ok());
+            std::fs::remove_file(path.join(name)).unwrap();
+        }
+        // A user's own recording is in the way of the demonstration alone, which would write it.
+        std::fs::write(path.join("train.csv"), "mine").unwrap();
+        assert!(refuse_folder(path, &[], false).is_ok());
+        assert!(refuse_folder(path, &DEMONSTRATION, false).is_err());
+        assert!(refuse_file(&path.join("notes.txt"), false).is_err());
+        assert!(refuse_file(&path.join("notes.txt"), true).is_ok());
+        assert!(refuse_file(&path.join("other.txt"), false).is_ok());
+    }
+}

@@ -1,0 +1,46 @@
+//! The figures of a diagnosis as files of their own.
+
+use std::path::Path;
+
+use super::error::CommandError;
+use crate::pages;
+use crate::pages::PICTURE_NAMES;
+use rig_diagnose::outcome::Diagnosis;
+use rig_report::{self, ReportError};
+
+/// More figures of one kind than any diagnosis has.
+const MOST: usize = 64;
+
+/// Writes the figures, and takes those of an earlier result away.
+///
+/// # Errors
+/// A figure that cannot be drawn, a file that cannot be written or removed.
+pub(super) fn write(out: &Path, found: &Diagnosis) -> Result<(), CommandError> {
+    let all = PICTURE_NAMES
+        .iter()
+        .flat_map(|kind| (1..=MOST).map(move |k| format!("{kind}-{k}.svg")));
+    for old in all {
+        forget(&out.join(old))?;
+    }
+    for (name, plot) in &pages::pictures(found) {
+        match rig_report::write_svg(&out.join(name), plot) {
+            // The report says so in its place.
+            Err(ReportError::NothingToDraw { .. }) => {}
+            written => written?,
+        }
+    }
+    Ok(())
+}
+
+/// Takes a file of an earlier result away, which nobody is to take for one of this.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub(super) fn forget(path: &Path) -> Result<(), CommandError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(CommandError::Sentence(
+            format!("{} cannot be removed: {error}.", path.display()),
+        )),
+        _ => Ok(()),
+    }
+}

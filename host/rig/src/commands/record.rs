@@ -1,0 +1,405 @@
+//! `rig record`: a trajectory run on the rig, or the rig at rest, recorded.
+
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgGroup, Args as ClapArgs};
+use rig_shared::safety::{FaultRecord, Limit, Mode};
+use rig_shared::wire::message::RequestBody;
+
+use super::error::CommandError;
+use super::input::described;
+use super::interrupts;
+use super::overwrite::refuse_file;
+use super::ui::Ui;
+use rig_data::{Column, RecordingWriter};
+use rig_excite::{JointTrajectory, TrajectoryFile};
+use rig_link::experiment::{Experiment, run as run_experiment};
+use rig_link::serial::DEFAULT_BAUD;
+use rig_link::{
+    COLUMNS, Converter, EmulatedPort, Event, LossReport, Port, SerialLine, Session,
+    SessionSettings, UNITS, describe_fault,
+};
+use rig_model::robot::{ONE_LINK_TEMPLATE, Robot};
+use rig_plant::PlantConfig;
+use rig_plant::emulated::{EmulatedRig, Nameplate, hardware_of, other_link, shortfalls, upload};
+
+/// Records the rig's telemetry, at rest or while it runs a trajectory.
+#[derive(Debug, ClapArgs)]
+#[command(group = ArgGroup::new("where").required(true).args(["port", "probe", "emulated"]))]
+pub(crate) struct Args {
+    /// Serial port of the rig, such as /dev/ttyACM0 or COM3
+    #[arg(long)]
+    port: Option<String>,
+    /// The board's debug probe instead of its serial port
+    #[arg(long)]
+    probe: bool,
+    /// The emulated rig instead of hardware
+    #[arg(long)]
+    emulated: bool,
+    /// Speed of the serial port, baud
+    #[arg(long, default_value_t = DEFAULT_BAUD)]
+    baud: u32,
+    /// Robot description whose model, friction and limits are sent to the rig first
+    #[arg(long)]
+    robot: Option<PathBuf>,
+    /// Trajectory to run (`rig excite` writes one); without it the rig stays disarmed
+    #[arg(long)]
+    trajectory: Option<PathBuf>,
+    /// How long to record after the trajectory or its drive_off, or in all without one, s
+    #[arg(long, default_value_t = 1.0)]
+    seconds: f64,
+    /// Where the link stands at the start, rad: an incremental encoder cannot know
+    #[arg(long, allow_negative_numbers = true)]
+    home: Option<f32>,
+    /// Compensate friction and effects by the description
+    #[arg(long, requires = "robot")]
+    precompensation: bool,
+    /// Seed of the emulated rig
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Which recording of the emulated rig this is: another one of the same motion differs by noise
+    #[arg(long, default_value_t = 1)]
+    run: u32,
+    /// Replace the recording if it exists
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// File to write, .csv or .mcap
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence: the port, the rig's refusal, the file.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
+        return Err(CommandError::Sentence(format!(
+            "--seconds {} is no time; give 0 or more.",
+            args.seconds
+        )));
+    }
+    refuse_file(&args.out, args.force)?;
+    let robot = match &args.robot {
+        Some(path) => Some(described(path, ui)?.robot),
+        None => None,
+    };
+    let mut settings: Vec<RequestBody> = args
+        .home
+        .map(RequestBody::SetPosition)
+        .into_iter()
+        .collect();
+    if let Some(robot) = &robot {
+        settings.extend(if args.precompensation {
+            uploaded(robot, true, ui)?
+        } else {
+            upload::settings(&Nameplate::from_robot(robot)?, false)
+        });
+    }
+    let mut experiment = Experiment {
+        settings,
+        rest: args.seconds,
+        ..Experiment::default()
+    };
+    let mut motion = None;
+    if let Some(path) = &args.trajectory {
+        let file = TrajectoryFile::load(path)?;
+        if let Some(robot) = &robot {
+            file.fits(robot, path)?;
+        }
+        let joint = single(&file, path, args.home)?;
+        experiment.trajectory = Some(joint.trajectory.to_f32());
+        experiment.drive_off = file.drive_off;
+        motion = Some(joint.clone());
+    }
+    let losses = if let Some(name) = &args.port {
+        record(
+            SerialLine::open(name, args.baud)?,
+            &experiment,
+            &args.out,
+            ON_BOARD,
+            ui,
+        )?
+    } else if args.probe {
+        record(open_probe()?, &experiment, &args.out, ON_BOARD, ui)?
+    } else {
+        let robot = described_or_template(robot)?;
+        let rig = emulated_at(&robot, [args.seed, args.run.into()], args.home)?;
+        doubt(&rig, &robot, motion.as_ref(), ui)?;
+        record(EmulatedPort::new(rig), &experiment, &args.out, "", ui)?
+    };
+    ui.say(&format!("{}: {losses}", args.out.display()));
+    Ok(())
+}
+
+/// What a description asks the rig to be told, effects included; what is left out of it is said.
+pub(crate) fn uploaded(
+    robot: &Robot,
+    leave_out: bool,
+    ui: &Ui,
+) -> Result<Vec<RequestBody>, CommandError> {
+    let upload = upload::requests(robot, leave_out)?;
+    for sentence in &upload.left_out {
+        ui.say(&format!("Left out: {sentence}."));
+    }
+    Ok(upload.requests)
+}
+
+/// The emulated rig: a laboratory's, with drive, encoder and nameplate of this description or of the template.
+pub(crate) fn emulated(robot: Option<Robot>, seed: u64) -> Result<EmulatedRig, CommandError> {
+    emulated_at(&described_or_template(robot)?, [seed, 1], None)
+}
+
+fn described_or_template(robot: Option<Robot>) -> Result<Robot, CommandError> {
+    match robot {
+        Some(robot) => Ok(robot),
+        None => Ok(Robot::from_toml(
+            ONE_LINK_TEMPLATE,
+            Path::new("one-link.toml"),
+        )?),
+    }
+}
+
+/// The same in one of its recordings (counted from 1), its link held where it is said to stand, if that is not where it hangs.
+fn emulated_at(
+    described: &Robot,
+    [seed, run]: [u64; 2],
+    home: Option<f32>,
+) -> Result<EmulatedRig, CommandError> {
+    let nameplate = Nameplate::from_robot(described)?;
+    let mut plant = PlantConfig::laboratory_with(&hardware_of(described)?, seed);
+    let hangs = plant.initial_position;
+    let home = home.map_or(hangs, f64::from);
+    if (home - hangs).abs() > HANGS {
+        // Who says straight down of where it hangs is off by as much wherever else he brings it: the rig has one zero.
+        let stands = home + (hangs + FRAC_PI_2);
+        (plant.initial_position, plant.sensors.encoder.zero) = (stands, stands);
+        plant.held = true;
+    }
+    let noise = seed ^ (run.wrapping_sub(1) << u32::BITS);
+    EmulatedRig::new(&nameplate, plant, noise).map_err(|fault| {
+        CommandError::Sentence(format!(
+            "The estimator's settings cannot be used: {fault:?}."
+        ))
+    })
+}
+
+/// Says where the description's link cannot be the emulated one, and where its motor is too weak for the motion of that.
+///
+/// # Errors
+/// What is missing in the description.
+fn doubt(
+    rig: &EmulatedRig,
+    robot: &Robot,
+    motion: Option<&JointTrajectory>,
+    ui: &Ui,
+) -> Result<(), CommandError> {
+    let nameplate = Nameplate::from_robot(robot)?;
+    let plant = rig.plant().config();
+    if let Some(sentence) = other_link(plant, &nameplate, robot) {
+        ui.remark(&sentence);
+    }
+    let Some(motion) = motion else { return Ok(()) };
+    let short = shortfalls(plant, &nameplate, &motion.trajectory, motion.start);
+    if !short.is_empty() {
+        ui.remark(&format!(
+            "The described drive is too weak to move the link of the emulated rig like this. {} Design a slower or smaller motion from this description (`rig excite --speed-share`), or describe another drive.",
+            short.join(" ")
+        ));
+    }
+    Ok(())
+}
+
+/// The rig behind the debug probe.
+#[cfg(feature = "probe")]
+pub(crate) fn open_probe() -> Result<rig_link::ProbeLine, CommandError> {
+    Ok(rig_link::ProbeLine::open()?)
+}
+
+/// A program without this ability says so.
+#[cfg(not(feature = "probe"))]
+pub(crate) fn open_probe() -> Result<Box<dyn Port>, CommandError> {
+    Err(CommandError::Sentence(
+        "This program was built without the debug probe; build it with `cargo build --release --features probe`, or use the board's serial port with --port.".to_owned(),
+    ))
+}
+
+/// The motion of the rig's one joint, if it starts where the link stands.
+fn single<'a>(
+    file: &'a TrajectoryFile,
+    path: &Path,
+    home: Option<f32>,
+) -> Result<&'a JointTrajectory, CommandError> {
+    let [joint] = file.joints.as_slice() else {
+        return Err(CommandError::Sentence(format!(
+            "{} moves {} joints, but the rig has one; design it with `rig excite` from the rig's description.",
+            path.display(),
+            file.joints.len()
+        )));
+    };
+    let stands = f64::from(home.unwrap_or(0.0));
+    if (joint.start - stands).abs() > START_TOLERANCE {
+        return Err(CommandError::Sentence(format!(
+            "{} starts at {:.4} rad, but the link stands at {stands:.4} rad (--home); bring the link there, or design the motion with `rig excite --start {stands:.4}`.",
+            path.display(),
+            joint.start
+        )));
+    }
+    Ok(joint)
+}
+
+/// A link that is said to stand within this of where it hangs does hang, rad.
+const HANGS: f64 = 0.2;
+
+/// How far from its start a motion may begin, rad: about what a spirit level leaves. The rig checks its
+/// limits from where the link really stands.
+const START_TOLERANCE: f64 = 0.02;
+
+/// What a board tells of a fault after the recording; the emulated rig is gone with it.
+const ON_BOARD: &str =
+    " `rig board fault` fetches the ticks around it, `rig board clear` forgets it.";
+
+/// What is written beside the rows: firmware, modes and limits by number.
+fn metadata(firmware: &str) -> BTreeMap<String, String> {
+    let modes = names(&[
+        Mode::Calibrating,
+        Mode::Disarmed,
+        Mode::Holding,
+        Mode::Running,
+        Mode::Stopping,
+        Mode::Fault,
+    ]);
+    let limits = Limit::ALL
+        .map(|limit| format!("{} {}", limit as u8, limit.name()))
+        .join(", ");
+    BTreeMap::from([
+        ("firmware".to_string(), firmware.to_string()),
+        ("modes".to_string(), modes),
+        ("limits".to_string(), limits),
+    ])
+}
+
+/// Records an experiment to a file. `more` is added to the sentence about a fault.
+fn record<P: Port>(
+    port: P,
+    experiment: &Experiment,
+    out: &Path,
+    more: &str,
+    ui: &Ui,
+) -> Result<LossReport, CommandError> {
+    let mut session = Session::open(port, SessionSettings::default())?;
+    let greeting = session.greeting().clone();
+    let converter = Converter::new(&greeting);
+    let columns: Vec<Column> = COLUMNS
+        .iter()
+        .zip(UNITS)
+        .map(|(name, unit)| Column::new(name, unit))
+        .collect();
+    let mut writer = RecordingWriter::create(out, &columns, &metadata(&greeting.firmware))?;
+    let total = experiment.samples(1.0 / converter.period());
+    let mut progress = ui.progress("recording", total);
+    let mut failed = None;
+    let mut ending = Ending::default();
+    interrupts::listen(writer.temporary())?;
+    let recorded = run_experiment(&mut session, experiment, |event| {
+        match event {
+            Event::Samples {
+                first_tick,
+                samples,
+            } => {
+                for (k, sample) in samples.iter().enumerate() {
+                    if let Err(error) =
+                        writer.push_row(&converter.row(first_tick, k, sample).values())
+                    {
+                        failed = Some(error);
+                        return ControlFlow::Break(());
+                    }
+                }
+                ending.done += samples.len() as u64;
+                ending.mode = samples.last().map_or(ending.mode, |sample| sample.mode);
+                progress.at(ending.done);
+            }
+            Event::Fault(record) => ending.fault = Some(*record),
+            _ => {}
+        }
+        if interrupts::asked() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    let losses = match recorded {
+        Ok(losses) => losses,
+        Err(error) if ending.done == 0 => return Err(error.into()),
+        Err(error) => {
+            writer.finish()?;
+            return Err(CommandError::Sentence(format!(
+                "{error} {} holds the {} samples that came before; how many were lost is not known.",
+                out.display(),
+                ending.done
+            )));
+        }
+    };
+    writer.finish()?;
+    ending.judge(out, more, f64::from(greeting.control_rate_hz))?;
+    Ok(losses)
+}
+
+/// How a recording ended.
+struct Ending {
+    fault: Option<FaultRecord>,
+    mode: Mode,
+    /// Samples that came.
+    done: u64,
+}
+
+impl Default for Ending {
+    fn default() -> Self {
+        Self {
+            fault: None,
+            mode: Mode::Disarmed,
+            done: 0,
+        }
+    }
+}
+
+impl Ending {
+    /// # Errors
+    /// A sentence where a fault or the user ended the recording.
+    fn judge(&self, out: &Path, more: &str, control_rate: f64) -> Result<(), CommandError> {
+        let out = out.display();
+        if let Some(record) = &self.fault {
+            return Err(CommandError::Sentence(format!(
+                "The rig has stopped. {} {out} holds what was recorded until the end.{more}",
+                describe_fault(record, control_rate)
+            )));
+        }
+        if self.mode == Mode::Fault {
+            return Err(CommandError::Sentence(format!(
+                "The rig has a fault latched that was not announced while {out} was recorded: `rig board fault` says which, `rig board clear` forgets it."
+            )));
+        }
+        if interrupts::asked() {
+            return Err(CommandError::Sentence(format!(
+                "Broken off: the motion was stopped and the bridge switched off; {out} holds the {} samples until then.",
+                self.done
+            )));
+        }
+        Ok(())
+    }
+}
+
+fn names(modes: &[Mode]) -> String {
+    let list: Vec<String> = modes
+        .iter()
+        .enumerate()
+        .map(|(k, mode)| format!("{k} {}", mode.name()))
+        .collect();
+    list.join(", ")
+}

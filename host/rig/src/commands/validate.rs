@@ -1,0 +1,233 @@
+//! `rig validate`: a description against data that it was not made from.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args as ClapArgs;
+use serde::Serialize;
+
+use super::error::CommandError;
+use super::input::{Inputs, RobotArg, command_line, recordings};
+use super::overwrite::refuse_folder;
+use super::ui::Ui;
+use crate::pages;
+use crate::pages::Context;
+use rig_data::EffortNeed;
+use rig_diagnose::voltage::{DrivenBy, FreeRun, controller_terms, validate_voltage};
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+use rig_output::{can_take, folder, write_whole};
+use rig_report::{self, Document};
+use rig_validate::{Motion, Options, Validation, validate};
+
+/// Predicts torque and simulates motion on data not used before.
+///
+/// Where the description has a [joint.controller] for every joint, the motion is that of the closed loop that follows the
+/// recorded references; else the recorded torque drives the model, and a controller answers what it departs from the recorded
+/// motion by, as in `rig diagnose`.
+///
+/// Where one joint's motor voltage was recorded (u1, or duty1 with supply) and neither torque nor current, the model runs freely
+/// under voltage instead: in the closed loop of the controller that the recording shows, with the supply of the description, or
+/// under the recorded voltage. RMS and mean absolute error of the position are printed.
+///
+/// Writes validation.json and report.html into the folder given with --out.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    robot: RobotArg,
+    /// Recording to judge by, CSV or MCAP; one or more
+    #[arg(long, required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Replace results that the folder holds
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A sentence naming the file, line or value at fault.
+pub(crate) fn run(args: &Args, ui: &Ui) -> Result<(), CommandError> {
+    can_take(&args.out, &["validation.json", "report.html"])?;
+    refuse_folder(&args.out, &[], args.force)?;
+    let robot = args.robot.load(ui)?;
+    let (inputs, voltage) = opened(&robot, &args.data)?;
+    for warning in inputs.warnings() {
+        ui.remark(&warning);
+    }
+    if voltage {
+        for sentence in inputs.strange_references(&robot)? {
+            ui.remark(&format!(
+                "{sentence} The controller that moved the joint was looked for with these references."
+            ));
+        }
+        return under_voltage(args, ui, &robot, &inputs);
+    }
+    if let Some(fuller) = args.robot.fuller() {
+        ui.remark(&fuller);
+    }
+    let mut progress = ui.progress("validating", 1000);
+    let mut validation = validate(
+        &robot,
+        &recordings(&inputs.listened()),
+        &Options::default(),
+        &mut |share| {
+            progress.at((1000.0 * share) as u64);
+        },
+    )?;
+    drop(progress);
+    validation.warnings.extend(inputs.heard());
+    let context = Context {
+        command: command_line(),
+        warnings: inputs.warnings().collect(),
+        ..Context::default()
+    };
+    write(
+        &args.out,
+        &validation,
+        &pages::validation(&robot, &validation, &context),
+    )?;
+    say(args, ui, &summary(&validation), &validation.warnings);
+    Ok(())
+}
+
+/// The recordings, and whether the voltage is all that they know of what drives the joint: of a robot of one joint alone.
+fn opened(robot: &Robot, paths: &[PathBuf]) -> Result<(Inputs, bool), CommandError> {
+    if robot.joints.len() != 1 {
+        return Ok((Inputs::open(robot, paths)?, false));
+    }
+    let inputs = Inputs::open_with(robot, paths, EffortNeed::Optional)?;
+    if inputs.all_effort() {
+        return Ok((inputs, false));
+    }
+    match !inputs.any_effort() && inputs.any_voltage() {
+        true => Ok((inputs, true)),
+        // It says what is missing, and where.
+        false => Ok((Inputs::open(robot, paths)?, false)),
+    }
+}
+
+/// The answer, the warnings and where the report is.
+fn say(args: &Args, ui: &Ui, answer: &[String], warnings: &[String]) {
+    for line in answer {
+        ui.say(line);
+    }
+    for warning in warnings {
+        ui.remark(warning);
+    }
+    ui.say(&format!(
+        "report: {}",
+        args.out.join("report.html").display()
+    ));
+}
+
+/// Writes the result as JSON and as a page into a folder.
+fn write<T: Serialize>(out: &Path, found: &T, page: &Document) -> Result<(), CommandError> {
+    folder(out)?;
+    let json = serde_json::to_string_pretty(found).map_err(|error| {
+        CommandError::Sentence(format!("The result cannot be written as JSON: {error}."))
+    })?;
+    write_whole(&out.join("validation.json"), (json + "\n").as_bytes())?;
+    rig_report::write(&out.join("report.html"), page)?;
+    Ok(())
+}
+
+/// Validates a joint that is known by its voltage.
+fn under_voltage(args: &Args, ui: &Ui, robot: &Robot, inputs: &Inputs) -> Result<(), CommandError> {
+    let mut found = validate_voltage(robot, &recordings(&inputs.listened()))?;
+    found.warnings.extend(inputs.heard());
+    let context = Context {
+        command: command_line(),
+        warnings: inputs.warnings().collect(),
+        ..Context::default()
+    };
+    write(
+        &args.out,
+        &found,
+        &pages::validation_voltage(&found, &context),
+    )?;
+    let each = found.recordings.iter().map(|checked| {
+        let moved = moved(&checked.motion, Some(&checked.driven), &found.position_unit);
+        format!("{}, {}: {moved}", checked.recording, found.joint)
+    });
+    let all = moved(&found.motion, None, &found.position_unit);
+    let all = format!("all recordings, {}: {all}", found.joint);
+    let answer: Vec<String> = each.chain([all]).collect();
+    say(args, ui, &answer, &found.warnings);
+    Ok(())
+}
+
+/// What became of a free run, with what drove it.
+fn moved(run: &FreeRun, driven: Option<&DrivenBy>, unit: &str) -> String {
+    let how = match driven {
+        Some(DrivenBy::Controller { controller }) => format!(
+            " in the closed loop of the controller that the recording shows ({})",
+            controller_terms(controller, unit)
+        ),
+        Some(DrivenBy::RecordedVoltage) => " under the recorded voltage".to_owned(),
+        None => String::new(),
+    };
+    match run {
+        FreeRun::Followed {
+            rms, mean_absolute, ..
+        } => format!(
+            "position simulated{how} off by {} {unit} rms, {} {unit} mean absolute",
+            format_significant(*rms, 4),
+            format_significant(*mean_absolute, 4)
+        ),
+        FreeRun::Diverged { time, .. } => {
+            format!("the position simulated{how} diverges at {time:.2} s; a remark says why")
+        }
+    }
+}
+
+/// The result at a glance: one line a joint and recording for the torque, one for the motion.
+fn summary(validation: &Validation) -> Vec<String> {
+    let mut lines = Vec::new();
+    for checked in &validation.recordings {
+        for torque in &checked.torque {
+            if torque.residual.rows == 0 {
+                // A remark says why.
+                continue;
+            }
+            lines.push(format!(
+                "{}, {}: torque off by {} {} rms, {:.2} % of the torque",
+                checked.recording,
+                torque.joint,
+                format_significant(torque.residual.rms, 4),
+                torque.unit,
+                100.0 * torque.residual.relative_error
+            ));
+        }
+        match &checked.motion {
+            // A remark says why.
+            Motion::NotSimulated { .. } => {}
+            Motion::Simulated {
+                joints,
+                uncontrolled,
+                ..
+            } => lines.extend(joints.iter().map(|joint| {
+                format!(
+                    "{}, {}: position simulated {} off by {} {} rms, {:.2} % of the tracking error of {} {}; torque by {} {} rms",
+                    checked.recording,
+                    joint.joint,
+                    if uncontrolled.is_empty() {
+                        "in closed loop"
+                    } else {
+                        "under the recorded torque"
+                    },
+                    format_significant(joint.position_rms_error, 4),
+                    joint.position_unit,
+                    100.0 * joint.tracking_relative_error,
+                    format_significant(joint.tracking_rms, 4),
+                    joint.position_unit,
+                    format_significant(joint.torque_rms_error, 4),
+                    joint.torque_unit
+                )
+            })),
+        }
+    }
+    lines
+}

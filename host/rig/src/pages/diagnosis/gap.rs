@@ -1,0 +1,373 @@
+//! How large the gap is and where it sits.
+
+use super::{parts, words};
+use rig_diagnose::outcome::{Diagnosis, Map, Place, Residual, Waterfall};
+use rig_diagnose::what_falls;
+use rig_output::{format_p_value, format_significant};
+use rig_report::{self, Axis, Block, Column, Marker, Plot, Role, Section, Series, Style, Table};
+
+/// Letters for which there is room below the axis on a narrow window; longer names lose their laws or give way to numbers.
+const ROOM: usize = 48;
+/// A smaller share is none.
+const LEAST_SHARE: f64 = 0.005;
+/// From this ratio of highest to floor on, bars from zero would hide the last steps.
+const TALL: f64 = 20.0;
+
+/// From the description down to the noise floor.
+pub(super) fn waterfall(found: &Diagnosis) -> Option<Section> {
+    if found.waterfall.is_empty() {
+        return None;
+    }
+    let mut section = Section::new(
+        "gap",
+        "From the description down to the noise",
+        match found.residual {
+            Residual::Torque => {
+                "How much torque each model leaves unexplained: first the description as it was given (its own values), then the same equations with all their parameters fitted to the training data, then each effect added in turn. Where that reaches the noise floor, nothing but noise is left."
+            }
+            Residual::Position => {
+                "How far the position of each model runs away from the recorded one when it is driven by the motor voltage, from the first row of a recording to its last: first with the parameters fitted again, then with each effect added in turn. The line is the encoder's step, which no simulation can pass."
+            }
+        },
+    );
+    if !found.noise_floor_how.is_empty() {
+        section = section.with(Block::Text(format!(
+            "The noise floor. {}",
+            found.noise_floor_how
+        )));
+    }
+    let (moved, still): (Vec<&Waterfall>, Vec<&Waterfall>) =
+        found.waterfall.iter().partition(|w| {
+            found.waterfall.len() == 1 || found.steps.iter().any(|step| step.joint == w.joint)
+        });
+    section
+        .blocks
+        .extend(moved.iter().map(|w| Block::Plot(bars(found, w, ROOM))));
+    if !still.is_empty() {
+        section.blocks.push(Block::Details {
+            summary: format!(
+                "Joints in which nothing was found: {}",
+                rig_output::listed(&still.iter().map(|w| w.joint.clone()).collect::<Vec<_>>())
+            ),
+            blocks: still
+                .iter()
+                .map(|w| Block::Plot(bars(found, w, ROOM)))
+                .collect(),
+        });
+    }
+    Some(section.with(figures(found)))
+}
+
+/// The residual of a joint from model to model. Where the models' names need more than `room` letters they go without the effects' laws,
+/// and where that is not enough the models are numbered.
+pub(super) fn bars(found: &Diagnosis, w: &Waterfall, room: usize) -> Plot {
+    let n = w.models.len();
+    let short: Vec<String> = w
+        .models
+        .iter()
+        .map(|model| match model.as_str() {
+            "frozen description" => "as given".into(),
+            "refitted" => "fitted again".into(),
+            effect => format!("+ {}", words::name(effect)),
+        })
+        .collect();
+    let bare: Vec<String> = (short.iter())
+        .map(|name| name.split(" (").next().unwrap_or(name).to_owned())
+        .collect();
+    let fits = |names: &Vec<String>| {
+        let longest = names.iter().map(|name| name.chars().count()).max();
+        longest.unwrap_or(0) * n <= room
+    };
+    let fitting = [short, bare].into_iter().find(fits);
+    let numbered = fitting.is_none();
+    let names = fitting.unwrap_or_else(|| (1..=n).map(|k| k.to_string()).collect());
+    let shown = words::shown(found, &w.unit);
+    let unit = &shown.unit;
+    let places: Vec<f64> = (0..n).map(|k| k as f64).collect();
+    let highest = w
+        .train
+        .iter()
+        .chain(&w.holdout)
+        .fold(0.0f64, |m, v| m.max(*v));
+    // A free-running position stays far above the encoder's step; there is no fall to a floor to show.
+    let tall = found.residual == Residual::Torque && w.floor > 0.0 && highest > TALL * w.floor;
+    let (y, style) = if tall {
+        (Axis::log("residual RMS", unit), Style::Line)
+    } else {
+        (Axis::new("residual RMS", unit), Style::Bars)
+    };
+    let mut plot = Plot::new(
+        format!("Joint {}: residual from model to model", w.joint),
+        Axis::categories("", names),
+        y,
+    )
+    .with(Series::new(
+        "training",
+        Role::Before,
+        style.clone(),
+        places.clone(),
+        shown.scaled(&w.train),
+    ));
+    if !w.holdout.is_empty() {
+        plot = plot.with(Series::new(
+            "held back",
+            Role::After,
+            style,
+            places,
+            shown.scaled(&w.holdout),
+        ));
+    }
+    let mut note = String::new();
+    if numbered {
+        note.push_str("The table below has the models' names. ");
+    }
+    if tall {
+        note.push_str("Logarithmic: the first model leaves far more than the last. ");
+    }
+    if w.floor.is_nan() {
+        note.push_str("No noise floor is known.");
+        return plot.note(note);
+    }
+    note.push_str(&format!("Noise floor {}.", shown.value(w.floor)));
+    plot.mark(Marker::horizontal(
+        shown.scaled(&[w.floor])[0],
+        "noise floor",
+    ))
+    .note(note)
+}
+
+fn figures(found: &Diagnosis) -> Block {
+    let held = super::held_out(found);
+    let mut columns = vec![
+        Column::text("Joint"),
+        Column::number("No.", ""),
+        Column::text("Model"),
+        Column::number("Training", ""),
+    ];
+    if held {
+        columns.push(Column::number("Held back", ""));
+    }
+    columns.extend([Column::text("Unit"), Column::number("Over the floor", "")]);
+    let value = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
+    let rows = found
+        .waterfall
+        .iter()
+        .flat_map(|w| {
+            let shown = words::shown(found, &w.unit);
+            w.models.iter().enumerate().map(move |(k, model)| {
+                let (train, holdout) = (value(&w.train, k), value(&w.holdout, k));
+                let judged = if w.holdout.is_empty() { train } else { holdout };
+                let mut row = vec![
+                    w.joint.clone(),
+                    (k + 1).to_string(),
+                    model.clone(),
+                    shown.number(train),
+                ];
+                if held {
+                    row.push(shown.number(holdout));
+                }
+                row.extend([
+                    shown.unit.clone(),
+                    match w.judged_floor().is_nan() {
+                        true => "–".into(),
+                        false => format!("{} ×", format_significant(judged / w.judged_floor(), 3)),
+                    },
+                ]);
+                row
+            })
+        })
+        .collect();
+    Block::Table(Table {
+        caption: format!(
+            "RMS of the {}, model by model",
+            words::shown(found, "").what
+        ),
+        columns,
+        rows,
+        note: format!(
+            "Over the floor: {} over the noise floor; 1 is nothing but noise.{}",
+            if held {
+                "RMS on the data held back"
+            } else {
+                "RMS"
+            },
+            what_falls(found).map_or(String::new(), |meaning| format!(" {meaning}"))
+        ),
+    })
+}
+
+/// Where the gap sits.
+pub(super) fn places(found: &Diagnosis) -> Option<Section> {
+    // Of a position that runs freely nothing is located, nor of recordings at fault.
+    if found.residual != Residual::Torque || found.waterfall.is_empty() {
+        return None;
+    }
+    let texts: Vec<String> = texts(&found.places, found.waterfall.len() > 1);
+    let mut section = Section::new(
+        "where",
+        "Where the gap sits",
+        "Before any effect is added: what the residual of the refitted model depends on. Noise depends on nothing; whatever does is something that the model lacks.",
+    );
+    if found.places.is_empty() {
+        return Some(section.with(Block::Text(
+            "No coordinate alone explains it: the residual goes with none of them more than chance would have it (p < 0.05)."
+                .to_owned(),
+        )));
+    }
+    if !texts.is_empty() {
+        section = section.with(Block::List(texts));
+    }
+    Some(section.with(table(
+        "What the gap depends on, most of it first",
+        &found.places,
+    )))
+}
+
+/// What goes with something, in words; of which joint, where there are several.
+pub(super) fn texts(places: &[Place], several: bool) -> Vec<String> {
+    places
+        .iter()
+        .filter(|place| !place.text.is_empty() && place.share >= LEAST_SHARE)
+        .map(|place| match several {
+            true => format!("{}: {}", place.joint, place.text),
+            false => place.text.clone(),
+        })
+        .collect()
+}
+
+pub(super) fn table(caption: &str, places: &[Place]) -> Block {
+    Block::Table(Table {
+        caption: caption.into(),
+        columns: vec![
+            Column::text("Joint"),
+            Column::text("Depends on"),
+            Column::number("Most of it between", ""),
+            Column::text("Unit"),
+            Column::number("Share", "%"),
+            Column::number("p", ""),
+        ],
+        rows: places
+            .iter()
+            .map(|place| {
+                vec![
+                    place.joint.clone(),
+                    place.coordinate.clone(),
+                    format!(
+                        "{} … {}",
+                        format_significant(place.interval[0], 2),
+                        format_significant(place.interval[1], 2)
+                    ),
+                    parts::unit(&place.unit),
+                    parts::percent(place.share),
+                    format_p_value(place.p_value),
+                ]
+            })
+            .collect(),
+        note: "Share: how much of the gap this one quantity accounts for; quantities that move together account for the same part, so shares do not add up. p is corrected for the number of quantities looked at; those that are 0.05 or more, as chance makes them, are left out.".into(),
+    })
+}
+
+/// Middle of the distances of bins from zero, as a share of the farthest, up to which they are crowded.
+const CROWDED: f64 = 0.2;
+/// Fewest bins of a figure of them.
+const FEWEST: usize = 8;
+
+/// The mean residual over one coordinate, before and after, and the law that was fitted to it; its middle once more where bins crowd
+/// there.
+pub(super) fn maps(map: &Map) -> Vec<Plot> {
+    let whole = drawn(map);
+    let nearer = |m: &Map| closer(m).filter(|m| m.at.len() >= FEWEST);
+    let close = std::iter::successors(nearer(map), nearer).last();
+    let close = close.map(|close| {
+        let mut plot = drawn(&close);
+        plot.title = format!("{}, its middle", plot.title);
+        plot.note = format!(
+            "The {} bins of the figure before that are crowded in its middle.",
+            close.at.len()
+        );
+        plot
+    });
+    std::iter::once(whole).chain(close).collect()
+}
+
+/// The bins in the middle, where they are too close to be told apart: those of the way or the time since a reversal, most of which are
+/// short.
+fn closer(map: &Map) -> Option<Map> {
+    let mut far: Vec<f64> = map.at.iter().map(|x| x.abs()).collect();
+    far.sort_by(f64::total_cmp);
+    let (median, most) = (*far.get(far.len() / 2)?, *far.last()?);
+    let within = |x: f64| x.abs() <= 2.0 * median;
+    let signed = map.at.iter().any(|x| *x < 0.0) && map.at.iter().any(|x| *x > 0.0);
+    if !signed || median > CROWDED * most {
+        return None;
+    }
+    let close = |values: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        (map.at.iter().zip(values))
+            .filter(|(x, _)| within(**x))
+            .map(|(_, v)| *v)
+            .collect()
+    };
+    Some(Map {
+        at: map.at.iter().copied().filter(|x| within(*x)).collect(),
+        before: close(&map.before),
+        after: close(&map.after),
+        law: (map.at.iter().zip(&map.law))
+            .filter(|(x, _)| within(**x))
+            .map(|(_, v)| *v)
+            .collect(),
+        ..map.clone()
+    })
+}
+
+fn drawn(map: &Map) -> Plot {
+    let unit = parts::unit(&map.residual_unit);
+    let bars = |name: &str, role, values: &[[f64; 2]]| {
+        Series::new(
+            name,
+            role,
+            Style::ErrorBars {
+                half_width: values.iter().map(|v| v[1]).collect(),
+            },
+            map.at.clone(),
+            values.iter().map(|v| v[0]).collect(),
+        )
+    };
+    let mut plot = Plot::new(
+        format!("Joint {}: mean residual over {}", map.joint, map.coordinate),
+        Axis::new(&map.coordinate, &parts::unit(&map.unit)),
+        Axis::new("mean residual", &unit),
+    );
+    if !map.before.is_empty() {
+        let name = if map.step.is_some() {
+            "before"
+        } else {
+            "first of all"
+        };
+        plot = plot.with(bars(name, Role::Before, &map.before));
+    }
+    if !map.after.is_empty() {
+        let name = if map.step.is_some() {
+            "after"
+        } else {
+            "at the end"
+        };
+        plot = plot.with(bars(name, Role::After, &map.after));
+    }
+    if !map.law.is_empty() {
+        plot = plot.with(Series::line(
+            "the fitted law",
+            Role::Model,
+            map.at.clone(),
+            map.law.clone(),
+        ));
+    }
+    plot.mark(Marker::horizontal(0.0, "")).note(format!(
+        "n = {} bins; bars are 95 % intervals of the mean.{}",
+        map.at.len(),
+        if map.law.is_empty() {
+            ""
+        } else {
+            " The law is drawn without the part that mass, inertia and friction of the standard model can take over."
+        }
+    ))
+}

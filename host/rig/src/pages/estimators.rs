@@ -1,0 +1,235 @@
+//! What an identification says beyond its estimate: other estimators, essential and full parameters.
+
+use super::parts;
+use rig_identify::{Comparison, EssentialSet, Identification, StandardSet};
+use rig_model::robot::Robot;
+use rig_output::format_significant;
+use rig_report::{Block, Column, NoteKind, Section, Table};
+
+/// The sections that `found` gives reason for.
+pub(super) fn sections(robot: &Robot, found: &Identification) -> Vec<Section> {
+    let mut all = Vec::new();
+    all.extend(found.comparison.as_ref().map(|c| compared(robot, found, c)));
+    if !found.procedure.is_empty() {
+        let mut section = Section::new("procedure", "How the estimator went", "");
+        for sentence in &found.procedure {
+            section = section.with(Block::Text(sentence.clone()));
+        }
+        all.push(section);
+    }
+    all.extend(found.essential.as_ref().map(essential));
+    all.extend(
+        found
+            .standard_parameters
+            .as_ref()
+            .map(|set| standard(robot, found, set)),
+    );
+    all
+}
+
+fn percents(list: Option<&Vec<f64>>) -> String {
+    list.map_or("–".into(), |errors| {
+        errors
+            .iter()
+            .map(|e| parts::percent(*e))
+            .collect::<Vec<_>>()
+            .join(" ")
+    })
+}
+
+fn compared(robot: &Robot, found: &Identification, comparison: &Comparison) -> Section {
+    let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
+    let held = comparison
+        .estimators
+        .iter()
+        .any(|row| row.holdout_relative_error.is_some());
+    let mut columns = vec![
+        Column::text("Estimator"),
+        Column::number("Left, cross-validated", "%"),
+    ];
+    if held {
+        columns.push(Column::number("Left, held back", "%"));
+    }
+    columns.extend([
+        Column::text("Bodies that can exist"),
+        Column::number("Distance to such", "std"),
+        Column::number("Largest shift", "std"),
+    ]);
+    let mut notes: Vec<Block> = Vec::new();
+    let rows = comparison
+        .estimators
+        .iter()
+        .map(|row| {
+            for sentence in &row.said {
+                notes.push(Block::Text(format!(
+                    "{}: {sentence}",
+                    row.estimator.words()
+                )));
+            }
+            let number = |v: Option<f64>| v.map_or("–".into(), |v| format_significant(v, 2));
+            let mut cells = vec![
+                row.estimator.name().to_owned(),
+                percents(row.cross_validated_relative_error.as_ref()),
+            ];
+            if held {
+                cells.push(percents(row.holdout_relative_error.as_ref()));
+            }
+            cells.extend([
+                match row.physically_consistent {
+                    Some(true) => "yes",
+                    Some(false) => "no",
+                    None => "–",
+                }
+                .to_owned(),
+                number(row.distance_to_consistent),
+                number(row.largest_shift),
+            ]);
+            cells
+        })
+        .collect();
+    let mut section = Section::new(
+        "estimators",
+        "Which result to trust",
+        "Every estimator predicts the torque of stretches of time that it was not fitted to.",
+    )
+    .with(Block::Note {
+        kind: if comparison.recommended == found.estimator {
+            NoteKind::Good
+        } else {
+            NoteKind::Warning
+        },
+        text: comparison.recommendation.clone(),
+    })
+    .with(Block::Table(Table {
+        caption: "Estimators side by side".into(),
+        columns,
+        rows,
+        note: format!(
+            "Left: residual RMS over torque RMS, joint by joint ({}), of {} stretches each predicted from the others. Distance: from the nearest parameters that bodies can have, all parameters together. Shift: largest difference from the weighted fit.",
+            joints.join(", "),
+            comparison.folds
+        ),
+    }));
+    if !comparison.repeated_holdout.is_empty() {
+        section = section.with(Block::Text(format!(
+            "Held back, but a repetition of a motion learnt from: {}. That is no evidence of how another motion is predicted.",
+            comparison.repeated_holdout.join(", ")
+        )));
+    }
+    if let Some(endogeneity) = &comparison.endogeneity {
+        section = section.with(Block::Text(endogeneity.text.clone()));
+    }
+    if !notes.is_empty() {
+        section = section.with(Block::Details {
+            summary: "How each of them went".into(),
+            blocks: notes,
+        });
+    }
+    section
+}
+
+fn essential(set: &EssentialSet) -> Section {
+    let intro = "The few parameters that the torque needs, from the estimate given here: the least certain one is taken as zero and the rest fitted anew, as long as that costs nothing that chance would not.";
+    let section = Section::new("essential", "Essential parameters", intro);
+    if set.left_out.is_empty() {
+        return section.with(parts::info(format!(
+            "All base parameters are essential. {}",
+            set.ended
+        )));
+    }
+    section.with(Block::Table(Table {
+        caption: format!("{} essential parameters", set.parameters.len()),
+        columns: vec![
+            Column::text("Parameter"),
+            Column::text("Unit"),
+            Column::number("Value", ""),
+            Column::number("Std", "%"),
+        ],
+        rows: set
+            .parameters
+            .iter()
+            .map(|p| {
+                vec![
+                    p.expression.clone(),
+                    parts::unit(&p.unit),
+                    format_significant(p.value, 4),
+                    format_significant(p.relative_std_percent, 2),
+                ]
+            })
+            .collect(),
+        note: format!(
+            "Left out, least certain first: {}. The residual's RMS grew by {} %. {}",
+            set.left_out.join(", "),
+            format_significant(set.residual_increase_percent, 2),
+            set.ended
+        ),
+    }))
+}
+
+fn standard(robot: &Robot, found: &Identification, set: &StandardSet) -> Section {
+    let worst = set
+        .residual_increase_percent
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let rows = set
+        .parameters
+        .iter()
+        .map(|p| {
+            vec![
+                p.name.clone(),
+                parts::unit(&p.unit),
+                format_significant(p.value, 4),
+                if p.determined {
+                    "data"
+                } else {
+                    "data and prior"
+                }
+                .to_owned(),
+            ]
+        })
+        .collect();
+    let increases: Vec<String> = if set.residual_increase_percent.len() == robot.joints.len() {
+        set.residual_increase_percent
+            .iter()
+            .zip(&robot.joints)
+            .map(|(p, joint)| format!("{} {} %", joint.name, format_significant(*p, 2)))
+            .collect()
+    } else {
+        vec![format!("{} %", format_significant(worst, 2))]
+    };
+    let mut section = Section::new(
+        "standard",
+        "Full parameters of bodies that can exist",
+        "One parameter set of the many that give the identified combinations or lie nearest to them: every link has positive mass and a pseudo-inertia that is positive definite, friction and drive inertia are not negative. It is what the written description holds.",
+    )
+    .with(parts::info(format!(
+        "Against the weighted fit, which is free to give links that cannot exist, the residual's RMS on the training data changes by: {}.",
+        increases.join(", ")
+    )));
+    for sentence in &set.prior {
+        section = section.with(Block::Text(sentence.clone()));
+    }
+    let least: Vec<String> = set
+        .least_eigenvalue
+        .iter()
+        .map(|e| format_significant(*e, 2))
+        .collect();
+    section.with(Block::Details {
+        summary: format!("All {} parameters", set.parameters.len()),
+        blocks: vec![Block::Table(Table {
+            caption: format!("Standard parameters of {}", found.robot),
+            columns: vec![
+                Column::text("Parameter"),
+                Column::text("Unit"),
+                Column::number("Value", ""),
+                Column::text("Decided by"),
+            ],
+            rows,
+            note: format!(
+                "Smallest eigenvalue of each link's pseudo-inertia, mass and radius of gyration scaled to one: {}.",
+                least.join(", ")
+            ),
+        })],
+    })
+}

@@ -1,0 +1,350 @@
+//! What is hidden in a recording: an effect of the emulated rig with its parameters.
+
+use serde::Serialize;
+
+use super::rig::TICK_RATE;
+use rig_plant::effect::cogging::Cogging;
+use rig_plant::effect::dead_time::DeadTime;
+use rig_plant::effect::drag::QuadraticDrag;
+use rig_plant::effect::encoder_eccentricity::EncoderEccentricity;
+use rig_plant::effect::friction_warmup::FrictionWarmup;
+use rig_plant::effect::gear_eccentricity::GearEccentricity;
+use rig_plant::effect::load_friction::LoadFriction;
+use rig_plant::effect::position_friction::PositionFriction;
+use rig_plant::effect::spring::Spring;
+use rig_plant::effect::tilt::Tilt;
+use rig_plant::effect::torque_ripple::TorqueRipple;
+use rig_plant::effect::torque_saturation::TorqueSaturation;
+use rig_plant::effect::transmission::{Backlash, Elasticity};
+use rig_plant::{Body, PlantConfig, VelocityWeakening};
+
+/// Power that friction takes on average in the scenarios' motion, W: 0.8 N·m and 0.25 N·m·s/rad at some 0.7 rad/s.
+const FRICTION_POWER: f64 = 0.7;
+/// Rise of the gear's temperature at that power, K. Only its product with the rate of the friction shows.
+const WARMING: f64 = 10.0;
+/// Stiffness of closed teeth, N·m/rad, and their damping, N·m·s/rad.
+const TEETH: [f64; 2] = [3000.0, 2.0];
+
+/// An effect with the parameters that are drawn, as the emulated rig means them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Effect {
+    /// Rational velocity weakening: breakaway over Coulomb torque, and speed at half of the excess, rad/s.
+    Stribeck {
+        /// Fs/Fc
+        ratio: f64,
+        /// rad/s
+        velocity: f64,
+    },
+    /// Difference of Coulomb friction between the directions over their mean.
+    AsymmetricCoulomb {
+        /// (F₊ − F₋)/F
+        difference: f64,
+    },
+    /// Torque with the square of speed.
+    QuadraticDrag {
+        /// N·m·s²/rad²
+        coefficient: f64,
+    },
+    /// Friction with the torque transmitted.
+    LoadFriction {
+        /// N·m per N·m
+        ratio: f64,
+    },
+    /// Tight spots of the joint.
+    PositionFriction {
+        /// Relative.
+        amplitude: f64,
+        /// Per turn of the joint.
+        order: f64,
+        /// rad
+        phase: f64,
+    },
+    /// Contact that yields before it slides (four Maxwell-slip elements).
+    Presliding {
+        /// From rest to sliding, rad.
+        stroke: f64,
+    },
+    /// Viscous friction falling as friction heats the gear.
+    ViscousWarmup {
+        /// Share that is gone in the end.
+        fall: f64,
+        /// s
+        time_constant: f64,
+    },
+    /// Detent torque.
+    Cogging {
+        /// Joint-side, N·m.
+        amplitude: f64,
+        /// Per turn of the motor.
+        order: f64,
+        /// rad
+        phase: f64,
+    },
+    /// Torque constant over the motor's angle.
+    TorqueRipple {
+        /// Relative.
+        amplitude: f64,
+        /// Per turn of the motor.
+        order: f64,
+        /// rad
+        phase: f64,
+    },
+    /// Torque once per turn of the motor.
+    GearEccentricity {
+        /// N·m
+        amplitude: f64,
+        /// rad
+        phase: f64,
+    },
+    /// Play between rotor and link.
+    Backlash {
+        /// Whole gap, rad.
+        gap: f64,
+    },
+    /// Elastic gear.
+    JointElasticity {
+        /// N·m/rad
+        stiffness: f64,
+        /// N·m·s/rad
+        damping: f64,
+    },
+    /// Encoder off its axis.
+    EncoderEccentricity {
+        /// rad of the motor
+        amplitude: f64,
+        /// rad
+        phase: f64,
+    },
+    /// Error of the current sensor.
+    CurrentOffset {
+        /// A
+        current: f64,
+    },
+    /// Torque constant over the current, 1/(1 + (i/knee)²).
+    TorqueSaturation {
+        /// Share lost at the current of the torque limit.
+        loss: f64,
+    },
+    /// Current reading that comes late.
+    MeasurementDelay {
+        /// s, whole tenths of a millisecond
+        delay: f64,
+    },
+    /// Base not level.
+    GravityTilt {
+        /// rad
+        angle: f64,
+    },
+    /// A body on the link that nobody wrote down.
+    Payload {
+        /// kg
+        mass: f64,
+        /// From the joint's axis, m.
+        distance: f64,
+    },
+    /// Cable.
+    Spring {
+        /// N·m/rad
+        stiffness: f64,
+        /// Angle from hanging at which it pulls nothing, rad.
+        rest: f64,
+    },
+    /// Dead time of the bridge.
+    DriveDeadzone {
+        /// V
+        voltage: f64,
+    },
+    /// Constant torque on the joint.
+    TorqueOffset {
+        /// N·m
+        torque: f64,
+    },
+}
+
+/// A compact body of steel, a few centimetres large, on the link.
+pub fn payload(mass: f64, distance: f64) -> Body {
+    Body {
+        mass,
+        distance,
+        angle: 0.0,
+        inertia: mass * 4.0e-4,
+    }
+}
+
+/// An effect in one joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Hidden {
+    /// Index of the joint.
+    pub joint: usize,
+    /// What.
+    pub effect: Effect,
+}
+
+impl Effect {
+    /// Current at the rig's torque limit of 8 N·m, A.
+    pub const PEAK_CURRENT: f64 = 3.2;
+
+    /// Name as the contract has it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Stribeck { .. } => "stribeck",
+            Self::AsymmetricCoulomb { .. } => "asymmetric_coulomb",
+            Self::QuadraticDrag { .. } => "quadratic_drag",
+            Self::LoadFriction { .. } => "load_friction",
+            Self::PositionFriction { .. } => "position_friction",
+            Self::Presliding { .. } => "presliding",
+            Self::ViscousWarmup { .. } => "viscous_warmup",
+            Self::Cogging { .. } => "cogging",
+            Self::TorqueRipple { .. } => "torque_ripple",
+            Self::GearEccentricity { .. } => "gear_eccentricity",
+            Self::Backlash { .. } => "backlash",
+            Self::JointElasticity { .. } => "joint_elasticity",
+            Self::EncoderEccentricity { .. } => "encoder_eccentricity",
+            Self::CurrentOffset { .. } => "current_offset",
+            Self::TorqueSaturation { .. } => "torque_saturation",
+            Self::MeasurementDelay { .. } => "measurement_delay",
+            Self::GravityTilt { .. } => "gravity_tilt",
+            Self::Payload { .. } => "payload",
+            Self::Spring { .. } => "spring",
+            Self::DriveDeadzone { .. } => "drive_deadzone",
+            Self::TorqueOffset { .. } => "torque_offset",
+        }
+    }
+
+    /// Puts it into the rig.
+    pub(super) fn hide(&self, config: &mut PlantConfig) {
+        let ratio = config.mechanism.ratio;
+        let motor = &mut config.motor;
+        let mechanism = &mut config.mechanism;
+        match *self {
+            Self::Stribeck {
+                ratio: excess,
+                velocity,
+            } => {
+                let weakening = |scale: f64| VelocityWeakening {
+                    breakaway_ratio: excess,
+                    velocity: velocity * scale,
+                };
+                motor.friction.weakening = Some(weakening(ratio));
+                mechanism.friction.weakening = Some(weakening(1.0));
+            }
+            Self::AsymmetricCoulomb { difference } => {
+                motor.friction.asymmetry = 0.5 * difference;
+                mechanism.friction.asymmetry = 0.5 * difference;
+            }
+            Self::QuadraticDrag { coefficient } => {
+                mechanism.friction.drag = Some(QuadraticDrag { coefficient });
+            }
+            Self::LoadFriction { ratio } => {
+                mechanism.friction.load = Some(LoadFriction { ratio });
+            }
+            Self::PositionFriction {
+                amplitude,
+                order,
+                phase,
+            } => {
+                let place = |scale: f64| PositionFriction {
+                    amplitude,
+                    order: order * scale,
+                    phase,
+                };
+                motor.friction.position = Some(place(1.0 / ratio));
+                mechanism.friction.position = Some(place(1.0));
+            }
+            Self::Presliding { stroke } => {
+                motor.friction.presliding.stroke = stroke * ratio;
+                mechanism.friction.presliding.stroke = stroke;
+            }
+            Self::ViscousWarmup {
+                fall,
+                time_constant,
+            } => {
+                let thermal_resistance = WARMING / FRICTION_POWER;
+                mechanism.warmup = Some(FrictionWarmup {
+                    heat_capacity: time_constant / thermal_resistance,
+                    thermal_resistance,
+                    viscous_rate: -(1.0 - fall).ln() / WARMING,
+                    coulomb_rate: 0.0,
+                });
+            }
+            Self::Cogging {
+                amplitude,
+                order,
+                phase,
+            } => {
+                motor.cogging = Some(Cogging {
+                    amplitude: amplitude / ratio,
+                    order,
+                    phase,
+                });
+            }
+            Self::TorqueRipple {
+                amplitude,
+                order,
+                phase,
+            } => {
+                motor.ripple = Some(TorqueRipple {
+                    amplitude,
+                    order,
+                    phase,
+                });
+            }
+            Self::GearEccentricity { amplitude, phase } => {
+                mechanism.eccentricity = Some(GearEccentricity {
+                    amplitude,
+                    order: 1.0,
+                    phase,
+                });
+            }
+            Self::Backlash { gap } => {
+                let [stiffness, damping] = TEETH;
+                mechanism.backlash = Some(Backlash {
+                    gap,
+                    stiffness,
+                    damping,
+                });
+            }
+            Self::JointElasticity { stiffness, damping } => {
+                mechanism.elasticity = Some(Elasticity {
+                    stiffness,
+                    hardening: 0.0,
+                    damping,
+                });
+            }
+            Self::EncoderEccentricity { amplitude, phase } => {
+                config.sensors.encoder.eccentricity =
+                    Some(EncoderEccentricity { amplitude, phase });
+            }
+            Self::CurrentOffset { current } => config.sensors.current.offset = current,
+            Self::TorqueSaturation { loss } => {
+                motor.saturation = Some(TorqueSaturation {
+                    knee: Self::PEAK_CURRENT * ((1.0 - loss) / loss).sqrt(),
+                });
+            }
+            Self::MeasurementDelay { delay } => {
+                config.sensors.current_delay = Some((delay * TICK_RATE).round() as usize);
+            }
+            Self::GravityTilt { angle } => {
+                mechanism.tilt = Some(Tilt {
+                    about_x: 0.0,
+                    about_y: angle,
+                });
+            }
+            Self::Payload { mass, distance } => mechanism.bodies.push(payload(mass, distance)),
+            Self::Spring { stiffness, rest } => {
+                mechanism.spring = Some(Spring {
+                    stiffness,
+                    rest: config.sensors.encoder.zero + rest,
+                });
+            }
+            Self::DriveDeadzone { voltage } => {
+                config.bridge.dead_time = Some(DeadTime {
+                    voltage,
+                    fade_current: 0.1,
+                });
+            }
+            Self::TorqueOffset { torque } => mechanism.torque_offset = Some(torque),
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! The rig that the scenarios are recorded on, and what its owner would have written down about it.
+//!
+//! A 24 V geared arm of the size of the catalogue's reference rig: ratio 50, reflected rotor 0.05 kg·m², link
+//! 0.15 kg·m², gravity 3.4 N·m, viscous 0.25 N·m·s/rad and Coulomb friction 0.8 N·m, three quarters of both before the gear.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::dice::Dice;
+use crate::ScenarioError;
+use rig_model::robot::{JointFriction, ONE_LINK_TEMPLATE, Robot};
+use rig_plant::effect::disturbance::Disturbance;
+use rig_plant::{Body, Friction, LinkEncoder, PlantConfig, Presliding};
+
+/// Ticks of the rig per second: also the resolution of a delay.
+pub(super) const TICK_RATE: f64 = 10_000.0;
+/// Substeps per tick. The tests compare with ten.
+pub(super) const SUBSTEPS: u32 = 2;
+/// Travel of the contact on the rig without presliding, rad: below one count of the encoder.
+const STROKE: f64 = 2.0e-5;
+/// Share of friction that acts before the gear.
+const BEFORE_GEAR: f64 = 0.75;
+/// Where the link hangs, in the angle of the plant, rad.
+const HANGING: f64 = -FRAC_PI_2;
+/// Largest relative departure of a rig from the reference.
+const SPREAD: f64 = 0.1;
+
+/// The encoder on the link where there is one: absolute, of 17 bits, with half a count of noise; nobody has set its zero.
+pub(super) const LINK_ENCODER: LinkEncoder = LinkEncoder {
+    counts_per_turn: 131_072.0,
+    zero: HANGING + 0.2,
+    noise: Some(2.4e-5),
+    eccentricity: None,
+};
+
+/// How much the sensors and the surroundings disturb.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Of one current sample, A rms.
+    pub current: f64,
+    /// Coloured torque on the joint, N·m rms.
+    pub disturbance: f64,
+    /// Its correlation time, s.
+    pub correlation: f64,
+    /// Encoder counts per motor turn.
+    pub counts: f64,
+}
+
+impl Noise {
+    /// A tenth of a newton metre in the torque: 0.05 A per sample at 2.5 N·m/A.
+    pub const MEDIUM: Self = Self {
+        current: 0.05,
+        disturbance: 0.03,
+        correlation: 0.05,
+        counts: 4096.0,
+    };
+    /// A good current sensor.
+    pub const LOW: Self = Self {
+        current: 0.02,
+        ..Self::MEDIUM
+    };
+    /// A poor one.
+    pub const HIGH: Self = Self {
+        current: 0.2,
+        ..Self::MEDIUM
+    };
+    /// Sixteen times finer counts and nothing random: what the effect alone leaves.
+    pub(super) const NONE: Self = Self {
+        current: 0.0,
+        disturbance: 0.0,
+        correlation: 0.05,
+        counts: 65536.0,
+    };
+    /// The three levels of the benchmark.
+    pub const LEVELS: [(&str, Self); 3] = [
+        ("low", Self::LOW),
+        ("medium", Self::MEDIUM),
+        ("high", Self::HIGH),
+    ];
+}
+
+/// A rig near the reference, nothing hidden in it.
+pub(super) fn healthy(seed: u64, noise: &Noise) -> PlantConfig {
+    let mut dice = Dice::new(seed, 0);
+    let mut near = |value: f64| value * dice.uniform(1.0 - SPREAD, 1.0 + SPREAD);
+    let mut config = PlantConfig {
+        tick: 1.0 / TICK_RATE,
+        substeps: SUBSTEPS,
+        initial_position: HANGING,
+        ..PlantConfig::default()
+    };
+
+    let ratio = 50.0;
+    let motor = &mut config.motor;
+    motor.torque_constant = near(0.05);
+    motor.resistance = near(0.6);
+    motor.inductance = near(0.5e-3);
+    motor.rotor_inertia = near(2.0e-5);
+    let (coulomb, viscous) = (near(0.8), near(0.25));
+    let presliding = Presliding {
+        stroke: STROKE,
+        damping_time: 1.0e-3,
+        lag: 1.0e-3,
+    };
+    let link = Friction {
+        coulomb: (1.0 - BEFORE_GEAR) * coulomb,
+        viscous: (1.0 - BEFORE_GEAR) * viscous,
+        asymmetry: 0.0,
+        weakening: None,
+        presliding,
+        load: None,
+        position: None,
+        drag: None,
+    };
+    motor.friction = Friction {
+        coulomb: BEFORE_GEAR * coulomb / ratio,
+        viscous: BEFORE_GEAR * viscous / (ratio * ratio),
+        presliding: Presliding {
+            stroke: STROKE * ratio,
+            ..presliding
+        },
+        ..link
+    };
+
+    let mechanism = &mut config.mechanism;
+    mechanism.ratio = ratio;
+    mechanism.friction = link;
+    mechanism.bodies = vec![Body {
+        mass: near(1.155),
+        distance: near(0.3),
+        angle: 0.0,
+        inertia: near(0.046),
+    }];
+    mechanism.disturbance = (noise.disturbance > 0.0).then_some(Disturbance {
+        std: noise.disturbance,
+        correlation_time: noise.correlation,
+    });
+
+    let sensors = &mut config.sensors;
+    sensors.encoder.counts_per_turn = noise.counts;
+    sensors.encoder.zero = HANGING;
+    sensors.current.noise = (noise.current > 0.0).then_some(noise.current);
+    sensors.current.offset = 0.0;
+    config
+}
+
+/// What the owner of the rig knows: its parameters to three digits, its angle from where it hangs. `error` is the
+/// relative standard deviation of what was written down wrongly.
+///
+/// # Errors
+/// The template cannot be read.
+pub(super) fn description(
+    config: &PlantConfig,
+    error: f64,
+    seed: u64,
+) -> Result<Robot, ScenarioError> {
+    let unreadable = |what: &dyn std::fmt::Display| ScenarioError(what.to_string());
+    let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, "one-link.toml".as_ref())
+        .map_err(|error| unreadable(&error))?;
+    let mut dice = Dice::new(seed, 1);
+    let mut written = |value: f64| three_digits(value * (1.0 + error * dice.normal()).abs());
+    let equivalent = config.equivalent();
+    let ratio = config.mechanism.ratio;
+    let rotor = config.motor.rotor_inertia;
+    let load = equivalent.inertia - ratio * ratio * rotor;
+    let mass: f64 = config.mechanism.bodies.iter().map(|b| b.mass).sum();
+    let moment: f64 = config
+        .mechanism
+        .bodies
+        .iter()
+        .map(|b| b.mass * b.distance)
+        .sum();
+    let Some(joint) = robot.joints.first_mut() else {
+        return Err(unreadable(&"the template has no joint"));
+    };
+    joint.theta = HANGING;
+    if let Some(inertial) = &mut joint.inertial {
+        inertial.mass = written(mass);
+        inertial.first_moment = [written(moment), 0.0, 0.0];
+        inertial.inertia[5] = written(load);
+    }
+    if let Some(limits) = &mut joint.limits {
+        limits.position = [-1.7, 1.7];
+    }
+    joint.friction = Some(JointFriction {
+        coulomb: written(equivalent.coulomb),
+        viscous: written(equivalent.viscous),
+        offset: 0.0,
+    });
+    if let Some(drive) = &mut joint.drive {
+        drive.gear_ratio = ratio;
+        drive.rotor_inertia = written(rotor);
+        // Torques are what this constant makes of the currents; an error would rescale every parameter alike.
+        drive.torque_constant = three_digits(config.motor.torque_constant);
+        drive.resistance = Some(three_digits(config.motor.resistance));
+        drive.inductance = Some(three_digits(config.motor.inductance));
+        drive.encoder_counts_per_rev = Some(config.sensors.encoder.counts_per_turn);
+    }
+    Ok(robot)
+}
+
+fn three_digits(value: f64) -> f64 {
+    if value == 0.0 {
+        return 0.0;
+    }
+    let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
+    // Divided by the inverse where that is whole: 0.799 and not 0.7990000000000001.
+    if unit < 1.0 {
+        let inverse = (1.0 / unit).round();
+        (value * inverse).round() / inverse
+    } else {
+        (value / unit).round() * unit
+    }
+}

@@ -1,0 +1,140 @@
+//! How large a hidden effect is against the noise floor.
+//!
+//! Both are RMS values of what a refit of the nominal model J·q̈ + m·g·l·sin q + fv·q̇ + fc·sgn q̇ leaves of the torque,
+//! model and torque below 40 Hz by the same zero-phase filter, while the joint moves: at rest sgn q̇ says nothing. The excess is taken from recordings without noise,
+//! with the effect and without it, of the same reference.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::ScenarioError;
+use rig_data::Block;
+use rig_data::prepare::{LowPass, central_difference, second_difference};
+
+use super::reference::RATE;
+
+/// Band that residuals are compared in, Hz.
+const BAND: f64 = 40.0;
+/// Every so many samples are used: twice the band and more.
+const STRIDE: usize = 10;
+
+/// Speed from which the joint moves, rad/s.
+const MOVING: f64 = 0.01;
+
+/// Which equation is refitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Equation {
+    /// Of the mechanics, N·m.
+    Torque,
+    /// Of the winding, V: u = R·i + L·di/dt + k·q̇.
+    Voltage,
+}
+
+/// A linear model of one recording: its columns, and what they are to explain.
+pub(super) struct Problem {
+    columns: DMatrix<f64>,
+    target: DVector<f64>,
+    equation: Equation,
+}
+
+impl Problem {
+    pub(super) fn of(block: &Block, equation: Equation) -> Result<Self, ScenarioError> {
+        let Signals {
+            columns,
+            target,
+            velocity,
+        } = Signals::of(block, equation)?;
+        let rows: Vec<usize> = (0..velocity.len())
+            .step_by(STRIDE)
+            .filter(|&k| velocity[k].abs() > MOVING)
+            .collect();
+        Ok(Self {
+            columns: DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][rows[k]]),
+            target: DVector::from_fn(rows.len(), |k, _| target[rows[k]]),
+            equation,
+        })
+    }
+
+    /// What the refitted model says at every sample.
+    pub(super) fn explained(&self, block: &Block) -> Result<Vec<f64>, ScenarioError> {
+        let parameters = self.refit()?;
+        let signals = Signals::of(block, self.equation)?;
+        let at = |k: usize| {
+            let terms = signals.columns.iter().zip(&parameters);
+            terms.map(|(column, p)| column[k] * p).sum()
+        };
+        Ok((0..signals.target.len()).map(at).collect())
+    }
+
+    /// Least squares.
+    pub(super) fn refit(&self) -> Result<DVector<f64>, ScenarioError> {
+        let normal = self.columns.transpose() * &self.columns;
+        let right = self.columns.transpose() * &self.target;
+        normal
+            .cholesky()
+            .map(|factor| factor.solve(&right))
+            .ok_or_else(|| ScenarioError("the motion does not excite the model".into()))
+    }
+
+    /// Of what `parameters` leave.
+    pub(super) fn rms(&self, parameters: &DVector<f64>) -> f64 {
+        let left = &self.target - &self.columns * parameters;
+        (left.norm_squared() / left.len() as f64).sqrt()
+    }
+}
+
+/// Columns and target at every sample.
+struct Signals {
+    columns: Vec<Vec<f64>>,
+    target: Vec<f64>,
+    velocity: Vec<f64>,
+}
+
+impl Signals {
+    fn of(block: &Block, equation: Equation) -> Result<Self, ScenarioError> {
+        let failed = |what: &str| ScenarioError(what.into());
+        let filter =
+            LowPass::butterworth(4, BAND, RATE).ok_or_else(|| failed("the band does not exist"))?;
+        let joint = block
+            .joints
+            .first()
+            .ok_or_else(|| failed("the recording has no joint"))?;
+        let q = filter.zero_phase(&joint.q);
+        let velocity = central_difference(&q, 1.0 / RATE);
+        let acceleration = second_difference(&q, 1.0 / RATE);
+        let each = |law: &dyn Fn(usize) -> f64| {
+            let column: Vec<f64> = (0..q.len()).map(law).collect();
+            filter.zero_phase(&column)
+        };
+        let (columns, target) = match equation {
+            Equation::Torque => (
+                vec![
+                    filter.zero_phase(&acceleration),
+                    each(&|k| q[k].sin()),
+                    filter.zero_phase(&velocity),
+                    each(&|k| velocity[k].signum()),
+                ],
+                filter.zero_phase(&joint.tau),
+            ),
+            Equation::Voltage => {
+                let current = filter.zero_phase(&joint.tau);
+                let change = central_difference(&current, 1.0 / RATE);
+                let voltage = joint.voltage.as_ref();
+                let voltage = voltage.ok_or_else(|| failed("no voltage was recorded"))?;
+                (
+                    vec![current, change, filter.zero_phase(&velocity)],
+                    filter.zero_phase(voltage),
+                )
+            }
+        };
+        Ok(Self {
+            columns,
+            target,
+            velocity,
+        })
+    }
+}
+
+/// What `with` has beyond `without`, of uncorrelated origin.
+pub(super) fn beyond(with: f64, without: f64) -> f64 {
+    (with * with - without * without).max(0.0).sqrt()
+}
