@@ -1,32 +1,33 @@
-//! Effects beyond the standard model, turned into what a controller does about them.
+//! Compensation of effects beyond the standard model by a controller.
 //!
-//! What is done follows from where the effect acts ([`Role`]):
+//! The action depends on where the effect acts ([`Role`]):
 //!
-//! * **Dry friction** goes the way of the friction law ([`precompensation`](crate::precompensation)): the direction is
-//!   the reference's near rest and the measurement's beyond the threshold, and a share of the torque is given,
-//!   `gain_at_rest` to `gain`. At which speed? Where friction falls with speed (Stribeck), a torque held at the
-//!   reference's speed exceeds the friction of a link that has run ahead, and drives it further; where it rises,
-//!   a torque at the measured speed takes damping from the loop. So an effect that falls with speed is evaluated at
-//!   the faster of reference and link, any other at the reference: no torque grows with the measured speed.
-//! * **What stands at a position** as well as in motion (cogging, eccentricity, springs, tilt) is given in full at the
-//!   measured position: it is a known torque like gravity, and wrong by the error of the position alone. Its speed
-//!   is the reference's, for the reason above. What is periodic in the motor's angle turns with it at every tick, and
-//!   is given for where the link will be when the torque acts ([`Now::lead`]).
-//! * **Friction with memory of distance** (presliding) builds up over the reference's way, as dry friction does at once:
-//!   fed by the measured way it would close a loop of positive sign. What acts through its contact goes the way that it does;
-//!   that it bends the contact farther ([`Instant::beside`](crate::effects::Instant::beside)) is left out, for want of time in a tick.
-//! * **An eccentric encoder** is taken off the measured position, and its slope off the velocity; **a constant error
-//!   of the current** is taken off the reading.
-//! * **A voltage that the bridge loses** is given beside the current loop's, in the direction that the current is about to have; within a
-//!   small band about none it fades, where the ripple crosses zero and so does the loss.
+//! * **Dry friction** follows the rules of the friction law ([`precompensation`](crate::precompensation)). Near rest
+//!   the direction is the reference's, beyond the threshold the measurement's. A share of the torque is given,
+//!   `gain_at_rest` to `gain`. The speed at which a law is evaluated depends on the law. Where friction falls with
+//!   speed (Stribeck), a torque at the reference's speed exceeds the friction of a link that has run ahead, and
+//!   drives it further. Where friction rises with speed, a torque at the measured speed takes damping from the loop.
+//!   So an effect that falls with speed is evaluated at the faster of reference and link, and any other at the
+//!   reference: no torque grows with the measured speed.
+//! * **Effects that also exist at rest** (cogging, eccentricity, springs, tilt) are given in full at the measured
+//!   position. Such an effect is a known torque like gravity, and its only error comes from the position error. Its
+//!   speed is the reference's, for the reason above. Effects that are periodic in the motor's angle are updated at
+//!   every tick, for the angle at which the torque will act ([`Now::lead`]).
+//! * **Presliding friction** builds up over the reference's travel, as dry friction does at once. With the measured
+//!   travel it would close a loop of positive sign. Friction through the same contact builds up with it. A tick
+//!   has no time for the extra deflection of the contact ([`Instant::beside`](crate::effects::Instant::beside)).
+//! * **An eccentric encoder** is corrected in the measured position, and its slope in the velocity. **A constant
+//!   current error** is subtracted from the measured current.
+//! * **A voltage loss of the bridge** is added to the current loop's voltage, in the direction of the coming current.
+//!   It fades within a small band around zero current, where the ripple crosses zero and the loss vanishes.
 //!
-//! Whatever else there is has no torque, voltage or reading that would undo it, and is refused with the reason
+//! No torque, voltage or correction undoes any other effect. Such effects are refused with the reason
 //! ([`Role::refusal`]).
 //!
-//! Beside the torque to give, a tick says what of the drive's torque the effects *explain*: the same laws at the
+//! Besides the torque to give, a tick returns the drive torque that the effects *explain*: the same laws at the
 //! measured motion, in full. An estimator of the standard model must not see that part, or its parameters absorb it.
 //!
-//! Leaves out: that the current loop gives fast torques smaller; effects that name another joint.
+//! Leaves out: the attenuation of fast torques by the current loop; effects that name another joint.
 
 mod compensated;
 mod now;
@@ -42,53 +43,53 @@ use crate::scalar::{Real, Scalar};
 use compensated::{Compensated, evaluate};
 use wave::{Stand, Waves};
 
-/// Most effects that a rig compensates.
+/// Maximum number of effects that a rig compensates.
 pub const EFFECTS: usize = 8;
 
-/// Ticks for which it is remembered what periodic effects were given: the most that [`Now::lead_ticks`] may be, and one.
+/// Number of ticks for which the given periodic torques are stored. [`Now::lead_ticks`] is at most this less 2.
 pub const GIVEN: usize = 64;
-// The place of a tick is its number modulo that of places, and the number wraps at 256.
+// A slot is the tick number modulo the number of slots, and the tick number wraps at 256.
 const _: () = assert!(GIVEN.is_power_of_two() && GIVEN <= 256);
 
-/// The effects of a rig, from the front.
+/// The effects of a rig; unused places are at the end.
 pub type Effects<T> = [Option<Effect<T>>; EFFECTS];
 
-/// What effects ask for in a control tick.
+/// Result of the compensation in a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output<T> {
-    /// Torque to give beside the law's, N·m.
+    /// Torque to add to the control law's, N·m.
     pub feed: T,
-    /// What the drive has to give because of the effects at the measured motion, N·m: not for an estimator to see.
+    /// Drive torque that the effects explain at the measured motion, N·m. An estimator must not see it.
     pub explained: T,
 }
 
-/// What effects do to the measured position.
+/// Errors of the measured position due to effects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading<T> {
-    /// Too much in the position, rad.
+    /// Error of the position, rad: reading minus true value.
     pub error: T,
-    /// Too much in the velocity, as a share of it.
+    /// Error of the velocity, as a share of it.
     pub slope: T,
 }
 
-/// What effects remember.
+/// Hidden state of all effects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T: Real> {
-    /// Of each law where the torque to give is taken from, and at the measured motion.
+    /// Hidden states of each law: for the planned motion, and for the measured motion.
     memories: [[Memory<T>; 2]; EFFECTS],
     stand: Stand<T>,
-    /// Value of each law where the torque to give is taken from: dry ones from the front, standing ones from the end.
+    /// Value of each law at the planned motion: dry laws from the front, standing laws from the end.
     planned: [T; EFFECTS],
     /// Value of each dry law at the measured motion.
     sliding: [T; EFFECTS],
-    /// Sums of dry and standing ones among `planned`, and of `sliding`: brought up to date with each law, and made anew with
-    /// each round, so that no rounding piles up.
+    /// Sums of the dry and of the standing laws in `planned`, and of `sliding`. Each law updates them. They are
+    /// recomputed once a round, so that rounding errors do not accumulate.
     sums: [T; 3],
     turn: u8,
     given: Given<T>,
 }
 
-/// What periodic effects were given in the ticks before: given ahead of the motor, it is what they explain when the motor is there.
+/// Periodic torques given in the last ticks. They are given ahead, and explained when the motor gets there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Given<T> {
     torques: [T; GIVEN],
@@ -105,7 +106,7 @@ impl<T: Real> Default for Given<T> {
 }
 
 impl<T: Real> Given<T> {
-    /// Puts down what is given now, and says what was given so many ticks ago.
+    /// Stores the torque given now. Returns the torque given `ticks` + `share` ticks ago, interpolated.
     #[inline(always)]
     fn put(&mut self, torque: T, ticks: u8, share: T) -> T {
         const LAST: usize = GIVEN - 1;
@@ -119,7 +120,7 @@ impl<T: Real> Given<T> {
 }
 
 impl<T: Real> State<T> {
-    /// Ticks have been left out: what was worked out before them no longer holds.
+    /// Discards all values after skipped ticks: they no longer hold.
     pub fn interrupt(&mut self) {
         self.planned = [T::ZERO; EFFECTS];
         self.sliding = [T::ZERO; EFFECTS];
@@ -129,7 +130,7 @@ impl<T: Real> State<T> {
         self.given = Given::default();
     }
 
-    /// Nobody knows where the link stands: what is periodic stands nowhere. Not inlined: it is seldom.
+    /// Discards the periodic state, because the position is unknown. Not inlined: it is seldom called.
     #[cold]
     #[inline(never)]
     fn forget(&mut self) {
@@ -137,47 +138,47 @@ impl<T: Real> State<T> {
     }
 }
 
-/// Sum of values. Not inlined: a chip's fast memory is small.
+/// Returns the sum of values. Not inlined: a chip's fast memory is small.
 #[inline(never)]
 fn total<T: Real>(values: &[T]) -> T {
     values.iter().fold(T::ZERO, |sum, value| sum + *value)
 }
 
-/// The last so many values.
+/// Returns the last `count` values.
 #[inline(always)]
 fn last<T>(values: &[T; EFFECTS], count: u8) -> &[T] {
     let first = EFFECTS.saturating_sub(usize::from(count));
     values.get(first..).unwrap_or_default()
 }
 
-/// One law to be evaluated.
+/// A law to be evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Job {
     effect: u8,
-    /// Place among the values.
+    /// Index among the values.
     place: u8,
-    /// At the measured motion, instead of where the torque to give is taken from.
+    /// True if it is evaluated at the measured motion instead of the planned one.
     sliding: bool,
-    /// The effect of presliding through whose contact it acts.
+    /// Index of the presliding effect through whose contact it acts.
     contact: Option<u8>,
 }
 
-/// The effects of a rig, checked.
+/// The checked effects of a rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Compensation<T> {
     effects: [Option<Compensated<T>>; EFFECTS],
-    /// What is evaluated in turn, one law a tick.
+    /// The laws to be evaluated in turn, one in each tick.
     jobs: [Job; 2 * EFFECTS],
     count: u8,
-    /// Dry effects, and standing ones.
+    /// Number of dry and of standing effects.
     dry: u8,
     standing: u8,
-    /// How many of the standing ones, the first, act on the link, where an effect depends on what the gear transmits.
+    /// Number of standing effects on the link (they come first); 0 if no effect depends on the transmitted torque.
     on_link: u8,
-    /// Ticks until a law's turn comes again.
+    /// Number of evaluated ticks between two turns of a law.
     round: T,
     waves: Waves<T>,
-    /// Some effect depends on the transmitted torque.
+    /// True if an effect depends on the transmitted torque.
     needs_load: bool,
 }
 
@@ -185,7 +186,7 @@ impl<T: Scalar> Compensation<T> {
     /// Checks all effects.
     ///
     /// # Errors
-    /// What is wrong with the first that cannot be used.
+    /// Returns the fault of the first effect that cannot be used.
     pub fn new(effects: &Effects<T>) -> Result<Self, EffectFault> {
         let mut all = Self::default();
         let mut contact = None;
@@ -197,7 +198,7 @@ impl<T: Scalar> Compensation<T> {
                 contact = Some(k as u8);
             }
         }
-        // What a gear carries comes first, so that its values lie side by side.
+        // Effects on the link come first, so that their values are contiguous.
         for on_link in [true, false] {
             for (k, one) in all.effects.into_iter().enumerate() {
                 let Some(one) = one else { continue };
@@ -213,7 +214,7 @@ impl<T: Scalar> Compensation<T> {
         Ok(all)
     }
 
-    /// Gives an effect its turn and its place among the values.
+    /// Assigns an effect its jobs and its place among the values.
     fn place(&mut self, effect: usize, one: &Compensated<T>, contact: Option<u8>) {
         let kind = one.effect.kind;
         let job = |place: u8, sliding: bool| Job {
@@ -244,30 +245,30 @@ impl<T: Scalar> Compensation<T> {
         }
     }
 
-    /// The effects as they were given.
+    /// Returns the effects as they were given.
     pub fn effects(&self) -> Effects<T> {
         self.effects.map(|one| one.map(|one| one.effect))
     }
 
-    /// Whether there is a torque to work out.
+    /// Returns true if any effect gives a torque.
     #[inline(always)]
     pub fn has_torque(&self) -> bool {
         self.count > 0 || self.waves.of_torque()
     }
 
-    /// Whether there is anything that turns with an angle, and is to be told of it at every tick.
+    /// Returns true if any effect is periodic and must get the angle at every tick.
     #[inline(always)]
     pub fn turns(&self) -> bool {
         self.waves.any()
     }
 
-    /// Whether an effect depends on the torque that the gear transmits.
+    /// Returns true if an effect depends on the torque that the gear transmits.
     #[inline(always)]
     pub fn needs_load(&self) -> bool {
         self.needs_load
     }
 
-    /// Voltage that the bridge loses against the current, V.
+    /// Returns the voltage that the bridge loses against the current, V.
     pub fn lost_voltage(&self) -> T {
         let lost = |one: &Compensated<T>| one.effect.gains[0];
         let all = self.effects.iter().flatten();
@@ -275,12 +276,12 @@ impl<T: Scalar> Compensation<T> {
             .fold(T::ZERO, |sum, one| sum + lost(one))
     }
 
-    /// Largest share of the velocity that what the encoder reads too much can make up.
+    /// Returns the largest error of the velocity due to the encoder, as a share of the velocity.
     pub fn position_slope(&self, gear_ratio: T) -> T {
         self.waves.position_slope(gear_ratio)
     }
 
-    /// Constant error of the measured current, A, where a torque in N·m is so many per ampere.
+    /// Returns the constant error of the measured current, A. `torque_per_ampere` is in N·m/A.
     pub fn current_error(&self, torque_per_ampere: T) -> T {
         let mut sum = T::ZERO;
         for one in self.effects.iter().flatten() {
@@ -298,8 +299,8 @@ impl<T: Scalar> Compensation<T> {
         sum
     }
 
-    /// Turns what is periodic to where the link is. What the encoder reads too much there: evaluated at the reading instead of
-    /// the truth, which is wrong by the error's own square.
+    /// Moves periodic effects to the current angle. Returns the encoder's error there, evaluated at the reading
+    /// instead of the true position; this is wrong by the square of the error.
     #[inline(always)]
     pub fn turn(&self, state: &mut State<T>, now: &Now<T>) -> Reading<T> {
         if !now.placed {
@@ -319,10 +320,10 @@ impl<T: Scalar> Compensation<T> {
         }
     }
 
-    /// Torque to give, and torque that is explained. The result is finite for any input.
+    /// Returns the torque to give and the torque that is explained. The result is finite for any input.
     ///
-    /// One law is evaluated in a tick that has time, in turn, and stands until its turn comes again, each in the middle of the
-    /// time that it stands for. Periodic ones are as [`turn`](Self::turn) has left them, which is to be called first.
+    /// In each tick that is not busy one law is evaluated, in turn. Its value is held until its next turn, and is
+    /// taken for the middle of that time. Call [`turn`](Self::turn) first: it updates the periodic effects.
     #[inline(always)]
     pub fn torque(
         &self,
@@ -357,7 +358,7 @@ impl<T: Scalar> Compensation<T> {
         output
     }
 
-    /// The sums anew.
+    /// Recomputes the sums.
     #[inline(never)]
     fn add_up(&self, state: &mut State<T>) {
         let dry = usize::from(self.dry);
@@ -368,7 +369,7 @@ impl<T: Scalar> Compensation<T> {
         ];
     }
 
-    /// How far the contact is bent through which a law acts; none where nothing bends it.
+    /// Returns the deflection of the contact through which a law acts; none if it acts through no contact.
     #[inline(always)]
     fn bent(&self, state: &State<T>, job: &Job) -> Option<T> {
         let contact = usize::from(job.contact?);
@@ -409,7 +410,7 @@ impl<T: Scalar> Compensation<T> {
             instant.load += total(last(&state.planned, self.on_link));
         }
         instant.period = now.period * self.round;
-        // Until half of the time that it stands for has passed.
+        // The middle of the time for which the value is held.
         let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
         instant.position += way;
         instant.motor_angle += way * now.gear_ratio;
@@ -435,7 +436,7 @@ impl<T: Scalar> Compensation<T> {
             };
             (&mut state.planned, planned)
         };
-        // Of dry friction nothing is given where nothing moves or is to, whatever a law remembers.
+        // Dry friction gives no torque where the direction is 0, whatever the hidden state.
         let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
         if let Some(bent) = bent {
             instant.direction = bent;

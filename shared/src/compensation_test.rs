@@ -1,5 +1,5 @@
-//! Effects as torques and corrections: against the friction law where both have the same effect, and over the whole
-//! registry for what holds of every effect.
+//! Tests of effects as torques and corrections: against the friction law where both describe the same effect, and
+//! over the whole registry for common properties.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
@@ -38,7 +38,7 @@ fn cogging(cosine: f64, sine: f64, order: f64) -> Effect<f64> {
     }
 }
 
-/// An effect of this kind in the middle of what rigs have.
+/// Returns an effect of this kind with typical parameters.
 fn typical(kind: Kind) -> Effect<f64> {
     let about = kind.about();
     let middle = |parameters: &[Parameter], k: usize| {
@@ -67,7 +67,7 @@ fn at(reference: f64, measured: f64) -> Now<f64> {
     }
 }
 
-/// Once every effect has had its turn.
+/// Returns the output after every effect has had its turn.
 fn settled<T: Scalar>(
     effects: &Effects<T>,
     settings: &PrecompensationSettings<T>,
@@ -76,7 +76,7 @@ fn settled<T: Scalar>(
     let compensation = Compensation::new(effects).unwrap();
     let mut state = State::default();
     let mut output = Output::default();
-    // A tick without time: what remembers a way makes none.
+    // With a period of 0, presliding travels no distance.
     let now = Now {
         period: T::ZERO,
         ..*now
@@ -118,7 +118,7 @@ fn what_is_explained_is_the_whole_law_at_the_measured_motion() {
     let effects = only(stribeck(0.25, 0.1));
     let output = torque(&effects, &at(0.3, -0.06));
     assert!((output.explained + 0.25 * libm::exp(-0.36)).abs() < 1e-12);
-    // Switched off, friction is not given, but it is there all the same.
+    // If switched off, friction is not given but still explained.
     let off = PrecompensationSettings {
         enabled: false,
         ..SETTINGS
@@ -141,7 +141,7 @@ fn cogging_is_given_in_full_at_rest_and_only_where_the_link_stands() {
         let output = torque(&effects, &now);
         assert!((output.feed - wanted).abs() < 1e-12);
         assert_eq!(output.feed, output.explained);
-        // Nobody has said where the link stands: then no angle means anything.
+        // If the position is unknown, no angle is valid.
         now.placed = false;
         assert_eq!(torque(&effects, &now), Output::default());
     }
@@ -185,13 +185,13 @@ fn no_effect_drives_a_link_that_runs_ahead_and_dry_ones_stop_with_the_reference(
             let mut last = torque(&effects, &at(reference, reference)).feed.abs();
             for k in 1..=400 {
                 let measured = reference + f64::from(k) * 5e-3;
-                // At one place, wherever the link is going.
+                // The same position for any velocity of the link.
                 let now = Now {
                     period: 0.0,
                     ..at(reference, measured)
                 };
                 let next = torque(&effects, &now).feed.abs();
-                // From a slow to a fast link the share may still rise.
+                // The share may still rise from a slow to a fast link.
                 let share_left = SETTINGS.gain / share(&SETTINGS, reference, reference);
                 assert!(next <= share_left * last + 1e-12, "{kind:?} {measured}");
                 last = next;
@@ -277,7 +277,7 @@ fn both<T: Copy>([first, second]: [Effect<T>; 2]) -> Effects<T> {
     effects
 }
 
-/// What nothing is done about is told by its name and with a reason, and only that.
+/// Exactly the kinds that cannot be compensated are refused, with a reason.
 #[test]
 fn each_kind_has_a_role_or_a_reason() {
     let refused: std::vec::Vec<_> = Kind::ALL
@@ -295,7 +295,7 @@ fn each_kind_has_a_role_or_a_reason() {
     assert_eq!(refused, expected);
 }
 
-/// A reversal: the torque builds up over the reference's stroke, goes with the reference alone, and rests with it.
+/// After a reversal the torque builds up over the reference's stroke, and follows the reference alone.
 #[test]
 fn friction_with_memory_is_given_over_the_way_of_the_reference() {
     let effect = Effect::new(Kind::PreslidingDahl, &[1.0], &[0.01]);
@@ -312,16 +312,16 @@ fn friction_with_memory_is_given_over_the_way_of_the_reference() {
         }
         last / share(&SETTINGS, reference, measured)
     };
-    // Twenty strokes on: nothing is left of the start.
+    // After twenty strokes the start is forgotten.
     assert!(go(0.5, 0.0, 4000).abs() < 1e-6);
-    // Half a stroke back: z = −1 + 2·exp(−½), the law gives z + 1.
+    // Half a stroke after the reversal: z = −1 + 2·exp(−½), the law gives z + 1.
     let back = go(-0.5, 0.0, 100);
     assert!((back - 2.0 * (-0.5_f64).exp()).abs() < 0.02, "{back}");
-    // The link's own motion changes nothing, and a reference that stands gives nothing.
+    // The motion of the link changes nothing, and a reference at rest gives no torque.
     assert_eq!(go(0.0, 0.3, 10), 0.0);
 }
 
-/// Set right one at a time, and right at the template's highest speed all the same.
+/// The two errors are reset one at a time, and are accurate even at the template's highest speed.
 #[test]
 fn two_errors_of_the_encoder_are_taken_off_in_turn() {
     let given = [
@@ -397,7 +397,7 @@ proptest! {
             ..at(reference.into(), measured.into())
         };
         let f64s = torque(&both(given), &wide);
-        // An order of 24 takes the angle's rounding with it.
+        // The rounding error of the angle is multiplied by the order, 24.
         prop_assert!((f64::from(f32s.feed) - f64s.feed).abs() < 1e-5);
         prop_assert!((f64::from(f32s.explained) - f64s.explained).abs() < 1e-5);
     }

@@ -1,27 +1,27 @@
 //! Friction precompensation: the friction law as a feed-forward torque that is safe at zero velocity.
 //!
-//! Three things go wrong when a friction law is simply added to the command, and each has its answer here:
+//! Three things go wrong when a friction law is simply added to the command. Each has its remedy here:
 //!
 //! * **Direction near rest.** The sign of a measured velocity near zero is noise. Below `velocity_threshold` the
-//!   direction is the reference's, above twice the threshold the measurement's, in between a smooth blend. The
+//!   direction is the reference's, above twice the threshold the measurement's, with a smooth blend in between. The
 //!   reference carries no noise, so its sign may saturate early: tanh of velocity over [`REFERENCE_SHARE`] of the
-//!   threshold. A reference at rest asks for no torque, whatever the link does: friction then helps to stop it, and a
-//!   torque that followed the measured speed would cancel that help and keep a limit cycle alive (seen on the
-//!   emulated rig: a disturbance of 0.03 N·m was enough to start one).
-//! * **Over-compensation.** With a friction estimate above the true friction the compensated link is driven by its
-//!   own friction model and hunts. Only a share is compensated: `gain_at_rest` at zero speed rising to `gain` at the
+//!   threshold. A reference at rest asks for no torque, whatever the link does: friction then helps to stop the link. A
+//!   torque that followed the measured speed would cancel that help and keep a limit cycle alive (seen on the emulated
+//!   rig: a disturbance of 0.03 N·m was enough to start one).
+//! * **Over-compensation.** With a friction estimate above the true friction, the friction model drives the compensated
+//!   link and the loop hunts. Only a share is compensated: `gain_at_rest` at zero speed rising to `gain` at the
 //!   threshold (the faster of reference and link counts).
 //! * **Velocity weakening.** On the falling branch of the Stribeck curve friction falls as speed rises. A torque held
-//!   at the reference's speed then exceeds the friction of a link that has run ahead, which runs ahead further:
-//!   stick-slip by feed-forward. A torque taken from the measured speed on the rising (viscous) branch cancels the
-//!   damping that the loop needs. So each part is evaluated where the torque cannot grow with the measured
-//!   speed: the Stribeck excess at the *faster* of reference and link, the viscous part at the reference.
+//!   at the reference's speed then exceeds the friction of a link that has run ahead, and drives it further: stick-slip
+//!   by feed-forward. A torque at the measured speed on the rising (viscous) branch cancels the damping that the loop
+//!   needs. So each part is evaluated where the torque cannot grow with the measured speed: the Stribeck excess at the
+//!   *faster* of reference and link, the viscous part at the reference.
 //!
-//! The torque is continuous in all its inputs. Background: Armstrong-Hélouvry, Dupont and Canudas de Wit 1994,
-//! sec. 5 (fixed compensation and its stability).
+//! The torque is continuous in all its inputs. Background: Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, sec. 5
+//! (fixed compensation and its stability).
 //!
-//! Leaves out: presliding displacement; within it the true friction is below the law's and `gain_at_rest` has to
-//! cover the difference.
+//! Leaves out: presliding displacement. Within it true friction is below the law's; `gain_at_rest` must cover the
+//! difference.
 
 use core::fmt;
 
@@ -31,24 +31,24 @@ use serde::{Deserialize, Serialize};
 use crate::friction::Friction;
 use crate::scalar::Real;
 
-/// Reference velocity, as a share of the velocity threshold, at which the direction is 76 % certain (tanh 1).
-/// A choice: a fiftieth of the noise that the threshold stands for, far above the rounding of `f32`.
+/// Reference velocity, as a share of the velocity threshold, at which the direction is 76 % certain (tanh 1). A choice:
+/// a fiftieth of the noise that the threshold stands for, far above the rounding of `f32`.
 pub const REFERENCE_SHARE: f64 = 0.02;
 
-/// How the friction law is turned into a feed-forward torque.
+/// Settings of the friction feed-forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct PrecompensationSettings<T> {
-    /// Off: no friction torque is added.
+    /// True if friction torque is added.
     pub enabled: bool,
     /// Share of the friction law that is compensated while sliding, 0 to 1.
     pub gain: T,
     /// Share near zero speed, below `gain` so that the loop cannot hunt, 0 to 1.
     pub gain_at_rest: T,
-    /// Speed below which the measured velocity says nothing about the direction, rad/s.
+    /// Speed below which the measured velocity does not show the direction, rad/s.
     pub velocity_threshold: T,
 }
 
-/// Which setting of the precompensation is impossible.
+/// Setting of the precompensation that is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PrecompensationError {
     /// `gain` is not between 0 and 1.
@@ -75,23 +75,23 @@ impl fmt::Display for PrecompensationError {
 
 impl core::error::Error for PrecompensationError {}
 
-/// 0 below `low`, 1 above `high`, the cubic with level ends between; `low` < `high`.
+/// Returns 0 below `low`, 1 above `high`, and a cubic with level ends between; `low` < `high`.
 #[inline(always)]
 fn smooth_step<T: Real>(x: T, low: T, high: T) -> T {
     let s = ((x - low) / (high - low)).clamp_to(T::ZERO, T::ONE);
     s.squared() * (T::from_f64(3.0) - T::from_f64(2.0) * s)
 }
 
-/// The value where it is a number of sane size, else zero.
+/// Returns the value if its magnitude is at most 10³⁰, else (NaN too) zero.
 #[inline(always)]
 pub(crate) fn finite<T: Real>(x: T) -> T {
     T::select(x.abs().le(T::from_f64(1.0e30)), x, T::ZERO)
 }
 
-/// Direction of motion, −1 to 1, smooth: the reference's near rest, the measurement's beyond the threshold; 0 where
-/// the reference stands.
+/// Returns the direction of motion, −1 to 1, smooth: the reference's near rest, the measurement's beyond the threshold;
+/// 0 where the reference is at rest.
 ///
-/// Not inlined: every law asks for it, and the chip's fast memory has no room for copies.
+/// Not inlined: every law calls it, and the chip's fast memory has no room for copies.
 #[inline(never)]
 pub fn direction<T: Real>(reference: T, measured: T, velocity_threshold: T) -> T {
     let threshold = velocity_threshold.max(T::from_f64(1.0e-6));
@@ -100,8 +100,8 @@ pub fn direction<T: Real>(reference: T, measured: T, velocity_threshold: T) -> T
     weight * measured.sgn() * wanted.abs() + (T::ONE - weight) * wanted
 }
 
-/// Share of dry friction that is given: `gain_at_rest` at rest, `gain` from the threshold on, by the faster of reference
-/// and link.
+/// Returns the share of dry friction that is given: `gain_at_rest` at rest, `gain` from the threshold on, by the faster
+/// of reference and link.
 #[inline(always)]
 pub fn share<T: Real>(settings: &PrecompensationSettings<T>, reference: T, measured: T) -> T {
     let threshold = settings.velocity_threshold.max(T::from_f64(1.0e-6));
@@ -110,7 +110,7 @@ pub fn share<T: Real>(settings: &PrecompensationSettings<T>, reference: T, measu
         + (settings.gain - settings.gain_at_rest) * smooth_step(faster, T::ZERO, threshold)
 }
 
-/// Feed-forward torque against friction, N·m.
+/// Returns the feed-forward torque against friction, N·m.
 ///
 /// `reference` and `measured` are velocities in rad/s, `load` the torque that the gear transmits, N·m. With
 /// settings and a law that pass their checks the result is finite for any input, NaN included (it counts as 0).
@@ -140,7 +140,7 @@ pub fn torque<T: Real>(
 }
 
 impl<T: Real<Mask = bool>> PrecompensationSettings<T> {
-    /// Whether the settings are usable; switched off they always are.
+    /// Checks the settings; if switched off they are always valid.
     ///
     /// # Errors
     /// [`PrecompensationError`] naming the setting that is out of its range.

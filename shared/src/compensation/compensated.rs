@@ -5,17 +5,17 @@ use crate::effects::{Effect, Instant, Memory, Parameter, Scale};
 use crate::precompensation::finite;
 use crate::scalar::{Real, Scalar};
 
-/// Slow and fast, rad/s: whether an effect falls with speed.
+/// A slow and a fast speed, rad/s. Their comparison shows if an effect falls with speed.
 const SPEEDS: [f64; 2] = [1e-3, 10.0];
 
-/// An effect that has passed its checks, with what follows from it.
+/// A checked effect with derived properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Compensated<T> {
     pub(super) effect: Effect<T>,
     pub(super) role: Role,
-    /// All shapes are whole: the motor's angle within a turn says as much as the angle itself, and better.
+    /// True if all shapes are whole. The motor's angle within a turn then suffices, and has less rounding error.
     pub(super) whole: bool,
-    /// It is smaller at high speed than at low speed.
+    /// True if the effect is smaller at high speed than at low speed.
     pub(super) falls: bool,
 }
 
@@ -23,7 +23,7 @@ impl<T: Scalar> Compensated<T> {
     /// Checks an effect.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns the fault of the effect.
     pub(super) fn new(effect: Effect<T>) -> Result<Self, EffectFault> {
         let kind = effect.kind;
         let role = Role::of(kind).ok_or(EffectFault::NotCompensable(kind))?;
@@ -49,7 +49,7 @@ impl<T: Scalar> Compensated<T> {
     }
 }
 
-/// Value of an effect that is not periodic. Every law of the registry is in here: once, not at every place that asks.
+/// Returns the value of an effect that is not periodic. Not inlined: the code of all laws is then stored only once.
 #[inline(never)]
 pub(super) fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: &Instant<T>) -> T {
     let terms = effect
@@ -63,7 +63,8 @@ pub(super) fn evaluate<T: Real>(effect: &Effect<T>, memory: &mut Memory<T>, at: 
     finite(sum)
 }
 
-/// `divided`: the law divides by those that are searched in ratios, and has no value where they are 0.
+/// Checks the bounds of parameters. With `divided` the lower bound of a logarithmic parameter is excluded: the law
+/// divides by it.
 fn within<T: Scalar>(
     parameters: &[Parameter],
     values: &[T],

@@ -1,13 +1,13 @@
-//! What a control tick knows.
+//! Inputs of the compensation in a control tick.
 
 use crate::effects::Instant;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// What a control tick knows. Joint-side, SI.
+/// Inputs of the compensation in a control tick. Joint-side, SI.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Now<T> {
-    /// Where the link should be.
+    /// Desired motion of the link.
     pub reference: Reference<T>,
     /// Measured position, rad.
     pub position: T,
@@ -17,18 +17,18 @@ pub struct Now<T> {
     pub gear_ratio: T,
     /// Angle of the motor, rad.
     pub motor_angle: T,
-    /// The same within one turn, without the rounding of many turns.
+    /// Motor angle within one turn, rad, without the rounding error of many turns.
     pub angle_in_turn: T,
-    /// Whether somebody has said where the link stands: nothing can stand at a position that nobody knows.
+    /// True if the position is known. Otherwise effects that depend on the position give no torque.
     pub placed: bool,
-    /// Whether the tick has enough else to do: the laws then stand as they are for one tick more.
+    /// True if the tick has no time for a law: all laws then hold their values.
     pub busy: bool,
-    /// Whether what is periodic is turned in this tick, as it must be in every one that is not busy; in the others it goes along
-    /// its parabola.
+    /// True if the periodic effects are updated by their angle in this tick, as every tick that is not busy must do.
+    /// Otherwise they are extrapolated along a parabola.
     pub turns: bool,
     /// Torque that the drive gives, N·m.
     pub drive_torque: T,
-    /// Torque that the gear transmits, without that of effects, N·m.
+    /// Torque that the gear transmits, without the torque of effects, N·m.
     pub load: T,
     /// Coulomb friction of the joint, N·m.
     pub coulomb: T,
@@ -40,16 +40,16 @@ pub struct Now<T> {
     pub warming: T,
     /// Time since the last tick that was not busy, s.
     pub period: T,
-    /// How long a torque that is ordered takes to act, s.
+    /// Delay until an ordered torque acts, s.
     pub lead: T,
-    /// The same in whole ticks, below [`GIVEN`](super::GIVEN) − 1.
+    /// Whole ticks of that delay, below [`GIVEN`](super::GIVEN) − 1.
     pub lead_ticks: u8,
-    /// What is left of it, as a share of a tick.
+    /// The fraction of a tick that remains of that delay.
     pub lead_share: T,
 }
 
 impl<T: Real> Now<T> {
-    /// The motor's angle as an effect wants it.
+    /// Returns the motor's angle: within a turn for `whole` orders, else over all turns.
     #[inline(always)]
     pub(super) fn angle(&self, whole: bool) -> T {
         if whole {
@@ -59,13 +59,13 @@ impl<T: Real> Now<T> {
         }
     }
 
-    /// Friction of the joint at a velocity and in a direction, N·m.
+    /// Returns the friction of the joint at a velocity and in a direction, N·m.
     #[inline(always)]
     pub(super) fn friction(&self, velocity: T, direction: T) -> T {
         self.coulomb * direction + self.viscous * velocity
     }
 
-    /// At the reference's acceleration, at rest.
+    /// Returns the inputs of an effect: at the reference's acceleration and at rest.
     #[inline(always)]
     pub(super) fn instant(&self, whole: bool) -> Instant<T> {
         Instant {
@@ -75,7 +75,7 @@ impl<T: Real> Now<T> {
             direction: T::ZERO,
             motor_angle: self.angle(whole),
             drive_torque: self.drive_torque,
-            // Laws of what a sensor reads late, and of masses, are not compensated.
+            // Laws of sensor delay and of payload are not compensated.
             drive_rate: T::ZERO,
             gravity: T::ZERO,
             load: self.load,

@@ -1,13 +1,13 @@
-//! What is done about an effect, and why nothing can be.
+//! The compensation of each kind of effect, or the reason why there is no compensation.
 
 use core::fmt;
 
 use crate::effects::{About, Channel, Direction, Kind};
 
-/// What is done about an effect.
+/// How an effect is compensated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A torque with the friction law's direction and share.
+    /// A torque with the direction and share of the friction law.
     Dry,
     /// A torque at the measured position, in full.
     Standing,
@@ -20,12 +20,12 @@ pub enum Role {
 }
 
 impl Role {
-    /// What is done about effects of this kind; `None` where nothing can be.
+    /// Returns the role of this kind; `None` if it cannot be compensated.
     pub const fn of(kind: Kind) -> Option<Self> {
         Self::by(kind.about())
     }
 
-    /// Why nothing is done about effects of this kind, and what to do instead; `None` where something is.
+    /// Returns why this kind is not compensated, and what to do instead; `None` if it is compensated.
     pub const fn refusal(kind: Kind) -> Option<&'static str> {
         if Self::of(kind).is_some() {
             return None;
@@ -45,17 +45,17 @@ impl Role {
         })
     }
 
-    /// The same by what is known of the effect.
+    /// Returns the role by the effect's description.
     pub(crate) const fn by(about: &About) -> Option<Self> {
         match (about.channel, about.direction) {
             (Channel::Torque, Direction::Dry) if about.compensable => Some(Self::Dry),
-            // A mass on the link belongs into the model, which knows where gravity points.
+            // A payload belongs into the model, which knows the direction of gravity.
             (Channel::Torque | Channel::Load, Direction::Indifferent)
                 if about.compensable && !same(about.name, "payload") =>
             {
                 Some(Self::Standing)
             }
-            // Of what a sensor reads wrongly, only a known function of the position, or a constant, can be taken off.
+            // A sensor error can be subtracted only if it is a constant or a known function of the position.
             (Channel::Position, _) if same(about.name, "encoder_eccentricity") => {
                 Some(Self::Position)
             }
@@ -66,7 +66,7 @@ impl Role {
     }
 }
 
-/// Equality of texts at compile time.
+/// Compares two texts at compile time.
 const fn same(a: &str, b: &str) -> bool {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     let mut k = 0;
@@ -79,11 +79,11 @@ const fn same(a: &str, b: &str) -> bool {
 /// Why an effect cannot be compensated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffectFault {
-    /// No torque and no correction undoes effects of this kind.
+    /// No torque and no correction compensates this kind.
     NotCompensable(Kind),
     /// This parameter is not a number within its physical bounds.
     Parameter(&'static str),
-    /// A value beyond the effect's parameters is not 0.
+    /// A value after the effect's last parameter is not 0.
     Surplus,
 }
 

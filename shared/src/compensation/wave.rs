@@ -1,12 +1,12 @@
-//! Periodic effects: turned with their angle in every second tick, along a parabola in the other, and set right by their own
-//! formula once in a while.
+//! Periodic effects. They are rotated with their angle in every second tick and extrapolated along a parabola in the
+//! other. Once in a while each is set to its own formula.
 //!
-//! cosine·cos φ + sine·sin φ and what it is a quarter of a period on are two numbers that turn into each other by the order
-//! times what the angle has moved: for less than what sine and cosine of the angle cost, and as right in whatever tick a
-//! wave's turn to be set right comes. Between two turns the sums of all waves go on by their first and second derivatives.
+//! A wave cosine·cos φ + sine·sin φ and its value a quarter of a period later form a pair. A rotation by order times
+//! the change of the angle updates the pair. This costs less than sine and cosine of the angle, and is accurate in
+//! any tick between two resets. The first and second derivatives extrapolate the sums between two rotations.
 //!
-//! Where the phase moves by more than 1.5 rad from one turn to the next (order 84 over 50 : 1 above 1.8 rad/s) there is no wave: a
-//! current loop of a twentieth of the tick's rate gives half of it at best, and at a jump of the angle nobody knows the phase.
+//! A wave whose phase moves by more than 1.5 rad between two rotations (order 84 over 50 : 1 above 1.8 rad/s) is 0. A
+//! current loop of a twentieth of the tick's rate gives at best half of it, and a jump makes the phase unknown.
 
 use super::EFFECTS;
 use super::compensated::Compensated;
@@ -16,11 +16,11 @@ use crate::effects::Periodic;
 use crate::precompensation::finite;
 use crate::scalar::{Real, Scalar};
 
-/// Farthest that a phase may move from one turn to the next, rad.
+/// Largest change of the phase between two rotations, rad.
 const FARTHEST: f64 = 1.5;
 
-/// What waves are summed up for: errors of the position by the motor's angle and by the joint's, and torques, on their own and
-/// per torque of the drive.
+/// The sums to which waves belong: position errors by the motor's angle and by the joint's, torques, and torques per
+/// drive torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Sort {
     #[default]
@@ -40,7 +40,7 @@ impl Sort {
         })
     }
 
-    /// Its place.
+    /// Returns its index.
     #[inline(always)]
     fn place(self) -> usize {
         self as usize & 3
@@ -50,36 +50,36 @@ impl Sort {
 /// An effect that is a sinusoid of an angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Wave<T> {
-    /// Periods in a turn of the angle.
+    /// Periods per turn of the angle.
     order: T,
     cosine: T,
     sine: T,
     sort: Sort,
-    /// The order is whole: the motor's angle within a turn says as much as the angle itself, and better.
+    /// True if the order is whole. The motor's angle within a turn then suffices, and has less rounding error.
     whole: bool,
 }
 
-/// What a wave is, and what it is a quarter of a period on.
+/// Value of a wave, and its value a quarter of a period later.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Phasor<T> {
     value: T,
     ahead: T,
 }
 
-/// Angles of the four sorts, or what is between two of them, rad. A torque's is that at which it acts when it is ordered now.
+/// Angles of the four sorts, or their changes, rad. A torque's angle is that at which a torque ordered now acts.
 type Angles<T> = [T; 4];
 
-/// Sum of waves of a sort.
+/// Sum of the waves of a sort.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sum<T> {
     pub(super) value: T,
-    /// Its first and second derivative by the angle, 1/rad and 1/rad² of the value.
+    /// First and second derivative by the angle: value per rad and per rad².
     pub(super) slope: T,
     bend: T,
 }
 
 impl<T: Real> Sum<T> {
-    /// So far on.
+    /// Returns the sum after the given change of angle.
     #[inline(always)]
     pub(super) fn after(self, angle: T) -> Self {
         let half = T::from_f64(0.5);
@@ -91,10 +91,10 @@ impl<T: Real> Sum<T> {
     }
 }
 
-/// The periodic ones among effects.
+/// The periodic effects of a rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Waves<T> {
-    /// Sort by sort.
+    /// Grouped by sort.
     waves: [Wave<T>; EFFECTS],
     count: u8,
     of_position: bool,
@@ -102,22 +102,22 @@ pub(super) struct Waves<T> {
     highest_order: T,
 }
 
-/// Where waves stand.
+/// Current state of the waves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Stand<T> {
     phasors: [Phasor<T>; EFFECTS],
     at: Angles<T>,
     sums: [Sum<T>; 4],
-    /// Highest order among those that are not too fast.
+    /// Highest order among the waves that are not too fast.
     highest_order: T,
-    /// Which is set right next.
+    /// Index of the wave that is set to its formula next.
     next: u8,
 }
 
 impl<T: Scalar> Waves<T> {
     pub(super) fn new(effects: &[Option<Compensated<T>>; EFFECTS]) -> Self {
         let mut all = Self::default();
-        // Sort by sort.
+        // Grouped by sort.
         for sort in [Sort::Motor, Sort::Joint, Sort::Torque, Sort::OfDrive] {
             for one in effects.iter().flatten() {
                 let Some(wave) = all.waves.get_mut(usize::from(all.count)) else {
@@ -146,7 +146,7 @@ impl<T: Scalar> Waves<T> {
         all
     }
 
-    /// Largest slope of what is read too much, motor and joint together: each wave's amplitude by its order.
+    /// Returns the largest slope of the position error: the sum of amplitude times order over motor and joint waves.
     pub(super) fn position_slope(&self, gear_ratio: T) -> T {
         let waves = self.waves.iter().take(usize::from(self.count));
         waves.fold(T::ZERO, |sum, wave| {
@@ -175,7 +175,7 @@ impl<T: Scalar> Waves<T> {
         self.of_torque
     }
 
-    /// Error of the position by the motor's angle, and by the joint's.
+    /// Returns the position error by the motor's angle and by the joint's.
     #[inline(always)]
     pub(super) fn position(&self, stand: &Stand<T>, now: &Now<T>) -> [Sum<T>; 2] {
         let [motor, joint, ..] = stand.at;
@@ -186,7 +186,7 @@ impl<T: Scalar> Waves<T> {
         ]
     }
 
-    /// Torque when what is ordered now acts, and the same per torque of the drive.
+    /// Returns the torque at the moment when an order of now acts, and the same per drive torque.
     #[inline(always)]
     pub(super) fn torque(&self, stand: &Stand<T>, now: &Now<T>) -> [Sum<T>; 2] {
         let [.., torque, of_drive] = stand.sums;
@@ -194,7 +194,7 @@ impl<T: Scalar> Waves<T> {
         [torque, of_drive].map(|sum| stand.after(sum, moved))
     }
 
-    /// Turns all waves to where the link is, and where there is time sets one of them right.
+    /// Rotates all waves to the current angles. If the tick has time, first sets one of them to its formula.
     ///
     /// Not inlined: it needs registers of its own.
     #[inline(never)]
@@ -209,11 +209,11 @@ impl<T: Scalar> Waves<T> {
             self.set(stand, now, &at, &moved);
         }
         let farthest = moved[0].abs().max(moved[1].abs()).max(moved[2].abs());
-        // Not so for what is no number, either.
+        // The negation also catches NaN.
         if !(farthest * stand.highest_order).le(f(FARTHEST)) {
             self.drop_fast(stand, &mut moved);
         }
-        // A sum is put down where the next sort begins; that of a sort without waves stays 0.
+        // A sum is stored where the next sort begins. The sum of a sort without waves stays 0.
         let mut sort = Sort::default();
         let mut way = moved[sort.place()];
         let mut sum = Sum::default();
@@ -227,7 +227,7 @@ impl<T: Scalar> Waves<T> {
             }
             let order = wave.order;
             let angle = order * way;
-            // Taylor's series: right to 3·10⁻³ and 6·10⁻⁴ at 1.5 rad, to 2·10⁻⁴ and 3·10⁻⁵ at one.
+            // Taylor series: errors of 3·10⁻³ and 6·10⁻⁴ at 1.5 rad, 2·10⁻⁴ and 3·10⁻⁵ at 1 rad.
             let square = angle * angle;
             let sine = angle * (T::ONE - square * (f(1.0 / 6.0) - square * f(1.0 / 120.0)));
             let cosine =
@@ -242,7 +242,7 @@ impl<T: Scalar> Waves<T> {
         stand.sums[sort.place()] = sum;
     }
 
-    /// Sets the next wave to what its formula says, as far before the tick's angles as it is then turned.
+    /// Sets the next wave to its formula at the previous angles; the rotation then moves it to the current ones.
     #[inline(always)]
     fn set(&self, stand: &mut Stand<T>, now: &Now<T>, at: &Angles<T>, moved: &Angles<T>) {
         let place = stand.next;
@@ -267,7 +267,7 @@ impl<T: Scalar> Waves<T> {
         stand.highest_order = self.highest_order;
     }
 
-    /// Drops waves whose phase has moved too far.
+    /// Sets waves whose phase has moved too far to 0.
     #[cold]
     #[inline(never)]
     fn drop_fast(&self, stand: &mut Stand<T>, moved: &mut Angles<T>) {
@@ -281,7 +281,7 @@ impl<T: Scalar> Waves<T> {
                 *phasor = Phasor::default();
             }
         }
-        // What turns nothing, but may be no number.
+        // These changes rotate no wave, but may be NaN.
         for moved in moved {
             *moved = T::select(moved.abs().le(farthest), *moved, T::ZERO);
         }
@@ -289,7 +289,7 @@ impl<T: Scalar> Waves<T> {
 }
 
 impl<T: Real<Mask = bool>> Stand<T> {
-    /// A sum so far from where it was taken; none where that is too far.
+    /// Returns a sum after a change of angle; 0 if the change is too large.
     #[inline(always)]
     fn after(&self, sum: Sum<T>, moved: T) -> Sum<T> {
         let near = (moved * self.highest_order).abs().le(T::from_f64(FARTHEST));
@@ -301,7 +301,7 @@ impl<T: Real<Mask = bool>> Stand<T> {
     }
 }
 
-/// The motor's angle when a torque that is ordered now acts, rad.
+/// Returns the motor's angle when a torque ordered now acts, rad.
 #[inline(always)]
 fn later<T: Real>(now: &Now<T>) -> T {
     now.motor_angle + now.lead * finite(now.velocity) * now.gear_ratio

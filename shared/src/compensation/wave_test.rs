@@ -1,4 +1,4 @@
-//! Waves against the formulas of their effects.
+//! Tests of the waves against the formulas of their effects.
 #![allow(clippy::unwrap_used)]
 
 use core::f64::consts::TAU;
@@ -12,10 +12,10 @@ use crate::precompensation::PrecompensationSettings;
 
 const RATIO: f64 = 50.0;
 const PERIOD: f64 = 1e-4;
-/// As the firmware has it: every fourth tick has time.
+/// As in the firmware: every fourth tick has time.
 const EVERY: u32 = 4;
 
-/// A rig whose link goes as told, its effects asked at every tick.
+/// A rig whose link follows exactly. Its effects are called at every tick.
 struct Rig {
     compensation: Compensation<f64>,
     state: State<f64>,
@@ -76,7 +76,7 @@ impl Rig {
         (torque, reading)
     }
 
-    /// By the formulas, `lead` later: torque, and error of the reading.
+    /// Returns torque and reading error by the formulas, `lead` later.
     fn truth(&self, velocity: f64, lead: f64) -> [f64; 2] {
         let position = self.position + lead * velocity;
         let at = Instant {
@@ -103,8 +103,8 @@ fn periodic() -> impl Iterator<Item = Kind> {
     kinds.filter(|kind| kind.periodic().is_some() && Role::of(*kind).is_some())
 }
 
-/// Every periodic kind, eight of it in turn: what is given is what the formula says for when it acts, and what is explained
-/// what it says now, at any speed at which there is a wave.
+/// Eight effects of each periodic kind. The given torque equals the formula at the time when it acts, and the
+/// explained torque equals the formula now, at any speed at which the waves exist.
 #[test]
 fn every_periodic_effect_is_its_formula_at_any_speed() {
     let lead = 3.7 * PERIOD;
@@ -126,7 +126,7 @@ fn every_periodic_effect_is_its_formula_at_any_speed() {
                 worst[2] = worst[2].max((torque.explained - here).abs());
             }
         }
-        // Eight of amplitude 1; the ripple is that per torque of the drive, which is 2.
+        // Eight waves of amplitude 1. Torque ripple is per drive torque, which is 2.
         let whole = if kind == Kind::TorqueRipple {
             16.0
         } else {
@@ -134,8 +134,8 @@ fn every_periodic_effect_is_its_formula_at_any_speed() {
         };
         let worst = worst.map(|worst| worst / whole);
         std::println!("{kind:?}: {worst:?} of the amplitude");
-        // What is explained lies on the line between two ticks: an eighth of the square of the phase between them, 0.27 rad at
-        // order 9.
+        // The explained torque is interpolated between two ticks. Its error is an eighth of the square of the phase
+        // between them, 0.27 rad at order 9.
         let most = [0.0025, 0.0025, 0.005];
         assert!(
             worst.iter().zip(most).all(|(worst, most)| *worst < most),
@@ -144,8 +144,8 @@ fn every_periodic_effect_is_its_formula_at_any_speed() {
     }
 }
 
-/// A law evaluated every fourth tick and held would be wrong by 1.44 rad at the end at 6 rad/s and order 12; with eight of them
-/// it would be noise.
+/// A law evaluated every fourth tick and held would be wrong by 1.44 rad at the end, at 6 rad/s and order 12. With
+/// eight of them it would be noise.
 #[test]
 fn fast_waves_are_followed_until_there_are_none() {
     for (order, speed, most) in [
@@ -171,7 +171,7 @@ fn fast_waves_are_followed_until_there_are_none() {
     }
 }
 
-/// The slope is the reading's derivative.
+/// The slope is the derivative of the position error.
 #[test]
 fn the_slope_of_the_reading_is_that_of_its_error() {
     for kind in periodic().filter(|kind| Role::of(*kind) == Some(Role::Position)) {
@@ -190,19 +190,19 @@ fn the_slope_of_the_reading_is_that_of_its_error() {
 }
 
 proptest! {
-    /// Whatever the angle does, jumps among it, a wave is never larger than it can be, and right again once its turn has come.
+    /// For any motion, with jumps, a wave stays within its amplitude. It is exact again after its next reset.
     #[test]
     fn jumps_do_no_harm(speeds in prop::collection::vec((-8.0..8.0_f64, 0..30_u32), 1..40)) {
         let effects = [wave(Kind::Cogging, 12.0), wave(Kind::GearEccentricity, 1.0)];
         let mut rig = Rig::new(&effects, 0.0);
         for (speed, ticks) in speeds {
-            // Half a joint's turn at once.
+            // A jump by half a turn of the joint.
             rig.position += if ticks % 7 == 0 { 3.0 } else { 0.0 };
             for _ in 0..ticks {
                 prop_assert!(rig.step(speed).0.feed.abs() < 2.02);
             }
         }
-        // The turn that a jump spoils, and one of each.
+        // The rotation that a jump spoils, and one reset of each wave.
         for _ in 0..12 {
             rig.step(0.0);
         }
