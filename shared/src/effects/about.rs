@@ -1,96 +1,95 @@
-//! What is known of an effect beside its equations.
+//! Descriptions of effects: names, parameters, sources and limits.
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// A torque on the joint.
     Torque,
-    /// On what the position sensor reads: the terms are its error in rad per unit of each gain.
+    /// The position reading. The terms are its error in rad per unit of each gain.
     Position,
-    /// On what the torque or current sensor reads.
+    /// The torque or current reading.
     Effort,
     /// Between motor and link.
     Transmission,
     /// Between the commanded and the effective voltage, V.
     Voltage,
-    /// Inertia and gravity of the link: nothing is left after a refit.
+    /// Inertia and gravity of the link. A refit of the link's parameters absorbs it completely.
     Load,
 }
 
-/// What the torque does with the direction of motion.
+/// Dependence of the torque on the direction of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Changes sign with it and holds the joint at rest: dry friction.
+    /// Changes sign with the direction and holds the joint at rest: dry friction.
     Dry,
     /// Exists at rest as well as in motion.
     Indifferent,
 }
 
-/// Of what a periodic effect is a sinusoid: its terms are cosine and sine of its first shape, the order, times that angle,
-/// and nothing else.
+/// Angle of a sinusoidal effect. The terms are cosine and sine of the order (its first shape) times that angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Periodic {
-    /// Of the motor's angle.
+    /// The motor's angle.
     Motor,
-    /// Of the motor's angle, times the torque of the drive.
+    /// The motor's angle; the terms are multiplied by the drive torque.
     MotorTimesDrive,
-    /// Of the joint's angle.
+    /// The joint's angle.
     Joint,
 }
 
-/// How a parameter is searched.
+/// How a search samples a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Any number, in equal steps.
     Linear,
     /// Any number, in equal ratios.
     Logarithmic,
-    /// Whole numbers alone, such as the order of a wave: nothing lies between two of them.
+    /// Whole numbers only, such as the order of a wave.
     Whole,
 }
 
-/// One parameter.
+/// Description of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Key in a description.
     pub name: &'static str,
     /// ASCII, joint-side unless the name says otherwise.
     pub unit: &'static str,
-    /// What physics allows.
+    /// Physical bounds.
     pub bounds: [f64; 2],
-    /// What rigs have: the range that is searched.
+    /// Range of real rigs, which is searched.
     pub range: [f64; 2],
-    /// How it is searched.
+    /// How a search samples it.
     pub scale: Scale,
-    /// In words.
+    /// Meaning in words.
     pub meaning: &'static str,
 }
 
-/// Another effect that can pass for this one.
+/// Another effect that can be mistaken for this one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Confusion {
     /// Its name.
     pub with: &'static str,
-    /// Whether no recording of torque and motor position can tell them apart.
+    /// True if no recording of torque and motor position can tell them apart.
     pub exact: bool,
-    /// What does.
+    /// Experiment or measurement that separates the two.
     pub separated_by: &'static str,
 }
 
-/// What a recording must contain before the effect can be judged.
+/// Requirement on a recording before the effect can be judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Need {
     /// Reversals of direction.
     Reversals(u32),
-    /// Motion below this speed in rad/s, and above three times of it.
+    /// Motion below this speed in rad/s, and above three times this speed.
     SlowMotion(f64),
-    /// Highest over typical speed.
+    /// Ratio of highest to typical speed.
     SpeedRange(f64),
-    /// Turns of the joint.
+    /// Travel of the joint, turns.
     Travel(f64),
-    /// Turns of the motor at less than this speed of the motor in rad/s.
+    /// Turns of the motor below this motor speed in rad/s.
     SlowTurns(f64),
-    /// Range of the transmitted torque over its mean.
+    /// Ratio of the range of the transmitted torque to its mean.
     LoadRange(f64),
     /// Running time, s.
     Duration(f64),
@@ -98,20 +97,20 @@ pub enum Need {
     Voltage,
     /// A recorded temperature or running time.
     Temperature,
-    /// Another joint that moves.
+    /// A second moving joint.
     OtherJoint,
-    /// A description known to be right before the change.
+    /// A description that was correct before the change.
     Prior,
 }
 
-/// What is known of an effect beside its equations.
+/// Description of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct About {
-    /// As descriptions and results write it.
+    /// Name in descriptions and results.
     pub name: &'static str,
-    /// Which of several laws under one name; none where there is one.
+    /// Name of the law if the effect has several, else none.
     pub law: Option<&'static str>,
-    /// In words, without an article.
+    /// Title in words, without an article.
     pub title: &'static str,
     /// The equation, plain text.
     pub equation: &'static str,
@@ -119,20 +118,20 @@ pub struct About {
     pub source: &'static str,
     /// Where it acts.
     pub channel: Channel,
-    /// What it does with the direction of motion.
+    /// Dependence on the direction of motion.
     pub direction: Direction,
     /// Parameters that enter linearly.
     pub gains: &'static [Parameter],
-    /// Parameters that do not.
+    /// Parameters that enter nonlinearly.
     pub shapes: &'static [Parameter],
-    /// How it shows in a residual.
+    /// Appearance in a residual.
     pub signature: &'static str,
-    /// What it is taken for.
+    /// Effects that are mistaken for it.
     pub confused: &'static [Confusion],
-    /// What a recording must contain.
+    /// Requirements on a recording.
     pub needs: &'static [Need],
-    /// Whether the firmware can compensate it by a torque.
+    /// True if the firmware can compensate it by a torque.
     pub compensable: bool,
-    /// What the equations leave out.
+    /// Physics that the equations leave out.
     pub leaves_out: &'static str,
 }

@@ -1,4 +1,4 @@
-//! Play between the teeth of a gear.
+//! Backlash of a gear.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,
@@ -76,10 +76,11 @@ impl Law for Backlash {
     }
 }
 
-/// Torque that a gear passes from motor to link, N·m: play, a spring behind it and damping in contact.
+/// Returns the torque that a gear passes from motor to link, N·m: backlash, then a spring and damping in contact.
 ///
-/// `twist` is the motor's angle over the ratio less the joint's, rad, `rate` its derivative; `gap` the whole play, rad;
-/// `stiffness` N·m/rad, `damping` N·m·s/rad. Teeth with play only push; a shaft without play pulls as well.
+/// `twist` is the motor's angle over the ratio minus the joint's angle, rad, and `rate` its derivative. `gap` is the
+/// whole backlash, rad; `stiffness` is in N·m/rad, `damping` in N·m·s/rad. Teeth with backlash only push; a shaft
+/// without pulls too.
 #[inline(always)]
 pub fn transmitted<T: Real>(gap: T, stiffness: T, damping: T, twist: T, rate: T) -> T {
     let half = T::from_f64(0.5) * gap;

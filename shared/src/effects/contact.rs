@@ -1,19 +1,19 @@
-//! The sliding contact of a joint, through which its dry friction acts: where a law with memory of distance stands, what grows with
-//! the load, varies with the position or falls with the speed builds up as that does and not at once, and bends the contact farther
-//! before it slides ([`Instant::beside`]): what bends is as stiff as it was. What is remembered is the torque that the contact holds,
-//! over the model's own friction: one that sticks while its friction changes keeps its torque, as a spring does, so that no change of
-//! friction does work. Beside friction that falls with the speed Dahl's law is LuGre's without micro-damping (Canudas de Wit, Olsson,
-//! Åström, Lischinsky 1995, eqs. 4 to 6).
+//! The sliding contact of a joint, through which its dry friction acts. Beside a presliding law, friction that grows
+//! with the load, varies with the position or falls with speed builds up with the presliding state and not at once. It
+//! also bends the contact farther before it slides ([`Instant::beside`]), at the same stiffness. The hidden state is
+//! the contact's torque over the model's own friction. A contact that sticks while its friction changes keeps its
+//! torque, as a spring does, so that no change of friction does work. Beside friction that falls with speed, Dahl's law
+//! is LuGre's without micro-damping (Canudas de Wit, Olsson, Åström, Lischinsky 1995, eqs. 4 to 6).
 //!
-//! Source: Lampaert, Al-Bender, Swevers 2003, eqs. 8 to 10, whose elements slip at their share of all the friction there is. Leaves
-//! out: friction that differs with the direction, which is a constant beside one that does not. Stiffness is kept where presliding
-//! holds all of the model's dry friction; where it holds a part, what bends is stiffer by what acts through it besides.
+//! Source: Lampaert, Al-Bender, Swevers 2003, eqs. 8 to 10; their elements slip at their share of the total friction.
+//! Leaves out: friction that differs with the direction (a constant beside symmetric friction). If presliding
+//! holds only a part of the model's dry friction, the other friction makes the contact stiffer.
 
 use super::{Effect, Instant, Kind, Memory};
 use crate::scalar::Real;
 
 impl Kind {
-    /// Whether it is a law of friction that builds up over a distance.
+    /// Returns true if it is a presliding law: friction that builds up over a distance.
     pub const fn is_presliding(self) -> bool {
         matches!(
             self,
@@ -21,7 +21,7 @@ impl Kind {
         )
     }
 
-    /// Whether it is dry friction that acts through the same contact as presliding of the joint.
+    /// Returns true if it is dry friction that acts through the same contact as the joint's presliding.
     pub const fn acts_through_contact(self) -> bool {
         matches!(
             self,
@@ -34,9 +34,9 @@ impl Kind {
 }
 
 impl<T: Real> Effect<T> {
-    /// How far the contact is bent that an effect of presliding remembers, with friction [`Instant::beside`] its own: what
-    /// [`Kind::acts_through_contact`] has in the place of its direction. From −1 to 1, but where friction has just fallen below what a
-    /// bristle of Dahl's law holds.
+    /// Returns the deflection of the contact of a presliding effect with the friction `beside` ([`Instant::beside`]).
+    /// Effects with [`Kind::acts_through_contact`] use it as their direction. It lies in −1 to 1, except with Dahl's
+    /// law right after friction has fallen below the torque that the contact holds.
     #[inline(always)]
     pub fn bent(&self, memory: &Memory<T>, beside: T) -> T {
         let at = Instant {
@@ -46,7 +46,7 @@ impl<T: Real> Effect<T> {
         let share = |state: T| state / at.whole();
         match self.kind {
             Kind::PreslidingDahl => return share(memory.0[0]),
-            // A bristle that is bent farther holds the breakaway of its own law.
+            // A bristle that is bent farther holds the breakaway torque of its own law.
             Kind::PreslidingLugre => return share(memory.0[0]).clamp_to(-T::ONE, T::ONE),
             _ => {}
         }

@@ -1,4 +1,4 @@
-//! What the current sensor reads when no current flows.
+//! Reading of the current sensor at zero current.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,4 +1,4 @@
-//! Torque of teeth whose lever arm varies over a turn.
+//! Torque of gear teeth whose lever arm varies over a turn.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, Periodic,

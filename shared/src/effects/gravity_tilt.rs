@@ -1,4 +1,4 @@
-//! Gravity that does not stand where the description says, for one joint: what its torque differs by.
+//! A direction of gravity that differs from the description: the change of torque of one joint.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,4 +1,4 @@
-//! Terms of another joint's motion: a coupled gear train, a rotor that is carried along.
+//! Terms of another joint's motion: a coupled gear train, or a rotor that another joint moves.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,4 +1,4 @@
-//! Friction of teeth and bearings that carry more.
+//! Friction of teeth and bearings that grows with the load.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,4 +1,4 @@
-//! A torque or current that is read later than the position.
+//! A torque or current reading that is delayed against the position.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,11 +1,11 @@
-//! Effects beyond the standard model: one file each, read alike by the simulator, the identifier, the diagnosis and the
-//! firmware's precompensation.
+//! Effects beyond the standard model, one file each. Simulator, identifier, diagnosis and the firmware's
+//! precompensation use the same laws.
 //!
-//! An effect adds a torque to what the drive has to give: τ = Y·π + Σ βₖ·hₖ(η; motion). The βₖ (*gains*) enter linearly,
-//! the η (*shapes*) do not; hidden states are driven by the motion itself. A few effects act elsewhere ([`Channel`]): on
-//! what a sensor reads, between motor and link, or between command and voltage.
+//! An effect adds a torque to the drive's torque: τ = Y·π + Σ βₖ·hₖ(η; motion). The βₖ (*gains*) enter linearly, the
+//! η (*shapes*) do not; the motion drives the hidden states. A few effects act elsewhere ([`Channel`]): on a sensor
+//! reading, between motor and link, or between command and voltage.
 //!
-//! Adding an effect is adding its file and one line to the `registry!` below.
+//! To add an effect, add its file and one line to the `registry!` below.
 
 mod about;
 mod asymmetric_coulomb;
@@ -49,14 +49,14 @@ use serde::{Deserialize, Serialize};
 use crate::compensation::Role;
 use crate::scalar::Real;
 
-/// Most gains of one effect.
+/// Maximum number of gains of an effect.
 pub const GAINS: usize = 4;
-/// Most shapes of one effect.
+/// Maximum number of shapes of an effect.
 pub const SHAPES: usize = 4;
-/// Most hidden states of one effect.
+/// Maximum number of hidden states of an effect.
 pub const MEMORY: usize = 4;
 
-/// What an effect sees at one instant. Joint-side, SI.
+/// Inputs of an effect at one instant. Joint-side, SI.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant<T> {
     /// rad or m
@@ -65,17 +65,17 @@ pub struct Instant<T> {
     pub velocity: T,
     /// rad/s² or m/s²
     pub acceleration: T,
-    /// Direction of motion, −1 to 1; stands apart from the velocity because near rest it is the caller's to know.
+    /// Direction of motion, −1 to 1. Not derived from the velocity: near rest the caller decides it.
     pub direction: T,
     /// Angle of the motor, rad.
     pub motor_angle: T,
-    /// Torque of the motor as its current and nominal constant say, times the ratio, N·m.
+    /// Torque of the motor by its current and nominal constant, times the ratio, N·m.
     pub drive_torque: T,
     /// Change of the drive torque, N·m/s.
     pub drive_rate: T,
-    /// Torque that the gear transmits to the link, friction and the drive's own inertia taken off, N·m.
+    /// Torque that the gear transmits to the link, without friction and the drive's own inertia, N·m.
     pub load: T,
-    /// Dry and viscous friction of the joint as its model has them without effects, against positive motion, N·m.
+    /// Dry and viscous friction of the joint by its model without effects, against positive motion, N·m.
     pub friction: T,
     /// Torque of gravity per kg·m of first moment along x of the link's frame, m/s².
     pub gravity: T,
@@ -87,30 +87,30 @@ pub struct Instant<T> {
     pub other: [T; 3],
     /// Time since the last instant, s.
     pub period: T,
-    /// Friction of other effects that acts through the joint's contact over that of the model, 1: by so much farther the contact
-    /// is bent before it slides.
+    /// Ratio of other effects' friction that acts through the joint's contact to the model's friction, 1. The contact
+    /// bends farther by this ratio before it slides.
     pub beside: T,
 }
 
 impl<T: Real> Instant<T> {
-    /// How far a contact is moved on since the last instant, rad.
+    /// Returns the travel of the contact since the last instant, rad.
     #[inline(always)]
     fn way(&self) -> T {
         self.velocity * self.period
     }
 
-    /// All friction that acts through the joint's contact over that of the model, 1.
+    /// Returns the ratio of all friction that acts through the joint's contact to the model's friction, 1.
     #[inline(always)]
     fn whole(&self) -> T {
-        // Fits and precompensation may state a little less friction than none.
+        // Fits and precompensation may give a slightly negative friction.
         (T::ONE + self.beside).max(T::from_f64(LEAST_FRICTION))
     }
 }
 
-/// Of a contact's own friction effects may take all off but this share.
+/// Smallest share of a contact's own friction that remains when effects reduce it, 1.
 const LEAST_FRICTION: f64 = 0.1;
 
-/// Cosine and sine of an order of an angle, as [`Law::terms`] has them.
+/// Returns cosine and sine of order times angle, as terms for [`Law::terms`].
 #[inline(always)]
 fn wave<T: Real>(order: T, angle: T) -> [T; GAINS] {
     let (sine, cosine) = (order * angle).sin_cos();
@@ -119,21 +119,21 @@ fn wave<T: Real>(order: T, angle: T) -> [T; GAINS] {
 
 /// The equations of one effect.
 trait Law {
-    /// What it is.
+    /// The description.
     const ABOUT: About;
-    /// Of what it is a sinusoid, where it is one.
+    /// The angle of a sinusoidal effect.
     const PERIODIC: Option<Periodic> = None;
-    /// Names of the shapes that a description may leave out; they are 0 then.
+    /// Names of the shapes that a description may leave out; they are then 0.
     const OPTIONAL: &'static [&'static str] = &[];
 
-    /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
+    /// Returns the torque per unit of each gain, N·m, and advances the hidden state by one period. States start at 0.
     fn terms<T: Real>(
         shapes: &[T; SHAPES],
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS];
 
-    /// The hidden state after so many seconds of which nothing is known, s: it begins anew.
+    /// Advances the hidden state over a gap of so many seconds, s. By default it is reset.
     fn rested<T: Real>(_shapes: &[T; SHAPES], memory: &mut [T; MEMORY], _seconds: T) {
         *memory = [T::ZERO; MEMORY];
     }
@@ -141,8 +141,8 @@ trait Law {
 
 macro_rules! registry {
     ($($(#[$meta:meta])* $kind:ident in $module:ident),+ $(,)?) => {
-        /// Which effect. On the wire it is its place in the registry; the wire's fingerprint holds the names in
-        /// their order, so that ends with different registries refuse each other.
+        /// Kind of effect. On the wire it is its index in the registry. The wire's fingerprint holds the names in
+        /// order, so that two ends with different registries refuse each other.
         #[derive(
             Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, Schema,
         )]
@@ -151,31 +151,31 @@ macro_rules! registry {
         }
 
         impl Kind {
-            /// All, in the order of the catalogue.
+            /// All kinds, in the order of the catalogue.
             pub const ALL: &'static [Self] = &[$(Self::$kind),+];
 
-            /// What it is.
+            /// Returns the description.
             pub const fn about(self) -> &'static About {
                 match self {
                     $(Self::$kind => &<$module::$kind as Law>::ABOUT),+
                 }
             }
 
-            /// Of what it is a sinusoid, where it is one.
+            /// Returns the angle of a sinusoidal effect, none for others.
             pub const fn periodic(self) -> Option<Periodic> {
                 match self {
                     $(Self::$kind => <$module::$kind as Law>::PERIODIC),+
                 }
             }
 
-            /// Names of the shapes that a description may leave out; they are 0 then.
+            /// Names of the shapes that a description may leave out; they are then 0.
             pub const fn optional(self) -> &'static [&'static str] {
                 match self {
                     $(Self::$kind => <$module::$kind as Law>::OPTIONAL),+
                 }
             }
 
-            /// Torque per unit of each gain, N·m, and the hidden state one period on. States start at 0.
+            /// Returns the torque per unit of each gain, N·m, and advances the hidden state by one period from 0.
             #[inline(always)]
             pub fn terms<T: Real>(
                 self,
@@ -194,8 +194,8 @@ macro_rules! registry {
                 }
             }
 
-            /// [`Self::terms`] without the laws that nothing compensates, and without the periodic ones, which are turned with the
-            /// angle instead: a chip need not hold their code. 0 for them.
+            /// Returns [`Self::terms`] of the compensated laws that are not periodic, and 0 for all others. A chip
+            /// then need not hold the code of the others. Periodic laws are rotated with their angle instead.
             #[inline(always)]
             pub(crate) fn compensated_terms<T: Real>(
                 self,
@@ -229,15 +229,15 @@ registry! {
     AsymmetricCoulomb in asymmetric_coulomb,
     /// Drag of air and churning grease.
     QuadraticDrag in quadratic_drag,
-    /// Friction of teeth and bearings that carry more.
+    /// Friction of teeth and bearings that grows with the load.
     LoadFriction in load_friction,
-    /// Tight spots.
+    /// Friction that varies with the position: tight spots.
     PositionFriction in position_friction,
-    /// Friction with memory of distance, after Dahl.
+    /// Presliding friction (memory of distance), Dahl's law.
     PreslidingDahl in presliding_dahl,
-    /// Friction with memory of distance and of speed, after Canudas de Wit.
+    /// Presliding friction with memory of distance and speed, LuGre law (Canudas de Wit).
     PreslidingLugre in presliding_lugre,
-    /// Friction with memory of distance: elements that slip one after the other.
+    /// Presliding friction: elements that slip one after the other.
     PreslidingMaxwell in presliding_maxwell,
     /// Viscous friction that falls with running time.
     ViscousWarmupTime in viscous_warmup_time,
@@ -251,7 +251,7 @@ registry! {
     TorqueRipple in torque_ripple,
     /// Torque of teeth whose lever arm varies over a turn.
     GearEccentricity in gear_eccentricity,
-    /// Play between the teeth of a gear.
+    /// Backlash of a gear.
     Backlash in backlash,
     /// A shaft or gear that twists under load.
     JointElasticity in joint_elasticity,
@@ -259,19 +259,19 @@ registry! {
     EncoderEccentricityMotor in encoder_eccentricity_motor,
     /// A code disc or magnet off the joint's axis.
     EncoderEccentricityJoint in encoder_eccentricity_joint,
-    /// What the current sensor reads when no current flows.
+    /// Reading of the current sensor at zero current.
     CurrentOffset in current_offset,
     /// A torque constant that falls at high current.
     TorqueSaturation in torque_saturation,
-    /// A torque or current that is read later than the position.
+    /// A torque or current reading that is delayed against the position.
     MeasurementDelay in measurement_delay,
-    /// Gravity that does not stand where the description says.
+    /// A direction of gravity that differs from the description.
     GravityTilt in gravity_tilt,
     /// A mass on the link.
     Payload in payload,
     /// A cable or hose that pulls the joint back.
     Spring in spring,
-    /// Voltage that half-bridges lose.
+    /// Voltage loss of half-bridges.
     DriveDeadzone in drive_deadzone,
     /// Terms of another joint's motion.
     InertiaCoupling in inertia_coupling,
@@ -285,13 +285,13 @@ impl Kind {
         matches!(self, Self::TorqueOffset | Self::Spring)
     }
 
-    /// How many of the parameters are gains; they come first.
+    /// Returns the number of gains; they come first among the parameters.
     pub fn gains(self) -> usize {
         self.about().gains.len()
     }
 
-    /// Gap, stiffness and damping of a transmission with these shapes, as [`transmitted`] takes them; none for what
-    /// does not act between motor and link.
+    /// Returns gap, stiffness and damping of a transmission with these shapes, as [`transmitted`] takes them. None
+    /// for an effect that does not act between motor and link.
     pub fn transmission<T: Real>(self, shapes: &[T; SHAPES]) -> Option<[T; 3]> {
         match self {
             Self::Backlash => Some([shapes[0], shapes[1], shapes[2]]),
@@ -300,8 +300,8 @@ impl Kind {
         }
     }
 
-    /// Share of the joint's friction that acts behind a transmission with these shapes; none for what does not act
-    /// between motor and link.
+    /// Returns the share of the joint's friction behind a transmission with these shapes. None for an effect that
+    /// does not act between motor and link.
     pub fn link_friction<T: Real>(self, shapes: &[T; SHAPES]) -> Option<T> {
         match self {
             Self::Backlash => Some(shapes[3]),
@@ -310,7 +310,7 @@ impl Kind {
         }
     }
 
-    /// Whether it takes viscous friction off as the joint warms.
+    /// Returns true if it reduces viscous friction as the joint warms.
     pub const fn is_warming(self) -> bool {
         matches!(
             self,
@@ -318,12 +318,12 @@ impl Kind {
         )
     }
 
-    /// Whether its law goes by the joint's own friction: heat of it, or what of the drive's torque is left for a gear to transmit.
+    /// Returns true if its law depends on the joint's own friction: by heat, or by the torque that the gear transmits.
     pub const fn heeds_friction(self) -> bool {
         matches!(self, Self::LoadFriction | Self::ViscousWarmupHeat)
     }
 
-    /// Whether its torque acts on the link: a gear transmits it, friction under load grows with it, and a shaft is twisted by it.
+    /// Returns true if its torque acts on the link: the gear transmits it, load friction grows with it, a shaft twists.
     pub const fn on_the_link(self) -> bool {
         matches!(
             self,
@@ -331,7 +331,7 @@ impl Kind {
         )
     }
 
-    /// The kind with this name and law, as a description writes them.
+    /// Returns the kind with this name and law, as a description writes them.
     pub fn named(name: &str, law: Option<&str>) -> Option<Self> {
         Self::ALL.iter().copied().find(|kind| {
             let about = kind.about();
@@ -343,11 +343,11 @@ impl Kind {
 /// One effect with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Effect<T> {
-    /// Which.
+    /// The kind.
     pub kind: Kind,
-    /// In the order of [`About::gains`]; 0 beyond.
+    /// In the order of [`About::gains`]; the others are 0.
     pub gains: [T; GAINS],
-    /// In the order of [`About::shapes`]; 0 beyond.
+    /// In the order of [`About::shapes`]; the others are 0.
     pub shapes: [T; SHAPES],
 }
 
@@ -362,8 +362,8 @@ impl<T: Real> Default for Memory<T> {
 }
 
 impl<T: Real> Effect<T> {
-    /// An effect of a kind with its `gains` and `shapes` in the order of [`About`]; 0 beyond them. An effect has room
-    /// for [`GAINS`] and [`SHAPES`] of them: what is beyond that is no value of any kind, and is not looked at.
+    /// Returns an effect with `gains` and `shapes` in the order of [`About`]; the others are 0. Values beyond
+    /// [`GAINS`] and [`SHAPES`] are ignored.
     pub fn new(kind: Kind, gains: &[T], shapes: &[T]) -> Self {
         let value = |list: &[T], k: usize| list.get(k).copied().unwrap_or(T::ZERO);
         Self {
@@ -373,7 +373,7 @@ impl<T: Real> Effect<T> {
         }
     }
 
-    /// Torque that the drive has to give because of it, N·m, and the hidden state one period on.
+    /// Returns the drive torque due to the effect, N·m, and advances the hidden state by one period.
     #[inline(always)]
     pub fn torque(&self, memory: &mut Memory<T>, at: &Instant<T>) -> T {
         let terms = self.kind.terms(&self.shapes, &mut memory.0, at);
@@ -383,8 +383,8 @@ impl<T: Real> Effect<T> {
             .fold(T::ZERO, |sum, (gain, term)| sum + *gain * term)
     }
 
-    /// The hidden state after `seconds` of which nothing is known, as in a gap of a recording: heat goes its way as in a joint at
-    /// rest, and what remembers a distance begins anew.
+    /// Returns the hidden state after a gap of `seconds`, as in a recording. Heat decays as in a joint at rest, and a
+    /// memory of distance is reset.
     pub fn rested(&self, mut memory: Memory<T>, seconds: T) -> Memory<T> {
         self.kind.rested(&self.shapes, &mut memory.0, seconds);
         memory

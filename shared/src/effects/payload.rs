@@ -1,4 +1,4 @@
-//! A mass on the link. Its inertia and its gravity are not two gains: both follow from mass and distance.
+//! A mass on the link. Inertia and gravity are not two independent gains: both follow from mass and distance.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

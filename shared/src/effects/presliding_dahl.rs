@@ -1,4 +1,4 @@
-//! Friction with memory of distance, after Dahl.
+//! Presliding friction (memory of distance), Dahl's law.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

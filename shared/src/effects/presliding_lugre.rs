@@ -1,4 +1,4 @@
-//! Friction with memory of distance and of speed, after Canudas de Wit.
+//! Presliding friction with memory of distance and speed, LuGre law (Canudas de Wit).
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

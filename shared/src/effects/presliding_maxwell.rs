@@ -1,4 +1,4 @@
-//! Friction with memory of distance: elastic elements that slip one after the other.
+//! Presliding friction: elastic elements that slip one after the other.
 
 use super::{
     About, Channel, Confusion, Direction, GAINS, Instant, Law, MEMORY, Need, Parameter, SHAPES,

@@ -1,4 +1,4 @@
-//! Friction that falls as the joint starts to slide, at once and with a long tail.
+//! Friction that falls at once as the joint starts to slide, with a long tail.
 
 use super::stribeck::Stribeck;
 use super::{About, GAINS, Instant, Law, MEMORY, SHAPES};

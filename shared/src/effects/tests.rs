@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A kind with its searched range's middle, gains all positive.
+/// Returns an effect in the middle of its searched range, with positive gains.
 fn example(kind: Kind) -> Effect<f64> {
     let about = kind.about();
     let middle = |p: &Parameter| match p.scale {
@@ -19,7 +19,7 @@ fn example(kind: Kind) -> Effect<f64> {
     Effect::new(kind, &of(about.gains), &of(about.shapes))
 }
 
-/// Instants along positions at a constant period, velocities between them taken as constant.
+/// Returns instants along positions at a constant period, with constant velocity between two positions.
 fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
     q.windows(2)
         .enumerate()
@@ -42,7 +42,7 @@ fn along(q: &[f64], period: f64) -> Vec<Instant<f64>> {
         .collect()
 }
 
-/// Work against `effect` along `q`, J; `coulomb` is friction of the joint beside it.
+/// Returns the work against `effect` along `q`, J. `coulomb` is additional friction of the joint.
 fn work(effect: &Effect<f64>, coulomb: f64, q: &[f64], period: f64) -> f64 {
     let mut memory = Memory::default();
     along(q, period)
@@ -54,7 +54,7 @@ fn work(effect: &Effect<f64>, coulomb: f64, q: &[f64], period: f64) -> f64 {
         .sum()
 }
 
-/// A closed path: there and back along three sines.
+/// Returns a closed path of three sines.
 fn loop_of(a: [f64; 3], turns: usize) -> Vec<f64> {
     let n = 4000;
     (0..=turns * n)
@@ -75,7 +75,7 @@ fn every_kind_says_all_there_is_to_say() {
             .iter()
             .filter(|k| k.about().name == about.name)
             .count();
-        // One of several laws may go by the name alone.
+        // One of several laws may be selected by the name alone.
         assert!(laws > 1 || about.law.is_none(), "{kind:?}");
         assert_eq!(Kind::named(about.name, about.law), Some(kind));
         for text in [
@@ -106,7 +106,7 @@ fn every_kind_says_all_there_is_to_say() {
             };
             assert!(searchable, "{kind:?}: {}", p.name);
         }
-        // Only what acts between motor and link has no torque of its own.
+        // Only effects between motor and link have no torque of their own.
         assert_eq!(
             about.gains.is_empty(),
             about.channel == Channel::Transmission
@@ -140,7 +140,7 @@ fn an_effect_takes_its_values_in_their_order_and_zero_beyond() {
     assert_eq!(effect.kind, Kind::Cogging);
     assert_eq!(effect.gains, [0.3, -0.2, 0.0, 0.0]);
     assert_eq!(effect.shapes, [14.0, 0.0, 0.0, 0.0]);
-    // Of a gear that is held by its shapes alone there is no gain to state.
+    // A gear that is described by shapes alone has no gain.
     let gear = Effect::new(Kind::JointElasticity, &[], &[2.0e3, 4.0, 0.5]);
     assert_eq!(gear.gains, [0.0; GAINS]);
     assert_eq!(gear.shapes, [2.0e3, 4.0, 0.5, 0.0]);
@@ -189,7 +189,7 @@ fn dry_friction_turns_with_the_direction_and_the_rest_does_not_know_it() {
         };
         let dry = kind.about().direction == Direction::Dry;
         if dry && kind != Kind::AsymmetricCoulomb {
-            // The hidden state does not depend on the direction; what is left is odd in it.
+            // The hidden state does not depend on the direction; the rest is odd in it.
             let even = torque(1.0) + torque(-1.0) - 2.0 * torque(0.0);
             assert!(even.abs() < 1e-12, "{kind:?}");
         }
@@ -208,7 +208,7 @@ fn dry_friction_turns_with_the_direction_and_the_rest_does_not_know_it() {
 }
 
 proptest! {
-    /// Over any closed path nothing that is friction gives energy back.
+    /// Friction never returns energy over a closed path.
     #[test]
     fn friction_only_takes(
         a in proptest::array::uniform3(-1.0..1.0_f64),
@@ -221,7 +221,7 @@ proptest! {
             Kind::PreslidingMaxwell, Kind::PositionFriction, Kind::AsymmetricCoulomb,
         ] {
             let effect = example(kind);
-            // What the joint's own friction must have at least, for its difference to be friction.
+            // Minimum friction of the joint itself, with which the sum is still friction.
             let coulomb: f64 = match kind {
                 Kind::PreslidingMaxwell | Kind::PreslidingDahl => effect.gains.iter().sum(),
                 Kind::PositionFriction => effect.gains[0].hypot(effect.gains[1]),
@@ -234,7 +234,7 @@ proptest! {
         }
     }
 
-    /// What has a potential takes nothing over a closed path.
+    /// A torque with a potential does no work over a closed path.
     #[test]
     fn conservative_torques_return_what_they_take(a in proptest::array::uniform3(-1.0..1.0_f64)) {
         let q = loop_of(a, 1);
@@ -244,13 +244,13 @@ proptest! {
         ] {
             let effect = example(kind);
             let lost = work(&effect, 0.0, &q, 1e-3);
-            // The midpoint rule is not exact for the periodic ones: 2000 motor radians in 4000 steps.
+            // The midpoint rule is not exact for periodic effects: 2000 motor radians in 4000 steps.
             let slack = match kind { Kind::Cogging | Kind::GearEccentricity => 1e-1, _ => 1e-6 };
             prop_assert!(lost.abs() < slack * way, "{kind:?}: {lost}");
         }
     }
 
-    /// Presliding knows distances, not times, and closes its loops.
+    /// Presliding depends on distance, not on time, and its loops close.
     #[test]
     fn presliding_does_not_know_how_fast(a in proptest::array::uniform3(-0.05..0.05_f64)) {
         let q = loop_of(a, 1);
@@ -271,7 +271,7 @@ proptest! {
         }
     }
 
-    /// The controller's numbers are those of the desktop.
+    /// Single precision on the controller agrees with double precision.
     #[test]
     fn single_precision_is_enough(
         position in -3.0..3.0_f64, velocity in -4.0..4.0_f64, torque in -20.0..20.0_f64,
@@ -293,14 +293,14 @@ proptest! {
             let wide = kind.terms(&shapes, &mut [0.0; MEMORY], &at);
             let narrow = kind.terms(&shapes.map(|x| x as f32), &mut [0.0; MEMORY], &near);
             for (w, n) in wide.iter().zip(narrow) {
-                // 150 motor radians times order 44, in units of 2⁻²⁴ of themselves.
+                // 150 motor radians times order 44, with a relative rounding of 2⁻²⁴.
                 let slack = 1e-6 * w.abs() + 150.0 * 44.0 * 1.2e-7 * torque.abs().max(1.0);
                 prop_assert!((w - f64::from(n)).abs() < slack, "{kind:?}: {w} {n}");
             }
         }
     }
 
-    /// Without a jump anywhere, save that teeth may part.
+    /// Continuous everywhere, except where teeth separate.
     #[test]
     fn what_a_gear_transmits_is_continuous_and_never_pulls(
         gap in 0.0..0.02_f64, twist in -0.03..0.03_f64, rate in -2.0..2.0_f64,
@@ -315,14 +315,14 @@ proptest! {
         let quasi = transmitted(gap, stiffness, 0.0, twist, rate);
         let moved = transmitted(gap, stiffness, 0.0, twist + 1e-9, rate);
         prop_assert!((quasi - moved).abs() <= stiffness * 1.1e-9);
-        // Damping takes: what is left of the elastic part is of the rate's sign, or the teeth are apart.
+        // Damping dissipates: torque minus elastic part has the sign of the rate, or the teeth are apart.
         prop_assert!(torque == 0.0 || (torque - quasi) * rate >= 0.0);
     }
 }
 
 #[test]
 fn inner_loops_of_the_slipping_elements_close_where_dahl_forgets() {
-    // Out, an inner loop of a tenth of the stroke, and back to where it began.
+    // Out, an inner loop of a tenth of the stroke, and back to its start.
     let stroke = (5.0e-4_f64 * 0.2).sqrt();
     let ramp =
         |from: f64, to: f64| (1..=1000).map(move |k| from + (to - from) * f64::from(k) * 1e-3);
@@ -362,7 +362,7 @@ fn inner_loops_of_the_slipping_elements_close_where_dahl_forgets() {
 
 #[test]
 fn sliding_on_leaves_only_coulomb_and_breakaway() {
-    // Far beyond the stroke the state is the direction, so that presliding adds nothing to Coulomb friction.
+    // Far beyond the stroke the state equals the direction, so presliding adds nothing to Coulomb friction.
     let q: Vec<f64> = (0..=5000).map(|k| 1e-3 * f64::from(k)).collect();
     for kind in [
         Kind::PreslidingDahl,
@@ -388,7 +388,7 @@ fn sliding_on_leaves_only_coulomb_and_breakaway() {
 
 #[test]
 fn a_saturated_motor_is_the_textbook_torque_constant() {
-    // Kt(1 − b·i²)·i·ratio is what the joint gets; the effect is what it lacks.
+    // The joint gets Kt(1 − b·i²)·i·ratio; the effect is the missing part.
     let (constant, ratio, current, b) = (0.05, 50.0, 6.0, 2.0e-3);
     let mut effect = example(Kind::TorqueSaturation);
     effect.gains[0] = b / (constant * ratio * constant * ratio);
@@ -401,8 +401,8 @@ fn a_saturated_motor_is_the_textbook_torque_constant() {
     assert!((at.drive_torque - lacking - got).abs() < 1e-12);
 }
 
-/// A gear carries the link's friction as well: where the motor drives the load that adds to it, where the load drives the motor it
-/// takes off.
+/// The load friction also depends on the link's friction: it adds if the motor drives the load, and subtracts if the
+/// load drives the motor.
 #[test]
 fn a_gear_that_carries_friction_loses_more_driving_than_driven() {
     let (coefficient, share, dry, load) = (0.1, 0.25, 0.8, 3.0);
@@ -419,11 +419,11 @@ fn a_gear_that_carries_friction_loses_more_driving_than_driven() {
     let [up, down] = [1.0, -1.0].map(|direction| lost(direction, share));
     assert!((up - coefficient * (load + share * dry)).abs() < 1e-12);
     assert!((down + coefficient * (load - share * dry)).abs() < 1e-12);
-    // With all friction before the gear both are alike.
+    // With all friction before the gear both directions are alike.
     assert!((lost(1.0, 0.0) + lost(-1.0, 0.0)).abs() < 1e-12);
 }
 
-/// From one direction to the other, evenly where all elements are alike, and no farther.
+/// The deflection goes from one direction to the other, evenly if all elements are alike, and no farther.
 #[test]
 fn a_contact_is_bent_from_one_direction_to_the_other() {
     for kind in [
@@ -456,7 +456,7 @@ fn a_contact_is_bent_from_one_direction_to_the_other() {
     }
 }
 
-/// Ten thousand times a second for ten minutes, in numbers of 24 bits: what a tick adds is less than their last digit.
+/// Ten thousand times a second for ten minutes in single precision: the increment of a tick is below the last digit.
 #[test]
 fn heat_is_stored_on_a_chip_as_it_is_on_a_desktop() {
     let (period, time_constant, velocity, friction) = (1e-4, 600.0, 0.5, 0.8);
@@ -481,7 +481,7 @@ fn heat_is_stored_on_a_chip_as_it_is_on_a_desktop() {
     );
 }
 
-/// What is left after a pause is what was there, cooled as the law cools a joint at rest; a distance is forgotten.
+/// After a pause the heat has decayed as in a joint at rest, and a distance is forgotten.
 #[test]
 fn heat_outlasts_a_pause_and_nothing_else_does() {
     for &kind in Kind::ALL {
@@ -512,8 +512,8 @@ fn heat_outlasts_a_pause_and_nothing_else_does() {
     }
 }
 
-/// Against elements that are springs of their own stiffness, each of which slips at its share of all the friction that there is: friction
-/// that falls with the speed then bends them farther than it would bend a contact of its own.
+/// Reference: springs of constant stiffness, each of which slips at its share of the total friction. Friction that
+/// falls with speed then bends them farther than a contact of its own.
 #[test]
 fn other_friction_bends_the_contact_farther() {
     let (gains, stroke, dry) = ([0.2, 0.1, 0.15, 0.05], 0.01, 0.5);
@@ -562,8 +562,8 @@ fn other_friction_bends_the_contact_farther() {
     );
 }
 
-/// A contact that is bent fast, where friction that falls with the speed is small, and let back slowly, where it is large: what it gives
-/// back it has taken.
+/// A contact is bent fast, where friction that falls with speed is small, and released slowly, where it is large. It
+/// returns only the energy that it has taken.
 #[test]
 fn friction_through_a_contact_never_gives_more_than_it_has_taken() {
     let (dry, falling, speed, stroke) = (0.46, 0.9, 0.12, 0.008);
@@ -582,7 +582,7 @@ fn friction_through_a_contact_never_gives_more_than_it_has_taken() {
                 let more = falling * (-f64::powi(velocity / speed, 2)).exp() / dry;
                 for _ in 0..(reach / f64::abs(velocity) / period) as usize {
                     if !kept {
-                        // As if the contact kept its share: it is stretched by nobody.
+                        // A contact that keeps its share instead would be stretched without work.
                         memory.0 = memory.0.map(|state| state * (1.0 + more) / (1.0 + beside));
                     }
                     beside = more;

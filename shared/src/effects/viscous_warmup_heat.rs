@@ -44,7 +44,8 @@ impl Law for ViscousWarmupHeat {
         memory: &mut [T; MEMORY],
         at: &Instant<T>,
     ) -> [T; GAINS] {
-        // Implicit Euler, so that any step is stable; what a step is too small to add to a number of 24 bits is kept for later ones.
+        // Implicit Euler: any step is stable. The increment below the last digit of a 24-bit number is kept for later
+        // steps.
         let share = at.period / (shapes[0] + at.period);
         let [warm, rest, ..] = *memory;
         let more = (at.friction * at.velocity - warm) * share + rest;
