@@ -1,4 +1,4 @@
-//! Faults: reasons to switch the bridge off. They latch.
+//! Faults: reasons to switch the bridge off. They are latched.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -10,14 +10,14 @@ pub enum Fault {
     Driver,
     /// Motor current beyond its hard limit; the value is in A.
     OverCurrent,
-    /// The current converter stayed at its rail or did not change while it had to; the value is its code.
+    /// The current converter stayed at its rail, or did not change although the duty did; the value is its code.
     AdcStuck,
     /// The current sensor's offset at start is outside its band; the value is in A.
     CurrentOffset,
     /// The encoder jumped further in a tick than the motor can turn; the value is in counts.
     EncoderJump,
-    /// Nothing drives one of the encoder's wires, or the winding's voltage tells of another speed than the encoder; the
-    /// value is the voltage in V that current and encoder leave unexplained.
+    /// An encoder wire is open, or the winding's voltage shows another speed than the encoder. The value is the voltage
+    /// in V that current and encoder leave unexplained.
     EncoderLost,
     /// Joint speed beyond its hard limit; the value is in rad/s.
     OverSpeed,
@@ -33,10 +33,10 @@ pub enum Fault {
     Deadline,
     /// The host has been silent for longer than allowed; the value is in s.
     HostSilent,
-    /// The encoder's channels changed both at once, or its index came at a wrong count; the value is by how many
-    /// counts, 0 where the channels were at fault.
+    /// Both encoder channels changed at once, or the index came at a wrong count. The value is the error in counts, 0
+    /// if the channels were at fault.
     EncoderSignal,
-    /// The stack has come near its end; the value is the bytes that are left.
+    /// The stack is nearly full; the value is the free bytes.
     Stack,
 }
 
@@ -51,14 +51,14 @@ pub struct FaultRecord {
     pub value: f32,
 }
 
-/// Keeps the first fault; later ones are consequences more often than causes.
+/// Keeps the first fault, because later ones are usually consequences.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FaultLatch {
     first: Option<FaultRecord>,
 }
 
 impl FaultLatch {
-    /// Latches a fault; true if it is the first since the last clearing.
+    /// Latches a fault; returns true if it is the first since the last clearing.
     pub fn latch(&mut self, record: FaultRecord) -> bool {
         let is_first = self.first.is_none();
         if is_first {
@@ -72,7 +72,7 @@ impl FaultLatch {
         self.first
     }
 
-    /// Forgets the fault. Whether its cause still acts is the caller's to check.
+    /// Clears the fault. The caller must check if its cause still acts.
     pub fn clear(&mut self) {
         self.first = None;
     }

@@ -1,12 +1,12 @@
-//! Limits: what the rig must stay within, and which of them act now. A limit is no fault: the rig goes on,
-//! and says why torque is missing.
+//! Limits of the rig, and the limits that act now. A limit is no fault: the rig goes on, and reports why torque is
+//! missing.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::Real;
 
-/// What the rig must stay within, joint-side unless said.
+/// Limits of the rig, joint-side unless stated otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Limits<T> {
     /// Lowest reference position, rad.
@@ -26,9 +26,8 @@ pub struct Limits<T> {
 }
 
 impl<T: Real<Mask = bool>> Limits<T> {
-    /// Whether every limit is a finite positive number and the position range is not empty.
-    ///
-    /// Written so that NaN fails each comparison.
+    /// Returns true if every limit is a finite positive number and the position range is not empty. NaN fails each
+    /// comparison.
     pub fn is_valid(&self) -> bool {
         let huge = T::from_f64(1e9);
         let positive = |x: T| T::ZERO.lt(x) && x.lt(huge);
@@ -42,7 +41,7 @@ impl<T: Real<Mask = bool>> Limits<T> {
             && positive(self.position_high - self.position_low)
     }
 
-    /// Whether no limit allows more than `ratings` do. NaN fails each comparison.
+    /// Returns true if no limit exceeds that of `ratings`. NaN fails each comparison.
     pub fn is_within(&self, ratings: &Self) -> bool {
         self.velocity.le(ratings.velocity)
             && self.acceleration.le(ratings.acceleration)
@@ -62,7 +61,7 @@ pub enum Limit {
     Torque = 1,
     /// The commanded current was cut to `Limits::peak_current`.
     Current = 2,
-    /// The supply voltage was used up.
+    /// The voltage was cut to the available supply voltage.
     Voltage = 4,
     /// The reference was held at the edge of the position range.
     Position = 8,
@@ -71,7 +70,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Every limit, for listing.
+    /// Every limit, for iteration.
     pub const ALL: [Self; 5] = [
         Self::Torque,
         Self::Current,
@@ -80,7 +79,7 @@ impl Limit {
         Self::HostSilent,
     ];
 
-    /// What a plot or table calls it.
+    /// Returns the name for plots and tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Torque => "torque",
@@ -104,12 +103,12 @@ impl LimitSet {
         }
     }
 
-    /// Whether the limit is in the set.
+    /// Returns true if the limit is in the set.
     pub const fn has(self, limit: Limit) -> bool {
         self.0 & limit as u8 != 0
     }
 
-    /// Limits in either set.
+    /// Returns the limits in either set.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)

@@ -1,7 +1,6 @@
-//! Faults, limits, the mode of the rig, and what is kept of the moment a fault came.
+//! Faults, limits, the mode of the rig, and the snapshot at a fault.
 //!
-//! Two types for two things: a [`Fault`] is latched and switches the bridge off; a [`Limit`] acts while it
-//! must and the rig goes on.
+//! A [`Fault`] is latched and switches the bridge off. A [`Limit`] acts as long as needed, and the rig goes on.
 
 mod fault;
 mod limit;

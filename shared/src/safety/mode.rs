@@ -1,4 +1,4 @@
-//! What the rig is doing, and what it may do next.
+//! Mode of the rig and its transitions.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 ///    Fault ◄──────────────────────────── a fault, from any mode; the bridge is off
 /// ```
 ///
-/// `Disarm` is heard in every mode with the bridge on. Nothing moves without `Arm`, and the reference
-/// that `Holding` starts from is where the link stands at that moment.
+/// `Disarm` is accepted in every mode with the bridge on. Nothing moves without `Arm`. The first reference of `Holding`
+/// is the position of the link at that moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Mode {
     /// Measuring the current sensor's offset; the bridge is off.
@@ -37,12 +37,12 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Whether the bridge's outputs are driven.
+    /// Returns true if the bridge's outputs are driven.
     pub const fn drives(self) -> bool {
         matches!(self, Self::Holding | Self::Running | Self::Stopping)
     }
 
-    /// What a table calls it.
+    /// Returns the name for tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Calibrating => "calibrating",

@@ -1,14 +1,14 @@
 //! The checks of every control tick.
 //!
-//! Each looks at measured values only, never at what the controller believes, so that a wrong model of the link
-//! cannot hide a fault. Leaves out: everything that hardware must catch within a tick (short circuits go
-//! to the timer's break input and arrive here as [`Fault::Driver`]).
+//! The checks use measured values only and no estimates of the controller, so that a wrong link model cannot hide a
+//! fault. Leaves out: everything that hardware must catch within a tick. Short circuits go to the timer's break input
+//! and arrive here as [`Fault::Driver`].
 
 use super::fault::Fault;
 use super::limit::Limits;
 use super::voltage::{self, VoltageModel, VoltageState};
 
-/// Thresholds that do not come with [`Limits`].
+/// Thresholds that are not in [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MonitorConfig {
     /// Control period, s.
@@ -17,44 +17,43 @@ pub struct MonitorConfig {
     pub supply: [f32; 2],
     /// Highest temperature, °C.
     pub temperature: f32,
-    /// Hard current limit over `Limits::peak_current`.
+    /// Ratio of the hard current limit to `Limits::peak_current`.
     pub current_margin: f32,
-    /// Hard speed limit over `Limits::velocity`.
+    /// Ratio of the hard speed limit to `Limits::velocity`.
     pub velocity_margin: f32,
-    /// How far beyond the position limits the link may be, rad.
+    /// Allowed travel beyond the position limits, rad.
     pub position_margin: f32,
     /// Largest plausible encoder step in a tick, counts.
     pub largest_step: i32,
-    /// Ticks in a row that a single-sample check must fail, so that one disturbed sample stops nothing.
+    /// Consecutive failing ticks before a single-sample check counts, so that one disturbed sample stops nothing.
     pub persistence: u16,
-    /// By which the encoder is found to have lost the motor.
+    /// Model to detect an encoder that has lost the motor.
     pub voltage: VoltageModel,
-    /// Ticks with one and the same current code, while the duty varied, that mean a stuck converter.
+    /// Ticks with the same current code, while the duty varied, after which the converter is stuck.
     pub stuck_ticks: u32,
-    /// Duty variation within `stuck_ticks` that a live converter must have answered.
+    /// Smallest variation of the duty within `stuck_ticks` that a live converter answers.
     pub stuck_duty: f32,
     /// Thermal time constant of the winding behind the i²t limit, s.
     pub thermal_time: f32,
 }
 
-/// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without
-/// current.
+/// Share of the thermal rating below which an overloaded motor counts as cooled: 0.7 thermal times without current.
 const COOLED: f32 = 0.5;
 /// Ticks within which the noise of a live converter changes its code.
 const QUIET: u32 = 10;
 
-/// What the checks look at.
+/// Inputs of the checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
     /// Break input.
     pub driver_fault: bool,
-    /// A comparator has found too much current.
+    /// True if a comparator has detected over-current.
     pub comparator: bool,
     /// The previous tick overran.
     pub overrun: bool,
     /// Converter code of the current.
     pub current_code: u16,
-    /// Whether that code is at a rail.
+    /// True if that code is at a rail.
     pub current_at_rail: bool,
     /// Motor current, A.
     pub current: f32,
@@ -64,7 +63,7 @@ pub struct Readings {
     pub temperature: f32,
     /// Encoder step of this tick, counts.
     pub encoder_step: i32,
-    /// Nothing drives one of the encoder's wires.
+    /// True if an encoder wire is open.
     pub encoder_open: bool,
     /// Joint position, rad.
     pub position: f32,
@@ -72,9 +71,9 @@ pub struct Readings {
     pub velocity: f32,
     /// Duty cycle that acts now, −1 to 1.
     pub duty: f32,
-    /// What the bridge loses of the voltage, as far as it is known, V.
+    /// Known voltage loss of the bridge, V.
     pub lost_voltage: f32,
-    /// Whether the bridge drives.
+    /// True if the bridge drives.
     pub driving: bool,
 }
 
@@ -93,11 +92,11 @@ pub struct MonitorState {
     duty_high: f32,
     /// Filtered square of the current, A².
     pub heat: f32,
-    /// The heat has passed its limit and is not yet well below it again.
+    /// True from the moment the heat exceeds its limit until the motor has cooled.
     pub overloaded: bool,
 }
 
-/// Counts up while `failing`; true once `persistence` ticks in a row failed.
+/// Counts consecutive failures; returns true from `persistence` ticks on.
 fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
     *counter = if failing {
         counter.saturating_add(1)
@@ -108,7 +107,7 @@ fn persists(counter: &mut u16, failing: bool, persistence: u16) -> bool {
 }
 
 // A comparison with NaN is false: written as `!(value <= limit)`, a NaN is a fault.
-/// One tick of all checks: the first fault found, with the value that was out of range.
+/// Runs all checks of one tick. Returns the first fault found, with the value that was out of range.
 pub fn step(
     config: &MonitorConfig,
     limits: &Limits<f32>,
@@ -117,7 +116,7 @@ pub fn step(
 ) -> Option<(Fault, f32)> {
     let magnitude = now.current.abs();
     let n = config.persistence;
-    // With the bridge off the winding is open: what a broken converter then reads heats nothing.
+    // With the bridge off the winding is open, so a current reading of a broken converter heats nothing.
     let heating = if now.driving {
         now.current * now.current
     } else {
@@ -125,7 +124,7 @@ pub fn step(
     };
     state.heat += (heating - state.heat) * (config.period / config.thermal_time);
     let rating = limits.continuous_current * limits.continuous_current;
-    // The cause acts until the motor has cooled: an instant after the bridge is off it is just below its limit.
+    // The overload lasts until the motor has cooled: just after the bridge is off the heat is barely below its limit.
     state.overloaded = !(state.heat
         <= if state.overloaded {
             COOLED * rating
@@ -133,7 +132,7 @@ pub fn step(
             rating
         });
 
-    // Every counter is brought up to date before any is judged: an early return must not stop the others.
+    // All counters are updated before any is judged: an early return must not stop the others.
     let over_current = persists(
         &mut state.over_current,
         !(magnitude <= limits.peak_current * config.current_margin),
@@ -151,7 +150,7 @@ pub fn step(
         !(now.velocity.abs() <= limits.velocity * config.velocity_margin),
         n,
     );
-    // With the bridge off the voltage over the motor is nobody's.
+    // With the bridge off the voltage over the motor is undefined.
     let lost = if now.driving {
         let applied = now.duty * now.supply - now.lost_voltage;
         voltage::step(
@@ -166,7 +165,7 @@ pub fn step(
         false
     };
     let stuck = converter_is_stuck(config, state, now);
-    // A current that stands still is no witness against the encoder, until it has been found not to be stuck.
+    // A constant current does not count against the encoder until the converter is known not to be stuck.
     let suspect = (QUIET..config.stuck_ticks).contains(&state.same_code);
     let outside = now.driving
         && !(limits.position_low - config.position_margin <= now.position
@@ -175,7 +174,7 @@ pub fn step(
     let jumped = now.encoder_step.unsigned_abs() > config.largest_step.unsigned_abs();
     let lost = now.encoder_open || lost && !suspect;
     let late = now.overrun && now.driving;
-    // Nearly always nothing is wrong: the list costs more to make than to see that it is empty.
+    // A fault is rare, and building the list costs more than this test.
     let any = now.driver_fault
         | at_rail
         | stuck
@@ -194,7 +193,7 @@ pub fn step(
     }
     let faults = [
         (now.driver_fault, Fault::Driver, 0.0),
-        // Before the over-current: a code at the rail is no measurement, though it reads as a large current.
+        // Before over-current: a code at the rail is no measurement, although it reads as a large current.
         (
             at_rail || stuck,
             Fault::AdcStuck,
@@ -218,13 +217,13 @@ pub fn step(
         .into_iter()
         .find(|(failing, _, _)| *failing)
         .map(|(_, fault, value)| match fault {
-            // Worked out only where it is told: a square root a tick is too dear.
+            // Computed only for a report: a square root in each tick is too expensive.
             Fault::Overload => (fault, libm::sqrtf(value)),
             _ => (fault, value),
         })
 }
 
-/// A converter that is alive follows the duty; one that is stuck keeps its code whatever is applied.
+/// Returns true if the converter is stuck: a live one follows the duty, a stuck one keeps its code.
 fn converter_is_stuck(config: &MonitorConfig, state: &mut MonitorState, now: &Readings) -> bool {
     if !now.driving || now.current_code != state.last_code {
         state.last_code = now.current_code;

@@ -1,9 +1,9 @@
-//! The last control ticks before the first fault, kept as they were.
+//! Ring of the last control ticks before the first fault.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// One control tick as the snapshot keeps it.
+/// One control tick in the snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct SnapshotSample {
     /// Control tick.
@@ -20,13 +20,13 @@ pub struct SnapshotSample {
     pub reference: f32,
 }
 
-/// A ring of the last `N` ticks that stops turning a few ticks after the first fault.
+/// A ring of the last `N` ticks that stops a few ticks after the first fault.
 #[derive(Clone, Debug)]
 pub struct Snapshot<const N: usize> {
     ring: [SnapshotSample; N],
     next: usize,
     filled: usize,
-    /// Ticks still to be kept once a fault has latched; `None` while no fault has.
+    /// Ticks still to be stored after a fault; `None` before a fault.
     remaining: Option<usize>,
 }
 
@@ -42,10 +42,10 @@ impl<const N: usize> Default for Snapshot<N> {
 }
 
 impl<const N: usize> Snapshot<N> {
-    /// Ticks kept after the fault: an eighth of the ring shows what the fault reaction did.
+    /// Ticks stored after the fault: an eighth of the ring shows the fault reaction.
     pub const AFTER: usize = N / 8;
 
-    /// Keeps a tick, unless the snapshot is frozen.
+    /// Stores a tick, unless the snapshot is frozen.
     pub fn push(&mut self, sample: SnapshotSample) {
         match &mut self.remaining {
             Some(0) => return,
@@ -64,29 +64,29 @@ impl<const N: usize> Snapshot<N> {
         self.remaining.get_or_insert(Self::AFTER);
     }
 
-    /// Whether nothing more will be written.
+    /// Returns true if no more ticks are stored.
     pub fn is_frozen(&self) -> bool {
         self.remaining == Some(0)
     }
 
-    /// Starts turning again, empty; in the same time however long the ring is, as it is called within a control tick.
+    /// Empties and restarts the ring. Its time is independent of the ring's length, because a control tick calls it.
     pub fn release(&mut self) {
         self.next = 0;
         self.filled = 0;
         self.remaining = None;
     }
 
-    /// Ticks kept.
+    /// Returns the number of stored ticks.
     pub fn len(&self) -> usize {
         self.filled
     }
 
-    /// Whether nothing has been kept yet.
+    /// Returns true if no tick is stored yet.
     pub fn is_empty(&self) -> bool {
         self.filled == 0
     }
 
-    /// The `index`-th kept tick, 0 the oldest.
+    /// Returns the `index`-th stored tick, 0 the oldest.
     pub fn get(&self, index: usize) -> Option<&SnapshotSample> {
         if index >= self.filled {
             return None;

@@ -1,47 +1,47 @@
-//! Whether the encoder and the winding tell of the same speed.
+//! Check that encoder and winding show the same speed.
 //!
-//! The voltage over the motor's terminals is u = R·i + L·di/dt + Kₑ·ω (Krishnan 2001, "Electric Motor Drives", ch. 2). What
-//! current and encoder leave unexplained of the applied one, low-passed, is nothing but noise while the encoder counts what
-//! the motor turns. Where it has lost the motor it is the back-EMF of a speed that nobody counts; of a motor that is blocked
-//! all is explained by R·i, so that one is not taken for the other.
+//! The voltage over the motor's terminals is u = R·i + L·di/dt + Kₑ·ω (Krishnan 2001, "Electric Motor Drives", ch. 2).
+//! Current and encoder leave a part of the applied voltage unexplained. Low-passed, this part is only noise while the
+//! encoder counts the motor's turns. If the encoder has lost the motor, it is the back-EMF of the uncounted speed. A
+//! blocked motor is not mistaken for that: R·i explains its voltage.
 //!
-//! The margin that is allowed is a constant and a share of either explained part, as nameplates and parts are not exact.
-//! A speed whose back-EMF stays below the margin is not missed, and neither is a motor at rest.
+//! The allowed margin is a constant and a share of each explained part, because ratings and parts are not exact. A lost
+//! encoder is not detected at rest, nor at a speed whose back-EMF is below the margin.
 //!
-//! Left out: L·di/dt, which the low-pass turns into L/T·i (0.025 Ω of it, with the template's 0.5 mH and 20 ms); dead time
-//! and drop of the bridge, temperature of winding and magnets, which the margin is for. A motor's wire that is off shows
-//! here too: voltage without current and speed.
+//! Leaves out: L·di/dt, which the low-pass turns into L/T·i (0.025 Ω with the template's 0.5 mH and 20 ms). The margin
+//! covers dead time and drop of the bridge and the temperature of winding and magnets. A broken motor wire shows here
+//! too: voltage without current and speed.
 
 use crate::drive::Drive;
 
-/// The model, and what it may be wrong by.
+/// The voltage model with its margins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltageModel {
-    /// Winding, leads and bridge, Ω.
+    /// Resistance of winding, leads and bridge, Ω.
     pub resistance: f32,
     /// Back-EMF of one encoder count a tick, V.
     pub back_emf_per_step: f32,
-    /// Control periods in the low-pass's time constant, inverted.
+    /// Control period over the time constant of the low-pass.
     pub forget: f32,
-    /// What is allowed at rest without current, V.
+    /// Margin at rest without current, V.
     pub floor: f32,
-    /// What is allowed beside of the resistance's part and the back-EMF's part, each as a share of it.
+    /// Additional margin as a share of the resistive voltage and of the back-EMF.
     pub shares: [f32; 2],
 }
 
-/// Time constant of the low-pass, s: long against the winding's and the velocity's delays, short against the way that a
-/// link makes on its own.
+/// Time constant of the low-pass, s. Long against the delays of winding and velocity, short against the time in which a
+/// link moves far on its own.
 const TIME: f32 = 0.02;
-/// The bridge's dead time and drops with what the supply's divider is wrong by, V (0.3 µs at 20 kHz and 24 V are 0.14 V, 1 %
-/// of 24 V is 0.24 V).
+/// Constant margin, V, for dead time and drops of the bridge and the error of the supply divider (0.3 µs at 20 kHz and
+/// 24 V are 0.14 V, 1 % of 24 V is 0.24 V).
 const FLOOR: f32 = 1.0;
-/// Copper has 39 % more resistance 100 K warmer (0.393 %/K, IEC 60028).
+/// Margin as a share of the resistive voltage. Copper has 39 % more resistance 100 K warmer (0.393 %/K, IEC 60028).
 const RESISTANCE_SHARE: f32 = 0.4;
-/// Torque constants are given to 10 %, and magnets lose up to 0.2 %/K.
+/// Margin as a share of the back-EMF. Torque constants are rated to 10 %, and magnets lose up to 0.2 %/K.
 const BACK_EMF_SHARE: f32 = 0.2;
 
 impl VoltageModel {
-    /// The model of a drive whose encoder has so many counts per motor turn, looked at every `period` seconds.
+    /// Returns the model for a drive, its encoder's counts per motor turn, and a step period in seconds.
     pub fn new(drive: &Drive<f32>, counts_per_motor_turn: u32, period: f32) -> Self {
         Self {
             resistance: drive.resistance,
@@ -54,17 +54,17 @@ impl VoltageModel {
     }
 }
 
-/// What is remembered from tick to tick.
+/// State between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VoltageState {
-    /// Voltage that is not explained, low-passed, V.
+    /// Unexplained voltage, low-passed, V.
     pub unexplained: f32,
-    /// What is allowed beside the floor, low-passed, V.
+    /// Margin in addition to the floor, low-passed, V.
     allowed: f32,
 }
 
-/// One tick: whether more is unexplained than the model may be wrong by. `voltage` in V is what the bridge applies, `current`
-/// in A, `step` in counts. A value that is no number counts as unexplained.
+/// Runs one tick. Returns true if the unexplained voltage exceeds the margin. `voltage` in V is the voltage that the
+/// bridge applies, `current` is in A, `step` in counts. NaN counts as unexplained.
 pub fn step(
     model: &VoltageModel,
     state: &mut VoltageState,
@@ -96,7 +96,7 @@ mod tests {
         VoltageModel::new(&DRIVE, 8192, 1e-4)
     }
 
-    /// Ticks until it is told, of voltage, current and motor speed (rad/s) that stand.
+    /// Returns the ticks until detection at constant voltage, current and motor speed (rad/s).
     fn told(voltage: f32, current: f32, speed: f32) -> Option<u32> {
         let (model, mut state) = (model(), VoltageState::default());
         let per_tick = speed * 1e-4 * 8192.0 / core::f32::consts::TAU;
@@ -118,7 +118,7 @@ mod tests {
         assert_eq!(told(0.6 + 2.5, 1.0, 50.0), None);
         let after = told(0.6 + 2.5, 1.0, 0.0);
         assert!(after.is_some_and(|ticks| ticks < 300), "{after:?}");
-        // Counted with the wrong sign.
+        // Encoder counts with the wrong sign.
         assert!(told(0.6 + 2.5, 1.0, -50.0).is_some());
     }
 
