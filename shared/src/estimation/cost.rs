@@ -1,10 +1,10 @@
-//! What a step of the on-line estimator costs, counted.
+//! Counts the operations of a step of the on-line estimator.
 #![allow(clippy::unwrap_used)]
 
 use super::tests::{LOWER, RATE, TRUTH, UPPER, motion, torque};
 use super::*;
 
-/// A number that counts what is done with it.
+/// A number that counts its operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counted(f64);
 
@@ -80,7 +80,7 @@ impl crate::scalar::Real for Counted {
     }
 }
 
-/// The cost stated in `one_link`: [sums and products, divisions, sine and cosine] of the dearest step.
+/// The cost stated in `one_link`: [sums and products, divisions, sine and cosine] of the most expensive step.
 #[test]
 fn operations_are_as_stated() {
     let settings = EstimatorSettings::for_band(LOWER.map(Counted), UPPER.map(Counted));

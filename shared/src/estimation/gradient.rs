@@ -1,11 +1,11 @@
 //! Gain of the normalised gradient update with an adaptation gain matrix.
 //!
 //! θ ← θ + Γφ·e/(1 + φᵀΓφ), Γ symmetric positive definite (Ioannou & Sun 1996, "Robust Adaptive Control",
-//! sec. 4.3; Slotine & Li 1991, sec. 8.7). The normalisation bounds a step whatever the size of φ.
+//! sec. 4.3; Slotine & Li 1991, sec. 8.7). The normalisation bounds a step for any size of φ.
 
 use crate::scalar::Real;
 
-/// Gain for the row `phi`; `None` where it is zero or not finite. Cost at N = 6: 90 operations.
+/// Returns the gain for the row `phi`; `None` if it is zero or not finite. Cost at N = 6: 90 operations.
 #[inline]
 pub fn gain<T: Real<Mask = bool>, const N: usize>(
     adaptation: &[[T; N]; N],

@@ -1,4 +1,4 @@
-//! On-line estimation of parameters that enter linearly.
+//! On-line estimation of linear parameters.
 
 pub mod gradient;
 pub mod least_squares;
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::link::PARAMETER_COUNT;
 use crate::scalar::Real;
 
-/// Which recursive estimator runs.
+/// Kind of recursive estimator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum EstimatorKind {
     /// Recursive least squares in UD form with directional forgetting.
@@ -33,13 +33,13 @@ pub enum EstimatorKind {
 /// Settings of the on-line estimator of the one-link model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct EstimatorSettings<T> {
-    /// Which estimator.
+    /// Kind of estimator.
     pub kind: EstimatorKind,
-    /// Time after which old data weigh 1/e, s.
+    /// Time after which the weight of old data is 1/e, s.
     pub memory: T,
     /// Bandwidth of the filter in front of the regressor, Hz.
     pub bandwidth: T,
-    /// Speed below which friction may be in presliding and sgn q̇ is not what it does, rad/s.
+    /// Speed below which friction may be in presliding, so that sgn q̇ does not describe it, rad/s.
     pub slip_velocity: T,
     /// Smallest plausible value of each parameter.
     pub lower: [T; PARAMETER_COUNT],
@@ -47,7 +47,7 @@ pub struct EstimatorSettings<T> {
     pub upper: [T; PARAMETER_COUNT],
 }
 
-/// What is wrong with settings.
+/// Setting that is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SettingsFault {
     /// The memory is not a positive number of seconds.
@@ -61,9 +61,9 @@ pub enum SettingsFault {
 }
 
 impl<T: Real<Mask = bool>> EstimatorSettings<T> {
-    /// Sensible settings for a band: least squares, a memory of 60 s, 30 Hz of bandwidth (well above the motion of a
-    /// link, well below a current loop), and a slip velocity of 0.05 rad/s (a presliding range of some
-    /// 10⁻³ rad is then left within the filter's memory).
+    /// Returns default settings for a band: least squares, a memory of 60 s, 30 Hz of bandwidth (well above the motion
+    /// of a link, well below a current loop), and a slip velocity of 0.05 rad/s (the joint then leaves a presliding
+    /// range of some 10⁻³ rad within the filter's memory).
     pub fn for_band(lower: [T; PARAMETER_COUNT], upper: [T; PARAMETER_COUNT]) -> Self {
         Self {
             kind: EstimatorKind::LeastSquares,
@@ -75,7 +75,7 @@ impl<T: Real<Mask = bool>> EstimatorSettings<T> {
         }
     }
 
-    /// Whether the settings can be run at this update rate, Hz.
+    /// Checks that the settings can run at this update rate, Hz.
     pub fn check(&self, update_rate_hz: T) -> Result<(), SettingsFault> {
         if !(T::ZERO.lt(self.memory) && recursive::finite(self.memory)) {
             return Err(SettingsFault::Memory);
@@ -96,30 +96,30 @@ impl<T: Real<Mask = bool>> EstimatorSettings<T> {
     }
 }
 
-/// What became of a sample.
+/// Result of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Update {
     /// The estimate was updated.
     Used,
-    /// The row carried no information worth its noise: nothing was changed.
+    /// The row carried too little information for its noise: nothing was changed.
     Uninformative,
-    /// Too soon after a reversal, standstill or the start for the Coulomb column to be true.
+    /// Too soon after a reversal, standstill or the start: the Coulomb column is not valid yet.
     Masked,
-    /// Not finite, or beyond any rig: nothing was changed.
+    /// Not finite, or beyond the range of any rig: nothing was changed.
     Refused,
-    /// Updated, and the residuals say that the parameters have jumped: estimation starts over from the band.
+    /// Updated, and the residuals show that the parameters have jumped: estimation restarts from the band.
     Changed,
 }
 
-/// What an estimator publishes.
+/// Published results of an estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report<T, const N: usize> {
     /// Estimates, inside their band.
     pub value: [T; N],
-    /// Standard deviation of each; the band's half-width until one is known.
+    /// Standard deviations; the band's half-width until they are known.
     pub std: [T; N],
-    /// Whether the estimate may be used: standard deviation known and below
-    /// [`recursive::TRUSTED_SHARE_OF_BAND`] of the band, and not pushed against its edge.
+    /// True if the estimate may be used: its standard deviation is known and at most
+    /// [`recursive::TRUSTED_SHARE_OF_BAND`] of the band, and it is not pushed against the band's edge.
     pub trusted: [bool; N],
     /// RMS of the filtered residual, N·m.
     pub residual_rms: T,

@@ -1,24 +1,22 @@
 //! The on-line estimator of the one-link model: filtered differential model, gate, update, report.
 //!
-//! Two questions are kept apart: whether a row is *valid* (the filter's start and presliding forgotten:
-//! [`filtered`]) and whether it is *informative* (leverage against noise). Memory and forgetting count
-//! valid, informative samples alone, so that standing still forgets nothing.
+//! A row must be *valid* (the filter's start and presliding are over: [`filtered`]) and *informative* (leverage against
+//! noise). Memory and forgetting count valid, informative samples only, so that standing still forgets nothing.
 //!
-//! Cost of a step, counted by the test `operations_are_as_stated`: at most 788 sums and products, 18 divisions, one sine and
-//! cosine (628 and 15 on the mean); the dearest step is the one that closes a residual block.
+//! Cost of a step, counted by the test `operations_are_as_stated`: at most 788 sums and products, 18 divisions, one
+//! sine and cosine (628 and 15 on average). The most expensive step closes a residual block.
 //!
-//! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both
-//! show in `residual_rms`.
+//! Leaves out: delay between torque and motion, friction beyond Coulomb and viscous; both show in `residual_rms`.
 
 use super::{EstimatorSettings, Report, SettingsFault, Update, recursive};
 use crate::link::PARAMETER_COUNT;
 use crate::model::filtered;
 use crate::scalar::Real;
 
-/// Length of a residual block, s: many times the filter's memory (27 ms at 30 Hz) and a typical correlation of
-/// current noise, short enough that the twenty-four before anything is trusted last six seconds.
+/// Length of a residual block, s. Many times the filter's memory (27 ms at 30 Hz) and a typical correlation of current
+/// noise, and short enough that the twenty-four blocks before any trust last six seconds.
 const BLOCK_SECONDS: f64 = 0.25;
-/// Assumed noise as a share of the torque that the band allows.
+/// Assumed noise as a share of the torque range of the band.
 const NOISE_SHARE: f64 = 0.01;
 /// Inputs beyond this (rad, rad/s, N·m) are refused: squares of filtered values stay finite in `f32`.
 const LARGEST_INPUT: f64 = 1e6;
@@ -30,14 +28,14 @@ pub struct Config<T> {
     estimator: recursive::Config<T, PARAMETER_COUNT>,
 }
 
-/// Memory of the estimator.
+/// State of the estimator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T: Real<Mask = bool>> {
     filter: filtered::State<T>,
     estimator: recursive::State<T, PARAMETER_COUNT>,
 }
 
-/// The on-line estimator: [`OneLinkEstimator::step`] at a fixed rate, [`OneLinkEstimator::report`] when asked.
+/// The on-line estimator. Call [`OneLinkEstimator::step`] at a fixed rate, [`OneLinkEstimator::report`] for results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneLinkEstimator<T: Real<Mask = bool>> {
     config: Config<T>,
@@ -45,7 +43,7 @@ pub struct OneLinkEstimator<T: Real<Mask = bool>> {
 }
 
 impl<T: Real<Mask = bool>> Config<T> {
-    /// `update_rate_hz`: calls of [`step`] a second, at least ten times the bandwidth.
+    /// `update_rate_hz`: calls of [`step`] per second, at least ten times the bandwidth.
     pub fn new(settings: &EstimatorSettings<T>, update_rate_hz: T) -> Result<Self, SettingsFault> {
         settings.check(update_rate_hz)?;
         let mut square = T::ZERO;
@@ -57,7 +55,7 @@ impl<T: Real<Mask = bool>> Config<T> {
         } else {
             T::ONE
         };
-        // Counted by comparison, as a `Real` has no conversion to an integer.
+        // Counted by comparison, because a `Real` has no conversion to an integer.
         let wanted = update_rate_hz * T::from_f64(BLOCK_SECONDS);
         let mut block = 1_u32;
         while block < 1 << 20 && T::from_f64(f64::from(block)).lt(wanted) {
@@ -87,9 +85,9 @@ impl<T: Real<Mask = bool>> Config<T> {
     }
 }
 
-/// One sample: position (rad, best reduced to a turn), velocity (rad/s), joint torque (N·m).
+/// Processes one sample: position (rad, best reduced to a turn), velocity (rad/s), joint torque (N·m).
 ///
-/// What is not finite, or beyond any rig, is refused before it reaches a filter.
+/// Values that are not finite or beyond the range of any rig are refused before the filter.
 #[inline]
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
@@ -114,7 +112,7 @@ pub fn step<T: Real<Mask = bool>>(
     )
 }
 
-/// What may be published now, in the order of the parameter names.
+/// Returns the current results, in the order of the parameter names.
 pub fn report<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &State<T>,
@@ -123,7 +121,7 @@ pub fn report<T: Real<Mask = bool>>(
 }
 
 impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
-    /// An estimator that knows nothing but the band.
+    /// Returns an estimator that starts from the band.
     pub fn new(settings: &EstimatorSettings<T>, update_rate_hz: T) -> Result<Self, SettingsFault> {
         Ok(Self {
             config: Config::new(settings, update_rate_hz)?,
@@ -131,7 +129,7 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         })
     }
 
-    /// Replaces the constants. What has been learnt stays: [`restart`](Self::restart) it before the next step.
+    /// Replaces the constants and keeps the estimate: call [`restart`](Self::restart) before the next step.
     pub fn reconfigure(&mut self, config: &Config<T>) {
         self.config = *config;
     }
@@ -142,24 +140,24 @@ impl<T: Real<Mask = bool>> OneLinkEstimator<T> {
         step(&self.config, &mut self.state, q, qd, tau)
     }
 
-    /// Samples have been left out: the filter starts anew with the next one, what has been learnt stays.
+    /// Restarts the filter after a gap in the samples and keeps the estimate.
     pub fn interrupt(&mut self) {
         self.state.filter = filtered::State::default();
     }
 
-    /// Everything that was learnt is forgotten. Not inlined: it is seldom.
+    /// Resets the estimate and the filter. Not inlined: it is seldom called.
     #[inline(never)]
     pub fn restart(&mut self) {
         self.state = State::default();
     }
 
-    /// See [`report`]. Not inlined: it is seldom.
+    /// See [`report`]. Not inlined: it is seldom called.
     #[inline(never)]
     pub fn report(&self) -> Report<T, PARAMETER_COUNT> {
         report(&self.config, &self.state)
     }
 
-    /// How often the parameters were seen to jump.
+    /// Returns how often the parameters jumped.
     pub fn changes(&self) -> u32 {
         self.state.estimator.changes()
     }

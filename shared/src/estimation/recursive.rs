@@ -1,14 +1,14 @@
 //! A recursive estimator of N parameters inside a plausibility band.
 //!
-//! Parameters are scaled to their band, θ = centre + half·x with x in −1 … 1, and torques to a unit of assumed noise;
-//! P starts at the identity: the band's half-width is the prior standard deviation. So `f32` is well
-//! conditioned whatever the units of the parameters. The sums x are compensated (Kahan 1965), as
-//! an update late in a run is far below the last bit of x.
+//! Parameters are scaled to their band, θ = centre + half·x with x in −1 … 1, and torques to a unit of assumed noise. P
+//! starts at the identity: the band's half-width is the prior standard deviation. So `f32` is well conditioned for any
+//! units of the parameters. The sums x are compensated (Kahan 1965), because an update late in a run is far below the
+//! last bit of x.
 //!
-//! The band: what is published is always projected onto it, and a parameter outside is flagged: not trusted for as
-//! long as it is there and [`EDGE_HOLD_BLOCKS`] blocks after. The gradient update is projected itself. Least squares
-//! is not: the first dozens of rows overshoot, and an x cut there would keep an error that P no longer
-//! knows of (measured: coverage of the 95 % interval of J fell to 36 %).
+//! Published values are always projected onto the band. A parameter outside its band is not trusted, and neither for
+//! [`EDGE_HOLD_BLOCKS`] blocks after. The gradient update itself is projected. Least squares is not: its first dozens
+//! of rows overshoot. Cutting x there would keep an error that P no longer covers (measured: coverage of the 95 %
+//! interval of J fell to 36 %).
 
 use super::least_squares;
 use super::ud::UdFactor;
@@ -16,14 +16,14 @@ use super::uncertainty::{self, Block, Uncertainty};
 use super::{EstimatorKind, Report, Update, gradient};
 use crate::scalar::Real;
 
-/// Blocks for which a parameter that was pushed to its band's edge is not trusted.
+/// Blocks during which a parameter is not trusted after it was at its band's edge.
 pub const EDGE_HOLD_BLOCKS: u32 = 10;
-/// A parameter is trusted where its standard deviation is at most this share of its band's width.
+/// Largest standard deviation of a trusted parameter, as a share of its band's width.
 pub const TRUSTED_SHARE_OF_BAND: f64 = 0.05;
-/// Half-widths of the band that least squares may be off its centre before it is cut: far beyond any overshoot.
+/// Half-widths from the band's centre at which least squares is cut: far beyond any overshoot.
 const FARTHEST: f64 = 1e3;
-/// Step of the gradient update against one forgetting of least squares: its directions converge at speeds that
-/// differ by their excitation, so it is set faster.
+/// Step of the gradient update relative to one forgetting of least squares. It is faster, because the gradient's
+/// directions converge at different speeds by their excitation.
 const GRADIENT_SPEED: f64 = 10.0;
 
 /// Constants of the estimator.
@@ -42,9 +42,9 @@ pub struct Config<T, const N: usize> {
 }
 
 impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
-    /// `noise`: assumed standard deviation of the measurement (its unit, > 0; sets only how soon the prior is left);
-    /// `share`: update interval over memory, 0 to forget nothing; `block`: updates a residual block, longer than
-    /// the residual's correlation. A parameter whose band is empty stays at its centre and is never trusted.
+    /// `noise`: assumed standard deviation of the measurement (its unit, > 0; affects only how fast the prior loses its
+    /// weight). `share`: update interval over memory, 0 to forget nothing. `block`: updates in a residual block, longer
+    /// than the correlation of the residual. A parameter with an empty band stays at its centre and is never trusted.
     pub fn new(
         kind: EstimatorKind,
         lower: &[T; N],
@@ -98,7 +98,7 @@ impl<T: Real<Mask = bool>, const N: usize> Config<T, N> {
     }
 }
 
-/// Memory of the estimator.
+/// State of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<T, const N: usize> {
     x: [T; N],
@@ -123,25 +123,25 @@ impl<T: Real<Mask = bool>, const N: usize> Default for State<T, N> {
 }
 
 impl<T: Real<Mask = bool>, const N: usize> State<T, N> {
-    /// Diagonal of P in scaled units (prior: 1). Not a variance of the estimate: see [`report`].
+    /// Returns the diagonal of P in scaled units (prior: 1). It is not the variance of the estimate: see [`report`].
     pub fn gain_variances(&self) -> [T; N] {
         self.p.variances()
     }
 
-    /// How often the parameters were seen to jump.
+    /// Returns how often the parameters jumped.
     pub fn changes(&self) -> u32 {
         self.changes
     }
 }
 
-/// Whether a value is neither infinite nor NaN.
+/// Returns true if a value is neither infinite nor NaN.
 #[inline(always)]
 pub(super) fn finite<T: Real<Mask = bool>>(value: T) -> bool {
     // ∞·0 and NaN·0 are NaN, and no comparison with NaN is true.
     (value * T::ZERO).le(T::ZERO)
 }
 
-/// Takes in one measurement y = row·θ + noise. Nothing is changed by input that is not finite.
+/// Processes one measurement y = row·θ + noise. Input that is not finite changes nothing.
 #[inline]
 pub fn update<T: Real<Mask = bool>, const N: usize>(
     config: &Config<T, N>,
@@ -208,7 +208,7 @@ pub fn update<T: Real<Mask = bool>, const N: usize>(
     }
 }
 
-/// What may be published now.
+/// Returns the current results.
 pub fn report<T: Real<Mask = bool>, const N: usize>(
     config: &Config<T, N>,
     state: &State<T, N>,
@@ -223,7 +223,7 @@ pub fn report<T: Real<Mask = bool>, const N: usize>(
     let share = T::from_f64(2.0 * TRUSTED_SHARE_OF_BAND);
     for i in 0..N {
         let value = config.centre[i] + config.half[i] * state.x[i].clamp_to(-T::ONE, T::ONE);
-        // centre ± half is the band's edge up to rounding only, which has been seen to fall outside.
+        // Rounding of centre ± half has been seen to fall outside the band.
         let [lower, upper] = [config.band[0][i], config.band[1][i]];
         if T::ZERO.lt(config.half[i]) {
             out.value[i] = value.clamp_to(lower, upper);

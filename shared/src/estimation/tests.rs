@@ -1,4 +1,4 @@
-//! What the estimators promise, on data of known truth.
+//! Tests of the estimators on data of known truth.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use rand::SeedableRng;
@@ -117,7 +117,7 @@ fn without_forgetting_it_is_batch_least_squares() {
             (0..6).for_each(|j| a[i][j] += row[i] * row[j]);
         }
     }
-    // The prior is a measurement too: the band's centre with its half-width, against noise 0.05.
+    // The prior counts as a measurement: the band's centre with its half-width, against noise 0.05.
     for i in 0..6 {
         let (centre, half) = (0.5 * (UPPER[i] + LOWER[i]), 0.5 * (UPPER[i] - LOWER[i]));
         a[i][i] += (0.05 / half).powi(2);
@@ -173,7 +173,7 @@ fn coverage(kind: EstimatorKind, memory: f64, seconds: f64, pole: f64, seeds: u6
     hits.map(|h| h / seeds as f64)
 }
 
-/// The measurement behind the choice of estimator of the standard deviation: 400 seeds each.
+/// The measurement behind the choice of the standard deviation's estimator: 400 seeds each.
 #[test]
 #[ignore = "minutes: the full measurement; a reduced one always runs"]
 fn coverage_in_full() {
@@ -192,13 +192,13 @@ fn intervals_cover() {
     for (memory, seconds, pole) in [(1e9, 30.0, 0.9), (10.0, 40.0, 0.9), (10.0, 40.0, 0.0)] {
         let c = coverage(EstimatorKind::LeastSquares, memory, seconds, pole, 80);
         let mean = c.iter().sum::<f64>() / 6.0;
-        // 80 seeds: one parameter's share has a standard deviation of 2.4 %.
+        // 80 seeds: the standard deviation of one parameter's share is 2.4 %.
         assert!(c.iter().all(|c| *c > 0.87), "{memory} {pole}: {c:?}");
         assert!((0.91..0.99).contains(&mean), "{memory} {pole}: {c:?}");
     }
 }
 
-/// `seconds` of motion of a link with parameters `theta` into `f32` and `f64` estimators.
+/// Feeds `seconds` of motion of a link with parameters `theta` to `f32` and `f64` estimators.
 fn run(
     e64: &mut OneLinkEstimator<f64>,
     e32: &mut OneLinkEstimator<f32>,
@@ -248,7 +248,7 @@ fn an_hour_of_standstill_changes_nothing() {
     let before = e32.report();
     assert!(before.trusted.iter().all(|t| *t));
     for _ in 0..3_600_000 {
-        // Velocity noise below slip, torque that stiction makes meaningless.
+        // Velocity noise below slip, and torque made meaningless by stiction.
         let qd = 0.01 * noise.next();
         e32.step(0.4, qd as f32, (1.0 + 0.1 * noise.next()) as f32);
     }
@@ -263,7 +263,7 @@ fn an_hour_of_standstill_changes_nothing() {
     assert_eq!(e32.changes(), 0);
 }
 
-/// The same without the mask's help: one regressor for an hour, then an hour of constant speed.
+/// The same without the mask: one regressor for an hour, then an hour of constant speed.
 #[test]
 fn what_is_not_excited_is_not_forgotten() {
     let low = LOWER.map(|v| v as f32);
@@ -314,7 +314,7 @@ fn what_is_not_excited_is_not_forgotten() {
                 "{name} {i}: {after:?}"
             );
         }
-        // Inertia is not excited at all: neither its estimate nor its variance goes anywhere.
+        // Inertia is not excited: neither its estimate nor its variance changes.
         assert!(
             (grown[0] / p[0] - 1.0).abs() < 0.2,
             "{name}: {grown:?} {p:?}"
@@ -341,8 +341,8 @@ fn a_payload_is_noticed_and_tracked() {
         let tau = torque(&loaded, m) + 0.1 * noise.next();
         e32.step(m[0] as f32, m[1] as f32, tau as f32);
         if k % 100 == 0 {
-            // Wherever it asks to be trusted, it is within its standard deviations; until a block (0.25 s
-            // of valid motion) has ended nothing can know of the change.
+            // A trusted value is within its standard deviations. The change cannot be noticed before a block (0.25 s of
+            // valid motion) has ended.
             let r = e32.report();
             for i in 0..6 {
                 let off = (f64::from(r.value[i]) - loaded[i]).abs() / f64::from(r.std[i]);
@@ -442,7 +442,7 @@ fn gate_asks_for_information_not_speed() {
     let config =
         recursive::Config::new(EstimatorKind::LeastSquares, &LOWER, &UPPER, 0.05, 0.0, 250);
     let mut state = recursive::State::default();
-    // At rest the first row does inform, about gravity and offset; a row of zeros never does.
+    // At rest the first row is informative about gravity and offset; a row of zeros never is.
     assert_eq!(
         recursive::update(&config, &mut state, &[0.0, 1.0, 0.0, 0.0, 0.0, 1.0], 3.0),
         Update::Used

@@ -1,8 +1,8 @@
 //! A covariance matrix as P = U·D·Uᵀ, U unit upper triangular, D diagonal and positive.
 //!
-//! It cannot lose symmetry or positive definiteness to rounding, which is what makes recursive least
-//! squares in `f32` safe for days. Sources: Bierman (1977), "Factorization Methods for Discrete Sequential
-//! Estimation", ch. V (measurement update, rank-one decrease) and ch. III (Agee & Turner 1972, rank-one increase).
+//! Rounding cannot destroy its symmetry or positive definiteness. This makes recursive least squares in `f32` safe for
+//! days. Sources: Bierman (1977), "Factorization Methods for Discrete Sequential Estimation", ch. V (measurement
+//! update, rank-one decrease) and ch. III (Agee & Turner 1972, rank-one increase).
 
 use crate::scalar::Real;
 
@@ -14,7 +14,7 @@ pub struct UdFactor<T, const N: usize> {
 }
 
 impl<T: Real<Mask = bool>, const N: usize> UdFactor<T, N> {
-    /// The diagonal covariance with these variances.
+    /// Returns the diagonal covariance with these variances.
     pub fn diagonal(variance: [T; N]) -> Self {
         let mut u = [[T::ZERO; N]; N];
         for i in 0..N {
@@ -23,7 +23,7 @@ impl<T: Real<Mask = bool>, const N: usize> UdFactor<T, N> {
         Self { u, d: variance }
     }
 
-    /// (P·φ, φᵀ·P·φ). Cost: N(N−1) + 2N products.
+    /// Returns (P·φ, φᵀ·P·φ). Cost: N(N−1) + 2N products.
     #[inline]
     pub fn times(&self, phi: &[T; N]) -> ([T; N], T) {
         let mut product = [T::ZERO; N];
@@ -85,7 +85,7 @@ impl<T: Real<Mask = bool>, const N: usize> UdFactor<T, N> {
         }
     }
 
-    /// The variances P_ii.
+    /// Returns the variances P_ii.
     #[inline]
     pub fn variances(&self) -> [T; N] {
         let mut out = self.d;
@@ -97,7 +97,7 @@ impl<T: Real<Mask = bool>, const N: usize> UdFactor<T, N> {
         out
     }
 
-    /// The whole matrix.
+    /// Returns the whole matrix.
     pub fn matrix(&self) -> [[T; N]; N] {
         let mut out = [[T::ZERO; N]; N];
         for i in 0..N {

@@ -1,35 +1,35 @@
-//! How far an estimate may be off, from the residuals themselves.
+//! Uncertainty of an estimate, from its residuals.
 //!
-//! P of recursive least squares is no standard deviation: residuals behind a filter are correlated, the model errs,
-//! and with forgetting P is not the covariance even for white noise. Here the error covariance Σ is propagated for
-//! whatever gain was used, Σ ← (I−Kφᵀ)Σ(I−Kφᵀ)ᵀ + r·KKᵀ (Joseph form), with r the *long-run* variance of the
-//! residual: L·Var(mean over a block of L), blocks longer than the residual's correlation time (non-overlapping batch
-//! means; Law & Carson 1979). That is the spectral density at zero frequency, right where the regressor is slower
-//! than the residual, and on the safe side where the residual's spectrum falls with frequency.
+//! P of recursive least squares is no covariance of the estimate: residuals behind a filter are correlated, the model
+//! has errors, and with forgetting P is not the covariance even for white noise. Here the error covariance Σ is
+//! propagated for any gain, Σ ← (I−Kφᵀ)Σ(I−Kφᵀ)ᵀ + r·KKᵀ (Joseph form). r is the *long-run* variance of the residual:
+//! L·Var(mean over a block of L), with blocks longer than the residual's correlation time (non-overlapping batch means;
+//! Law & Carson 1979). That is the spectral density at zero frequency. It is right where the regressor is slower than
+//! the residual, and conservative where the residual's spectrum falls with frequency.
 //!
-//! Until enough blocks are in, Σ is carried in units of r and scaled once r is known.
+//! Until there are enough blocks, Σ is in units of r. It is scaled once r is known.
 //!
-//! A jump of a parameter (a payload) shows as blocks that Σ and r cannot explain; two in a row raise
-//! [`Block::Changed`] and the caller starts over from its prior (covariance resetting; Goodwin & Sin 1984, sec. 3.3; Hägglund 1985).
+//! A jump of a parameter (a payload) causes blocks that Σ and r cannot explain. Two in a row raise [`Block::Changed`],
+//! and the caller restarts from its prior (covariance resetting; Goodwin & Sin 1984, sec. 3.3; Hägglund 1985).
 //!
-//! Measured (`coverage_in_full`: 400 seeds, noise AR(1) with pole 0, 0.9 and 0.98 at 1 kHz behind the 30 Hz filter, random
-//! parameters): 95 % intervals of the six parameters cover in 92.0–97.3 % of the runs with a memory of 15 s and
-//! 92.8–98.0 % with 60 s. With the gradient update they cover always: its Σ keeps the prior of what it has not yet
-//! learnt, and its residuals count as noise while it converges.
+//! Measured (`coverage_in_full`: 400 seeds, noise AR(1) with pole 0, 0.9 and 0.98 at 1 kHz behind the 30 Hz filter,
+//! random parameters): 95 % intervals of the six parameters cover in 92.0–97.3 % of the runs with a memory of 15 s and
+//! 92.8–98.0 % with 60 s. With the gradient update they always cover: its Σ keeps the prior of directions that it has
+//! not yet learnt, and its residuals count as noise while it converges.
 //!
-//! Leaves out: the lag behind parameters that drift too slowly to be noticed so, and model error in step with the motion.
+//! Leaves out: the lag behind parameters that drift unnoticed, and model errors in phase with the motion.
 
 use crate::scalar::Real;
 
-/// Blocks, beyond three a parameter, before r counts as known.
+/// Blocks per parameter, in addition to one per parameter, before r counts as known.
 const BLOCKS_PER_PARAMETER: usize = 3;
-/// Squared ratio of a block's mean to its standard deviation that calls for alarm: six sigma.
+/// Squared ratio of a block's mean to its standard deviation that raises an alarm: six sigma.
 const ALARM_MEAN: f64 = 36.0;
-/// Ratio of a block's mean square to the usual one that calls for alarm.
+/// Ratio of a block's mean square to the usual one that raises an alarm.
 const ALARM_POWER: f64 = 8.0;
-/// Most blocks that are averaged where nothing is forgotten.
+/// Maximum number of blocks in the average, if nothing is forgotten.
 const MOST_BLOCKS: f64 = 4096.0;
-/// Fewest blocks that r is averaged over, however short the memory.
+/// Minimum number of blocks in the average of r, for any memory.
 const FEWEST_BLOCKS: f64 = 40.0;
 
 /// Constants of the residual statistics.
@@ -41,8 +41,8 @@ pub struct Config<T> {
 }
 
 impl<T: Real<Mask = bool>> Config<T> {
-    /// `block`: samples a block, longer than the residual's correlation; `memory_blocks`: blocks that r is averaged
-    /// over (infinite is allowed).
+    /// `block`: samples in a block, longer than the correlation of the residual. `memory_blocks`: blocks over which r
+    /// is averaged (infinite is allowed).
     pub fn new(block: u32, memory_blocks: T) -> Self {
         let block = block.max(1);
         Self {
@@ -54,12 +54,12 @@ impl<T: Real<Mask = bool>> Config<T> {
     }
 }
 
-/// What a finished block says.
+/// Result of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Block {
     /// The block goes on, or it ended as expected.
     Usual,
-    /// The residuals say that the parameters are no longer those estimated.
+    /// The residuals show that the parameters have changed.
     Changed,
 }
 
@@ -73,7 +73,7 @@ pub struct Uncertainty<T, const N: usize> {
     filled: u32,
     blocks: T,
     long_run: T,
-    /// r: the long-run variance, corrected for the freedom that the estimate took.
+    /// r: the long-run variance, corrected for the degrees of freedom of the estimate.
     noise: T,
     mean_square: T,
     known: bool,
@@ -81,7 +81,7 @@ pub struct Uncertainty<T, const N: usize> {
 }
 
 impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
-    /// Nothing known: Σ is the prior's, diagonal `variance` in units of the assumed residual variance.
+    /// Returns the initial state: Σ is the prior's, diagonal `variance` in units of the assumed residual variance.
     pub fn new(variance: T) -> Self {
         let mut sigma = [[T::ZERO; N]; N];
         for i in 0..N {
@@ -102,22 +102,22 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
     }
 
-    /// Whether r has been seen long enough for standard deviations to mean something.
+    /// Returns true if r has been observed long enough for valid standard deviations.
     pub fn known(&self) -> bool {
         self.known
     }
 
-    /// Whether the last block was one that Σ and r cannot explain.
+    /// Returns true if Σ and r cannot explain the last block.
     pub fn suspicious(&self) -> bool {
         self.alarms > 0
     }
 
-    /// Mean square of the residual; zero before the first block.
+    /// Returns the mean square of the residual; zero before the first block.
     pub fn mean_square(&self) -> T {
         self.mean_square
     }
 
-    /// Error variance of each parameter; only once [`known`](Self::known).
+    /// Returns the error variance of each parameter; none before [`known`](Self::known).
     pub fn variances(&self) -> Option<[T; N]> {
         let mut out = [T::ZERO; N];
         for i in 0..N {
@@ -126,7 +126,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         self.known.then_some(out)
     }
 
-    /// Takes in that the estimate moved by `k`·residual at the row `phi`. Cost at N = 6: about 250 operations.
+    /// Processes a move of the estimate by `k`·residual at the row `phi`. Cost at N = 6: about 250 operations.
     #[inline]
     pub fn update(&mut self, config: &Config<T>, phi: &[T; N], k: &[T; N], residual: T) -> Block {
         let mut s = [T::ZERO; N];
@@ -139,7 +139,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
             spread += s[i] * phi[i];
             taken += k[i] * phi[i];
         }
-        // What is left of the residual after the update: the start's large errors are not noise.
+        // The residual after the update: the large errors of the start are not noise.
         let residual = residual * (T::ONE - taken);
         let noise = if self.known { self.noise } else { T::ONE };
         let square = spread + noise;
@@ -163,7 +163,7 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         }
     }
 
-    /// Ends a block. Not inlined: it is seldom, one update in a block's length.
+    /// Ends a block. Not inlined: it is seldom called, once in a block.
     #[inline(never)]
     fn close(&mut self, config: &Config<T>) -> Block {
         let mean = self.sum * config.inverse_block;
@@ -188,13 +188,13 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
                 if self.alarms >= 2 {
                     return Block::Changed;
                 }
-                // One odd block is neither believed nor averaged in.
+                // A single odd block is neither counted as a change nor averaged.
                 return Block::Usual;
             }
         }
         self.alarms = 0;
         if !self.known && (square * T::from_f64(ALARM_POWER)).lt(self.mean_square) {
-            // Still converging: what was averaged so far was error, not noise.
+            // Still converging: the average so far was error, not noise.
             self.blocks = T::ZERO;
         }
         let parameters = T::from_f64(N as f64);
@@ -203,8 +203,8 @@ impl<T: Real<Mask = bool>, const N: usize> Uncertainty<T, N> {
         let length = T::ONE / config.inverse_block;
         self.long_run += share * (length * mean * mean - self.long_run);
         self.mean_square += share * (square - self.mean_square);
-        // The estimate follows the noise itself and so takes up to N block means' freedom away from the
-        // residuals, with forgetting as without.
+        // The estimate follows the noise and so takes up to N block means' degrees of freedom from the residuals, with
+        // or without forgetting.
         let free = (self.blocks - parameters).max(T::ONE);
         self.noise = self.long_run * self.blocks / free;
         let enough = T::from_f64((N + BLOCKS_PER_PARAMETER * N) as f64);
