@@ -5,10 +5,10 @@
 //! V̇ ≤ −kd·s², also with friction in the regressor at v instead of q̇: friction grows with velocity, so
 //! (q̇ − v)·(F(q̇) − F(v)) ≥ 0.
 //!
-//! What makes it last on a rig: each θ̂ is kept within its band (projection; exact for the diagonal Γ used here, it
-//! only lowers V), nothing is learnt inside a dead zone of s that measurement noise fills (Slotine and Coetsee
-//! 1986) nor while the torque is limited, and the sums are compensated (Kahan), because at 10 kHz a
-//! step of θ̂ is often below half a unit of `f32`.
+//! Three measures make it robust on a rig. Each θ̂ is kept within its band (projection; exact for the diagonal Γ used
+//! here, it only lowers V). Nothing is learnt inside a dead zone of s that measurement noise fills (Slotine and Coetsee
+//! 1986), nor while the torque is limited. The sums are compensated (Kahan), because at 10 kHz a step of θ̂ is often
+//! below half a unit of `f32`.
 //!
 //! Leaves out: velocity-weakening friction, for which the inequality above does not hold.
 
@@ -19,7 +19,7 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// What the adaptation must keep to.
+/// Bounds and rates of the adaptation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Adaptation<T> {
     /// Diagonal of Γ, in unit of the parameter squared per joule.
@@ -33,8 +33,8 @@ pub struct Adaptation<T> {
 }
 
 impl<T: Real> Adaptation<T> {
-    /// Γ for a band: adaptation·width²/(torque limit·velocity limit), so that a parameter that makes the full
-    /// torque crosses its band in 1/adaptation seconds while s is as large as the highest speed.
+    /// Returns Γ for a band: adaptation·width²/(torque limit·velocity limit). With s at the highest speed, a parameter
+    /// that makes the full torque then crosses its band in 1/adaptation seconds.
     pub fn design(
         adaptation: T,
         lower: [T; PARAMETER_COUNT],
@@ -56,17 +56,17 @@ impl<T: Real> Adaptation<T> {
     }
 }
 
-/// What the law remembers.
+/// State of the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T> {
     /// The parameters in use, in the order of [`PARAMETER_NAMES`](crate::link::PARAMETER_NAMES).
     pub theta: [T; PARAMETER_COUNT],
-    /// What rounding has kept from `theta` so far.
+    /// Rounding error of `theta` so far.
     residue: [T; PARAMETER_COUNT],
 }
 
 impl<T: Real> State<T> {
-    /// Start from known parameters.
+    /// Returns a state with known parameters.
     pub fn new(start: LinkParameters<T>) -> Self {
         Self {
             theta: start.to_array(),
@@ -75,7 +75,7 @@ impl<T: Real> State<T> {
     }
 }
 
-/// Row of the one-link model for a reference velocity and acceleration; `direction` is the smoothed sign.
+/// Returns the row of the one-link model for a reference velocity and acceleration; `direction` is the smoothed sign.
 pub fn regressor<T: Real>(
     position: T,
     velocity: T,
@@ -86,8 +86,8 @@ pub fn regressor<T: Real>(
     [acceleration, cosine, sine, velocity, direction, T::ONE]
 }
 
-/// Joint torque for one tick, and a step of the adaptation; `feed` is known beside the model, N·m.
-/// `gains.derivative` must be above zero.
+/// Returns the joint torque for one tick and advances the adaptation. `feed` is a known torque in addition to the
+/// model, N·m. `gains.derivative` must be above zero.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
@@ -102,7 +102,7 @@ pub fn step<T: Real<Mask = bool>>(
     let s = error_rate + slope * error;
     let velocity = reference.velocity - slope * error;
     let acceleration = reference.acceleration - slope * error_rate;
-    // The direction of v alone keeps the proof; it is smoothed as the precompensation smooths the reference's.
+    // The proof needs the direction of v alone; it is smoothed like the reference's in the precompensation.
     let direction =
         precompensation::direction(velocity, T::ZERO, config.precompensation.velocity_threshold);
     let row = regressor(measured.position, velocity, acceleration, direction);

@@ -1,11 +1,11 @@
 //! Computed torque: the model turns a wanted acceleration into a torque.
 //!
 //! τ = J·(q̈r + kd/J₀·ė + kp/J₀·e) + g(q) + fv·q̇ + off + friction (Craig 1986; Khalil and Dombre 2002, sec. 14.4).
-//! J₀ is the inertia that the gains were designed for, so the error obeys the designed poles also after the
-//! model's inertia has changed (an estimate taken over, a payload).
+//! J₀ is the inertia that the gains were designed for. So the error keeps the designed poles after a change of the
+//! model's inertia (a new estimate, a payload).
 //!
-//! The viscous part is the model's, at the measured velocity, and the precompensation adds the dry friction
-//! alone; with precompensation off there is no dry friction in the torque.
+//! The viscous part is the model's, at the measured velocity. Precompensation adds dry friction only; if it is off, the
+//! torque contains no dry friction.
 
 use super::law::Config;
 use super::{Measured, Torque};
@@ -14,7 +14,7 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Joint torque for one tick; `feed` is known beside the model, N·m. `design_inertia` must be above zero.
+/// Returns the joint torque for one tick; `feed` is a known additional torque, N·m. `design_inertia` must be above zero.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
@@ -28,7 +28,7 @@ pub fn step<T: Real<Mask = bool>>(
             / config.design_inertia;
     let gravity = model.gravity_torque(measured.position);
     let load = model.inertia * acceleration + gravity;
-    // The feedback part would carry measurement noise into the load: the planned load decides friction.
+    // The planned load decides friction, because feedback would carry measurement noise into the load.
     let planned = model.inertia * reference.acceleration + gravity;
     let dry = Friction {
         viscous: T::ZERO,

@@ -1,10 +1,10 @@
 //! Current loop: PI whose zero cancels the winding's pole, with back-EMF feed-forward.
 //!
-//! Designed in discrete time for a voltage held over a period T: the winding is i⁺ = a·i + (1−a)/R·u with
-//! a = exp(−R·T/L); the controller's zero sits at a and its gain puts the only pole left at exp(−ω·T), so the
-//! current follows its reference as a first-order lag of the stated bandwidth, with no steady error
-//! (Åström and Wittenmark 1997, ch. 5, pole-zero cancellation). The integrator is held back by the
-//! voltage that the bridge could not give (back-calculation, Åström and Rundqwist 1989).
+//! Designed in discrete time for a voltage held over a period T: the winding is i⁺ = a·i + (1−a)/R·u with a =
+//! exp(−R·T/L). The controller's zero is at a, and its gain puts the remaining pole at exp(−ω·T). So the current
+//! follows its reference as a first-order lag of the stated bandwidth, without steady error (Åström and Wittenmark
+//! 1997, ch. 5, pole-zero cancellation). Back-calculation reduces the integrator by the voltage that the bridge could
+//! not give (Åström and Rundqwist 1989).
 //!
 //! Leaves out: the delay of one PWM period between computing and applying a voltage. It takes 360°·f·T of phase, so
 //! keep the bandwidth below a twentieth of the loop rate.
@@ -13,7 +13,7 @@ use super::Gains;
 use crate::drive::Drive;
 use crate::scalar::Real;
 
-/// What does not change while the loop runs.
+/// Constants of the loop while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config<T> {
     /// Gain from current error to voltage, V/A.
@@ -22,19 +22,19 @@ pub struct Config<T> {
     pub integral: T,
     /// Largest share of the supply that the bridge may use, 0 to 1.
     pub duty_limit: T,
-    /// How long the current takes to be what its reference was, s.
+    /// Delay of the current behind its reference, s.
     pub lag: T,
-    /// Share of the way to its reference that the current goes in a period.
+    /// Share of its distance to the reference that the current covers in a period.
     pub closed: T,
 }
 
 impl<T: Real> Config<T> {
-    /// The loop for a drive, a bandwidth ([`Gains::current_bandwidth`], Hz) and a period (s). Resistance and
+    /// Returns the loop for a drive, a bandwidth ([`Gains::current_bandwidth`], Hz) and a period (s). Resistance and
     /// inductance must be above zero.
     ///
-    /// The lag is the inverse of the velocity gain of the loop, which is of type 1: the time by which a ramp, and near enough
-    /// any slow change, comes late, whatever the delay between computing and applying a voltage (Franklin, Powell and
-    /// Emami-Naeini 2015, sec. 4.2).
+    /// The lag is the inverse of the velocity gain of the loop, which is of type 1. A ramp, and nearly any slow change,
+    /// is late by this time, for any delay between computing and applying a voltage (Franklin, Powell and Emami-Naeini
+    /// 2015, sec. 4.2).
     pub fn design(drive: &Drive<T>, gains: &Gains<T>, period: T, duty_limit: T) -> Self {
         let omega = T::from_f64(core::f64::consts::TAU) * gains.current_bandwidth;
         let closed = one_minus_exp(omega * period);
@@ -49,30 +49,30 @@ impl<T: Real> Config<T> {
     }
 }
 
-/// 1 − exp(−x) without cancellation for small x: 2t/(1 + t) with t = tanh(x/2).
+/// Returns 1 − exp(−x) without cancellation for small x: 2t/(1 + t) with t = tanh(x/2).
 fn one_minus_exp<T: Real>(x: T) -> T {
     let t = (T::from_f64(0.5) * x).tanh();
     (t + t) / (T::ONE + t)
 }
 
-/// What the loop remembers.
+/// State of the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T> {
     /// Voltage that the integrator holds, V.
     pub integral: T,
-    /// What the current should be at the end of the period, A.
+    /// Expected current at the end of the period, A.
     pub expected: T,
 }
 
-/// What the current will be when the voltage for this reference acts, A: the reference behind the loop's lag. It turns
-/// where the current does, without its noise. To be asked once in a period.
+/// Returns the expected current when the voltage for this reference acts, A: the reference delayed by the loop's lag.
+/// It reverses when the current does, without its noise. Call it once in a period.
 #[inline(always)]
 pub fn expect<T: Real>(config: &Config<T>, state: &mut State<T>, reference: T) -> T {
     state.expected += config.closed * (reference - state.expected);
     state.expected
 }
 
-/// What the loop sees in one period.
+/// Inputs of the loop in one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Input<T> {
     /// Wanted motor current, A.
@@ -85,19 +85,18 @@ pub struct Input<T> {
     pub supply: T,
 }
 
-/// What the loop wants.
+/// Output of the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output<T> {
     /// Voltage over the motor's terminals, V.
     pub voltage: T,
-    /// The same as a share of the supply, −1 to 1.
+    /// Voltage as a share of the supply, −1 to 1.
     pub duty: T,
-    /// Whether the voltage limit took something away.
+    /// True if the voltage limit has reduced the voltage.
     pub limited: bool,
 }
 
-/// One period of the current loop. Without a supply, or with an input that is not a number, the duty is 0
-/// and the state stays.
+/// Runs one period of the current loop. Without a supply, or if an input is NaN, the duty is 0 and the state stays.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
@@ -114,8 +113,8 @@ pub fn step<T: Real<Mask = bool>>(
         };
     }
     let voltage = wish.clamp_to(-most, most);
-    // Back-calculation with the winding's own time constant: the integrator then ends where it
-    // would have been with the reference that the voltage could just follow.
+    // Back-calculation with the winding's time constant: the integrator ends as for the reference that the voltage can
+    // just follow.
     state.integral += config.integral * (error + (voltage - wish) / config.proportional);
     Output {
         voltage,
@@ -145,7 +144,7 @@ mod tests {
         Config::design(&DRIVE, &gains, PERIOD, 0.95)
     }
 
-    /// The winding over one period, a hundred substeps of the voltage equation at a fixed joint speed.
+    /// Advances the winding by one period: a hundred substeps of the voltage equation at a fixed joint speed.
     fn wind(current: &mut f64, voltage: f64, velocity: f64) {
         let h = PERIOD / 100.0;
         for _ in 0..100 {
@@ -191,7 +190,7 @@ mod tests {
         }
     }
 
-    /// A ramp, with the period between computing and applying a voltage that a board has, and without.
+    /// A ramp, with and without the period between computing and applying a voltage that a board has.
     #[test]
     fn a_ramp_comes_late_by_the_lag() {
         let config = config();
@@ -219,7 +218,7 @@ mod tests {
     #[test]
     fn voltage_limit_is_kept_and_the_integrator_does_not_wind_up() {
         let (mut state, mut current) = (State::default(), 0.0);
-        // 40 A would take 24 V and more: unreachable at 12 V.
+        // 40 A need at least 24 V: unreachable at 12 V.
         for _ in 0..5_000 {
             let output = step(
                 &config(),
@@ -237,7 +236,7 @@ mod tests {
             wind(&mut current, output.voltage, 0.0);
         }
         assert!((current - 11.4 / 0.6).abs() < 1e-6, "{current}");
-        // After half a second in saturation the reference falls: no overshoot beyond the step's share.
+        // After half a second in saturation the reference falls: the overshoot stays below the step's share.
         let mut lowest = current;
         let mut ticks = 0;
         while (current - 5.0).abs() > 0.05 && ticks < 200 {

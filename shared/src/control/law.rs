@@ -1,4 +1,4 @@
-//! The position law in force: one entry for all of [`ControlKind`].
+//! Selection of the position law by [`ControlKind`].
 
 use super::adaptive::{self, Adaptation};
 use super::{ControlKind, Gains, Measured, Torque, computed_torque, pd};
@@ -8,10 +8,10 @@ use crate::precompensation::PrecompensationSettings;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// What does not change while a law runs.
+/// Constants of a law while it runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Config<T> {
-    /// Which law.
+    /// Kind of law.
     pub kind: ControlKind,
     /// Feedback gains.
     pub gains: Gains<T>,
@@ -21,9 +21,9 @@ pub struct Config<T> {
     pub model: LinkParameters<T>,
     /// Friction law for precompensation.
     pub friction: Friction<T>,
-    /// How the friction law is used.
+    /// Settings of the friction precompensation.
     pub precompensation: PrecompensationSettings<T>,
-    /// What the adaptive law must keep to.
+    /// Bounds and rates of the adaptive law.
     pub adaptation: Adaptation<T>,
     /// Highest joint torque, N·m.
     pub torque_limit: T,
@@ -31,15 +31,15 @@ pub struct Config<T> {
     pub period: T,
 }
 
-/// What the laws remember.
+/// State of the laws.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T> {
     /// Parameters of the adaptive law.
     pub adaptive: adaptive::State<T>,
 }
 
-/// Joint torque for one tick by the law in force. `feed` is a torque that is known beside the model
-/// ([`compensation`](crate::compensation)), N·m; it counts within the torque limit.
+/// Returns the joint torque for one tick by the selected law. `feed` is a known torque in addition to the model
+/// ([`compensation`](crate::compensation)), N·m; the torque limit includes it.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     state: &mut State<T>,
@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// RMS tracking error over the last of `seconds`, the state left, and the largest rise of V in a tick.
+    /// Returns the RMS tracking error over the last of `seconds`, the final state, and V's largest rise and final value.
     fn track(
         config: &Config<f64>,
         start: LinkParameters<f64>,
@@ -155,8 +155,8 @@ mod tests {
         let config = config(ControlKind::Adaptive);
         let (early, ..) = track(&config, start, 1);
         let (late, state, rise, left) = track(&config, start, 60);
-        // The proof is for continuous time: a step of 0.1 ms may lift V by what is of second order in it, so
-        // half the step must leave about a quarter of that.
+        // The proof is for continuous time. A step of 0.1 ms may raise V by a term of second order, so half the step
+        // must leave about a quarter of the rise.
         assert!(rise < 5e-6, "V rose by {rise} of its start in one tick");
         let finer = Config {
             period: 5e-5,

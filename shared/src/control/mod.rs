@@ -1,8 +1,7 @@
 //! Control laws of the one-link rig.
 //!
-//! Each law is a pure function `step(&Config, &mut State, Input) -> Output` (or without a state where it has
-//! none). [`law`] picks among the position laws by [`ControlKind`]; [`current`] turns the torque's current into a
-//! bridge duty cycle.
+//! Each law is a pure function `step(&Config, &mut State, Input) -> Output`, or without a state if it has none. [`law`]
+//! selects among the position laws by [`ControlKind`]; [`current`] turns the torque's current into a bridge duty cycle.
 
 pub mod adaptive;
 pub mod computed_torque;
@@ -15,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::scalar::Real;
 
-/// Which law turns reference and measurement into a joint torque.
+/// Kind of control law that turns reference and measurement into a joint torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ControlKind {
     /// PD feedback with gravity and friction feed-forward.
@@ -41,9 +40,9 @@ pub struct Gains<T> {
 }
 
 impl<T: Real> Gains<T> {
-    /// Gains that give an inertia (kg·m²) the undamped natural frequency `bandwidth` (Hz) and the damping ratio:
-    /// kp = J·ω², kd = 2ζ·J·ω. The current loop is made ten times as fast, so that its lag takes
-    /// less than 6° of phase at ω, and adaptation runs at ω.
+    /// Returns gains that give an inertia (kg·m²) the undamped natural frequency `bandwidth` (Hz) and the damping
+    /// ratio: kp = J·ω², kd = 2ζ·J·ω. The current loop is ten times as fast, so that its lag takes less than 6° of
+    /// phase at ω, and adaptation runs at ω.
     pub fn design(inertia: T, bandwidth: T, damping: T) -> Self {
         let omega = T::from_f64(core::f64::consts::TAU) * bandwidth;
         Self {
@@ -56,7 +55,7 @@ impl<T: Real> Gains<T> {
 }
 
 impl<T: Real<Mask = bool>> Gains<T> {
-    /// Whether all gains are finite, none negative, and those that are divided by above zero.
+    /// Returns true if all gains are finite and not negative, and the divisors among them are above zero.
     pub fn usable(&self) -> bool {
         let most = T::from_f64(1.0e30);
         let within = |x: T| T::ZERO.le(x) && x.le(most);
@@ -69,7 +68,7 @@ impl<T: Real<Mask = bool>> Gains<T> {
     }
 }
 
-/// Where the link is.
+/// Measured motion of the link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured<T> {
     /// Joint position, rad.
@@ -81,16 +80,16 @@ pub struct Measured<T> {
 /// A joint torque within its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Torque<T> {
-    /// What is to be applied, N·m.
+    /// Torque to apply, N·m.
     pub value: T,
-    /// Whether the limit took something away.
+    /// True if the limit has reduced the torque.
     pub limited: bool,
     /// Part of the unlimited torque that came from friction precompensation, N·m.
     pub friction: T,
 }
 
 impl<T: Real<Mask = bool>> Torque<T> {
-    /// A wished torque cut to ±`limit`, N·m. A wish that is not a number becomes 0 and counts as limited.
+    /// Returns the wished torque cut to ±`limit`, N·m. A NaN becomes 0 and counts as limited.
     #[inline]
     pub fn within(limit: T, wish: T, friction: T) -> Self {
         let number = wish.le(wish);
@@ -130,7 +129,7 @@ pub(crate) mod rig {
         }
     }
 
-    /// The link over `step` seconds under a constant torque, ten substeps.
+    /// Advances the link by `step` seconds under a constant torque, with ten substeps.
     pub(crate) fn advance(
         link: &LinkParameters<f64>,
         x: &mut Measured<f64>,

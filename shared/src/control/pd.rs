@@ -1,8 +1,8 @@
 //! PD feedback with feed-forward of inertia, gravity, offset and friction.
 //!
-//! τ = kp·e + kd·ė + J·q̈r + g(q) + off + friction, gravity at the measured position so that the fixed point is
-//! stable whatever the gains (Takegaki and Arimoto 1981). The friction part is that of
-//! [`precompensation`]; without it the model's friction is left to the feedback.
+//! τ = kp·e + kd·ė + J·q̈r + g(q) + off + friction. Gravity is taken at the measured position, so that the fixed point
+//! is stable for any gains (Takegaki and Arimoto 1981). The friction part is that of [`precompensation`]. Without it
+//! the feedback has to overcome friction.
 
 use super::law::Config;
 use super::{Measured, Torque};
@@ -10,7 +10,7 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Joint torque for one tick; `feed` is known beside the model, N·m.
+/// Returns the joint torque for one tick; `feed` is a known torque in addition to the model, N·m.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,
