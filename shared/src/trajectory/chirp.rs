@@ -8,7 +8,7 @@ use super::phase::Phase;
 use super::{Elapsed, Reference};
 use crate::scalar::Scalar;
 
-/// How the frequency runs from start to end.
+/// Law of the frequency from start to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Sweep {
     /// The same change each second.
@@ -18,17 +18,17 @@ pub enum Sweep {
 }
 
 /// q(t) = E(t)·A(f)·sin φ(t) with φ' = 2πf and A(f) = A₀/√(1 + (ω/ωv)² + (ω/ωa)⁴), ωv = v/A₀, ωa² = a/A₀: then A ≤ A₀,
-/// A·ω ≤ v and A·ω² ≤ a. What envelope and sweep add to that is small for slow sweeps and counted by the check.
+/// A·ω ≤ v and A·ω² ≤ a. Envelope and sweep add to that; the part is small for slow sweeps, and the check includes it.
 ///
-/// The phase is computed in whole numbers, because hundreds of turns leave an `f32` no digits for the angle. A
-/// logarithmic sweep over less than 1/4096 octave is run as a linear one.
+/// The phase is computed in whole numbers, because after hundreds of turns an `f32` has no digits for the angle. A
+/// logarithmic sweep over less than 1/4096 octave runs as a linear one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Chirp<T> {
     /// Frequency at the start, Hz.
     pub start_hz: T,
     /// Frequency at the end, Hz.
     pub end_hz: T,
-    /// How it runs between them.
+    /// Law of the frequency between them.
     pub sweep: Sweep,
     /// Length of one pass with both ramps, µs.
     pub duration_us: u32,
@@ -40,8 +40,8 @@ pub struct Chirp<T> {
     pub velocity: T,
     /// Largest acceleration a, rad/s².
     pub acceleration: T,
-    /// Share of the first pass at which a second one of the same length follows, at most 1; 0 for none. What is linear
-    /// answers both alike, play and friction do not.
+    /// Amplitude of a second pass of the same length as a share of the first, at most 1; 0 for no second pass. A linear
+    /// system answers both alike; backlash and friction do not.
     pub again: T,
 }
 
@@ -66,27 +66,27 @@ impl<T: Scalar> Chirp<T> {
         u64::from(self.duration_us) << u32::from(twice)
     }
 
-    /// What its phase follows from.
+    /// Returns the constants of its phase.
     pub(super) fn phase(&self) -> Phase<T> {
         let [start, end] = [self.start_hz, self.end_hz].map(T::to_f64);
         Phase::new(start, end, self.sweep, self.duration_us)
     }
 
-    /// Phase within a turn (rad), angular frequency and its first two derivatives.
+    /// Returns the phase within a turn (rad), the angular frequency and its first two derivatives.
     #[inline(always)]
     fn angle(&self, time: Elapsed<T>, phase: &Phase<T>) -> (T, [T; 3]) {
-        // Whoever asks is below the length, which is in 32 bits.
+        // The time is below the length, which fits into 32 bits.
         let micros = time.micros as u32;
         let change = self.end_hz - self.start_hz;
         let point = phase.at(micros, self.start_hz, change);
         let tau = T::from_f64(core::f64::consts::TAU);
         let w = [point.hz, point.slope, point.bend].map(|x| tau * x);
-        // The share of a microsecond: the frequency's change within it turns nothing.
+        // The fraction of a microsecond; the change of frequency within it is negligible.
         let rest = w[0] * time.fraction * T::from_f64(1e-6);
         (tau * point.turns + rest, w)
     }
 
-    /// Amplitude and its first two time derivatives, from the angular frequency and its.
+    /// Returns the amplitude and its first two time derivatives, from the angular frequency and its derivatives.
     fn amplitude(&self, [w, w1, w2]: [T; 3]) -> Reference<T> {
         let f = T::from_f64;
         let (v, a) = (
@@ -109,7 +109,7 @@ impl<T: Scalar> Chirp<T> {
         }
     }
 
-    /// Amplitude under the envelope, angular frequency and its derivative.
+    /// Returns the amplitude with its envelope, the phase, the angular frequency and its derivative.
     #[inline(always)]
     fn carrier(&self, time: Elapsed<T>, phase: &Phase<T>) -> (Reference<T>, T, T, T) {
         let (angle, frequency) = self.angle(time, phase);
@@ -122,7 +122,7 @@ impl<T: Scalar> Chirp<T> {
         (amplitude, angle, w, w1)
     }
 
-    /// The same time in its pass, and the share at which that runs.
+    /// Returns the time within its pass, and the amplitude share of that pass.
     #[inline(always)]
     fn pass(&self, time: Elapsed<T>) -> (Elapsed<T>, T) {
         match time.micros.checked_sub(u64::from(self.duration_us)) {
@@ -144,8 +144,8 @@ impl<T: Scalar> Chirp<T> {
         sine.under(amplitude).scaled(share)
     }
 
-    /// What position, velocity and acceleration cannot exceed at a time of the first pass, whatever the phase; the second
-    /// stays below.
+    /// Returns bounds of position, velocity and acceleration at a time of the first pass, for any phase. The second
+    /// pass is smaller.
     pub(super) fn bound(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         let (amplitude, _, w, w1) = self.carrier(time, phase);
         let two = T::from_f64(2.0);

@@ -8,7 +8,7 @@ use super::segment::quintic;
 use super::{Elapsed, HARMONICS, Reference};
 use crate::scalar::Real;
 
-/// q(t) = E(t)·Σ (aₖ·sin kωt + bₖ·cos kωt), k from 1: the envelope E rises from 0 to 1 over the ramp by the quintic
+/// q(t) = E(t)·Σ (aₖ·sin kωt + bₖ·cos kωt), k from 1. The envelope E rises from 0 to 1 over the ramp by the quintic
 /// 10s³ − 15s⁴ + 6s⁵, stays at 1 for whole periods and falls likewise, so the motion begins and ends at rest at 0.
 /// Phase zero is at the end of the first ramp: the whole periods are exactly periodic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -42,9 +42,9 @@ impl<T: Real<Mask = bool>> Fourier<T> {
 
     fn series(&self, time: Elapsed<T>) -> Reference<T> {
         let period = self.period_us.max(1);
-        // Time since the end of the ramp, moved ahead by whole periods so that it is not negative.
+        // Time since the end of the ramp, shifted by whole periods so that it is not negative.
         let ahead = period - self.ramp_us % period;
-        // In 32 bits where they are enough, which the microcontroller divides by hardware.
+        // In 32 bits if they suffice, because the microcontroller divides them in hardware.
         let since = match u32::try_from(time.micros) {
             Ok(micros) => micros % period,
             Err(_) => (time.micros % u64::from(period)) as u32,
@@ -64,7 +64,7 @@ impl<T: Real<Mask = bool>> Fourier<T> {
         let omega = tau / Elapsed::seconds(period, T::ZERO);
         let (sine, cosine) = (tau * turns).sin_cos();
         let mut sum = Reference::rest(T::ZERO);
-        // Harmonics by turning the fundamental's vector: one sine for all of them.
+        // Harmonics by rotating the fundamental's vector: one sine for all of them.
         let (mut s, mut c, mut w) = (sine, cosine, omega);
         for k in 0..self.sine.len().max(self.cosine.len()) {
             let a = self.sine.get(k).copied().unwrap_or(T::ZERO);
@@ -88,7 +88,7 @@ impl<T: Real<Mask = bool>> Fourier<T> {
     }
 }
 
-/// The envelope within either ramp; none where it is 1.
+/// Returns the envelope within either ramp; none where it is 1.
 pub(super) fn envelope<T: Real<Mask = bool>>(
     time: Elapsed<T>,
     ramp_us: u32,
@@ -97,7 +97,7 @@ pub(super) fn envelope<T: Real<Mask = bool>>(
     let span = Elapsed::seconds(ramp_us.max(1), T::ZERO);
     let left = duration.saturating_sub(time.micros);
     if time.micros < u64::from(ramp_us) {
-        // Below the ramp, so within 32 bits.
+        // Below the ramp, so it fits into 32 bits.
         let s = (T::from_u32(time.micros as u32) + time.fraction) / T::from_u32(ramp_us);
         Some(quintic(s, span))
     } else if left <= u64::from(ramp_us) {

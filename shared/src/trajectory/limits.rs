@@ -1,4 +1,4 @@
-//! Whether a trajectory stays within the limits.
+//! Check of a trajectory against the limits.
 
 use core::fmt;
 
@@ -8,13 +8,13 @@ use super::{Elapsed, Reference, SlowReversals, Trajectory};
 use crate::safety::Limits;
 use crate::scalar::Scalar;
 
-/// Samples of a Fourier trajectory per period of its fastest harmonic. Between them a peak hides at most
+/// Samples of a Fourier trajectory per period of its fastest harmonic. Between samples a peak is missed by at most
 /// (π/256)²/2 = 8·10⁻⁵ of that harmonic's amplitude.
 const SAMPLES: u32 = 256;
-/// Samples of a sweep's amplitude bound, which is smooth over its whole length.
+/// Samples of a sweep's amplitude bound over its whole length, along which it is smooth.
 const SWEEP_SAMPLES: u32 = 1024;
 
-/// The furthest that a trajectory goes, relative to its start.
+/// Extreme values of a trajectory, relative to its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes<T> {
     /// Lowest position, rad.
@@ -27,10 +27,10 @@ pub struct Extremes<T> {
     pub acceleration: T,
 }
 
-/// Why a trajectory cannot run.
+/// Reason why a trajectory cannot run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrajectoryError<T> {
-    /// A value is not finite or makes no motion; the field's name.
+    /// A value is not finite or describes no motion; the field's name.
     BadValue(&'static str),
     /// Below the lowest position.
     PositionLow {
@@ -109,14 +109,14 @@ impl<T: Scalar> fmt::Display for TrajectoryError<T> {
 
 impl<T: Scalar> core::error::Error for TrajectoryError<T> {}
 
-/// One place to look at: a time, and the lowest and highest that the motion does there.
+/// A sample: a time, and the lowest and highest reference there.
 struct Probe<T> {
     micros: u64,
     low: Reference<T>,
     high: Reference<T>,
 }
 
-/// Looks at a segment that begins at a time (µs); gives its length, µs.
+/// Samples a segment that begins at a time (µs) and returns its length, µs.
 fn probe_segment<T: Scalar>(
     segment: Segment<T>,
     before: u64,
@@ -135,10 +135,10 @@ fn probe_segment<T: Scalar>(
 }
 
 impl<T: Scalar> Trajectory<T> {
-    /// Whether every value is finite and makes a motion.
+    /// Checks that every value is finite and describes a motion.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadValue`] with the first field that is not.
+    /// [`TrajectoryError::BadValue`] with the first field that fails.
     pub fn validate(&self) -> Result<(), TrajectoryError<T>> {
         let finite = |x: &T| x.abs().le(T::from_f64(1.0e6));
         let positive = |x: &T| finite(x) && T::ZERO.lt(*x);
@@ -195,7 +195,7 @@ impl<T: Scalar> Trajectory<T> {
         }
     }
 
-    /// Calls `visit` wherever the motion can be extreme.
+    /// Calls `visit` at all points where the motion can be extreme.
     fn probe(&self, visit: &mut dyn FnMut(Probe<T>)) {
         let mut point = |micros: u64| {
             let at = self.at_elapsed(Elapsed {
@@ -225,7 +225,7 @@ impl<T: Scalar> Trajectory<T> {
             }
             Self::Chirp(m) => {
                 let phase = m.phase();
-                // Thousands of oscillations: bound them by their amplitude instead of looking at each.
+                // Thousands of oscillations: their amplitude bounds them without a look at each.
                 for k in 0..=u64::from(SWEEP_SAMPLES) {
                     let micros = u64::from(m.duration_us) * k / u64::from(SWEEP_SAMPLES);
                     let time = Elapsed {
@@ -266,7 +266,7 @@ impl<T: Scalar> Trajectory<T> {
         }
     }
 
-    /// How far the trajectory goes. A chirp is bounded from above, a Fourier series found to 10⁻⁴, the others exact.
+    /// Returns the extremes: upper bounds for a chirp, accurate to 10⁻⁴ for a Fourier series, exact for others.
     pub fn extremes(&self) -> Extremes<T> {
         let mut found = Extremes::<T>::default();
         self.probe(&mut |probe| {
@@ -278,13 +278,13 @@ impl<T: Scalar> Trajectory<T> {
         found
     }
 
-    /// Whether the trajectory, started at `start` (rad), stays within the limits.
+    /// Checks that the trajectory, started at `start` (rad), stays within the limits.
     ///
     /// # Errors
-    /// [`TrajectoryError`]: a value that makes no motion, or the first limit left, with the time.
+    /// [`TrajectoryError`]: a value that describes no motion, or the first violated limit with its time.
     pub fn check(&self, limits: &Limits<T>, start: T) -> Result<Extremes<T>, TrajectoryError<T>> {
         self.validate()?;
-        // Rounding of the peak itself must not refuse a motion designed to touch its limit.
+        // Rounding of the peak must not refuse a motion designed to touch its limit.
         let slack = T::from_f64(1.0 + 1.0e-6);
         let mut failed = None;
         self.probe(&mut |probe| {

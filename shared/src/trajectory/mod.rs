@@ -1,15 +1,15 @@
 //! Reference trajectories of one joint.
 //!
-//! Positions are offsets from where the trajectory is started; every kind begins and ends at rest, and position,
-//! velocity and acceleration are continuous and belong to each other exactly.
+//! Positions are offsets from the start position. Every kind begins and ends at rest. Position, velocity and
+//! acceleration are continuous and consistent with each other.
 //!
 //! # Time
-//! Every duration is a whole number of microseconds. The chip asks [`Trajectory::at_tick`] with its tick counter, and
-//! whole periods and segments are taken off in integers before anything becomes a floating-point number: after days an
-//! `f32` sees the same phase as in the first period. [`Trajectory::at`] takes seconds and is for the desktop; seconds
-//! in `f32` would be 60 µs coarse after 20 minutes. Host (`f64`) and chip (`f32`) share all durations exactly.
+//! Every duration is a whole number of microseconds. The chip calls [`Trajectory::at_tick`] with its tick counter.
+//! Whole periods and segments are subtracted in integers before any conversion to floating point: after days an `f32`
+//! sees the same phase as in the first period. [`Trajectory::at`] takes seconds and is for the desktop; seconds in
+//! `f32` would be 60 µs coarse after 20 minutes. Host (`f64`) and chip (`f32`) share all durations exactly.
 //!
-//! Leaves out: the joint's zero position and its limits, which [`Trajectory::check`] is given.
+//! Leaves out: the joint's zero position and its limits; [`Trajectory::check`] gets them as arguments.
 
 mod chirp;
 mod fourier;
@@ -54,7 +54,7 @@ pub struct Reference<T> {
 }
 
 impl<T: Real> Reference<T> {
-    /// Standing at a position.
+    /// Returns a reference at rest at a position.
     fn rest(position: T) -> Self {
         Self {
             position,
@@ -63,7 +63,7 @@ impl<T: Real> Reference<T> {
         }
     }
 
-    /// All three times a number.
+    /// Returns the reference multiplied by a number.
     fn scaled(self, share: T) -> Self {
         Self {
             position: share * self.position,
@@ -72,7 +72,7 @@ impl<T: Real> Reference<T> {
         }
     }
 
-    /// The motion times an envelope that has its own rate and second derivative (product rule).
+    /// Returns the motion multiplied by an envelope with its own first and second derivative (product rule).
     fn under(self, envelope: Self) -> Self {
         let two = T::from_f64(2.0);
         Self {
@@ -85,11 +85,11 @@ impl<T: Real> Reference<T> {
     }
 }
 
-/// A reference motion about the point where it is started.
+/// A reference motion relative to its start position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 #[allow(clippy::large_enum_variant)] // it crosses the wire whole; boxing needs an allocator
 pub enum Trajectory<T> {
-    /// Stand still for a time, µs.
+    /// Rest for a time, µs.
     Hold(u32),
     /// Periodic sum of harmonics: excitation for identification.
     Fourier(Fourier<T>),
@@ -103,7 +103,7 @@ pub enum Trajectory<T> {
     FrictionSweep(FrictionSweep<T>),
 }
 
-/// A point in time: whole microseconds and what is left over.
+/// A point in time: whole microseconds and a fraction.
 #[derive(Clone, Copy, Debug)]
 struct Elapsed<T> {
     micros: u64,
@@ -113,8 +113,8 @@ struct Elapsed<T> {
 
 impl<T: Real> Elapsed<T> {
     fn from_tick(tick: u64, rate_hz: u32) -> Self {
-        // A period of whole microseconds, as the rig's: no division of 64 bits, which the microcontroller has no
-        // hardware for.
+        // With a period of whole microseconds, as on the rig, no 64-bit division is needed. The microcontroller has no
+        // hardware for it.
         let (step, odd) = (
             MICROS as u32 / rate_hz.max(1),
             MICROS as u32 % rate_hz.max(1),
@@ -127,7 +127,7 @@ impl<T: Real> Elapsed<T> {
         }
         let rate = u64::from(rate_hz.max(1));
         let within = (tick % rate) * MICROS;
-        // The rate fits 32 bits, so does a remainder by it.
+        // The rate fits into 32 bits, and so does its remainder.
         let rest = T::from_u32((within % rate) as u32) / T::from_u32(rate_hz.max(1));
         Self {
             micros: (tick / rate)
@@ -137,7 +137,7 @@ impl<T: Real> Elapsed<T> {
         }
     }
 
-    /// Time within a span, s; the span is short enough for its microseconds to fit 32 bits.
+    /// Returns the time within a span, s. The microseconds of the span fit into 32 bits.
     fn seconds(micros: u32, fraction: T) -> T {
         (T::from_u32(micros) + fraction) * T::from_f64(1.0e-6)
     }
@@ -161,16 +161,16 @@ impl<T: Scalar> Trajectory<T> {
         T::from_f64(self.duration_micros() as f64 / MICROS as f64)
     }
 
-    /// The reference at a control tick; at rest before the start and after the end.
+    /// Returns the reference at a control tick; at rest before the start and after the end.
     pub fn at_tick(&self, tick: u64, rate_hz: u32) -> Reference<T> {
         self.at_elapsed(Elapsed::from_tick(tick, rate_hz))
     }
 
-    /// The reference at a time in seconds since the start. Precise for `f64`; for long runs in `f32` use
+    /// Returns the reference at a time in seconds since the start. Precise for `f64`; for long runs in `f32` use
     /// [`at_tick`](Self::at_tick).
     pub fn at(&self, time: T) -> Reference<T> {
         let micros = time.to_f64() * MICROS as f64;
-        // A cast from floating point saturates, and takes NaN for zero.
+        // A cast from floating point saturates, and turns NaN into zero.
         let whole = micros as u64;
         let fraction = (micros - whole as f64).clamp_to(0.0, 1.0);
         self.at_elapsed(Elapsed {
@@ -183,7 +183,7 @@ impl<T: Scalar> Trajectory<T> {
         self.at_phase(time, &self.phase())
     }
 
-    /// What the phase of a sweep follows from; of anything else that of one that stands.
+    /// Returns the phase constants of a sweep; for other kinds those of a constant phase.
     fn phase(&self) -> Phase<T> {
         match self {
             Self::Chirp(motion) => motion.phase(),
@@ -198,7 +198,7 @@ impl<T: Scalar> Trajectory<T> {
         self.within(time, phase)
     }
 
-    /// Before its end. Not inlined: the chip's linker finds it by name.
+    /// Returns the reference before the end. Not inlined: the chip's linker finds it by name.
     #[inline(never)]
     fn within(&self, time: Elapsed<T>, phase: &Phase<T>) -> Reference<T> {
         match self {
@@ -222,7 +222,7 @@ impl<T: Scalar> Trajectory<T> {
     }
 }
 
-/// What follows from a trajectory and takes longer to work out than a control tick has.
+/// Precomputed values of a trajectory. A control tick is too short to compute them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation<T> {
     phase: Phase<T>,
@@ -230,7 +230,7 @@ pub struct Preparation<T> {
 }
 
 impl<T: Scalar> Trajectory<T> {
-    /// Works out what a [`Course`] needs: some thousand cycles of the microcontroller.
+    /// Computes the values that a [`Course`] needs: some thousand cycles of the microcontroller.
     pub fn prepare(&self) -> Preparation<T> {
         Preparation {
             phase: self.phase(),
@@ -247,7 +247,7 @@ pub struct Course<T> {
 }
 
 impl<T: Scalar> Course<T> {
-    /// A trajectory with its own preparation; with another's its reference is another's too.
+    /// Returns a trajectory with its preparation. The preparation must be of the same trajectory.
     pub fn new(trajectory: Trajectory<T>, prepared: Preparation<T>) -> Self {
         Self {
             trajectory,
@@ -260,7 +260,7 @@ impl<T: Scalar> Course<T> {
         self.prepared.duration_micros
     }
 
-    /// The reference at a control tick, as [`Trajectory::at_tick`] gives it.
+    /// Returns the reference at a control tick, as [`Trajectory::at_tick`] does.
     pub fn at_tick(&self, tick: u64, rate_hz: u32) -> Reference<T> {
         let time = Elapsed::from_tick(tick, rate_hz);
         if time.micros >= self.prepared.duration_micros {

@@ -1,25 +1,25 @@
-//! The phase of a swept sine in whole numbers: thousands of turns leave an `f32` no digits for the angle, but 64 bits of a
-//! turn's fraction do, and a multiplication of them is four instructions of the microcontroller.
+//! The phase of a swept sine in whole numbers. After thousands of turns an `f32` has no digits for the angle. 64 bits
+//! of a turn's fraction have, and their multiplication takes four instructions of the microcontroller.
 //!
-//! Turns are kept modulo one, as multiples of 2⁻⁶⁴. Constants are worked out once, in double precision; what they are
-//! rounded by bends the sweep a little (by its length in µs times 2⁻⁶⁴: 3·10⁻¹² in a minute) and does not shake it.
+//! Turns are kept modulo one, as multiples of 2⁻⁶⁴. Constants are computed once, in double precision. Their rounding
+//! bends the sweep a little (by its length in µs times 2⁻⁶⁴: 3·10⁻¹² in a minute) but adds no jitter.
 //!
-//! Left out: lanes; sweeps above 10⁵ Hz or over more than 31 octaves, which no rig is given.
+//! Leaves out: lanes; sweeps above 10⁵ Hz or over more than 31 octaves, which no rig gets.
 
 use super::Sweep;
 use crate::scalar::Scalar;
 
 /// Highest frequency of a sweep, Hz.
 pub(super) const HIGHEST_HZ: f64 = 1.0e5;
-/// Most octaves of a logarithmic sweep.
+/// Largest number of octaves of a logarithmic sweep.
 pub(super) const MOST_OCTAVES: f64 = 31.0;
-/// A logarithmic sweep over fewer octaves is taken for a linear one: the two differ by less than 10⁻⁸ of the phase, and its
-/// own formula would be the difference of two large numbers.
+/// A logarithmic sweep over fewer octaves runs as a linear one. The two differ by less than 10⁻⁸ of the phase, and the
+/// logarithmic formula would be the difference of two large numbers.
 const FEWEST_OCTAVES: f64 = 1.0 / 4096.0;
 
-/// The upper half of a product.
+/// Returns the upper half of a product.
 ///
-/// Not inlined: a phase takes a dozen of them, and the chip's fast memory has no room for copies.
+/// Not inlined: a phase needs a dozen of them, and the chip's fast memory has no room for copies.
 #[inline(never)]
 fn high(a: u64, b: u64) -> u64 {
     let low = |x: u64| x & 0xFFFF_FFFF;
@@ -46,8 +46,8 @@ const TAIL: [u64; 5] = [
 ];
 const LN_2: u64 = 0xb172_17f7_d1cf_79ac;
 
-/// 2^(share/2⁶⁴), a multiple of 2⁻⁶³: sixteenths of the octave from a table, the rest by the exponential's series,
-/// 1 + z + z²·(1/2! + z/3! + …), z below 0.044. What is in the brackets needs 32 bits: it is off by 10⁻⁹, the whole by 10⁻¹².
+/// Returns 2^(share/2⁶⁴), a multiple of 2⁻⁶³: sixteenths of the octave from a table, the rest by the exponential's
+/// series 1 + z + z²·(1/2! + z/3! + …), z below 0.044. The brackets, in 32 bits, are off by 10⁻⁹, the whole by 10⁻¹².
 #[inline(always)]
 fn exp2(share: u64) -> u64 {
     const ONE: u64 = 1 << 63;
@@ -62,10 +62,10 @@ fn exp2(share: u64) -> u64 {
     high(*POWERS.get(sixteenth).unwrap_or(&ONE), series) << 1
 }
 
-/// Turns and frequency of a sweep, ready to be asked at any time.
+/// Constants for the turns and the frequency of a sweep at any time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Phase<T> {
-    /// Of the length, per µs, 2⁻⁶⁴.
+    /// Share of the length per µs, 2⁻⁶⁴.
     share: u64,
     law: Law,
     /// Change of the frequency, Hz/s, or of its logarithm, 1/s.
@@ -87,29 +87,29 @@ enum Law {
         falls: bool,
         mantissa: u64,
         exponent: i32,
-        /// The scale's own fraction, 2⁻⁶⁴ turns.
+        /// Fraction of the scale, 2⁻⁶⁴ turns.
         fraction: u64,
     },
 }
 
-/// What a sweep is at a time.
+/// State of a sweep at a time.
 pub(super) struct Point<T> {
-    /// Turns beside a whole number, −½ to ½.
+    /// Fraction of a turn, −½ to ½.
     pub(super) turns: T,
     /// Frequency, Hz.
     pub(super) hz: T,
-    /// Its change, Hz/s.
+    /// First derivative of the frequency, Hz/s.
     pub(super) slope: T,
-    /// The change of that, Hz/s².
+    /// Second derivative of the frequency, Hz/s².
     pub(super) bend: T,
 }
 
-/// 2^exponent.
+/// Returns 2^exponent.
 fn power_of_two(exponent: i32) -> f64 {
     libm::ldexp(1.0, exponent)
 }
 
-/// A number from 0 to 1 that comes as multiples of 2⁻⁶⁴.
+/// Returns a number from 0 to 1 that is given in multiples of 2⁻⁶⁴.
 #[inline(always)]
 fn fraction<T: Scalar>(value: u64) -> T {
     let unit = T::from_f64(1.0 / 4_294_967_296.0);
@@ -117,7 +117,7 @@ fn fraction<T: Scalar>(value: u64) -> T {
 }
 
 impl<T: Scalar> Phase<T> {
-    /// Stands at phase 0: of what is no sweep.
+    /// Constant phase 0, for motions other than sweeps.
     pub(super) const STILL: Self = Self {
         share: 0,
         law: Law::Linear {
@@ -128,12 +128,12 @@ impl<T: Scalar> Phase<T> {
         rate: T::ZERO,
     };
 
-    /// Of a sweep from one frequency (Hz) to another.
+    /// Returns the constants of a sweep from one frequency (Hz) to another.
     pub(super) fn new(start_hz: f64, end_hz: f64, sweep: Sweep, duration_us: u32) -> Self {
         let duration_us = duration_us.max(1);
         let octaves = libm::log2(end_hz / start_hz);
         let falls = end_hz < start_hz;
-        // Casts from floating point saturate, and take NaN for zero: nothing here can go beyond its word.
+        // Casts from floating point saturate, and turn NaN into zero: no value overflows its word.
         let seconds = f64::from(duration_us) * 1e-6;
         let (rate, law) = if sweep == Sweep::Linear || !(octaves.abs() >= FEWEST_OCTAVES) {
             let per_us = |hz: f64| (hz * 1e-6 * power_of_two(64)) as u64;
@@ -163,7 +163,7 @@ impl<T: Scalar> Phase<T> {
         }
     }
 
-    /// At a whole µs of a sweep that begins with this frequency and changes by that one in all, Hz.
+    /// Returns the state at a whole µs of a sweep with this start frequency and this total change, Hz.
     #[inline(always)]
     pub(super) fn at(&self, micros: u32, start_hz: T, change_hz: T) -> Point<T> {
         let share = self.share * u64::from(micros);
@@ -243,7 +243,7 @@ mod tests {
         assert_eq!(exp2(0), 1 << 63);
     }
 
-    /// Against the law in double precision, up and down, over many turns.
+    /// Compares with the law in double precision, up and down, over many turns.
     #[test]
     fn turns_are_the_integral_of_the_frequency() {
         let length = 60_000_000;
@@ -273,7 +273,7 @@ mod tests {
                     };
                     let point = phase.at(micros, from, to - from);
                     let off = point.turns - turns;
-                    // What the constants are rounded by, and the double itself.
+                    // Rounding of the constants and of the double.
                     let off = (off - libm::round(off)).abs();
                     assert!(
                         off < 3e-12 * seconds * from.max(hz),

@@ -1,30 +1,30 @@
-//! The two shapes that staged trajectories are built of.
+//! The two segment shapes of staged trajectories.
 
 use super::{Elapsed, Reference};
 use crate::scalar::Real;
 
-/// Part of a trajectory, starting where the one before it ends.
+/// Part of a trajectory, starting at the end of the previous one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment<T> {
     /// Length, µs.
     pub(super) micros: u32,
     /// Position at its start, rad.
     pub(super) start: T,
-    /// What happens.
+    /// Motion of the segment.
     pub(super) shape: Shape<T>,
 }
 
-/// What happens in a segment.
+/// Motion of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape<T> {
-    /// From rest to rest over a distance (rad), the quintic without velocity and acceleration at its ends.
+    /// From rest to rest over a distance (rad), by a quintic with zero velocity and acceleration at its ends.
     Move(T),
-    /// From one velocity to another (rad/s), 3s² − 2s³ between them; equal velocities cruise, zeros dwell.
+    /// From one velocity to another (rad/s), 3s² − 2s³ between them; equal velocities cruise, two zeros dwell.
     Blend(T, T),
 }
 
 impl<T: Real<Mask = bool>> Segment<T> {
-    /// The reference `micros` and a `fraction` of one after the segment's start. Not inlined: the chip's linker finds it by name.
+    /// Returns the reference `micros` and a `fraction` after the start. Not inlined: the chip's linker finds it by name.
     #[inline(never)]
     pub(super) fn at(&self, micros: u32, fraction: T) -> Reference<T> {
         let f = T::from_f64;
@@ -51,16 +51,16 @@ impl<T: Real<Mask = bool>> Segment<T> {
         }
     }
 
-    /// Where in the segment position, velocity and acceleration can be extreme, as shares of its length.
+    /// Returns the points where position, velocity and acceleration can be extreme, as shares of the segment's length.
     pub(super) fn candidates(&self) -> [f64; 6] {
-        // The quintic's acceleration peaks at ½ ∓ 1/√12, its velocity at ½. The blend's acceleration peaks at ½; a
-        // turn between opposite equal velocities has its position's extreme there too.
+        // The quintic's acceleration peaks at ½ ∓ 1/√12, its velocity at ½. The blend's acceleration peaks at ½. A turn
+        // between opposite equal velocities has its extreme position there too.
         let root = 0.28867513459481287;
         [0.0, 0.5 - root, 0.25, 0.5, 0.5 + root, 1.0]
     }
 }
 
-/// 10s³ − 15s⁴ + 6s⁵ and its derivatives over a span in seconds.
+/// Returns 10s³ − 15s⁴ + 6s⁵ and its derivatives over a span in seconds.
 #[inline(never)]
 pub(super) fn quintic<T: Real>(s: T, span: T) -> Reference<T> {
     let f = T::from_f64;
@@ -72,7 +72,7 @@ pub(super) fn quintic<T: Real>(s: T, span: T) -> Reference<T> {
     }
 }
 
-/// The reference at a time, by walking through the segments.
+/// Returns the reference at a time, by a walk through the segments.
 pub(super) fn at<T: Real<Mask = bool>>(
     segments: impl FnOnce(&mut dyn FnMut(Segment<T>) -> bool),
     time: Elapsed<T>,
@@ -87,8 +87,8 @@ pub(super) fn at<T: Real<Mask = bool>>(
         found = Some(segment);
         false
     });
-    // Evaluated in one place: the walk is repeated in the machine code for every sort of segment. What is left is below the
-    // segment's length, so within 32 bits.
+    // Evaluated in one place, because the machine code repeats the walk for every kind of segment. The remaining time
+    // is below the segment's length, so it fits into 32 bits.
     found.map_or(Reference::rest(T::ZERO), |segment| {
         segment.at(left as u32, time.fraction)
     })

@@ -1,4 +1,4 @@
-//! Trajectories made of stages: staircase, slow reversals, friction sweep.
+//! Trajectories of stages: staircase, slow reversals, friction sweep.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -15,27 +15,27 @@ pub struct Staircase<T> {
     pub levels: Vec<T, LEVELS>,
     /// Length of a move, µs.
     pub move_us: u32,
-    /// Time at rest after a move, µs.
+    /// Dwell after a move, µs.
     pub dwell_us: u32,
 }
 
-/// Triangles at constant slow speed with smooth turns, several amplitudes one after the other, each about the start.
+/// Triangles at constant slow speed with smooth turns about the start, with several amplitudes one after the other.
 ///
-/// Times are stored instead of distances so that host and chip agree to the microsecond:
-/// [`SlowReversals::new`] computes them, [`SlowReversals::amplitude`] gives the distance back.
+/// Times are stored instead of distances so that host and chip agree to the microsecond. [`SlowReversals::new`]
+/// computes the times, [`SlowReversals::amplitude`] returns the distance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct SlowReversals<T> {
     /// Speed between the turns, rad/s.
     pub speed: T,
     /// Half the length of a turn from one direction to the other, µs; also half of starting and stopping.
     pub half_turn_us: u32,
-    /// For each amplitude the time from the centre to where the turn begins, µs; at least `half_turn_us`.
+    /// For each amplitude the time from the centre to the start of the turn, µs; at least `half_turn_us`.
     pub quarter_us: Vec<u32, AMPLITUDES>,
     /// Full triangles per amplitude.
     pub cycles: u16,
 }
 
-/// For each speed once forth and once back across the same interval, each pass from rest to rest.
+/// For each speed one pass forth and one back across the same interval, each from rest to rest.
 ///
 /// The interval is centred on the start. All passes run between the same ends, so that the constant-speed part covers
 /// at least the stated travel for every speed.
@@ -47,19 +47,19 @@ pub struct FrictionSweep<T> {
     pub cruise_us: Vec<u32, SPEEDS>,
     /// Time to reach the speed, and to stop, µs.
     pub ramp_us: u32,
-    /// Time at rest after each pass, µs.
+    /// Dwell after each pass, µs.
     pub dwell_us: u32,
-    /// Time of the move from the start to the first end, and back at the end of all, µs.
+    /// Time of the move from the start to the first end, and of the final move back, µs.
     pub lead_us: u32,
 }
 
-/// Whole microseconds of a time in seconds; none where it is not a number or beyond 32 bits.
+/// Returns the whole microseconds of a time in seconds; none if it is NaN, below 1 µs or beyond 32 bits.
 fn micros(seconds: f64) -> Option<u32> {
     let micros = libm::round(seconds * 1.0e6);
     (micros >= 1.0 && micros <= f64::from(u32::MAX)).then_some(micros as u32)
 }
 
-/// A quotient; in 32 bits where they are enough, which the microcontroller divides by hardware.
+/// Returns a quotient, in 32 bits if they suffice, because the microcontroller divides them in hardware.
 fn divided(number: u64, by: u64) -> u64 {
     match (u32::try_from(number), u32::try_from(by)) {
         (Ok(number), Ok(by)) => u64::from(number / by.max(1)),
@@ -106,10 +106,10 @@ impl<T: Real<Mask = bool>> Staircase<T> {
 }
 
 impl<T: Scalar> SlowReversals<T> {
-    /// Reversals at a speed (rad/s) with turns of `turn` seconds over amplitudes in rad.
+    /// Returns reversals at a speed (rad/s) with turns of `turn` seconds over amplitudes in rad.
     ///
-    /// None where speed, turn or an amplitude is not above zero, an amplitude is too small for its turn, there are
-    /// more than [`AMPLITUDES`], or a time exceeds 71 minutes.
+    /// None if speed, turn or an amplitude is not above zero, an amplitude is too small for its turn, there are more
+    /// than [`AMPLITUDES`], or a time exceeds 71 minutes.
     pub fn new(speed: T, turn: T, amplitudes: &[T], cycles: u16) -> Option<Self> {
         let half_turn_us = micros(0.5 * turn.to_f64())?;
         let mut quarter_us = Vec::new();
@@ -128,7 +128,7 @@ impl<T: Scalar> SlowReversals<T> {
         })
     }
 
-    /// The distance from the centre to the outermost point of the triangle with that index, rad.
+    /// Returns the distance from the centre to the outermost point of the triangle with that index, rad.
     pub fn amplitude(&self, index: usize) -> Option<T> {
         let quarter = *self.quarter_us.get(index)?;
         let overshoot = T::from_f64(2.0 * OVERSHOOT) * Elapsed::seconds(self.half_turn_us, T::ZERO);
@@ -136,11 +136,11 @@ impl<T: Scalar> SlowReversals<T> {
     }
 }
 
-/// How far a turn goes beyond the point where it begins, in speed times length of the turn: ½ − 2·(⅛ − 1/32).
+/// Travel of a turn beyond its start, in speed times length of the turn: ½ − 2·(⅛ − 1/32).
 const OVERSHOOT: f64 = 0.3125;
 
 impl<T: Real<Mask = bool>> SlowReversals<T> {
-    /// Full turns are whole microseconds of at most 32 bits.
+    /// Returns the length of a full turn, in whole microseconds within 32 bits.
     fn turn_us(&self) -> u32 {
         self.half_turn_us.saturating_mul(2)
     }
@@ -180,8 +180,8 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
         }
     }
 
-    /// The reference at a time. Whole amplitudes and triangles are taken off first: a tick must not take longer the
-    /// more of them there are. Not inlined: the chip's linker finds it by name.
+    /// Returns the reference at a time. Whole amplitudes and triangles are subtracted first, so that the time of a tick
+    /// does not grow with their number. Not inlined: the chip's linker finds it by name.
     #[inline(never)]
     pub(super) fn at(&self, time: Elapsed<T>) -> Reference<T> {
         let mut left = time.micros;
@@ -196,7 +196,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
             let cycle = 2 * u64::from(self.turn_us()) + 4 * u64::from(quarter);
             let mut done = 0;
             if left >= lead && self.cycles > 0 {
-                // At most the number of cycles, so within 16 bits.
+                // At most the number of cycles, so it fits into 16 bits.
                 let whole = divided(left - lead, cycle.max(1)).min(u64::from(self.cycles) - 1);
                 left -= lead + whole * cycle;
                 done = whole as u16 + 1;
@@ -215,7 +215,7 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
         Reference::rest(T::ZERO)
     }
 
-    /// The segments of one amplitude from the first of a cycle on; cycles count from 1, 0 begins with the start.
+    /// Visits the segments of one amplitude from cycle `first` on. Cycles count from 1; 0 also includes the start.
     pub(super) fn triangles(
         &self,
         quarter: u32,
@@ -253,10 +253,10 @@ impl<T: Real<Mask = bool>> SlowReversals<T> {
 }
 
 impl<T: Scalar> FrictionSweep<T> {
-    /// A sweep over speeds (rad/s) that each hold for at least `travel` (rad), reached within `ramp` seconds,
-    /// with a rest of `dwell` seconds after each pass and `lead` seconds to get to the first end.
+    /// Returns a sweep over speeds (rad/s). Each speed holds for at least `travel` (rad) and is reached within `ramp`
+    /// seconds. Each pass ends with a dwell of `dwell` seconds, and the move to the first end takes `lead` seconds.
     ///
-    /// None where a value is not above zero, there are more than [`SPEEDS`], or a time exceeds 71 minutes.
+    /// None if a value is not above zero, there are more than [`SPEEDS`], or a time exceeds 71 minutes.
     pub fn new(speeds: &[T], travel: T, ramp: T, dwell: T, lead: T) -> Option<Self> {
         let fastest = speeds.iter().fold(0.0, |most: f64, v| most.max(v.to_f64()));
         let ramp_us = micros(ramp.to_f64())?;
@@ -283,13 +283,13 @@ impl<T: Scalar> FrictionSweep<T> {
 }
 
 impl<T: Real<Mask = bool>> FrictionSweep<T> {
-    /// Constant speed of the pair of passes with that index, rad/s.
+    /// Returns the constant speed of the pair of passes with that index, rad/s.
     pub fn speed(&self, index: usize) -> Option<T> {
         Some(self.speed_of(*self.cruise_us.get(index)?))
     }
 
     fn speed_of(&self, cruise: u32) -> T {
-        // Both ramps together cover one ramp's time at speed.
+        // Both ramps together cover the distance of one ramp's time at speed.
         let time = cruise.saturating_add(self.ramp_us).max(1);
         (self.half_span + self.half_span) / Elapsed::seconds(time, T::ZERO)
     }
@@ -315,7 +315,7 @@ impl<T: Real<Mask = bool>> FrictionSweep<T> {
         }
     }
 
-    /// The reference at a time. Not inlined: the chip's linker finds it by name.
+    /// Returns the reference at a time. Not inlined: the chip's linker finds it by name.
     #[inline(never)]
     pub(super) fn at(&self, time: Elapsed<T>) -> Reference<T> {
         segment::at(|visit| self.segments(visit), time)

@@ -77,7 +77,7 @@ fn derivatives_are_those_of_the_position_and_nothing_jumps() {
         for k in 1..(end / h) as u32 {
             let t = f64::from(k) * h;
             let here = trajectory.at(t);
-            // The mean of both ends' slopes is the chord's up to h²/12 of the next derivative but one.
+            // The mean of both ends' slopes equals the chord's, up to h²/12 times the third derivative.
             let chord = (here.position - before.position) / h;
             let slope = 0.5 * (here.velocity + before.velocity);
             assert!(
@@ -330,7 +330,7 @@ fn hostile_values_neither_panic_nor_run_for_ever() {
             again: 0.0,
         }),
     ];
-    // Frequencies whose ratio no scalar holds.
+    // The ratio of these frequencies overflows any scalar.
     let boundless = Trajectory::Chirp(Chirp {
         start_hz: 1e-30,
         end_hz: 1e30,
