@@ -1,4 +1,4 @@
-//! Columns of the motor parameters in the regressors, and what they add to the matrices of the dynamics.
+//! Regressor columns of the motor parameters, and the motors' part in the matrices of the dynamics.
 
 use super::{
     DriveKind, MOTOR_COLUMNS, Motor, Transmission, TransmissionError, check, motor_column,
@@ -7,7 +7,7 @@ use crate::multibody::MAX_JOINTS;
 use crate::scalar::Real;
 
 impl<T: Real> Motor<T> {
-    /// The row that the motor's parameters act along: r of a coupled drive, J of a varying one, zero of a simple one.
+    /// Writes the row along which the parameters act: r of a coupled drive, J of a varying one, zero of a simple one.
     #[inline(always)]
     fn direction(&self, q: &[T], out: &mut [T]) {
         match self.kind {
@@ -17,7 +17,7 @@ impl<T: Real> Motor<T> {
         }
     }
 
-    /// What joint `i` sees of the motor's inertia on its diagonal and states itself, in `Ia<i>`.
+    /// Returns the motor's inertia on the diagonal of joint `i` that `Ia<i>` describes.
     #[inline(always)]
     fn own_inertia(&self, motor: usize, i: usize, direction: &[T]) -> T {
         if self.kind == DriveKind::Coupled && i != motor {
@@ -27,7 +27,7 @@ impl<T: Real> Motor<T> {
         }
     }
 
-    /// The same for viscous friction, in `fv<i>`.
+    /// Returns the same for viscous friction and `fv<i>`.
     #[inline(always)]
     fn own_viscosity(&self, i: usize, direction: &[T]) -> T {
         if self.kind == DriveKind::Coupled {
@@ -38,7 +38,7 @@ impl<T: Real> Motor<T> {
     }
 }
 
-/// Σ a_j·b_j.
+/// Returns Σ a_j·b_j.
 #[inline(always)]
 fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let mut sum = T::ZERO;
@@ -49,8 +49,8 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 }
 
 impl<T: Real> Transmission<T> {
-    /// Columns of the motor parameters in the differential model: `out` is n × 3n, row-major; entry (i, 3k + c)
-    /// multiplies parameter c of motor k in the torque of joint i. See the [module](super) for what they are.
+    /// Writes the columns of the motor parameters in the differential model. `out` is n × 3n, row-major: entry (i, 3k +
+    /// c) multiplies parameter c of motor k in the torque of joint i. See the [module](super) for the entries.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -90,7 +90,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Row of the kinetic energy of the motors, length 3n, as far as `Ia` does not state it: ½·(s² − Σ r_i²·q̇_i²) of a
+    /// Writes the row of the motors' kinetic energy, length 3n, without the part in `Ia`: ½·(s² − Σ r_i²·q̇_i²) of a
     /// coupled drive (i ≠ k), ½·Ψ̇² of a varying one. Friction columns are 0.
     ///
     /// # Errors
@@ -110,8 +110,8 @@ impl<T: Real> Transmission<T> {
         })
     }
 
-    /// Row of the power that the motors' friction takes, length 3n, as far as `fv` does not state it: s² − Σ r_i²·q̇_i²
-    /// and |s| of a coupled drive, Ψ̇² and |Ψ̇| of a varying one. Inertia columns are 0.
+    /// Writes the row of the motors' friction power, length 3n, without the part in `fv`: s² − Σ r_i²·q̇_i² and |s| of
+    /// a coupled drive, Ψ̇² and |Ψ̇| of a varying one. Inertia columns are 0.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -132,8 +132,8 @@ impl<T: Real> Transmission<T> {
         })
     }
 
-    /// The speeds whose sign Coulomb friction of the motors takes, length n: s of a coupled drive (joint units),
-    /// Ψ̇ of a varying one (rad/s of the motor), 0 of a simple one.
+    /// Writes the speeds that give the sign of the motors' Coulomb friction, length n: s of a coupled drive (joint
+    /// units), Ψ̇ of a varying one (rad/s of the motor), 0 of a simple one.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -151,8 +151,8 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// The rows along which the motor parameters act, n × n row-major, a row a motor: r of a coupled drive, J of a
-    /// varying one, zero of a simple one. Coulomb friction of motor k is `fcm`·row·sgn of its [`Self::motor_speeds`].
+    /// Writes the rows along which the motor parameters act, n × n row-major, one row per motor: r of a coupled drive,
+    /// J of a varying one, zero of a simple one. Coulomb friction is `fcm`·row·sgn of [`Self::motor_speeds`].
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -166,8 +166,8 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Adds the motors' inertia to an inertia matrix A(q) of the joints (n × n, row-major), so that A + Jᵀ·I_m·J results
-    /// when `Ia` states the rest. `parameters` has one row a motor.
+    /// Adds the motors' inertia to an inertia matrix A(q) of the joints (n × n, row-major). With the rest in `Ia` the
+    /// result is A + Jᵀ·I_m·J. `parameters` has one row per motor.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -186,7 +186,7 @@ impl<T: Real> Transmission<T> {
         )
     }
 
-    /// Adds the motors' viscous friction to the matrix of the joints' (n × n, row-major; `fv` on its diagonal).
+    /// Adds the motors' viscous friction to that of the joints (n × n, row-major; `fv` on its diagonal).
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -236,7 +236,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// One row of 3n entries, motor by motor.
+    /// Fills a row of 3n entries, motor by motor.
     fn rows(
         &self,
         q: &[T],

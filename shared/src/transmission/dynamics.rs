@@ -17,7 +17,7 @@ pub struct MotorSpace<T> {
 }
 
 impl<T: Real> MotorSpace<T> {
-    /// The change at `q` and `qd` (length n).
+    /// Returns the change at `q` and `qd` (length n).
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
@@ -41,7 +41,7 @@ impl<T: Real> MotorSpace<T> {
         })
     }
 
-    /// A_Ψ (n × n, row-major, kg·m² at the motors) from the joints' inertia matrix A.
+    /// Computes A_Ψ (n × n, row-major, kg·m² at the motors) from the joints' inertia matrix A.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -49,7 +49,7 @@ impl<T: Real> MotorSpace<T> {
         let n = self.n;
         check("joint", n * n, joint.len())?;
         check("out", n * n, out.len())?;
-        // J⁻ᵀ on the columns of the symmetric A, then on the rows of what results.
+        // J⁻ᵀ on the columns of the symmetric A, then on the rows of the result.
         let mut column = [T::ZERO; MAX_JOINTS];
         let column = &mut column[..n];
         for c in 0..n {
@@ -67,8 +67,8 @@ impl<T: Real> MotorSpace<T> {
         Ok(())
     }
 
-    /// b_Ψ (length n, N·m at the motors) from the joints' inertia matrix A and bias torque b (Coriolis, gravity,
-    /// friction; [`crate::multibody::bias_torque`]).
+    /// Computes b_Ψ (length n, N·m at the motors) from the joints' inertia matrix A and bias torque b (Coriolis,
+    /// gravity, friction; [`crate::multibody::bias_torque`]).
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].

@@ -5,17 +5,17 @@ use super::{Transmission, TransmissionError, check};
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::{Mask, Real};
 
-/// Most Newton steps of [`Transmission::joint_position`]; from a neighbouring sample two or three are enough.
+/// Maximum number of Newton steps of [`Transmission::joint_position`]. Two or three suffice from a neighbouring sample.
 pub const MOST_STEPS: usize = 60;
 
-/// Most times a Newton step is halved because it left the screws' reach or came no nearer.
+/// Maximum number of halvings of a Newton step that leaves the screws' reach or does not reduce the error.
 const MOST_HALVINGS: usize = 30;
 
-/// Motor positions agree when they do to this share of the largest ratio times a radian, times the type's rounding.
+/// Tolerance of the motor positions, in units of the type's rounding times the largest position or ratio.
 const ROUNDINGS: f64 = 64.0;
 
 impl<T: Real> Transmission<T> {
-    /// Torques of the motors that give the joint torques τ: τ_motor = J⁻ᵀ·τ.
+    /// Returns the motor torques for the joint torques τ: τ_motor = J⁻ᵀ·τ.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
@@ -34,7 +34,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Joint velocities q̇ = J⁻¹·Ψ̇.
+    /// Returns the joint velocities q̇ = J⁻¹·Ψ̇.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
@@ -53,7 +53,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Joint accelerations q̈ = J⁻¹·(Ψ̈ − J̇·q̇).
+    /// Returns the joint accelerations q̈ = J⁻¹·(Ψ̈ − J̇·q̇).
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`].
@@ -76,10 +76,10 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Joint position with F(q) = Ψ, by Newton's method from the position that `q` holds on entry (the sample before);
-    /// `q` is the result, to rounding of the motor positions. Two angles of a crank give the same length of its
-    /// screw: the one on the side of the start is found, for a step is shortened where it would cross the dead centre
-    /// to where the screw's length has the wrong slope.
+    /// Finds the joint position with F(q) = Ψ by Newton's method. `q` holds the start on entry (the previous sample)
+    /// and the result on return, accurate to rounding of the motor positions. Two angles of a crank give the same
+    /// length of its screw. The result is on the side of the start: a step that would cross the dead centre, where the
+    /// slope changes sign, is shortened.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`], [`TransmissionError::Singular`] (also at a dead centre of a crank),
@@ -101,7 +101,7 @@ impl<T: Real> Transmission<T> {
             let mut step = rest;
             factors.solve(&mut step[..n]);
             if before.le(enough).all() {
-                // One step more costs little and carries the derivatives of dual numbers along.
+                // One more step is cheap and updates the derivatives of dual numbers.
                 for (out, (&position, &last)) in q.iter_mut().zip(at.iter().zip(&step)) {
                     *out = position + last;
                 }
@@ -115,7 +115,7 @@ impl<T: Real> Transmission<T> {
                 }
                 self.residual(psi, &next[..n], &mut rest[..n])?;
                 let now = size(&rest[..n]);
-                // Each lane shortens its own step; a screw out of reach gives NaN, which is never nearer.
+                // Each lane shortens its own step. A screw out of reach gives NaN, which never counts as nearer.
                 let nearer = now.lt(before) | now.le(enough);
                 let good = nearer & self.same_side(&at[..n], &next[..n]);
                 if good.all() {
@@ -132,7 +132,7 @@ impl<T: Real> Transmission<T> {
         Err(self.farthest(psi, &at[..n]))
     }
 
-    /// The Jacobian in factors.
+    /// Returns the factored Jacobian.
     pub(super) fn factored(&self, q: &[T]) -> Result<Factors<T>, TransmissionError> {
         let n = self.joint_count();
         let mut square = [[T::ZERO; MAX_JOINTS]; MAX_JOINTS];
@@ -143,14 +143,14 @@ impl<T: Real> Transmission<T> {
         })
     }
 
-    /// The motor whose row of a singular Jacobian follows best from the rows before it (Gram and Schmidt).
+    /// Returns the motor whose row of a singular Jacobian depends most on the rows before it (Gram and Schmidt).
     fn dependent(&self, q: &[T], jacobian: &mut [T]) -> usize {
         let n = self.joint_count();
         let mut worst = (n - 1, T::from_f64(f64::INFINITY));
         for (k, motor) in self.motors.iter().enumerate() {
             let (done, rest) = jacobian.split_at_mut(k * n);
             let row = &mut rest[..n];
-            // What the row would be of, had its crank the best angle.
+            // Size of the row at the best angle of its crank.
             let reach = motor
                 .screw
                 .as_ref()
@@ -180,7 +180,7 @@ impl<T: Real> Transmission<T> {
         worst.0
     }
 
-    /// Ψ − F(q).
+    /// Computes Ψ − F(q).
     fn residual(&self, psi: &[T], q: &[T], out: &mut [T]) -> Result<(), TransmissionError> {
         self.motor_position(q, out)?;
         for (entry, &wanted) in out.iter_mut().zip(psi) {
@@ -189,7 +189,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Whether every screw's slope keeps its sign from one position to another.
+    /// Returns true if every screw's slope has the same sign at both positions.
     fn same_side(&self, from: &[T], to: &[T]) -> T::Mask {
         let mut all = T::ZERO.le(T::ZERO);
         for screw in self.motors.iter().filter_map(|m| m.screw.as_ref()) {
@@ -199,7 +199,7 @@ impl<T: Real> Transmission<T> {
         all
     }
 
-    /// Refuses what a screw that depends on its crank alone cannot reach at any angle.
+    /// Refuses positions that a screw, which depends on its crank alone, cannot reach at any angle.
     fn reach(&self, psi: &[T]) -> Result<(), TransmissionError> {
         for (motor, (m, &wanted)) in self.motors.iter().zip(psi).enumerate() {
             let Some(screw) = &m.screw else { continue };
@@ -211,7 +211,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// What the motor positions and the functions' own terms are of: the largest, rad, at least one turn of the joint.
+    /// Returns the largest of 1 rad, the motor positions and the terms of their functions, rad.
     fn scale(&self, psi: &[T]) -> T {
         let mut scale = T::ONE;
         for (m, &wanted) in self.motors.iter().zip(psi) {
@@ -226,7 +226,7 @@ impl<T: Real> Transmission<T> {
         scale
     }
 
-    /// The motor that is farthest from its position, as an error.
+    /// Returns the motor with the largest position error, as an error.
     fn farthest(&self, psi: &[T], q: &[T]) -> TransmissionError {
         let n = self.joint_count();
         let mut rest = [T::ZERO; MAX_JOINTS];
@@ -243,7 +243,7 @@ impl<T: Real> Transmission<T> {
     }
 }
 
-/// Euclidean length.
+/// Returns the Euclidean length.
 fn norm<T: Real>(values: &[T]) -> T {
     let mut sum = T::ZERO;
     for value in values {
@@ -252,13 +252,13 @@ fn norm<T: Real>(values: &[T]) -> T {
     sum.sqrt()
 }
 
-/// Largest absolute entry; NaN where any entry is.
+/// Returns the largest absolute entry; NaN if any entry is NaN.
 fn size<T: Real>(values: &[T]) -> T {
     let mut largest = T::ZERO;
     for &value in values {
         largest = largest.max(value.abs());
     }
-    // 0, or NaN where any entry is not a finite number: comparisons alone would lose it.
+    // 0, or NaN if any entry is not finite: comparisons alone would miss it.
     let mut nothing = T::ZERO;
     for &value in values {
         nothing += T::ZERO * value;
@@ -266,7 +266,7 @@ fn size<T: Real>(values: &[T]) -> T {
     largest + nothing
 }
 
-/// Distance from 1 to the next number of the type, by the textbook loop.
+/// Returns the distance from 1 to the next number of the type, by the textbook loop.
 fn rounding<T: Real>() -> T {
     let half = T::from_f64(0.5);
     let mut step = T::ONE;

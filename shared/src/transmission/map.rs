@@ -1,10 +1,10 @@
-//! Motor positions, velocities and accelerations from those of the joints; torques the other way.
+//! Motor positions, velocities and accelerations from those of the joints; joint torques from those of the motors.
 
 use super::{Motor, Screw, Transmission, TransmissionError, check};
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::Real;
 
-/// A screw at some angle of its crank: length over lead (as motor angle) and its first two derivatives.
+/// A screw at an angle of its crank: length over lead (as motor angle) and its first two derivatives.
 #[derive(Clone, Copy)]
 pub(super) struct Turned<T> {
     pub(super) position: T,
@@ -18,14 +18,14 @@ impl<T: Real> Screw<T> {
         weighted(&self.weights, q) + self.offset
     }
 
-    /// What has the sign of the slope, and is zero at the dead centres.
+    /// Returns a value with the sign of the slope; it is zero at the dead centres.
     #[inline(always)]
     pub(super) fn slope_sign(&self, q: &[T]) -> T {
         let (sin, cos) = self.angle(q).sin_cos();
         -(self.cosine * sin + self.sine * cos)
     }
 
-    /// Whether some angle of the crank gives this motor angle.
+    /// Returns true if an angle of the crank gives this motor angle.
     pub(super) fn reaches(&self, position: T) -> T::Mask {
         let length = position / self.factor;
         let swing = (self.cosine.squared() + self.sine.squared()).sqrt();
@@ -95,8 +95,8 @@ impl<T: Real> Motor<T> {
 }
 
 impl<T: Real> Transmission<T> {
-    /// Motor positions Ψ = F(q), rad; `q` and `psi` have length n. Where a screw cannot reach the crank the result is
-    /// not a number.
+    /// Computes motor positions Ψ = F(q), rad; `q` and `psi` have length n. The result is NaN where a screw cannot
+    /// reach the crank.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -110,7 +110,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Jacobian J = ∂F/∂q, n × n row-major, a row a motor: motor radians a radian (or metre) of each joint.
+    /// Computes the Jacobian J = ∂F/∂q, n × n row-major, one row per motor: motor radians per joint radian (or metre).
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -124,7 +124,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Rate of the Jacobian J̇ along q̇, n × n row-major.
+    /// Computes the rate of the Jacobian J̇ along q̇, n × n row-major.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -145,7 +145,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Motor velocities Ψ̇ = J·q̇, rad/s.
+    /// Computes motor velocities Ψ̇ = J·q̇, rad/s.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -167,7 +167,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Motor accelerations Ψ̈ = J·q̈ + J̇·q̇, rad/s².
+    /// Computes motor accelerations Ψ̈ = J·q̈ + J̇·q̇, rad/s².
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].
@@ -191,7 +191,7 @@ impl<T: Real> Transmission<T> {
         Ok(())
     }
 
-    /// Joint torques τ = Jᵀ·τ_motor, N·m or N.
+    /// Computes joint torques τ = Jᵀ·τ_motor, N·m or N.
     ///
     /// # Errors
     /// [`TransmissionError::WrongLength`].

@@ -11,9 +11,9 @@
 //! Ψ̇ = J·q̇, Ψ̈ = J·q̈ + J̇·q̇, τ = Jᵀ·τ_motor.
 //!
 //! # Parameters of the motors
-//! After the 14·n columns of [`multibody`](crate::multibody) a regressor has three a motor ([`MOTOR_COLUMN_NAMES`]):
-//! inertia, viscous and Coulomb friction of the motor as far as the joint's own `Ia`, `fv`, `fc` do not state them.
-//! What they multiply depends on the drive ([`DriveKind`]; r_j = J_kj/J_kk, s = Σ_j r_j·q̇_j, torque of joint i):
+//! After the 14·n columns of [`multibody`](crate::multibody) a regressor has three per motor ([`MOTOR_COLUMN_NAMES`]):
+//! inertia, viscous and Coulomb friction of the motor, except the part that the joint's own `Ia`, `fv`, `fc` describe.
+//! Their factors depend on the drive ([`DriveKind`]; r_j = J_kj/J_kk, s = Σ_j r_j·q̇_j, torque of joint i):
 //!
 //! | column | simple | coupled | varying |
 //! | --- | --- | --- | --- |
@@ -21,18 +21,18 @@
 //! | `fvm` | 0 | r_i·s − r_i²·q̇_i | J_ki·Ψ̇_k |
 //! | `fcm` | 0 | r_i·sgn s | J_ki·sgn Ψ̇_k |
 //!
-//! For a coupled drive the values are those seen at its own joint, and what the motor adds to the diagonal of another
-//! joint belongs to that joint's `Ia` and `fv`: the convention under which the coupled wrists of the Stäubli arms are
-//! published (Gautier 1991; Khalil & Dombre 2002, ch. 12). For a varying drive the values are the motor's own. `Ia` of
-//! the joint of a coupled or varying drive is left out, as where nothing but the motor turns there `Iam` states it, save where another
-//! motor puts something there or gear and shaft have an inertia of their own
+//! For a coupled drive the values are those seen at its own joint. The motor's part on the diagonal of another joint
+//! belongs to that joint's `Ia` and `fv`. This is the convention under which the coupled wrists of the Stäubli arms are
+//! published (Gautier 1991; Khalil & Dombre 2002, ch. 12). For a varying drive the values are the motor's own. The
+//! joint of a coupled or varying drive has no `Ia` if only the motor turns there: `Iam` describes that inertia. It has
+//! one if another motor adds to the joint, or if gear and shaft have an inertia of their own
 //! ([`Transmission::has_joint_inertia`], [`DriveMap::joint_inertia`]).
 //!
-//! Leaves out: more or fewer motors than joints, play and elasticity of gears, mass of the screws and rods (which turn
-//! with the links they lie along), friction of the screws that grows with the load, the gyroscopic torque of rotors; and
-//! the first moment of a crank that turns with a sum of joint angles about the shoulder of a parallelogram (the IRp-6's
-//! with φ₃ = q₂ + q₃): it has the weight of a first moment of the outer link, without the coupling of the two links that
-//! one at the elbow has, so that the serial chain states its weight or its lack of coupling, not both.
+//! Leaves out: more or fewer motors than joints, backlash and elasticity of gears, mass of the screws and rods (they
+//! turn with the links beside them), screw friction that grows with the load, the gyroscopic torque of rotors. Leaves
+//! out also the first moment of a crank that turns with a sum of joint angles about the shoulder of a parallelogram
+//! (the IRp-6's with φ₃ = q₂ + q₃). It has the weight of a first moment of the outer link, without the coupling of the
+//! two links that a crank at the elbow has. The serial chain can describe only one of these two properties.
 
 mod columns;
 mod dynamics;
@@ -64,7 +64,7 @@ pub const MOTOR_COLUMNS: usize = 3;
 /// | `fcm` | Coulomb friction of the motor | N·m (N), at the own joint | N·m, at the motor |
 pub const MOTOR_COLUMN_NAMES: [&str; MOTOR_COLUMNS] = ["Iam", "fvm", "fcm"];
 
-/// Places of the parameters within the [`MOTOR_COLUMNS`] of a motor.
+/// Indices of the parameters within the [`MOTOR_COLUMNS`] of a motor.
 pub mod motor_column {
     /// Rotor inertia.
     pub const INERTIA: usize = 0;
@@ -74,10 +74,10 @@ pub mod motor_column {
     pub const COULOMB: usize = 2;
 }
 
-/// A ball screw that turns a crank, as a term of a motor's position.
+/// A ball screw that turns a crank: a term of a motor's position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScrewMap<'a> {
-    /// Advance of the nut a turn of the motor, m; negative where the screw shortens as the motor turns forwards.
+    /// Advance of the nut per turn of the motor, m; negative if the screw shortens as the motor turns forwards.
     pub lead: f64,
     /// s, m².
     pub constant: f64,
@@ -91,31 +91,31 @@ pub struct ScrewMap<'a> {
     pub offset: f64,
 }
 
-/// One motor's position as a function of the joint coordinates, as numbers.
+/// One motor's position as a function of the joint coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveMap<'a> {
-    /// g: motor radians a radian (or metre) of each joint.
+    /// g: motor radians per radian (or metre) of each joint.
     pub ratios: &'a [f64],
-    /// The screw, where there is one.
+    /// The screw, if there is one.
     pub screw: Option<ScrewMap<'a>>,
     /// Constant added, rad.
     pub zero: f64,
-    /// Whether gear and shaft have an inertia that turns with the joint and not with the motor.
+    /// True if gear and shaft have an inertia that turns with the joint and not with the motor.
     pub joint_inertia: bool,
 }
 
-/// What a motor's row of the Jacobian looks like.
+/// Form of a motor's row of the Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {
-    /// Constant, its own joint only.
+    /// Constant, with an entry for its own joint only.
     Simple,
-    /// Constant, other joints too.
+    /// Constant, with entries for other joints too.
     Coupled,
-    /// Changes with the position.
+    /// Depends on the position.
     Varying,
 }
 
-/// Why a transmission cannot be built or used.
+/// Reason why a transmission cannot be built or used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransmissionError {
     /// No motor, or more than [`MAX_JOINTS`].
@@ -123,7 +123,7 @@ pub enum TransmissionError {
         /// Number of motors given.
         found: usize,
     },
-    /// A slice does not have the length that the number of joints asks for.
+    /// The length of a slice does not match the number of joints.
     WrongLength {
         /// Name of the argument.
         argument: &'static str,
@@ -132,11 +132,11 @@ pub enum TransmissionError {
         /// Length it has.
         found: usize,
     },
-    /// A number of a motor's function is infinite or not a number.
+    /// A number of a motor's function is infinite or NaN.
     NotFinite {
         /// The motor, from 0.
         motor: usize,
-        /// Which number.
+        /// The parameter.
         parameter: &'static str,
     },
     /// The lead of a screw is zero.
@@ -144,19 +144,19 @@ pub enum TransmissionError {
         /// The motor, from 0.
         motor: usize,
     },
-    /// The screw's length is no positive number at any angle.
+    /// The screw's length is not a positive number at any angle.
     NoScrew {
         /// The motor, from 0.
         motor: usize,
     },
-    /// A motor of constant ratios that does not move its own joint.
+    /// A motor of constant ratios does not move its own joint.
     OwnRatioZero {
         /// The motor, from 0.
         motor: usize,
     },
-    /// The Jacobian has no inverse here: a crank at its dead centre, or motors that turn alike.
+    /// The Jacobian has no inverse here: a crank is at its dead centre, or motors turn alike.
     Singular {
-        /// The motor that moves no joint in a way that the motors before it do not, from 0.
+        /// The motor whose row depends on those of the motors before it, from 0.
         motor: usize,
     },
     /// A screw would have to be shorter or longer than its crank allows.
@@ -164,9 +164,9 @@ pub enum TransmissionError {
         /// The motor, from 0.
         motor: usize,
     },
-    /// No joint position was found for the motor positions from the start given.
+    /// No joint position was found for the motor positions from the given start.
     NotFound {
-        /// The motor that was left farthest from its position, from 0.
+        /// The motor with the largest remaining error, from 0.
         motor: usize,
     },
     /// A quantity of the chain could not be computed.
@@ -234,7 +234,7 @@ impl From<MultibodyError> for TransmissionError {
     }
 }
 
-/// Whether `argument` has the length it must have.
+/// Checks that `argument` has the expected length.
 #[inline(always)]
 fn check(argument: &'static str, expected: usize, found: usize) -> Result<(), TransmissionError> {
     if expected == found {
@@ -263,32 +263,32 @@ struct Screw<T> {
 #[derive(Clone, Debug)]
 struct Motor<T> {
     kind: DriveKind,
-    /// g; of a coupled drive also r = g/g_kk in `shares`.
+    /// g; a coupled drive also has r = g/g_kk in `shares`.
     ratios: Vec<T, MAX_JOINTS>,
     shares: Vec<T, MAX_JOINTS>,
     screw: Option<Screw<T>>,
     zero: T,
 }
 
-/// The drives of a chain: as many motors as joints.
+/// The drives of a chain, one motor per joint.
 #[derive(Clone, Debug)]
 pub struct Transmission<T> {
     motors: Vec<Motor<T>, MAX_JOINTS>,
-    /// Whether `Ia<k>` says something that no motor parameter says.
+    /// True if `Ia<k>` describes an inertia that no motor parameter describes.
     joint_inertia: Vec<bool, MAX_JOINTS>,
 }
 
-/// `values` as `T`; they are as many as there are joints.
+/// Converts `values` to `T`; there is one for each joint.
 fn converted<T: Real>(values: &[f64]) -> Vec<T, MAX_JOINTS> {
     values.iter().map(|v| T::from_f64(*v)).collect()
 }
 
 impl<T: Real> Transmission<T> {
-    /// Builds the transmission from one function a motor, base joint first.
+    /// Builds the transmission from one function per motor, base joint first.
     ///
     /// # Errors
-    /// [`TransmissionError`]: numbers that are not finite or no drive; a motor that never moves its own joint. That the
-    /// motors together move all joints is asked where it matters ([`Self::joint_position`]).
+    /// [`TransmissionError`]: numbers that are not finite, no drive, or a motor that never moves its own joint. The
+    /// functions that need it check that the motors together move all joints ([`Self::joint_position`]).
     pub fn new(drives: &[DriveMap<'_>]) -> Result<Self, TransmissionError> {
         let n = drives.len();
         if n == 0 || n > MAX_JOINTS {
@@ -391,24 +391,24 @@ impl<T: Real> Transmission<T> {
         MOTOR_COLUMNS * self.motors.len()
     }
 
-    /// Kind of the drive `motor` (from 0); `None` past the end.
+    /// Returns the kind of the drive `motor` (from 0); `None` past the end.
     pub fn kind(&self, motor: usize) -> Option<DriveKind> {
         self.motors.get(motor).map(|m| m.kind)
     }
 
-    /// Whether every drive moves its own joint only, at a constant ratio: all motor columns are then zero.
+    /// Returns true if every drive moves only its own joint at a constant ratio: all motor columns are then zero.
     pub fn is_simple(&self) -> bool {
         self.motors.iter().all(|m| m.kind == DriveKind::Simple)
     }
 
-    /// Whether the Jacobian is the same at every position.
+    /// Returns true if the Jacobian is the same at every position.
     pub fn is_constant(&self) -> bool {
         self.motors.iter().all(|m| m.screw.is_none())
     }
 
-    /// Whether the column `Ia` of a joint (from 0) belongs to the regressor: it does for a simple drive, where
-    /// another, coupled motor adds to the joint's diagonal, and with [`DriveMap::joint_inertia`]; elsewhere `Iam` stands for it
-    /// and the column is to be taken as zero. `false` past the end.
+    /// Returns true if the regressor has the column `Ia` of a joint (from 0): for a simple drive, if another coupled
+    /// motor adds to the joint's diagonal, and with [`DriveMap::joint_inertia`]. Elsewhere `Iam` replaces it, and the
+    /// column counts as zero. Returns `false` past the end.
     pub fn has_joint_inertia(&self, joint: usize) -> bool {
         self.joint_inertia.get(joint).copied().unwrap_or(false)
     }

@@ -1,31 +1,29 @@
-//! Small linear systems, lane by lane, without a branch on a value.
+//! Small linear systems, lane by lane, without branches on values.
 
 use crate::multibody::MAX_JOINTS;
 use crate::scalar::{Mask, Real};
 
-/// A pivot below this share of the largest entry of its column counts as zero: ratios of real drives lie within 10⁴ of
-/// each other, and rounding of `f32` in a few operations is 10⁻⁶.
+/// Smallest pivot that counts as non-zero, as a share of the largest entry of its column. Ratios of real drives lie
+/// within 10⁴ of each other, and rounding of `f32` in a few operations is 10⁻⁶.
 pub(super) const SINGULAR: f64 = 1e-7;
 
-/// n × n matrix in factors, L·U = P·M with the rows exchanged as recorded.
+/// LU factors of an n × n matrix, L·U = P·M, with the row exchanges.
 pub(super) struct Factors<T> {
     entries: [[T; MAX_JOINTS]; MAX_JOINTS],
-    /// Row exchanges: at step j, row i > j came to the front where the mask says so; as weights 0 and 1.
+    /// Row exchanges as weights 0 and 1: 1 at (i, j) if step j exchanged row i > j with row j.
     exchanged: [[T; MAX_JOINTS]; MAX_JOINTS],
     n: usize,
 }
 
 impl<T: Real> Factors<T> {
-    /// Factors a matrix given row-major.
-    ///
-    /// None where no pivot was left in some lane.
+    /// Factors a row-major matrix. Returns none if a lane has no valid pivot.
     pub(super) fn of(matrix: &[T], n: usize) -> Option<Self> {
         let mut f = Self {
             entries: [[T::ZERO; MAX_JOINTS]; MAX_JOINTS],
             exchanged: [[T::ZERO; MAX_JOINTS]; MAX_JOINTS],
             n,
         };
-        // By columns: what scale a pivot there can have.
+        // Largest entry of each column: the scale of its pivot.
         let mut largest = [T::ZERO; MAX_JOINTS];
         for i in 0..n {
             for j in 0..n {

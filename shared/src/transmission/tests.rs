@@ -1,4 +1,4 @@
-//! The transmission against finite differences, powers and energies, on the drives of the IRp-6 and on random ones.
+//! Tests of the transmission by finite differences, powers and energies, on the drives of the IRp-6 and on random ones.
 #![allow(clippy::unwrap_used)]
 
 use std::vec;
@@ -85,7 +85,7 @@ fn irp6_position(rng: &mut Pcg64) -> Vec<f64> {
     vec![u(-2.9, 2.9), p2, p3 - p2 - right, p4 - p3, u(-1.0, 1.0)]
 }
 
-/// Random drives of n joints of which no screw loses its slope's sign for |q| ≤ 0.5.
+/// Returns random drives of n joints. No screw's slope changes its sign for |q| ≤ 0.5.
 fn random(n: usize, rng: &mut Pcg64) -> Vec<Numbers> {
     let mut u = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     (0..n)
@@ -121,7 +121,7 @@ fn random(n: usize, rng: &mut Pcg64) -> Vec<Numbers> {
         .collect()
 }
 
-/// Every case with a position in its range.
+/// Returns every case with a position in its range.
 fn cases() -> Vec<(Vec<Numbers>, Vec<f64>)> {
     let mut rng = Pcg64::seed_from_u64(11);
     let mut all = Vec::new();
@@ -198,7 +198,7 @@ fn velocity_and_acceleration_are_differences_of_the_position() {
         t.motor_velocity(&q, &qd, &mut psid).unwrap();
         t.motor_acceleration(&q, &qd, &qdd, &mut psidd).unwrap();
         close(&psid, &speed, 1e-6);
-        // Rounding of positions of some hundred radians over h².
+        // Rounding error of positions of some hundred radians, divided by h².
         close(&psidd, &acceleration, 1e-4);
 
         let (mut rate, mut ahead, mut behind) =
@@ -268,7 +268,7 @@ fn the_inverse_carries_derivatives_and_runs_in_lanes() {
     let positions: Vec<Vec<f64>> = (0..4).map(|_| irp6_position(&mut rng)).collect();
     let exact = build::<Dual<f64, 5>>(&numbers);
     for q in &positions {
-        // ∂q/∂Ψ = J⁻¹, also where the start is the answer.
+        // ∂q/∂Ψ = J⁻¹, also if the start is the solution.
         for start in [q.clone(), vec![0.0, -1.57, 0.13, -0.13, 0.0]] {
             let psi: Vec<_> = position(&t, q)
                 .iter()
@@ -372,7 +372,7 @@ fn what_a_screw_cannot_reach_and_dead_centres_are_refused_by_name() {
     ));
 }
 
-/// Motor inertia, viscous and Coulomb friction as they are at the motors, and the parameters they make.
+/// Returns motor inertia, viscous and Coulomb friction at the motors, and the parameters that follow.
 fn split(
     t: &Transmission<f64>,
     q: &[f64],
@@ -429,12 +429,12 @@ fn columns_give_the_torque_of_spinning_motors() {
                     .zip(motors.as_flattened())
                     .map(|(y, p)| y * p)
                     .sum();
-                // A column that is left out must have nothing to say.
+                // A column that is left out must be zero.
                 assert!(t.has_joint_inertia(i) || ia == 0.0);
                 ia * qdd[i] + fv * qd[i] + fc * qd[i].signum() + motor
             })
             .collect();
-        // What Newton says of each rotor, carried to the joints.
+        // Newton's law for each rotor, transformed to the joints.
         let (mut psid, mut psidd) = (vec![0.0; n], vec![0.0; n]);
         t.motor_velocity(&q, &qd, &mut psid).unwrap();
         t.motor_acceleration(&q, &qd, &qdd, &mut psidd).unwrap();
@@ -512,7 +512,7 @@ fn energy_and_power_columns_are_those_of_the_torque_columns() {
 
 #[test]
 fn the_coupled_wrist_has_the_columns_of_the_published_model() {
-    // Stäubli TX40: Ψ5 = 45·q5, Ψ6 = 32·q5 + 32·q6. Iam6 couples q̈5 and q̈6, fvm6 the speeds, fcm6 takes the sign of
+    // Stäubli TX40: Ψ5 = 45·q5, Ψ6 = 32·q5 + 32·q6. Iam6 couples q̈5 and q̈6, fvm6 the speeds, and fcm6 has the sign of
     // their sum (Gautier et al.; parameters Iam6, fvm6, fsm6).
     let t = Transmission::<f64>::new(&[
         DriveMap {
@@ -545,8 +545,8 @@ fn the_coupled_wrist_has_the_columns_of_the_published_model() {
 
 #[test]
 fn the_published_screw_functions_give_the_published_lengths() {
-    // Synchronisation position of the Warsaw robots: 220.3374 mm and 183.8348 mm; both lie within the screws' reach,
-    // and at those lengths the ratios are those of F differentiated by hand, dL/dφ = −(m·sin φ + n·cos φ)/2L.
+    // Synchronisation position of the Warsaw robots: 220.3374 mm and 183.8348 mm. Both lie within the screws' reach. At
+    // those lengths the ratios equal the hand-derived ones of F, dL/dφ = −(m·sin φ + n·cos φ)/2L.
     let t = build::<f64>(&irp6());
     let mut q = vec![0.0, -1.57, 0.13, -0.13, 0.0];
     let mut psi = position(&t, &q);
@@ -565,7 +565,7 @@ fn the_published_screw_functions_give_the_published_lengths() {
     close(&jacobian[10..15], &[0.0, third, third, 0.0, 0.0], 1e-9);
 }
 
-/// A chain with the joints of the IRp-6's first three axes and two more.
+/// Returns a chain with the joints of the IRp-6's first three axes and two more.
 fn chain() -> (Chain<f64>, Vec<[f64; COLUMNS]>) {
     let joint = |alpha: f64, a: f64| JointGeometry {
         kind: JointKind::Revolute,
@@ -631,7 +631,7 @@ fn motor_coordinates_and_joint_coordinates_tell_the_same_mechanics() {
         let (mut a_psi, mut b_psi) = (vec![f64::NAN; 25], vec![f64::NAN; 5]);
         space.inertia_matrix(&a, &mut a_psi).unwrap();
         space.bias_torque(&a, &bias, &mut b_psi).unwrap();
-        // Torques at the motors by both ways.
+        // Torques at the motors, computed in two ways.
         let by_motor: Vec<f64> = (0..5)
             .map(|k| b_psi[k] + (0..5).map(|l| a_psi[k * 5 + l] * psidd[l]).sum::<f64>())
             .collect();
