@@ -1,4 +1,4 @@
-//! The rig's end of the telemetry: samples into batches, so numbered that every loss shows.
+//! The rig's end of the telemetry: numbers samples in batches, so that every loss shows.
 
 use heapless::Vec;
 
@@ -6,17 +6,17 @@ use super::message::{BATCH, Batch, StateSample, StreamEnd};
 
 /// Collects samples into batches.
 ///
-/// Window k of a stream begins at control tick `first_tick + k·decimation` and belongs to batch
-/// ⌊k/[`BATCH`]⌋: position in the stream, tick and sequence number determine each other, and batches that
-/// the rig itself must drop leave a gap in the numbers like those that the line loses. A batch is sent
-/// whole or not at all, except for the last of a stream, which may be short.
+/// Window k of a stream begins at control tick `first_tick + k·decimation` and belongs to batch ⌊k/[`BATCH`]⌋. So
+/// position in the stream, tick and sequence number determine each other. A batch that the rig drops leaves a gap in
+/// the numbers, like a batch that the line loses. A batch is sent whole or not at all; only the last of a stream may be
+/// short.
 #[derive(Clone, Debug, Default)]
 pub struct Batcher {
     first_tick: u64,
     decimation: u16,
-    /// Windows since the start, with or without sample.
+    /// Windows since the start, with or without a sample.
     windows: u64,
-    /// Samples of the present batch, all of its windows so far unless `spoilt`.
+    /// Samples of the present batch: all of its windows so far, unless `spoilt`.
     samples: Vec<StateSample, BATCH>,
     spoilt: bool,
     batches_sent: u32,
@@ -25,12 +25,12 @@ pub struct Batcher {
 }
 
 impl Batcher {
-    /// No stream yet.
+    /// Returns a batcher without a stream.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Begins a stream whose first window begins at control tick `first_tick`; `decimation` ticks a window.
+    /// Starts a stream with its first window at control tick `first_tick`, and `decimation` ticks per window.
     pub fn start(&mut self, first_tick: u64, decimation: u16) {
         *self = Self {
             first_tick,
@@ -40,14 +40,14 @@ impl Batcher {
         };
     }
 
-    /// Whether a stream runs.
+    /// Returns true if a stream runs.
     pub fn is_running(&self) -> bool {
         self.running
     }
 
-    /// Adds the next window's sample; gives a batch when one is full. Does nothing without a stream.
+    /// Adds the next window's sample; returns a batch when one is full. Does nothing without a stream.
     ///
-    /// The batch counts as sent: say so with [`Batcher::refused`] where the transmit queue has no room.
+    /// The batch counts as sent: call [`Batcher::refused`] if the transmit queue has no room.
     pub fn push(&mut self, sample: StateSample) -> Option<Batch> {
         if !self.running {
             return None;
@@ -58,7 +58,7 @@ impl Batcher {
         self.advance()
     }
 
-    /// Says that the next window has no sample. Its batch will not be sent; the windows count as dropped.
+    /// Marks the next window as without sample. Its batch is not sent; the windows count as dropped.
     pub fn skip(&mut self) {
         if self.running {
             self.spoilt = true;
@@ -66,20 +66,20 @@ impl Batcher {
         }
     }
 
-    /// Takes back a batch that the transmit queue refused: its samples count as dropped.
+    /// Corrects the totals for a batch that the transmit queue refused: its samples count as dropped.
     pub fn refused(&mut self, batch: &Batch) {
         self.batches_sent = self.batches_sent.wrapping_sub(1);
         self.samples_sent = self.samples_sent.saturating_sub(batch.samples.len() as u64);
     }
 
-    /// Ends the stream; gives its last, short batch if there is one.
+    /// Ends the stream; returns its last, short batch if there is one.
     pub fn close(&mut self) -> Option<Batch> {
         self.running = false;
         self.take()
     }
 
-    /// What the stream held so far; after [`Batcher::close`] what it held in all. May be asked again and
-    /// again until the next start, so that a lost answer can be repeated.
+    /// Returns the totals so far; after [`Batcher::close`] those of the whole stream. May be called repeatedly until
+    /// the next start, so that a lost answer can be repeated.
     pub fn end(&self) -> StreamEnd {
         StreamEnd {
             batches: self.batches_sent,
@@ -108,7 +108,7 @@ impl Batcher {
         self.batches_sent = self.batches_sent.wrapping_add(1);
         self.samples_sent = self.samples_sent.wrapping_add(samples.len() as u64);
         Some(Batch {
-            // The number wraps after a year and more; the host counts on.
+            // The number wraps after more than a year; the host extends it.
             sequence: (first_window / BATCH as u64) as u32,
             first_tick: self
                 .first_tick

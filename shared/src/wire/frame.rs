@@ -1,9 +1,9 @@
 //! Messages to frames and back.
 //!
-//! COBS (Cheshire & Baker 1999) frees the bytes of zeros, so that a zero ends a frame and nothing
-//! else; whatever happens on the line, decoding is in step again after the next zero.
-//! CRC-32C (Castagnoli 1993) keeps Hamming distance 6 up to 5243 bits (Koopman 2002, Table 1): any
-//! five flipped bits in a message of up to 651 bytes are found.
+//! COBS (Cheshire & Baker 1999) removes zeros from the bytes, so that only the end of a frame is a zero. After any
+//! disturbance of the line, decoding is in step again after the next zero. CRC-32C (Castagnoli 1993) keeps Hamming
+//! distance 6 up to 5243 bits (Koopman 2002, Table 1): it detects any five flipped bits in a message of up to 651
+//! bytes.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -22,13 +22,12 @@ pub const CRC_BYTES: usize = 4;
 pub const MAX_MESSAGE: usize = 1024;
 /// Longest content of a frame: message and CRC, bytes.
 pub const MAX_PAYLOAD: usize = MAX_MESSAGE + CRC_BYTES;
-/// Longest frame on the line with its delimiter, bytes: a buffer of this size takes any message.
+/// Longest frame on the line with its delimiter, bytes: a buffer of this size holds any message.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PAYLOAD) + 1;
 
-// Postcard writes a type without heap in at most twice its size in memory: varints of 16, 32 and 64 bits
-// take 3, 5 and 10 bytes; a variant's number or an option takes one byte even where memory hides it in a
-// niche, of which there is at most one per byte of payload in these types. So these lines hold for every
-// value, also of types that others extend.
+// Postcard writes a type without heap in at most twice its size in memory. Varints of 16, 32 and 64 bits take 3, 5 and
+// 10 bytes. A variant's number or an option takes one byte even if memory hides it in a niche; these types have at most
+// one niche per byte of payload. So these lines hold for every value, and for types that others extend.
 const _: () = assert!(
     2 * size_of::<Request>() <= MAX_MESSAGE,
     "a Request might not fit: raise MAX_MESSAGE"
@@ -38,12 +37,12 @@ const _: () = assert!(
     "a Report might not fit: raise MAX_MESSAGE"
 );
 
-/// Why a message could not be framed.
+/// Reason why a message could not be framed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncodeError {
     /// The buffer is shorter than the frame; [`MAX_FRAME`] bytes are always enough.
     BufferTooSmall,
-    /// The type cannot be written in postcard (a sequence of unknown length); no message type is like that.
+    /// Postcard cannot write the type (a sequence of unknown length); no message type is like that.
     Unserializable,
 }
 
@@ -58,14 +57,14 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Why a frame was thrown away.
+/// Reason why a frame was discarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
-    /// The delimiter came where the COBS code byte promised data.
+    /// The delimiter came where the COBS code byte announced data.
     Cobs,
-    /// The check sum does not agree, or the frame is too short to have one.
+    /// The check sum is wrong, or the frame is too short to have one.
     Crc,
-    /// The check sum agrees, but the bytes are no message of the expected type, or more than one.
+    /// The check sum is right, but the bytes are not exactly one message of the expected type.
     Message,
     /// The frame is longer than any message.
     TooLong,
@@ -87,7 +86,7 @@ impl core::error::Error for DecodeError {}
 /// Writes `message` as one frame with its delimiter to the front of `frame`; returns its length, bytes.
 ///
 /// # Errors
-/// [`EncodeError::BufferTooSmall`] where `frame` is too short; `frame` then holds rubbish.
+/// [`EncodeError::BufferTooSmall`] if `frame` is too short; the content of `frame` is then invalid.
 pub fn encode<M: Serialize + ?Sized>(message: &M, frame: &mut [u8]) -> Result<usize, EncodeError> {
     let capacity = frame.len();
     let length = {
@@ -100,7 +99,7 @@ pub fn encode<M: Serialize + ?Sized>(message: &M, frame: &mut [u8]) -> Result<us
             _ => EncodeError::Unserializable,
         })?
     };
-    // The COBS encoder reserves its last code byte without looking whether it fits.
+    // The COBS encoder reserves its last code byte without a bounds check.
     if length >= capacity {
         return Err(EncodeError::BufferTooSmall);
     }
@@ -109,7 +108,7 @@ pub fn encode<M: Serialize + ?Sized>(message: &M, frame: &mut [u8]) -> Result<us
     Ok(length + 1)
 }
 
-/// Where postcard's bytes go: into the check sum and, stuffed, into the frame.
+/// Receiver of postcard's bytes: adds them to the check sum and, stuffed, to the frame.
 struct Framed<'a> {
     encoder: cobs::CobsEncoder<'a>,
     digest: Digest<'static, u32, Table<1>>,
@@ -142,23 +141,23 @@ impl postcard::ser_flavors::Flavor for Framed<'_> {
     }
 }
 
-/// What a decoder has seen.
+/// Counts of a decoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameCounts {
-    /// Frames whose check sum agreed.
+    /// Frames with a correct check sum.
     pub good: u64,
     /// [`DecodeError::Cobs`].
     pub bad_cobs: u64,
     /// [`DecodeError::Crc`].
     pub bad_crc: u64,
-    /// [`DecodeError::Message`]; these are among `good` too, for the line did its work.
+    /// [`DecodeError::Message`]; these are also in `good`, because the line transferred them correctly.
     pub bad_message: u64,
     /// [`DecodeError::TooLong`].
     pub too_long: u64,
 }
 
 impl FrameCounts {
-    /// Frames that the line has spoilt.
+    /// Returns the number of frames that the line has damaged.
     pub fn bad(&self) -> u64 {
         self.bad_cobs
             .saturating_add(self.bad_crc)
@@ -166,7 +165,7 @@ impl FrameCounts {
     }
 }
 
-/// Takes bytes as they come and hands out the content of whole frames. `N`: longest content with CRC, bytes.
+/// Decodes a stream of bytes to the contents of frames. `N`: longest content with CRC, bytes.
 #[derive(Debug)]
 pub struct Decoder<const N: usize> {
     state: cobs::DecoderState,
@@ -183,7 +182,7 @@ impl<const N: usize> Default for Decoder<N> {
 }
 
 impl<const N: usize> Decoder<N> {
-    /// Waits for the start of a frame.
+    /// Returns a decoder that waits for the start of a frame.
     pub fn new() -> Self {
         Self {
             state: cobs::DecoderState::Idle,
@@ -194,14 +193,14 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// What came so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> FrameCounts {
         self.counts
     }
 
-    /// Takes one byte. `Some` at the end of a frame: its content without CRC, or why it was thrown away.
+    /// Takes one byte. Returns `Some` at the end of a frame: its content without CRC, or why it was discarded.
     ///
-    /// Delimiters without anything between them are no frames and give `None`.
+    /// Delimiters in a row are no frames and return `None`.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], DecodeError>> {
         match self.state.feed(byte) {
             Ok(cobs::DecodeResult::NoData) => None,
@@ -231,7 +230,7 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// Takes one byte. `Some` at the end of a frame: the message in it, or why it was thrown away.
+    /// Takes one byte. Returns `Some` at the end of a frame: its message, or the reason why it was discarded.
     pub fn push_message<M: DeserializeOwned>(
         &mut self,
         byte: u8,
@@ -246,7 +245,7 @@ impl<const N: usize> Decoder<N> {
         Some(message)
     }
 
-    /// Takes `bytes` and hands each message, or why a frame was thrown away, to `on_message`.
+    /// Takes `bytes`; passes each message, or the reason why a frame was discarded, to `on_message`.
     pub fn feed<M: DeserializeOwned>(
         &mut self,
         bytes: &[u8],

@@ -13,12 +13,12 @@ use super::super::schema::version_of_greeting;
 use super::*;
 use crate::safety::{LimitSet, Mode, SnapshotSample};
 
-/// Bytes of a longest varint of so many bits.
+/// Returns the bytes of the longest varint of `bits` bits.
 fn varint(bits: usize) -> usize {
     bits.div_ceil(7)
 }
 
-/// Upper bound of a type's postcard form where no sequence is longer than `sequence` and no text than 24.
+/// Returns an upper bound of a type's postcard size, with sequences up to `sequence` entries and texts up to 24 bytes.
 fn bound(named: &NamedType, sequence: usize) -> usize {
     let each = |types: &[&NamedType]| types.iter().map(|one| bound(one, sequence)).sum::<usize>();
     match named.ty {
@@ -54,7 +54,7 @@ fn bound(named: &NamedType, sequence: usize) -> usize {
 
 #[test]
 fn no_message_is_longer_than_the_buffers() {
-    // 16: the longest sequence of any message type at present is a friction sweep's.
+    // 16: the longest sequence of any message type, that of a friction sweep.
     let longest = 16
         .max(BATCH)
         .max(SNAPSHOT_PART)
@@ -109,7 +109,7 @@ fn fullest_messages_fit_and_come_back() {
     }
 }
 
-/// Bytes as a message of their own, to reach every length of content.
+/// Bytes as a message, to reach every length of content.
 struct Raw<'a>(&'a [u8]);
 
 impl Serialize for Raw<'_> {
@@ -149,7 +149,7 @@ fn every_length_up_to_the_longest_comes_back_and_one_more_is_too_long() {
             );
             let got = payloads(&mut Decoder::new(), &frame[..end]);
             assert_eq!(got, [Ok(content[..length].to_vec())]);
-            // Exactly as long as needed is enough, one byte less is refused.
+            // The exact length suffices, one byte less is refused.
             assert_eq!(encode(&Raw(&content[..length]), &mut vec![0; end]), Ok(end));
             assert_eq!(
                 encode(&Raw(&content[..length]), &mut vec![0; end - 1]),
@@ -176,7 +176,7 @@ fn a_truncated_frame_costs_itself_and_no_other() {
     let end = encode(&fullest_batch(), &mut frame).unwrap();
     let whole = &frame[..end];
     for cut in 1..end - 1 {
-        // The tail is missing, but for the delimiter.
+        // The tail is missing, except for the delimiter.
         let mut line = whole[..cut].to_vec();
         line.push(0);
         line.extend_from_slice(whole);
@@ -250,7 +250,7 @@ fn a_frame_with_a_message_and_more_is_no_message() {
 
 #[test]
 fn the_greeting_of_an_unknown_version_still_tells_its_version() {
-    // A future greeting: variant 0, protocol, schema, then what nobody knows yet.
+    // A future greeting: variant 0, protocol, schema, then unknown fields.
     let mut payload = [0; 64];
     let payload = postcard::to_slice(
         &(0_u32, 77_u16, u64::MAX - 1, "later", 3.5_f64),

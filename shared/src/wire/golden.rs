@@ -1,8 +1,8 @@
-//! One exemplar of every message against the bytes it must have on the line.
+//! One example of every message and its exact bytes on the line.
 //!
-//! When one of these fails, the format has changed: rigs in the field would no longer be understood.
-//! If that is meant, raise [`PROTOCOL_VERSION`](super::PROTOCOL_VERSION), put the new bytes here (the failing
-//! test prints them) and describe the change in `docs/formats.md`.
+//! If one of these fails, the format has changed: rigs in the field would no longer be understood. If that is intended,
+//! raise [`PROTOCOL_VERSION`](super::PROTOCOL_VERSION), put the new bytes here (the failing test prints them) and
+//! describe the change in `docs/formats.md`.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::format;
@@ -326,7 +326,7 @@ fn check<M: Serialize + DeserializeOwned + PartialEq + core::fmt::Debug>(
     bytes == expected
 }
 
-/// Adding a variant must fail here, so that it gets its exemplar.
+/// A new variant must fail to compile here, so that it gets its example.
 fn request_number(body: &RequestBody) -> usize {
     match body {
         RequestBody::Hello => 0,

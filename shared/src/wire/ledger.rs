@@ -1,16 +1,15 @@
-//! A request that was sent twice is carried out once.
+//! Memory of answered requests: a repeated request is carried out only once.
 
 use super::message::{Acknowledge, Refusal};
 
-/// Answers that the rig remembers. The host has one request under way at a time, so that one would do on a
-/// line that keeps the order; the others are for keep-alives sent in between.
+/// Number of stored answers. The host has one request under way at a time, so one would suffice on a line that keeps
+/// the order. The others are for keep-alives sent in between.
 const REMEMBERED: usize = 8;
 
-/// What the rig answered to the last requests, by number.
+/// The rig's answers to the last requests, by number.
 ///
-/// The host repeats a request with the same number until it is acknowledged. The rig looks here first:
-/// a number that stands here is only answered again, not carried out again. `Hello` begins a new count:
-/// clear the ledger then.
+/// The host repeats a request with the same number until it is acknowledged. For a stored number the rig only repeats
+/// the answer. `Hello` begins a new count: clear the ledger then.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ledger {
     entries: [Option<(u16, Result<(), Refusal>)>; REMEMBERED],
@@ -18,12 +17,12 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Nothing answered yet.
+    /// Returns a ledger without answers.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The answer given before to request `id`, to be sent again; `None` where it is new.
+    /// Returns the stored answer to request `id`; `None` if the request is new.
     pub fn answered(&self, id: u16) -> Option<Acknowledge> {
         self.entries.iter().flatten().find_map(|entry| {
             (entry.0 == id).then_some(Acknowledge {
@@ -33,7 +32,7 @@ impl Ledger {
         })
     }
 
-    /// Notes the answer to request `id` and gives it as it is to be sent.
+    /// Stores the answer to request `id` and returns the acknowledgement to send.
     pub fn answer(&mut self, id: u16, result: Result<(), Refusal>) -> Acknowledge {
         if let Some(entry) = self.entries.get_mut(self.next % REMEMBERED) {
             *entry = Some((id, result));
@@ -42,7 +41,7 @@ impl Ledger {
         Acknowledge { id, result }
     }
 
-    /// Forgets everything, at `Hello`.
+    /// Clears the ledger, at `Hello`.
     pub fn clear(&mut self) {
         *self = Self::default();
     }

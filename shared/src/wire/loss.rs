@@ -1,13 +1,13 @@
-//! The host's end of the telemetry: which samples are missing, exactly.
+//! The host's end of the telemetry: finds exactly which samples are missing.
 
 use core::fmt;
 
 use super::message::{BATCH, Batch, StreamEnd};
 
-/// Batches behind the newest that are told apart as duplicate or late.
+/// Number of batches behind the newest for which duplicate and late are distinguished.
 const REMEMBERED: u32 = u64::BITS;
 
-/// Consecutive windows without sample.
+/// Consecutive windows without samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// Control tick at which the first missing window began.
@@ -16,21 +16,21 @@ pub struct Gap {
     pub missing: u64,
 }
 
-/// Why a batch was not taken.
+/// Reason why a batch was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BatchRefusal {
-    /// It came before.
+    /// The batch was received before.
     Duplicate,
-    /// A later one came before it; its samples have already been called missing, and stay so.
+    /// A later batch was received before it. Its samples were already counted as missing, and stay so.
     Late,
-    /// Empty, or its number and its tick do not agree with those before.
+    /// Empty, or its number and tick contradict those before.
     Inconsistent,
 }
 
 /// The rig's totals contradict what was received: the end belongs to another stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EndMismatch {
-    /// Windows that the rig says there were.
+    /// Windows of the stream according to the rig.
     pub announced: u64,
     /// Windows up to the last sample received.
     pub seen: u64,
@@ -48,7 +48,7 @@ impl fmt::Display for EndMismatch {
 
 impl core::error::Error for EndMismatch {}
 
-/// What became of a stream so far.
+/// Counts of a stream so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LossCounts {
     /// Batches taken.
@@ -65,24 +65,24 @@ pub struct LossCounts {
     pub inconsistent: u64,
 }
 
-/// Puts a stream together and knows its holes: those at the very start by the first batch's number, those
-/// in between by number and tick, those at the end by the rig's totals.
+/// Reassembles a stream and finds its gaps: at the start by the first batch's number, in between by number and tick, at
+/// the end by the rig's totals.
 #[derive(Clone, Debug)]
 pub struct Reassembly {
     decimation: u64,
-    /// Tick at which window 0 began, once known.
+    /// Tick at which window 0 began, if known.
     origin: Option<u64>,
-    /// Number of the next batch in order, never wrapping.
+    /// Number of the next batch in order, without wrapping.
     next_sequence: u64,
     /// Index of the next window in order.
     next_window: u64,
-    /// Bit i: batch `next_sequence − 1 − i` was taken.
+    /// Bit i is set if batch `next_sequence − 1 − i` was taken.
     taken: u64,
     counts: LossCounts,
 }
 
 impl Reassembly {
-    /// A stream about to start, of windows of `decimation` control ticks (0 counts as 1).
+    /// Returns the state before a stream with windows of `decimation` control ticks (0 counts as 1).
     pub fn new(decimation: u16) -> Self {
         Self {
             decimation: u64::from(decimation.max(1)),
@@ -94,22 +94,22 @@ impl Reassembly {
         }
     }
 
-    /// What became of the stream so far.
+    /// Returns the counts of the stream so far.
     pub fn counts(&self) -> LossCounts {
         self.counts
     }
 
-    /// Control tick at which window 0 began; `None` before the first batch.
+    /// Returns the control tick at which window 0 began; `None` before the first batch.
     pub fn origin(&self) -> Option<u64> {
         self.origin
     }
 
-    /// Takes the next batch; gives the hole before it, if any. The batch's samples then follow the hole.
+    /// Takes the next batch; returns the gap before it, if any. The batch's samples then follow the gap.
     ///
     /// # Errors
-    /// [`BatchRefusal`] where the batch must not be used; it is counted and changes nothing else.
+    /// [`BatchRefusal`] if the batch must not be used; it is counted and changes nothing else.
     pub fn accept(&mut self, batch: &Batch) -> Result<Option<Gap>, BatchRefusal> {
-        // The number wraps at 32 bits: the nearest one to the expected is meant.
+        // The number wraps at 32 bits: the nearest value to the expected one is taken.
         let ahead = batch.sequence.wrapping_sub(self.next_sequence as u32);
         if (ahead as i32) < 0 {
             return Err(self.refuse_old(ahead.wrapping_neg()));
@@ -134,12 +134,12 @@ impl Reassembly {
         Ok(gap)
     }
 
-    /// Tick of window 0 and index of the batch's first window; `None` where they contradict what came before.
+    /// Returns the tick of window 0 and the batch's first window; `None` if they contradict the batches before.
     fn place(&self, batch: &Batch, ahead: u64) -> Option<(u64, u64)> {
         let first_window = (self.next_sequence + ahead).checked_mul(BATCH as u64)?;
         let ticks = first_window.checked_mul(self.decimation)?;
         let origin = batch.first_tick.checked_sub(ticks)?;
-        // The end of the batch must be a tick too.
+        // The end of the batch must fit into a tick too.
         batch
             .first_tick
             .checked_add(self.decimation * BATCH as u64)?;
@@ -160,11 +160,11 @@ impl Reassembly {
         }
     }
 
-    /// Closes the stream with the rig's totals; gives the hole at its end, if any.
-    /// Afterwards `received + missing` is what the stream held.
+    /// Closes the stream with the rig's totals; returns the gap at its end, if any. Afterwards `received + missing` is
+    /// the number of samples in the stream.
     ///
     /// # Errors
-    /// [`EndMismatch`] where the totals cannot be those of this stream; nothing has changed then.
+    /// [`EndMismatch`] if the totals cannot belong to this stream; nothing has changed then.
     pub fn finish(&mut self, end: &StreamEnd) -> Result<Option<Gap>, EndMismatch> {
         let announced = end.samples.saturating_add(end.dropped);
         let mismatch = EndMismatch {

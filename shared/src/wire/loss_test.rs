@@ -17,8 +17,8 @@ fn sample(window: u64) -> StateSample {
     }
 }
 
-/// A stream of `windows` windows from tick `first_tick`; the rig itself has no sample where `skipped`, and
-/// no room in its queue for batch b where `refused`.
+/// Returns a stream of `windows` windows from tick `first_tick`. The rig has no sample where `skipped`, and no room in
+/// its queue for batch b where `refused`.
 fn stream(
     first_tick: u64,
     windows: u64,
@@ -51,7 +51,7 @@ fn stream(
     (batches, batcher.end())
 }
 
-/// Runs batches through a reassembly; gives the windows that came and those called missing, by window.
+/// Passes batches to a reassembly; returns the received and the missing windows.
 fn reassemble(
     first_tick: u64,
     batches: &[Batch],
@@ -135,7 +135,7 @@ proptest! {
         all.sort_unstable();
         prop_assert_eq!(all, (0..237).collect::<Vec<_>>());
         let repeated = order.iter().enumerate().filter(|(k, b)| {
-            // Came before, and was the newest when it came first.
+            // The batch was received before, and was the newest then.
             order[..*k].iter().position(|one| one == *b).is_some_and(|first| order[..first].iter().all(|one| one < b))
         }).count() as u64;
         prop_assert_eq!(counts.duplicates, repeated);

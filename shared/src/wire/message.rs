@@ -1,8 +1,8 @@
-//! What the rig and the host say to each other.
+//! Messages between rig and host.
 //!
-//! Requests go to the rig, each with a number that the acknowledgement repeats; reports come from it.
-//! Floating-point values are SI and joint-side unless their name says otherwise. A change to any type
-//! here changes [`schema`](super::schema()), and both ends then refuse each other by name.
+//! Requests go to the rig, each with a number that the acknowledgement repeats. Reports come from the rig.
+//! Floating-point values are SI and joint-side unless their name says otherwise. A change to any type here changes
+//! [`schema`](super::schema()); both ends then refuse each other by name.
 
 use heapless::{String, Vec};
 use postcard_schema::Schema;
@@ -25,37 +25,37 @@ pub const PARAMETERS: usize = crate::link::PARAMETER_COUNT;
 /// Samples of the fault snapshot carried by one report.
 pub const SNAPSHOT_PART: usize = 8;
 
-/// Host to rig: a numbered wish.
+/// Host to rig: a numbered request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Request {
-    /// Repeated by the acknowledgement; the host counts up.
+    /// Number, repeated by the acknowledgement; the host counts up.
     pub id: u16,
-    /// What is wished.
+    /// The request.
     pub body: RequestBody,
 }
 
-/// What the host can ask for.
+/// Requests of the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 #[allow(
     clippy::large_enum_variant,
     reason = "there is no heap to box it on, and a message is stored for one command only"
 )]
 pub enum RequestBody {
-    /// Ask for the [`Greeting`]; first in every version, so that it is always understood.
+    /// Ask for the [`Greeting`]; variant 0 in every version, so that it is always understood.
     Hello,
-    /// Nothing but a sign of life; without one the rig stops after its host time-out.
+    /// Sign of life only; without one the rig stops after its host time-out.
     KeepAlive,
-    /// Allow motion: the bridge is switched on and holds position.
+    /// Allow motion: switches the bridge on and holds position.
     Arm,
-    /// Bridge off, at once.
+    /// Switch the bridge off at once.
     Disarm,
-    /// Run the loaded trajectory from where the link stands.
+    /// Run the loaded trajectory from the link's position.
     Start,
     /// Come to rest under control, then hold.
     Stop,
-    /// Forget a latched fault; refused while its cause still acts.
+    /// Clear a latched fault; refused while its cause still acts.
     ClearFault,
-    /// Replace the trajectory; refused while one runs and where it would leave the limits.
+    /// Replace the trajectory; refused while one runs, and if it would leave the limits.
     SetTrajectory(Trajectory<f32>),
     /// Replace the feedback gains.
     SetGains(Gains<f32>),
@@ -65,29 +65,29 @@ pub enum RequestBody {
     SetModel(LinkParameters<f32>),
     /// Replace the friction law used for precompensation.
     SetFriction(Friction<f32>),
-    /// Replace how the friction law is used near zero speed, or switch it off.
+    /// Replace the settings of the friction precompensation, or switch it off.
     SetPrecompensation(PrecompensationSettings<f32>),
     /// Replace the limits.
     SetLimits(Limits<f32>),
-    /// Replace the on-line estimator's settings and start it anew.
+    /// Replace the on-line estimator's settings and restart it.
     SetEstimator(EstimatorSettings<f32>),
-    /// Send telemetry until `StopStream`; a stream that runs is ended without [`StreamEnd`].
+    /// Send telemetry until `StopStream`; a running stream ends without [`StreamEnd`].
     StartStream,
-    /// End the telemetry with [`StreamEnd`]. Without a stream the last one's end is sent again.
+    /// End the telemetry with [`StreamEnd`]. Without a stream the last [`StreamEnd`] is sent again.
     StopStream,
     /// Send the snapshot of the first latched fault, part by part.
     GetSnapshot,
-    /// Say where the link stands now, rad; only while disarmed. An incremental encoder cannot know.
+    /// Set the link's present position, rad; only while disarmed. An incremental encoder does not know it.
     SetPosition(f32),
-    /// Keep limits, gains, laws and models in the rig's own memory, for the next power on; only while disarmed.
-    /// Answered when it is done.
+    /// Store limits, gains, laws and models in the rig's memory for the next power on; only while disarmed.
+    /// Acknowledged when done.
     Store,
-    /// Have the capture of single control ticks stand still so many ticks from now. One that waits to be
-    /// fetched is given up.
+    /// Stop the capture of single control ticks after this number of ticks. A capture that was not fetched is
+    /// discarded.
     Capture(u16),
-    /// Send the capture, part by part, once it stands still; one part without samples where none was triggered.
+    /// Send the capture, part by part, once it has stopped; one part without samples if none was triggered.
     GetCapture,
-    /// Replace the effects that are compensated beside the friction law; none to compensate none.
+    /// Replace the effects that are compensated in addition to the friction law; an empty list switches them off.
     SetEffects(Vec<Effect<f32>, EFFECTS>),
 }
 
@@ -95,7 +95,7 @@ pub enum RequestBody {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 #[allow(clippy::large_enum_variant)] // the batch is the common case; boxing needs an allocator
 pub enum Report {
-    /// Who speaks, in which version, at which rates; first in every version.
+    /// Identity, version and rates of the rig; variant 0 in every version.
     Greeting(Greeting),
     /// Answer to a [`Request`].
     Acknowledge(Acknowledge),
@@ -105,17 +105,17 @@ pub enum Report {
     Estimate(Estimate),
     /// A fault has latched.
     Fault(FaultRecord),
-    /// Part of the snapshot that a latched fault kept.
+    /// Part of the snapshot of a latched fault.
     Snapshot(SnapshotPart),
-    /// The stream has ended; what was sent in all, so that losses at its end count too.
+    /// The stream has ended; holds its totals, so that losses at its end count too.
     StreamEnd(StreamEnd),
     /// Part of the capture: single control ticks.
     Capture(SnapshotPart),
-    /// How the board is, about once a second.
+    /// State of the board, about once a second.
     Health(Health),
 }
 
-/// Who speaks, in which version, at which rates.
+/// Identity, version and rates of the rig.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Greeting {
     /// [`super::PROTOCOL_VERSION`] of the rig. This and `schema` come first in every version.
@@ -143,11 +143,11 @@ pub struct Greeting {
 pub struct Acknowledge {
     /// The request's number.
     pub id: u16,
-    /// `Err` says why nothing was changed.
+    /// `Err` gives the reason why nothing was changed.
     pub result: Result<(), Refusal>,
 }
 
-/// Why a request was refused. Nothing has changed then.
+/// Reason for a refused request. Nothing has changed then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
     /// The mode does not allow it (start while disarmed, upload while running, …).
@@ -162,20 +162,20 @@ pub enum Refusal {
     OutsideLimits,
     /// No trajectory is loaded.
     NoTrajectory,
-    /// The settings are being stored; ask again when that has been answered.
+    /// The settings are being stored; repeat the request after the answer to that.
     Busy,
-    /// This rig cannot keep settings.
+    /// This rig cannot store settings.
     NoStorage,
-    /// The memory did not take the settings; those stored before still stand.
+    /// The memory did not accept the settings; the previous ones remain stored.
     StorageFailed,
-    /// Effects of this kind have no torque and no corrected reading that would undo them.
+    /// No torque and no corrected reading compensates effects of this kind.
     NotCompensable(Kind),
 }
 
 /// Consecutive state samples, oldest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Batch {
-    /// Counts batches since `StartStream`, those that the rig had to drop too; a gap is a loss.
+    /// Batch number since `StartStream`, counting batches that the rig dropped too; a gap is a loss.
     pub sequence: u32,
     /// Control tick at which the first sample's averaging window began.
     pub first_tick: u64,
@@ -183,10 +183,10 @@ pub struct Batch {
     pub samples: Vec<StateSample, BATCH>,
 }
 
-/// The state, averaged over one telemetry window so that nothing is aliased.
+/// The state, averaged over one telemetry window to avoid aliasing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct StateSample {
-    /// Unwrapped motor-encoder counts summed over the window: exact, no rounding.
+    /// Unwrapped motor-encoder counts, summed over the window: exact, without rounding.
     pub position_sum: i64,
     /// Estimated joint velocity, mean, rad/s.
     pub velocity: f32,
@@ -207,13 +207,13 @@ pub struct StateSample {
 /// The on-line estimate of the one-link model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Estimate {
-    /// Control tick of the last update that went in.
+    /// Control tick of the last update.
     pub tick: u64,
     /// Values, in the order of [`crate::link::PARAMETER_NAMES`].
     pub value: [f32; PARAMETERS],
     /// Standard deviations, same order and units.
     pub std: [f32; PARAMETERS],
-    /// Whether each may be trusted: excited, converged and within its band.
+    /// True if the estimate may be used: excited, converged and within its band.
     pub trusted: [bool; PARAMETERS],
     /// RMS of the torque residual, N·m.
     pub residual_rms: f32,
@@ -230,70 +230,70 @@ pub struct SnapshotPart {
     pub samples: Vec<SnapshotSample, SNAPSHOT_PART>,
 }
 
-/// What a stream held in all.
+/// Totals of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct StreamEnd {
     /// Batches sent since `StartStream`.
     pub batches: u32,
     /// Samples sent since `StartStream`.
     pub samples: u64,
-    /// Samples the rig itself had to drop because its transmit queue was full.
+    /// Samples that the rig dropped because its transmit queue was full.
     pub dropped: u64,
-    /// Control tick at which the stream's first window began; places a loss of the whole stream.
+    /// Control tick at which the stream's first window began; locates a loss of the whole stream.
     pub first_tick: u64,
 }
 
-/// Where the settings came from that the rig started with.
+/// Origin of the settings with which the rig started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum SettingsOrigin {
-    /// Nothing was ever stored: the firmware's own.
+    /// Nothing was ever stored: the firmware's own settings.
     Defaults,
-    /// As stored.
+    /// The stored settings.
     Stored,
-    /// One of the two stored copies is damaged, or the newer one is of no use to this firmware: the other.
+    /// The other of two stored copies, because one is damaged or this firmware cannot use the newer one.
     OlderCopy,
-    /// What is stored is damaged: the firmware's own.
+    /// The stored settings are damaged: the firmware's own settings.
     Damaged,
-    /// What is stored is of another firmware's form, or cannot be used: the firmware's own.
+    /// The stored settings have another firmware's format or cannot be used: the firmware's own settings.
     Unusable,
 }
 
-/// Why the chip last started.
+/// Reason of the chip's last start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ResetCause {
-    /// Power on, or the supply of the chip broke down.
+    /// Power on, or a failure of the chip's supply.
     Power,
     /// The reset button or the debugger.
     Pin,
-    /// The firmware itself, after a panic or a processor fault.
+    /// The firmware, after a panic or a processor fault.
     Software,
-    /// The independent watchdog: a part of the firmware no longer reported.
+    /// The independent watchdog: a part of the firmware stopped reporting.
     Watchdog,
-    /// Another one.
+    /// Any other reason.
     Other,
 }
 
-/// How the board is.
+/// State of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Health {
     /// Control tick of this report.
     pub tick: u64,
-    /// Why the chip last started.
+    /// Reason of the chip's last start.
     pub reset: ResetCause,
-    /// Where the settings came from.
+    /// Origin of the settings.
     pub settings: SettingsOrigin,
-    /// Processor cycles in a second.
+    /// Processor cycles per second.
     pub clock_hz: u32,
-    /// A crystal sets the pace (some 50 ppm); else the chip's own oscillator (1 %), and every time is so wrong.
+    /// True if a crystal sets the clock (some 50 ppm); else the chip's oscillator does (1 %, as every time then is).
     pub crystal: bool,
-    /// Processor cycles that the longest control tick took since the last report, interrupt entry excluded.
+    /// Processor cycles of the longest control tick since the last report, without interrupt entry.
     pub tick_cycles_max: u32,
-    /// Processor cycles that a control tick took on average since the last report.
+    /// Mean processor cycles of a control tick since the last report.
     pub tick_cycles_mean: u32,
-    /// Bytes of the stack that have never been used.
+    /// Stack bytes that were never used.
     pub stack_free: u32,
-    /// Requests that came damaged since power on.
+    /// Damaged requests since power on.
     pub bad_requests: u32,
-    /// Telemetry windows that found no room since power on.
+    /// Telemetry windows dropped for lack of room since power on.
     pub dropped: u32,
 }

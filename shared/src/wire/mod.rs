@@ -4,10 +4,10 @@
 //!  message ──postcard──► bytes ++ CRC-32C ──COBS──► no zero byte ++ 0x00 ──► line
 //! ```
 //!
-//! * [`message`]: what is said; [`mod@schema`]: how both ends make sure that they mean the same by it;
+//! * [`message`]: the messages; [`mod@schema`]: how both ends check that they agree on them;
 //! * [`frame`]: messages to bytes and back, over a line that may lose, flip or add bytes;
-//! * [`batch`]: the rig collects its telemetry, [`loss`]: the host says exactly what of it is missing;
-//! * [`ledger`]: a request that was sent twice is carried out once.
+//! * [`batch`]: the rig collects its telemetry, [`loss`]: the host finds exactly which samples are missing;
+//! * [`ledger`]: a repeated request is carried out only once.
 //!
 //! Nothing here allocates, and no sequence of bytes makes it panic.
 

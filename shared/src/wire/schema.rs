@@ -1,4 +1,4 @@
-//! Version and fingerprint, by which rig and host make sure that they speak the same language.
+//! Version and fingerprint with which rig and host check that they use the same protocol.
 
 use postcard_schema::key::Key;
 
@@ -6,18 +6,17 @@ use super::message::{BATCH, PARAMETERS, Report, Request, SNAPSHOT_PART};
 use crate::compensation::EFFECTS;
 use crate::trajectory::{AMPLITUDES, HARMONICS, LEVELS, SPEEDS};
 
-/// Version of the conversation: framing, and what each message asks of the other end.
+/// Version of the protocol: framing, and the meaning of each message.
 ///
-/// Raise it whenever a frame or an exchange changes its meaning. A mere change of a type need not
-/// raise it ([`schema`] changes by itself), but does so by custom whenever a released rig would
-/// misunderstand.
+/// Raise it if a frame or an exchange changes its meaning. A change of a type alone need not raise it, because
+/// [`schema`] changes by itself. By convention it is raised too if a released rig would misunderstand.
 pub const PROTOCOL_VERSION: u16 = 1;
 
 /// Fingerprint of every message type: names and types of all fields and variants, and all capacities.
 ///
-/// FNV-1a over the postcard schemas of [`Request`] and [`Report`] (`postcard_schema::key`), then over
-/// the capacities, which the schemas leave out. Two programs with the same fingerprint decode each
-/// other's messages; it protects against mistakes, not against intent.
+/// FNV-1a over the postcard schemas of [`Request`] and [`Report`] (`postcard_schema::key`), then over the capacities,
+/// which the schemas leave out. Two programs with the same fingerprint decode each other's messages. It protects
+/// against mistakes, not against intent.
 pub const fn schema() -> u64 {
     const FINGERPRINT: u64 = {
         let request = u64::from_le_bytes(Key::for_path::<Request>("request").to_bytes());
@@ -52,9 +51,9 @@ const fn fold(mut hash: u64, word: u64) -> u64 {
 
 /// Protocol version and schema of a greeting whose remaining fields may be unknown here.
 ///
-/// `payload` is a frame's content ([`Decoder::push`](super::Decoder::push)). A greeting is variant 0 of
-/// every [`Report`] and begins with these two in every version, so that both ends can still refuse each
-/// other by name. `None` where the payload is not a greeting.
+/// `payload` is a frame's content ([`Decoder::push`](super::Decoder::push)). A greeting is variant 0 of every
+/// [`Report`] and begins with these two in every version, so that both ends can still refuse each other by name.
+/// Returns `None` if the payload is not a greeting.
 pub fn version_of_greeting(payload: &[u8]) -> Option<(u16, u64)> {
     let (head, _rest) = postcard::take_from_bytes::<(u32, u16, u64)>(payload).ok()?;
     let (variant, protocol, schema) = head;
