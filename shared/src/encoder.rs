@@ -6,29 +6,28 @@
 //! Kalman Filtering Made Easy", sec. 1.2.10), which is critically damped for any interval T between
 //! measurements: with θ = e^{−ωT}, position gain 1 − θ³, velocity gain 1.5(1−θ)²(1+θ)/T, acceleration gain (1−θ)³/T².
 //!
-//! What makes it right at low speed: a measurement is an *edge*, not a sample. Where a count has just changed, the
-//! position is known to a fraction of a count; where it has not, nothing was measured but that the link stays
-//! within its count. So the filter is updated at edges, with the interval since the last one, and between edges it
-//! predicts under two bounds that are certain: the position stays in its count, and since T samples without
-//! an edge mean less than one count in T, |v| ≤ 1/T counts a sample. A linear observer fed with counts instead
-//! answers each edge with a velocity pulse of some ω counts/s, and with a dead zone it has a limit
-//! cycle (a type-3 loop is only conditionally stable). At standstill the bound takes the velocity to zero as 1/t.
+//! The observer stays accurate at low speed because a measurement is an *edge*, not a sample. At an edge the position
+//! is known to a fraction of a count. A sample without an edge shows only that the link stays within its count. So
+//! edges update the filter, with the interval since the last one. Between edges the filter predicts under two certain
+//! bounds: the position stays in its count, and since T samples without an edge mean less than one count in T, |v| ≤
+//! 1/T counts a sample. A linear observer fed with counts instead answers each edge with a velocity pulse of some ω
+//! counts/s, and with a dead zone it has a limit cycle (a type-3 loop is only conditionally stable). At standstill the
+//! bound takes the velocity to zero as 1/t.
 //!
-//! At speeds above one count a sample this is the linear observer, as s → with pole ω:
-//! v̂/v = ω²(3s+ω)/(s+ω)³ (group delay zero at low frequency, peak +2.3 dB, −3 dB at 1.643·ω/2π: the stated bandwidth),
-//! â/a = ω³/(s+ω)³ (group delay 3/ω). Below one edge in some 0.7/ω the edges themselves limit
-//! the bandwidth.
+//! Above one count a sample it equals the linear observer with pole ω: v̂/v = ω²(3s+ω)/(s+ω)³ (group delay zero at low
+//! frequency, peak +2.3 dB, −3 dB at 1.643·ω/2π: the stated bandwidth), â/a = ω³/(s+ω)³ (group delay 3/ω). Below one
+//! edge in some 0.7/ω the edges limit the bandwidth.
 //!
-//! Measured ripple of the velocity (rms, 100 Hz of bandwidth at 10 kHz; test `ripple_at_low_speed`), counts/s, and that of a
-//! linear observer of the same bandwidth: at 1 count/s 0.0005 (17), at 10 0.007 (54), at 100 0.19 (112), at 1000 8.9 (21),
-//! at 5000 43 (52), at 20 000 91 (95), at 400 000 24 (26).
+//! Measured ripple of the velocity (rms, 100 Hz of bandwidth at 10 kHz; test `ripple_at_low_speed`), counts/s, with
+//! that of a linear observer of the same bandwidth in brackets: at 1 count/s 0.0005 (17), at 10 0.007 (54), at 100 0.19
+//! (112), at 1000 8.9 (21), at 5000 43 (52), at 20 000 91 (95), at 400 000 24 (26).
 //!
-//! Where a timer has captured when an edge came, the position is known at that very instant instead of somewhere in its
-//! sample. Ripple measured with it (200 Hz at 10 kHz, test `times_of_edges_make_the_velocity_smooth`), counts/s, and without: at
-//! 100 counts/s 0.044 (0.19), at 1000 0.0045 (16), at 20 000 0.063 (203), at 400 000 1.3 (72).
+//! If a timer has captured the time of an edge, the position is known at that instant instead of anywhere in its
+//! sample. Measured ripple with it (200 Hz at 10 kHz, test `times_of_edges_make_the_velocity_smooth`), counts/s, and
+//! without in brackets: at 100 counts/s 0.044 (0.19), at 1000 0.0045 (16), at 20 000 0.063 (203), at 400 000 1.3 (72).
 //!
-//! Position is an integer of counts plus a fraction, velocity and acceleration are per sample inside, so `f32`
-//! resolves the same after any number of turns.
+//! Position is an integer of counts plus a fraction; velocity and acceleration are per sample. So `f32` has the same
+//! resolution after any number of turns.
 //!
 //! Leaves out: unequal edge spacing and eccentricity of the encoder, missed counts.
 
@@ -37,15 +36,15 @@ use crate::units::EncoderCount;
 
 /// −3 dB frequency of v̂/v over ω: y = x² solves (1+y)³ = 2(1+9y).
 const VELOCITY_CORNER_OVER_POLE: f64 = 1.643_4;
-/// Smallest θ: however long the interval, the filter remembers some edges, so that a single one, itself
-/// only known to a sample in time, does not set the velocity alone.
+/// Smallest θ. For any interval the filter remembers some edges, so that a single edge, whose time is only known to a
+/// sample, does not set the velocity alone.
 const SMALLEST_MEMORY: f64 = 0.5;
-/// Longest interval counted, samples: beyond it the velocity bound no longer shrinks.
+/// Longest interval that is counted, samples. Beyond it the velocity bound no longer shrinks.
 const LONGEST_INTERVAL: u32 = 1 << 24;
 
-/// Signed movement between two readings of the wrapping 16-bit counter.
+/// Returns the signed movement between two readings of the wrapping 16-bit counter.
 ///
-/// Right as long as the encoder moves less than 2¹⁵ counts between them.
+/// Valid if the encoder moves less than 2¹⁵ counts between them.
 #[inline]
 pub const fn difference(new: EncoderCount, old: EncoderCount) -> i16 {
     new.0.wrapping_sub(old.0) as i16
@@ -63,7 +62,7 @@ pub struct Config<T> {
 }
 
 impl<T: Real> Config<T> {
-    /// `bandwidth_hz`: −3 dB frequency from true to estimated velocity; `sample_rate_hz`: calls of [`step`] a second,
+    /// `bandwidth_hz`: −3 dB frequency from true to estimated velocity; `sample_rate_hz`: calls of [`step`] per second,
     /// at least ten times the bandwidth.
     pub fn new(bandwidth_hz: T, sample_rate_hz: T) -> Self {
         let pole = bandwidth_hz * T::from_f64(core::f64::consts::TAU / VELOCITY_CORNER_OVER_POLE);
@@ -74,13 +73,13 @@ impl<T: Real> Config<T> {
         }
     }
 
-    /// Group delay of the acceleration at low frequency, s. That of position and velocity is zero.
+    /// Returns the group delay of the acceleration at low frequency, s. That of position and velocity is zero.
     pub fn acceleration_delay(&self) -> T {
         T::from_f64(3.0) / self.pole
     }
 }
 
-/// Memory of the observer.
+/// State of the observer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T> {
     started: bool,
@@ -94,16 +93,16 @@ pub struct State<T> {
     acceleration: T,
     /// Samples since the last edge.
     since_edge: u32,
-    /// θ for that interval.
+    /// θ for the interval since the last edge.
     theta: T,
 }
 
 /// Estimated motion in counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion<T> {
-    /// Unwrapped position: what the counter says, counts.
+    /// Unwrapped position of the counter, counts.
     pub counts: i64,
-    /// What the observer adds to it, counts (0 to 1 at low speed).
+    /// Fraction that the observer adds, counts (0 to 1 at low speed).
     pub fraction: T,
     /// Velocity, counts/s.
     pub velocity: T,
@@ -112,8 +111,8 @@ pub struct Motion<T> {
 }
 
 impl<T: Real> Motion<T> {
-    /// Position within one turn (rad, 0 ≤ q < 2π up to the fraction), exact after any number of turns.
-    /// `counts_per_turn` below 1 is taken as 1.
+    /// Returns the position within one turn (rad, 0 ≤ q < 2π up to the fraction), exact after any number of turns.
+    /// `counts_per_turn` below 1 counts as 1.
     #[inline]
     pub fn angle_in_turn(&self, counts_per_turn: i32) -> T {
         let turn = i64::from(counts_per_turn.max(1));
@@ -123,10 +122,10 @@ impl<T: Real> Motion<T> {
     }
 }
 
-/// Takes in a reading of the counter. The first one defines count zero of [`Motion::counts`] plus its own code.
+/// Processes a reading of the counter. The first reading sets [`Motion::counts`] to its own code.
 ///
-/// `age`: samples (0 to about 1) from the last edge to this reading, where a timer has captured when it came; looked at only
-/// where the count has changed.
+/// `age`: samples (0 to about 1) from the last edge to this reading, if a timer has captured the edge; ignored if the
+/// count has not changed.
 #[inline]
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
@@ -166,7 +165,7 @@ pub fn step<T: Real<Mask = bool>>(
     }
 }
 
-/// No edge: the position has stayed in its count, and |v| ≤ `bound` counts a sample.
+/// Processes a sample without an edge: the position has stayed in its count, and |v| ≤ `bound` counts a sample.
 #[inline(always)]
 fn wait<T: Real<Mask = bool>>(config: &Config<T>, state: &mut State<T>, bound: T) {
     state.lead = state.lead.clamp_to(T::ZERO, T::ONE);
@@ -177,12 +176,12 @@ fn wait<T: Real<Mask = bool>>(config: &Config<T>, state: &mut State<T>, bound: T
     }
 }
 
-/// An edge was passed since the last sample.
+/// Processes an edge since the last sample.
 #[inline(always)]
 fn correct<T: Real<Mask = bool>>(state: &mut State<T>, delta: i16, interval: T, age: Option<T>) {
     let half = T::from_f64(0.5);
-    // Not captured: passed at a moment evenly spread over the sample, on the mean half a sample's movement ago, at
-    // most half a count. In either case the next edge was not reached.
+    // Without a captured time, the edge is anywhere in the sample: on average half a sample's movement ago, at most
+    // half a count. In either case the next edge was not reached.
     let (age, farthest) = match age {
         Some(age) => (age, T::ONE),
         None => (half, half),

@@ -1,4 +1,4 @@
-//! The observer against motions that are known.
+//! Tests of the observer on known motions.
 
 use super::*;
 use core::f64::consts::TAU;
@@ -40,7 +40,7 @@ fn unwraps_both_ways() {
     assert!((f64::from(motion.angle_in_turn(4096)) - TAU / 4.0).abs() < 1e-3);
 }
 
-/// Amplitude ratio and phase (rad) of velocity and acceleration for q = A·sin 2πft, `f32` inside.
+/// Returns amplitude ratio and phase (rad) of velocity and acceleration for q = A·sin 2πft, with `f32` inside.
 fn response(bandwidth: f64, f: f64, amplitude: f64) -> [(f64, f64); 2] {
     let config = Config::<f32>::new(bandwidth as f32, RATE as f32);
     let mut state = State::default();
@@ -125,8 +125,8 @@ fn constant_acceleration_leaves_no_lag() {
     }
 }
 
-/// RMS error of the velocity (counts/s) at constant speed, with the speed wandering by a hundredth so
-/// that edges do not lock to the samples; and that of a linear observer of the same bandwidth.
+/// Returns the RMS error of the velocity (counts/s), and that of a linear observer of the same bandwidth. The speed
+/// wanders by a hundredth, so that edges do not lock to the samples.
 fn ripple(speed: f64, bandwidth: f64) -> (f64, f64) {
     let config = Config::<f32>::new(bandwidth as f32, RATE as f32);
     let mut state = State::default();
@@ -157,7 +157,7 @@ fn ripple(speed: f64, bandwidth: f64) -> (f64, f64) {
 
 #[test]
 fn ripple_at_low_speed() {
-    // (counts/s, largest ripple allowed as a share of the speed)
+    // (counts/s, largest allowed ripple as a share of the speed)
     for (speed, share) in [(1.0, 0.05), (10.0, 0.05), (100.0, 0.05), (1000.0, 0.1)] {
         let (ours, linear) = ripple(speed, 100.0);
         std::println!("{speed} counts/s: ripple {ours:.4}, linear observer {linear:.3} counts/s");
@@ -234,7 +234,7 @@ fn coarse_encoder_follows_a_swing() {
     assert!(rms < 0.03 * amplitude * w, "{rms}");
 }
 
-/// An encoder whose edges at whole counts k lie at k + offset[k mod 4], timed by a counter at 170 MHz.
+/// An encoder whose edge k lies at k + offset[k mod 4] counts, timed by a counter at 170 MHz.
 struct Lines {
     offset: [f64; 4],
     timed: bool,
@@ -251,8 +251,8 @@ impl Lines {
         if self.edge(near) <= q { near } else { near - 1 }
     }
 
-    /// The reading at `q`, and the age of its last edge where the count has changed since the reading before: within a
-    /// sample the motion is straight to a ten-thousandth of a count in the tests below.
+    /// Returns the reading at `q`, and the age of its last edge if the count has changed. Within a sample the motion is
+    /// straight to a ten-thousandth of a count in the tests below.
     fn sample(&mut self, q: f64) -> (EncoderCount, Option<f32>) {
         let before = core::mem::replace(&mut self.before, q);
         let count = self.count(q);
@@ -268,7 +268,7 @@ impl Lines {
     }
 }
 
-/// RMS error of the velocity (counts/s) along q(t), v(t) after the first half.
+/// Returns the RMS error of the velocity (counts/s) along q(t), v(t) after the first half.
 fn error(lines: Lines, bandwidth: f64, seconds: f64, motion: impl Fn(f64) -> (f64, f64)) -> f64 {
     let config = Config::<f32>::new(bandwidth as f32, RATE as f32);
     let mut state = State::default();
@@ -285,10 +285,10 @@ fn error(lines: Lines, bandwidth: f64, seconds: f64, motion: impl Fn(f64) -> (f6
     (sum / (n - n / 2) as f64).sqrt()
 }
 
-/// Ten electrical degrees of phase error between the channels and as much of duty cycle.
+/// Ten electrical degrees of phase error between the channels, and as much of duty cycle.
 const UNEQUAL: [f64; 4] = [0.0, 0.11, 0.11, 0.0];
 
-/// RMS error without and with the times of the edges, 200 Hz of bandwidth.
+/// Returns the RMS error without and with the times of the edges, 200 Hz of bandwidth.
 fn errors(offset: [f64; 4], seconds: f64, motion: impl Fn(f64) -> (f64, f64)) -> [f64; 2] {
     [false, true].map(|timed| {
         let lines = Lines {
@@ -300,9 +300,9 @@ fn errors(offset: [f64; 4], seconds: f64, motion: impl Fn(f64) -> (f64, f64)) ->
     })
 }
 
-/// At constant speed, wandering by a hundredth. Times take away what comes of not knowing when in a sample an edge came;
-/// unequal lines stay, and below some 1000 counts/s they are all that is left. At 100 counts/s, an edge in two of the observer's
-/// time constants, what even equal lines leave is the wandering between the edges: 0.04 %.
+/// Constant speed, wandering by a hundredth. Captured times remove the error of the unknown time of an edge. The error
+/// of unequal lines stays, and dominates below some 1000 counts/s. At 100 counts/s (an edge in two of the observer's
+/// time constants) even equal lines leave the wandering between the edges: 0.04 %.
 #[test]
 fn times_of_edges_make_the_velocity_smooth() {
     for (scale, most) in [(0.0, [0.25, 0.02]), (0.25, [1.02, 0.2]), (1.0, [1.02, 0.5])] {
@@ -327,7 +327,7 @@ fn times_of_edges_make_the_velocity_smooth() {
     }
 }
 
-/// Swings at 0.5 Hz about a point: the velocity goes through zero.
+/// Swings at 0.5 Hz about a point, with reversals of the velocity.
 #[test]
 fn times_of_edges_help_through_reversals() {
     for (offset, share) in [([0.0; 4], 0.5), (UNEQUAL, 0.9)] {
