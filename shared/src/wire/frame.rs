@@ -298,7 +298,7 @@ impl<const N: usize> Decoder<N> {
 /// Reads a frame's content as one message.
 ///
 /// # Errors
-/// [`DecodeError::Message`] where it is none, or where bytes are left over.
+/// [`DecodeError::Message`] if it is no message, or if bytes remain.
 pub fn parse<M: DeserializeOwned>(payload: &[u8]) -> Result<M, DecodeError> {
     match postcard::take_from_bytes::<M>(payload) {
         Ok((message, [])) => Ok(message),
@@ -333,7 +333,7 @@ impl<M: DeserializeOwned> MessageDecoder<M> {
         self.decoder.feed(bytes, on_message);
     }
 
-    /// What came so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> FrameCounts {
         self.decoder.counts()
     }
