@@ -1,8 +1,8 @@
 //! Exact gradients of weighted sums of the regressor, at about the cost of two regressors.
 //!
-//! A criterion of excitation depends on the motion through every entry of Y. Dual numbers would carry 3n derivatives
-//! through each of the n·14n entries; going backwards instead (reverse accumulation, Griewank & Walther 2008, ch. 3.2)
-//! takes one sweep inwards whatever the number of joints.
+//! An excitation criterion depends on the motion through every entry of Y. Dual numbers would carry 3n derivatives
+//! through each of the n·14n entries. Reverse accumulation (Griewank & Walther 2008, ch. 3.2) takes one sweep inwards
+//! for any number of joints.
 
 use super::chain::{Chain, JointKind, MultibodyError, check};
 use super::inverse::LinkMotion;
@@ -11,18 +11,18 @@ use super::spatial::{Motion, Transform, Vector3, Wrench};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// What a link's motion was, outwards, with all that the way back needs.
+/// Motion of a link in the outward pass, with the values that the backward pass needs.
 #[derive(Clone, Copy)]
 struct Step<T> {
     transform: Transform<T>,
     motion: LinkMotion<T>,
 }
 
-/// Gradient of Σ W∘Y by `q`, `qd` and `qdd`, with Y the n × 14n matrix of
-/// [`differential_regressor`](super::differential_regressor) and W constant weights of the same shape (row-major).
+/// Computes the gradient of Σ W∘Y by `q`, `qd` and `qdd`. Y is the n × 14n matrix of
+/// [`differential_regressor`](super::differential_regressor), W has constant weights of the same shape (row-major).
 ///
-/// With W = λ·πᵀ it is the gradient of λᵀτ. Each derivative is written to the slice of its name (length n). The jump
-/// of sgn q̇ in the Coulomb columns counts as constant. Takes O(n²) operations.
+/// With W = λ·πᵀ it is the gradient of λᵀτ. Each derivative is written to the slice of its name (length n). The sgn q̇
+/// in the Coulomb columns counts as constant. Takes O(n²) operations.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -75,7 +75,7 @@ fn gradient<T: Real, const CAPACITY: usize>(
         }
         axes[i][i] = joint.axis();
     }
-    // Derivatives of the sum by what the link further in hands outwards.
+    // Derivatives of the sum by the values that the link further in passes outwards.
     let mut by_axes = [Wrench::ZERO; CAPACITY];
     let mut by_motion = LinkMotion {
         velocity: Vector3::ZERO,
@@ -96,7 +96,7 @@ fn gradient<T: Real, const CAPACITY: usize>(
         let mut dqd = own[column::VISCOUS];
         let mut dqdd = own[column::DRIVE_INERTIA];
 
-        // An axis further in, seen from this link, turns against the joint.
+        // Seen from this link, an axis further in turns against the joint.
         let axis = axes[i][i];
         for j in 0..i {
             dq -= axis.cross(axes[i][j]).dot(by_axes[j]);
@@ -115,7 +115,7 @@ fn gradient<T: Real, const CAPACITY: usize>(
                 dqd += by_motion.velocity.z() + by_motion.acceleration.dot(across);
                 by_carried += z.cross(by_motion.acceleration).scaled(qd[i]);
                 let turning = transform.direction_to_child(parent.acceleration);
-                // What the rotation makes of a constant vector v changes by −z × v.
+                // A rotated constant vector v changes by −z × v.
                 dq -= by_carried.dot(z.cross(carried))
                     + by_motion.acceleration.dot(z.cross(turning))
                     + by_motion.proper.dot(z.cross(motion.proper));
@@ -145,15 +145,15 @@ fn gradient<T: Real, const CAPACITY: usize>(
     }
 }
 
-/// Gradient by ω of a·(ω × (ω × b)), which is symmetric in a and b.
+/// Returns the gradient by ω of a·(ω × (ω × b)), which is symmetric in a and b.
 #[inline(always)]
 fn centripetal<T: Real>(spin: Vector3<T>, a: Vector3<T>, b: Vector3<T>) -> Vector3<T> {
     let along = a.dot(b);
     b.scaled(spin.dot(a)) + a.scaled(spin.dot(b)) - spin.scaled(along + along)
 }
 
-/// Adds the gradient of one link's ten columns along one axis, weighted. The weights act as a body: the derivative by
-/// the axis is that body's wrench.
+/// Adds the weighted gradient of one link's ten columns along one axis. The weights act as a body, and the derivative
+/// by the axis is that body's wrench.
 #[inline(always)]
 fn link_gradient<T: Real>(
     weights: &[T; COLUMNS],
@@ -187,7 +187,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// Weights without order, so that no two entries can stand for each other.
+    /// Weights without order, so that no two entries can be exchanged.
     fn weights(count: usize) -> Vec<f64> {
         (0..count)
             .map(|k| libm::sin(1.0 + 12.9898 * k as f64) * 3.0)

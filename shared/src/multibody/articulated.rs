@@ -6,16 +6,16 @@ use super::spatial::{Inertia, Motion, Symmetric3, Transform, Vector3, Wrench};
 use super::with_capacity;
 use crate::scalar::{Mask, Real};
 
-/// Accelerations q̈ (length n) under the torques `tau` by the articulated-body algorithm (Featherstone 2008, table
-/// 7.1), drive inertias, friction and offsets included as in [`super::forward_dynamics`], which it agrees with.
+/// Computes the accelerations q̈ (length n) under the torques `tau` by the articulated-body algorithm (Featherstone
+/// 2008, table 7.1), with drive inertias, friction and offsets as in [`super::forward_dynamics`]. Both agree.
 ///
-/// Takes O(n) operations, and sample by sample a tenth less time than [`super::forward_dynamics`] with six joints, a
-/// quarter less with twelve (`host/model/benches/dynamics.rs` prints both). Blocks of samples ([`super::block`]) use composite
-/// bodies, which share the work of the inverse dynamics before them.
+/// Takes O(n) operations. For single samples it needs a tenth less time than [`super::forward_dynamics`] with six
+/// joints, and a quarter less with twelve (`host/model/benches/dynamics.rs` prints both). Blocks of samples
+/// ([`super::block`]) use composite bodies, which share the work of the inverse dynamics before them.
 ///
 /// # Errors
-/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`] where the links from some joint outwards,
-/// free to move, show no positive inertia along it (in some lane), also where a number is NaN. `qdd` is then untouched.
+/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`] if the free links from some joint outwards
+/// have no positive inertia along it (in some lane), also if a number is NaN. `qdd` is then untouched.
 pub fn articulated_forward_dynamics<T: Real>(
     chain: &Chain<T>,
     parameters: &[[T; COLUMNS]],
@@ -33,19 +33,19 @@ pub fn articulated_forward_dynamics<T: Real>(
     with_capacity!(n, articulated_bodies(chain, parameters, q, qd, tau, qdd))
 }
 
-/// What the way outwards and the way inwards leave at a joint.
+/// Results of the outward and the inward pass at a joint.
 #[derive(Clone, Copy)]
 struct Link<T> {
     transform: Transform<T>,
-    /// Acceleration by velocity alone, v × s·q̇.
+    /// Acceleration due to velocity, v × s·q̇.
     drift: Motion<T>,
     body: ArticulatedBody<T>,
     bias: Wrench<T>,
     /// Wrench of the articulated body at unit acceleration along the joint.
     along: Wrench<T>,
-    /// Inverse of the inertia that the drive feels.
+    /// Inverse of the inertia that the drive moves.
     compliance: T,
-    /// Torque left for accelerating.
+    /// Torque that remains for acceleration.
     free: T,
 }
 
@@ -178,7 +178,7 @@ impl<T: Real> ArticulatedBody<T> {
         }
     }
 
-    /// Wrench at unit acceleration along a joint.
+    /// Returns the wrench at unit acceleration along a joint.
     fn along(&self, joint: &Joint<T>) -> Wrench<T> {
         let [a, b, c] = self.coupling;
         match joint.kind {
@@ -193,7 +193,7 @@ impl<T: Real> ArticulatedBody<T> {
         }
     }
 
-    /// The same body seen through a joint that gives way: less u·uᵀ·compliance.
+    /// Returns the body seen through a free joint: minus u·uᵀ·compliance.
     fn freed(&self, u: Wrench<T>, compliance: T) -> Self {
         let Wrench { force, moment } = u.scaled(compliance);
         let [x, y, z] = moment.0;
@@ -209,17 +209,17 @@ impl<T: Real> ArticulatedBody<T> {
         }
     }
 
-    /// The same body, about the origin of frame i − 1 and written in it.
+    /// Returns the body about the origin of frame i − 1, in that frame.
     fn to_parent(self, transform: &Transform<T>) -> Self {
         let mass = transform.symmetric_to_parent(self.mass);
-        // R·H·Rᵀ: the rows are turned, then the columns of what came out.
+        // R·H·Rᵀ: rotates the rows, then the columns of the result.
         let rows = transposed(self.coupling.map(|row| transform.direction_to_parent(row)));
         let h = transposed(rows.map(|column| transform.direction_to_parent(column)));
-        // H + [p]×·M, column by column of M (its rows, for it is symmetric).
+        // H + [p]×·M, column by column of M (equal to its rows, as M is symmetric).
         let m = mass.rows();
         let shifted = transposed(m.map(|column| transform.origin.cross(column)));
         let coupling = [h[0] + shifted[0], h[1] + shifted[1], h[2] + shifted[2]];
-        // −H·[p]× and its mirror image, and −[p]×·M·[p]×: row r of K·[p]× is (row r of K) × p.
+        // −H·[p]× and its transpose, and −[p]×·M·[p]×: row r of K·[p]× is (row r of K) × p.
         let p = transform.origin;
         let one = h.map(|row| row.cross(p));
         let two = shifted.map(|row| row.cross(p));

@@ -1,4 +1,4 @@
-//! Geometry of a serial chain and what is computed from it once.
+//! Geometry of a serial chain and its precomputed values.
 
 use core::fmt;
 
@@ -8,10 +8,10 @@ use super::parameters::COLUMNS;
 use super::spatial::{Motion, Transform, Vector3, Wrench};
 use crate::scalar::Real;
 
-/// Longest chain, in joints. The buffers of every recursion lie on the stack and are sized by it.
+/// Longest chain, in joints. It sets the size of the stack buffers of every recursion.
 pub const MAX_JOINTS: usize = 16;
 
-/// How a joint moves.
+/// Kind of motion of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns about z of its frame; positions in rad.
@@ -20,7 +20,7 @@ pub enum JointKind {
     Prismatic,
 }
 
-/// Place of frame i in frame i − 1 by modified Denavit–Hartenberg parameters:
+/// Pose of frame i in frame i − 1 by modified Denavit–Hartenberg parameters:
 /// RotX(α)·TransX(a)·RotZ(θ + q if revolute)·TransZ(d + q if prismatic)
 /// (Craig 1986, eq. 3.6; Khalil & Dombre 2002, eq. 3.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,13 +31,13 @@ pub struct JointGeometry<T = f64> {
     pub alpha: T,
     /// Translation along x of frame i − 1, m.
     pub a: T,
-    /// Rotation about z of frame i, rad; the offset of q where revolute.
+    /// Rotation about z of frame i, rad; the offset of q if revolute.
     pub theta: T,
-    /// Translation along z of frame i, m; the offset of q where prismatic.
+    /// Translation along z of frame i, m; the offset of q if prismatic.
     pub d: T,
 }
 
-/// Why a chain could not be built.
+/// Reason why a chain could not be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChainError {
     /// The list of joints is empty.
@@ -47,14 +47,14 @@ pub enum ChainError {
         /// Number of joints given.
         found: usize,
     },
-    /// A geometric parameter is infinite or not a number.
+    /// A geometric parameter is infinite or NaN.
     GeometryNotFinite {
         /// The joint, from 0 at the base.
         joint: usize,
         /// `alpha`, `a`, `theta` or `d`.
         parameter: &'static str,
     },
-    /// A component of gravity is infinite or not a number.
+    /// A component of gravity is infinite or NaN.
     GravityNotFinite,
 }
 
@@ -78,10 +78,10 @@ impl fmt::Display for ChainError {
 
 impl core::error::Error for ChainError {}
 
-/// Why a quantity of a chain could not be computed.
+/// Reason why a quantity of a chain could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MultibodyError {
-    /// A slice does not have the length that the chain asks for.
+    /// The length of a slice does not match the chain.
     WrongLength {
         /// Name of the argument.
         argument: &'static str,
@@ -90,7 +90,7 @@ pub enum MultibodyError {
         /// Length it has.
         found: usize,
     },
-    /// The inertia matrix is not positive definite (in some lane): the parameters are no bodies that exist.
+    /// The inertia matrix is not positive definite (in some lane): no real bodies have these parameters.
     NotPositiveDefinite {
         /// The joint at which the factorisation failed, from 0 at the base.
         joint: usize,
@@ -117,7 +117,7 @@ impl fmt::Display for MultibodyError {
 
 impl core::error::Error for MultibodyError {}
 
-/// Whether `argument` has the length it must have.
+/// Checks that `argument` has the expected length.
 #[inline(always)]
 pub(super) fn check(
     argument: &'static str,
@@ -135,15 +135,15 @@ pub(super) fn check(
     }
 }
 
-/// One joint with the sines and cosines that never change.
+/// One joint with the sines and cosines of its constant angles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Joint<T> {
     pub(super) kind: JointKind,
     pub(super) sin_alpha: T,
     pub(super) cos_alpha: T,
-    /// Sine of the constant θ; used where prismatic.
+    /// Sine of the constant θ; used if prismatic.
     pub(super) sin_theta: T,
-    /// Cosine of the constant θ; used where prismatic.
+    /// Cosine of the constant θ; used if prismatic.
     pub(super) cos_theta: T,
     pub(super) a: T,
     pub(super) theta: T,
@@ -166,7 +166,7 @@ impl<T: Real> Joint<T> {
         }
     }
 
-    /// Place of frame i in frame i − 1 at joint position `q`.
+    /// Returns the pose of frame i in frame i − 1 at joint position `q`.
     #[inline(always)]
     pub(super) fn transform(&self, q: T) -> Transform<T> {
         let (sin_theta, cos_theta, height) = match self.kind {
@@ -185,7 +185,7 @@ impl<T: Real> Joint<T> {
         }
     }
 
-    /// The motion of link i against link i − 1 at unit joint velocity, in frame i.
+    /// Returns the motion of link i relative to link i − 1 at unit joint velocity, in frame i.
     #[inline(always)]
     pub(super) fn axis(&self) -> Motion<T> {
         let z = Vector3([T::ZERO, T::ZERO, T::ONE]);
@@ -201,7 +201,7 @@ impl<T: Real> Joint<T> {
         }
     }
 
-    /// The part of a wrench in frame i that the drive of joint i has to give.
+    /// Returns the part of a wrench in frame i that the drive of joint i has to give.
     #[inline(always)]
     pub(super) fn project(&self, wrench: Wrench<T>) -> T {
         match self.kind {
@@ -210,7 +210,7 @@ impl<T: Real> Joint<T> {
         }
     }
 
-    /// Velocity of link i in frame i from that of link i − 1 in frame i − 1.
+    /// Returns the velocity of link i in frame i from that of link i − 1 in frame i − 1.
     #[inline(always)]
     pub(super) fn velocity(&self, transform: &Transform<T>, parent: Motion<T>, qd: T) -> Motion<T> {
         let carried = transform.motion_to_child(parent);
@@ -227,12 +227,12 @@ impl<T: Real> Joint<T> {
     }
 }
 
-/// Sine and cosine, with the multiples of a quarter turn exact.
+/// Returns sine and cosine, exact for multiples of a quarter turn.
 ///
-/// The nearest double to π/2 has the cosine 6·10⁻¹⁷. Columns that vanish for parallel and perpendicular axes
-/// would so become tiny instead, and rounding would decide what counts as identifiable.
+/// The nearest double to π/2 has the cosine 6·10⁻¹⁷. Columns that vanish for parallel and perpendicular axes would then
+/// be tiny instead of zero, and rounding would decide which parameters are identifiable.
 fn exact_quarters(angle: f64) -> (f64, f64) {
-    // 16 roundings: a quarter turn written with all digits and divided or summed a few times.
+    // 16 roundings: a quarter turn with all digits, after a few divisions or sums.
     const TOLERANCE: f64 = 16.0 * f64::EPSILON;
     let (sin, cos) = libm::sincos(angle);
     if cos.abs() < TOLERANCE {
@@ -252,14 +252,14 @@ pub struct Chain<T> {
 }
 
 impl<T: Real> Chain<T> {
-    /// Builds the chain from its joints, base first, and the gravitational acceleration in the base frame, m/s²
-    /// (`[0, 0, -9.81]` where z points up).
+    /// Builds the chain from its joints, base first, and the gravitational acceleration in the base frame, m/s² (`[0,
+    /// 0, -9.81]` if z points up).
     ///
-    /// Taken in `f64` whatever `T` is, so that sines and cosines of the constant angles are right to the last
-    /// digit of `T`; angles within rounding of a multiple of a quarter turn count as exactly that.
+    /// The input is `f64` for any `T`, so that sines and cosines of the constant angles are right to the last digit of
+    /// `T`. Angles within rounding of a multiple of a quarter turn count as exactly that.
     ///
     /// # Errors
-    /// [`ChainError`] where there are no joints or more than [`MAX_JOINTS`], or a number is not finite.
+    /// [`ChainError`] if there are no joints or more than [`MAX_JOINTS`], or a number is not finite.
     pub fn new(joints: &[JointGeometry<f64>], gravity: [f64; 3]) -> Result<Self, ChainError> {
         if joints.is_empty() {
             return Err(ChainError::NoJoints);

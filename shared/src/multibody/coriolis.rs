@@ -6,8 +6,8 @@ use super::spatial::{Motion, Wrench};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Matrix C(q, q̇), n × n row-major, by the Christoffel symbols: C(q, q̇)·q̇ are the Coriolis and centrifugal
-/// torques, and Ȧ − 2C is skew-symmetric, which the stability proof of Slotine & Li (1987) rests on.
+/// Computes the matrix C(q, q̇), n × n row-major, by the Christoffel symbols. C(q, q̇)·q̇ are the Coriolis and
+/// centrifugal torques, and Ȧ − 2C is skew-symmetric, as the stability proof of Slotine & Li (1987) requires.
 ///
 /// Built from the links' Jacobians J (body frames): C = Σ Jᵀ·(M·J̇ + B·J) with
 /// 2·B·w = M·(v × w) + v ×* (M·w) + w ×* (M·v), the Levi-Civita connection of the kinetic energy of one free
@@ -51,7 +51,7 @@ fn christoffel<T: Real, const CAPACITY: usize>(
         velocity = joint.velocity(&transform, velocity, qd[i]);
         for (axis, rate) in axes[..i].iter_mut().zip(&mut rates[..i]) {
             *axis = transform.motion_to_child(*axis);
-            // Written in frame i, an axis fixed below moves backwards as joint i moves on.
+            // In frame i, an axis fixed below moves backwards as joint i moves forwards.
             *rate = transform.motion_to_child(*rate).plus(step.cross(*axis));
         }
         axes[i] = joint.axis();

@@ -1,8 +1,8 @@
 //! Energies of a chain and their regressors: the integral (energy) model.
 //!
 //! The integral model needs no acceleration: over any window, ∫ τᵀq̇ dt = H(end) − H(start) + ∫ (fv·q̇² + fc·|q̇| + off·q̇) dt
-//! (Gautier & Khalil 1988; Khalil & Dombre 2002, ch. 12). The regressors here are the rows of H and of the
-//! integrand; the window belongs to the caller.
+//! (Gautier & Khalil 1988; Khalil & Dombre 2002, ch. 12). The regressors here are the rows of H and of the integrand;
+//! the caller chooses the window.
 
 use super::chain::{Chain, MultibodyError, check};
 use super::inverse::LinkMotion;
@@ -11,7 +11,7 @@ use super::regressor::link_columns;
 use super::spatial::{Motion, Vector3};
 use crate::scalar::Real;
 
-/// Row of the kinetic energy, length 14n: T = row·π, drives included as ½·Ia·q̇².
+/// Computes the row of the kinetic energy, length 14n: T = row·π, with ½·Ia·q̇² of the drives.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -30,7 +30,7 @@ pub fn kinetic_energy_regressor<T: Real>(
     Ok(())
 }
 
-/// Row of the potential energy, length 14n: U = row·π, zero for a link at the origin of the base frame.
+/// Computes the row of the potential energy, length 14n: U = row·π, zero for a link at the origin of the base frame.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -46,8 +46,8 @@ pub fn potential_energy_regressor<T: Real>(
     Ok(())
 }
 
-/// Row of the total mechanical energy, length 14n: H(q, q̇) = T + U = row·π. Its friction and offset columns
-/// are 0; [`friction_power_regressor`] gives theirs.
+/// Computes the row of the total mechanical energy, length 14n: H(q, q̇) = T + U = row·π. Its friction and offset
+/// columns are 0; [`friction_power_regressor`] computes them.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -62,9 +62,9 @@ pub fn energy_regressor<T: Real>(
     Ok(())
 }
 
-/// Row of the power that friction and the offsets take, length 14n: fv·q̇² + fc·|q̇| + off·q̇ = row·π, all other
-/// columns 0. Its integral over a window, added to the difference of [`energy_regressor`] at its ends, is a row
-/// of the integral model for y = ∫ τᵀq̇ dt.
+/// Computes the row of the power of friction and offsets, length 14n: fv·q̇² + fc·|q̇| + off·q̇ = row·π, all other
+/// columns 0. Its integral over a window plus the difference of [`energy_regressor`] at its ends is a row of the
+/// integral model for y = ∫ τᵀq̇ dt.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -84,9 +84,9 @@ pub fn friction_power_regressor<T: Real>(
     Ok(())
 }
 
-/// Row of the power of the torques, length 14n: q̇ᵀτ = row·π, the power model (Gautier 1997): the rate of the energy, and what
-/// friction and the offsets take. It is q̇ᵀ·Y of [`super::differential_regressor`], made in O(n): every wrench of a link
-/// meets the link's own velocity.
+/// Computes the row of the power of the torques, length 14n: q̇ᵀτ = row·π, the power model (Gautier 1997). It is the
+/// rate of the energy plus the power of friction and offsets. It equals q̇ᵀ·Y of [`super::differential_regressor`] but
+/// costs O(n): every wrench of a link acts on the link's own velocity.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -122,7 +122,7 @@ pub fn power_regressor<T: Real>(
     Ok(())
 }
 
-/// Kinetic energy in J, drives included.
+/// Returns the kinetic energy in J, drives included.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -147,7 +147,7 @@ pub fn kinetic_energy<T: Real>(
     Ok(T::from_f64(0.5) * twice)
 }
 
-/// Potential energy in J, zero for a link at the origin of the base frame.
+/// Returns the potential energy in J, zero for a link at the origin of the base frame.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -169,7 +169,7 @@ pub fn potential_energy<T: Real>(
     Ok(energy)
 }
 
-/// Gravity as a link sees it.
+/// Gravity in a link's frame.
 struct GravityField<T> {
     /// Gravity in the link's frame.
     gravity: Vector3<T>,
@@ -195,7 +195,7 @@ impl<T: Real> GravityField<T> {
     }
 }
 
-/// Adds the row of the kinetic energy; lengths are checked by the callers.
+/// Adds the row of the kinetic energy; the callers check lengths.
 fn add_kinetic<T: Real>(chain: &Chain<T>, q: &[T], qd: &[T], out: &mut [T]) {
     let half = T::from_f64(0.5);
     let mut velocity = Motion::ZERO;
@@ -223,7 +223,7 @@ fn add_kinetic<T: Real>(chain: &Chain<T>, q: &[T], qd: &[T], out: &mut [T]) {
     }
 }
 
-/// Adds the row of the potential energy; lengths are checked by the callers.
+/// Adds the row of the potential energy; the callers check lengths.
 fn add_potential<T: Real>(chain: &Chain<T>, q: &[T], out: &mut [T]) {
     let mut field = GravityField::base(chain);
     for (i, joint) in chain.joints.iter().enumerate() {

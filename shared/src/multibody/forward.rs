@@ -7,14 +7,14 @@ use super::parameters::COLUMNS;
 use super::with_capacity;
 use crate::scalar::{Mask, Real};
 
-/// Accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix from the
-/// composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2). The factorisation
-/// says when A is not positive definite, which identified parameters need not give; O(n³), with n at most [`MAX_JOINTS`].
-/// [`super::articulated_forward_dynamics`] gives the same in O(n).
+/// Computes the accelerations q̈ (length n) under the torques `tau`: A(q)·q̈ = τ − bias(q, q̇), with the inertia matrix
+/// of the composite-rigid-body algorithm and a Cholesky factorisation (Featherstone 2008, sec. 6.2). The factorisation
+/// detects an A that is not positive definite, as identified parameters may give. O(n³), with n at most [`MAX_JOINTS`].
+/// [`super::articulated_forward_dynamics`] computes the same in O(n).
 ///
 /// # Errors
-/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`], also where a number is NaN. `qdd` is
-/// then untouched.
+/// [`MultibodyError::WrongLength`]; [`MultibodyError::NotPositiveDefinite`], also if a number is NaN. `qdd` is then
+/// untouched.
 pub fn forward_dynamics<T: Real>(
     chain: &Chain<T>,
     parameters: &[[T; COLUMNS]],
@@ -45,7 +45,7 @@ fn accelerate<T: Real, const CAPACITY: usize>(
     x: &mut [T],
 ) -> Result<(), MultibodyError> {
     let n = chain.joint_count();
-    // A square of constant generics is not expressible; the rows of a CAPACITY × CAPACITY array are.
+    // A square with constant generics is not expressible; the rows of a CAPACITY × CAPACITY array are.
     let mut square = [[T::ZERO; CAPACITY]; CAPACITY];
     let matrix = square.as_flattened_mut();
     let matrix = &mut matrix[..n * n];

@@ -6,7 +6,7 @@ use super::spatial::{Inertia, Transform};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Inertia matrix A(q), n × n row-major and symmetric, the drive inertias Ia on its diagonal included:
+/// Computes the inertia matrix A(q), n × n row-major and symmetric, with the drive inertias Ia on its diagonal:
 /// composite-rigid-body algorithm (Walker & Orin 1982; Featherstone 2008, table 6.2).
 ///
 /// # Errors
@@ -37,7 +37,7 @@ fn composite_bodies<T: Real, const CAPACITY: usize>(
     for (i, joint) in chain.joints.iter().enumerate() {
         transforms[i] = joint.transform(q[i]);
     }
-    // The links from i outwards, as one body in frame i.
+    // The links from i outwards as one body, in frame i.
     let mut carried: Option<Inertia<T>> = None;
     for (i, joint) in chain.joints.iter().enumerate().rev() {
         let own = inertia(&parameters[i]);

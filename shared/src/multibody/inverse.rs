@@ -6,19 +6,19 @@ use super::spatial::{Motion, Transform, Vector3, Wrench};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Velocity and acceleration of a link, in its frame, while a recursion walks outwards.
+/// Velocity and acceleration of a link, in its frame, during an outward recursion.
 #[derive(Clone, Copy)]
 pub(super) struct LinkMotion<T> {
     /// Angular velocity.
     pub(super) velocity: Vector3<T>,
     /// Angular acceleration.
     pub(super) acceleration: Vector3<T>,
-    /// Acceleration of the origin, less gravity: what an accelerometer there would show.
+    /// Acceleration of the origin minus gravity: the reading of an accelerometer there.
     pub(super) proper: Vector3<T>,
 }
 
 impl<T: Real> LinkMotion<T> {
-    /// The base at rest: gravity enters as an upward acceleration (Luh, Walker & Paul 1980).
+    /// Returns the base at rest: gravity enters as an upward acceleration (Luh, Walker & Paul 1980).
     #[inline(always)]
     pub(super) fn base(gravity: Vector3<T>) -> Self {
         Self {
@@ -28,7 +28,7 @@ impl<T: Real> LinkMotion<T> {
         }
     }
 
-    /// The next link outwards (Luh, Walker & Paul 1980; Khalil & Dombre 2002, ch. 9).
+    /// Returns the motion of the next link outwards (Luh, Walker & Paul 1980; Khalil & Dombre 2002, ch. 9).
     #[inline(always)]
     pub(super) fn next(&self, joint: &Joint<T>, transform: &Transform<T>, qd: T, qdd: T) -> Self {
         let velocity = transform.direction_to_child(self.velocity);
@@ -53,11 +53,10 @@ impl<T: Real> LinkMotion<T> {
     }
 }
 
-/// Torques τ (length n) that move the chain by `q`, `qd`, `qdd` (length n each): recursive Newton–Euler
+/// Computes the torques τ (length n) that move the chain by `q`, `qd`, `qdd` (length n each): recursive Newton–Euler
 /// (Luh, Walker & Paul 1980; Featherstone 2008, table 5.1), plus the drive inertias, friction and offsets.
 ///
-/// `parameters` holds one row of [`COLUMNS`] a joint, in the order of [`super::COLUMN_NAMES`].
-/// Takes O(n) operations.
+/// `parameters` holds one row of [`COLUMNS`] per joint, in the order of [`super::COLUMN_NAMES`]. Takes O(n) operations.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -85,7 +84,7 @@ pub fn inverse_dynamics<T: Real>(
     Ok(())
 }
 
-/// Torques that hold the links still against gravity at `q`: g(q), without drives, friction and offsets.
+/// Computes the torques that hold the links against gravity at `q`: g(q), without drives, friction and offsets.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -105,7 +104,7 @@ pub fn gravity_vector<T: Real>(
     Ok(())
 }
 
-/// Torques at q̈ = 0: C(q, q̇)·q̇ + g(q) + fv·q̇ + fc·sgn q̇ + off, so that (A + Ia)·q̈ = τ − bias.
+/// Computes the torques at q̈ = 0: C(q, q̇)·q̇ + g(q) + fv·q̇ + fc·sgn q̇ + off, so that (A + Ia)·q̈ = τ − bias.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -122,7 +121,7 @@ pub fn bias_torque<T: Real>(
     inverse_dynamics(chain, parameters, q, qd, &still[..n], bias)
 }
 
-/// The part of the links alone. All slices have the chain's length, which is at most `CAPACITY`.
+/// The part of the links only. All slices have the chain's length, which is at most `CAPACITY`.
 fn newton_euler<T: Real, const CAPACITY: usize>(
     chain: &Chain<T>,
     parameters: &[[T; COLUMNS]],
@@ -138,7 +137,7 @@ fn newton_euler<T: Real, const CAPACITY: usize>(
         let transform = joint.transform(q[i]);
         motion = motion.next(joint, &transform, qd[i], qdd[i]);
         let body = inertia(&parameters[i]);
-        // Newton and Euler about the frame's origin; the gyroscopic part is that of a body turning about it.
+        // Newton and Euler about the frame's origin; the gyroscopic part is that of a body that turns about the origin.
         let inertial = body.times(Motion {
             angular: motion.acceleration,
             linear: motion.proper,

@@ -1,13 +1,13 @@
-//! Where a point of a link is, and how it moves with the joints.
+//! Position of a point of a link, and its derivatives by the joint positions.
 
 use super::chain::{Chain, JointKind, MultibodyError, check};
 use super::spatial::Vector3;
 use crate::scalar::Real;
 
-/// Position of a point of link `link` (from 0) in the base frame, m, and its derivatives by the joint positions.
+/// Computes the position of a point of link `link` (from 0) in the base frame, m, and its joint-position derivatives.
 ///
-/// `point` is given in frame `link`, which moves with it. `jacobian` has length n: entry j is the derivative of the
-/// position by q of joint j (Khalil & Dombre 2002, eq. 5.9), zero for the joints beyond the link.
+/// `point` is fixed in frame `link`. `jacobian` has length n: entry j is the derivative of the position by q of joint j
+/// (Khalil & Dombre 2002, eq. 5.9), zero for the joints beyond the link.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`], also for a `link` that the chain does not have.
@@ -30,7 +30,7 @@ pub fn point_position<T: Real>(
     }
     jacobian.fill([T::ZERO; 3]);
     let mut place = Vector3(point);
-    // Inwards: what is known in frame i is written in frame i − 1.
+    // Inwards: values in frame i are transformed to frame i − 1.
     for i in (0..=link).rev() {
         let joint = &chain.joints[i];
         let transform = joint.transform(q[i]);
@@ -92,7 +92,7 @@ mod tests {
             let point = [0.1, -0.2, 0.3];
             let mut jacobian = vec![[f64::NAN; 3]; n];
             let p = point_position(&s.chain(), &s.q, link, point, &mut jacobian).unwrap();
-            // A mass of 1 kg there, under gravity along each axis in turn.
+            // A mass of 1 kg at the point, under gravity along each axis in turn.
             let mut mass = vec![[0.0; crate::multibody::COLUMNS]; n];
             mass[link][..4].copy_from_slice(&[1.0, point[0], point[1], point[2]]);
             for axis in 0..3 {

@@ -1,6 +1,6 @@
-//! The recursions against Lagrange's equations, derived anew: energies from 4×4 homogeneous transforms and
-//! pseudo-inertia matrices (Uicker 1965), differentiated exactly by numbers with two infinitesimal parts.
-//! Nothing of the module under test is used but the order of the parameters.
+//! Tests of the recursions against Lagrange's equations, derived independently: energies from 4×4 homogeneous
+//! transforms and pseudo-inertia matrices (Uicker 1965), with exact derivatives by numbers with two infinitesimal
+//! parts. Of the tested module only the order of the parameters is used.
 #![allow(clippy::unwrap_used)]
 
 use core::ops::{Add, Mul, Neg, Sub};
@@ -29,7 +29,7 @@ const fn real(x: f64) -> HyperDual {
 }
 
 impl HyperDual {
-    /// A function of it, from the function's value and first two derivatives.
+    /// Returns a function of the number, from the function's value and first two derivatives.
     fn chain(self, f: f64, df: f64, ddf: f64) -> Self {
         Self {
             x: f,
@@ -138,7 +138,7 @@ fn shift(axis: usize, by: HyperDual) -> Matrix {
     m
 }
 
-/// Kinetic and potential energy of links and drives.
+/// Returns kinetic and potential energy of links and drives.
 fn energies(sample: &Sample, q: &[HyperDual], qd: &[HyperDual]) -> (HyperDual, HyperDual) {
     let (mut kinetic, mut potential) = (real(0.0), real(0.0));
     let (mut place, mut rate) = (identity(), NOTHING);
@@ -184,7 +184,7 @@ fn energies(sample: &Sample, q: &[HyperDual], qd: &[HyperDual]) -> (HyperDual, H
     (kinetic, potential)
 }
 
-/// d/dt ∂L/∂q̇ₖ − ∂L/∂qₖ plus friction and offset, for every joint.
+/// Returns d/dt ∂L/∂q̇ₖ − ∂L/∂qₖ plus friction and offset for every joint.
 fn torques(sample: &Sample) -> Vec<f64> {
     let n = sample.n();
     (0..n)

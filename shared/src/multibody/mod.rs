@@ -10,14 +10,14 @@
 //! All quantities are SI and joint-side; an entry that belongs to a prismatic joint is in metres and newtons
 //! where that of a revolute joint is in radians and newton metres. Matrices are row-major slices.
 //!
-//! Every function checks the lengths of its slices and answers [`MultibodyError::WrongLength`] where one is
-//! wrong; outputs are then untouched. No function allocates, and none branches on a value of `T` save
-//! [`forward_dynamics`] and [`articulated_forward_dynamics`], which stop where some lane's inertia is not positive.
-//! [`block`] holds the functions that recordings ask for again, over blocks of samples.
+//! Every function checks the lengths of its slices and returns [`MultibodyError::WrongLength`] if one is wrong; outputs
+//! are then untouched. No function allocates. None branches on a value of `T`, except [`forward_dynamics`] and
+//! [`articulated_forward_dynamics`], which stop if some lane's inertia is not positive. [`block`] holds the functions
+//! that recordings use repeatedly, for blocks of samples.
 //!
-//! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of
-//! the rotors (their inertia acts along its own joint only), external forces on the links, and every friction
-//! beyond Coulomb and viscous; at q̇ = 0 Coulomb friction is 0 and not the set of torques that hold the joint.
+//! Leaves out: elasticity of links and joints, closed loops, coupling between drives, the gyroscopic torque of the
+//! rotors (their inertia acts only along its own joint), external forces on the links, and friction other than Coulomb
+//! and viscous. At q̇ = 0 Coulomb friction is 0 instead of the set of torques that hold the joint.
 
 mod adjoint;
 mod articulated;
@@ -63,8 +63,8 @@ pub use momentum::{momentum_loss_regressor, momentum_regressor};
 pub use parameters::{COLUMN_NAMES, COLUMNS, column};
 pub use regressor::differential_regressor;
 
-/// Calls a kernel with the smallest of a few fixed capacities that holds the chain: one joint must not pay for
-/// buffers of sixteen, and one copy of the code for each length would not fit the microcontroller.
+/// Calls a kernel with the smallest of a few fixed capacities that holds the chain. One joint must not pay for buffers
+/// of sixteen, and one copy of the code for each length would not fit into the microcontroller.
 macro_rules! with_capacity {
     ($n:expr, $kernel:ident($($argument:expr),* $(,)?)) => {
         match $n {

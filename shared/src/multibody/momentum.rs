@@ -1,12 +1,12 @@
-//! The differential model without acceleration: momentum and what changes it.
+//! The differential model without acceleration: momentum and its rate.
 //!
-//! Lagrange's equations read d/dt (A(q)·q̇) = τ + ∂T/∂q − g(q) − friction. Both momentum and the rest are linear in the parameters, so
+//! Lagrange's equations are d/dt (A(q)·q̇) = τ + ∂T/∂q − g(q) − friction. All terms are linear in the parameters, so
 //!
 //! τ = d/dt (P(q, q̇))·π + R(q, q̇)·π
 //!
-//! and any low-pass F(s) on both sides leaves F(τ) = (s·F(P) + F(R))·π, where s·F is what the filter's own state gives: a regressor of
-//! the differential model that needs no q̈ (Hsu, Bodson, Sastry & Paden 1987; Slotine & Li 1991, sec. 9.2). The filter
-//! belongs to the caller; it must be the same for torque, P and R.
+//! Any low-pass F(s) on both sides gives F(τ) = (s·F(P) + F(R))·π, and the filter's state gives s·F. This is a
+//! regressor of the differential model without q̈ (Hsu, Bodson, Sastry & Paden 1987; Slotine & Li 1991, sec. 9.2). The
+//! caller has the filter, which must be the same for torque, P and R.
 
 use super::chain::{Chain, MultibodyError, check};
 use super::inverse::LinkMotion;
@@ -16,7 +16,7 @@ use super::spatial::{Motion, Vector3};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Regressor P of the momentum, A(q)·q̇ = P·π with the drives' Ia·q̇, n × 14n row-major like
+/// Computes the regressor P of the momentum, A(q)·q̇ = P·π with the drives' Ia·q̇, n × 14n row-major like
 /// [`super::differential_regressor`]; its friction and offset columns are 0.
 ///
 /// # Errors
@@ -35,8 +35,8 @@ pub fn momentum_regressor<T: Real>(
     Ok(())
 }
 
-/// Regressor R of what the torque does beside changing the momentum: g(q) − ∂T/∂q + fv·q̇ + fc·sgn q̇ + off = R·π,
-/// n × 14n row-major.
+/// Computes the regressor R of the torque that does not change the momentum: g(q) − ∂T/∂q + fv·q̇ + fc·sgn q̇ + off =
+/// R·π, n × 14n row-major.
 ///
 /// # Errors
 /// [`MultibodyError::WrongLength`].
@@ -63,7 +63,7 @@ fn momentum<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T],
     for (i, joint) in chain.joints.iter().enumerate() {
         let transform = joint.transform(q[i]);
         velocity = joint.velocity(&transform, velocity, qd[i]);
-        // The momentum is the inertial wrench of starting from rest with the velocity as acceleration.
+        // The momentum is the inertial wrench of a start from rest with the velocity as acceleration.
         let start = LinkMotion {
             velocity: Vector3::ZERO,
             acceleration: velocity.angular,
@@ -85,7 +85,7 @@ fn momentum<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T],
 fn loss<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T], out: &mut [T]) {
     let width = chain.parameter_count();
     let mut axes = [Motion::ZERO; CAPACITY];
-    // Velocity of the link before joint j, carried along like the axes.
+    // Velocity of the link before joint j, transformed like the axes.
     let mut before = [Motion::ZERO; CAPACITY];
     let mut velocity = Motion::ZERO;
     let mut gravity = chain.gravity;
@@ -109,7 +109,8 @@ fn loss<T: Real, const CAPACITY: usize>(chain: &Chain<T>, q: &[T], qd: &[T], out
             let at = j * width + i * COLUMNS;
             let block = &mut out[at..at + COLUMNS];
             link_columns(&rest, &axes[j], block);
-            // Seen from link i, moving joint j turns back what the joints before j do: ∂v/∂q_j = v_before × s_j.
+            // Seen from link i, a motion of joint j reverses the motion of the joints before j: ∂v/∂q_j = v_before ×
+            // s_j.
             let slope = before[j].cross(axes[j]);
             let Vector3([hx, hy, hz]) =
                 slope.linear.cross(velocity.angular) + velocity.linear.cross(slope.angular);

@@ -1,13 +1,13 @@
-//! The parameters of a joint and of the link it carries.
+//! The parameters of a joint and of its link.
 
 use super::spatial::{Inertia, Symmetric3, Vector3};
 use crate::scalar::Real;
 
-/// Number of parameters of a joint, and so of regressor columns it adds.
+/// Number of parameters, and so of regressor columns, of a joint.
 pub const COLUMNS: usize = 14;
 
-/// Names of the parameters, in the order of every vector of them; the joint's number (from 1) is appended
-/// where several joints are listed.
+/// Names of the parameters in the order of every parameter vector. The joint's number (from 1) is appended if several
+/// joints are listed.
 ///
 /// | name | meaning | unit |
 /// | --- | --- | --- |
@@ -22,7 +22,7 @@ pub const COLUMN_NAMES: [&str; COLUMNS] = [
     "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "Ia", "fv", "fc", "off",
 ];
 
-/// Places of the parameters within the [`COLUMNS`] of a joint.
+/// Indices of the parameters within the [`COLUMNS`] of a joint.
 pub mod column {
     /// Mass.
     pub const MASS: usize = 0;

@@ -7,8 +7,8 @@ use super::spatial::{Motion, Vector3};
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Regressor Y of the differential model (Atkeson, An & Hollerbach 1986; Khalil & Dombre 2002, ch. 12),
-/// gravity included, so that τ = Y·π with π the parameters of all joints one after the other.
+/// Computes the regressor Y of the differential model (Atkeson, An & Hollerbach 1986; Khalil & Dombre 2002, ch. 12),
+/// with gravity, so that τ = Y·π. π holds the parameters of all joints one after the other.
 ///
 /// `q`, `qd`, `qdd` have length n; `out` is n × 14n, row-major: entry (j, 14·i + k) multiplies parameter k of
 /// joint i in the torque of joint j. It is 0 for j > i: a link does not load the joints beyond it.
@@ -31,8 +31,8 @@ pub fn differential_regressor<T: Real>(
     Ok(())
 }
 
-/// One pass outwards. The axes of the joints below are carried along in the frame of the current link, two
-/// vectors each; the other way round, ten wrenches a link would have to be carried inwards to every joint.
+/// One pass outwards, which transforms the axes of the joints below to the frame of the current link, two vectors each.
+/// A pass inwards would have to transform ten wrenches of each link to every joint.
 fn regressor<T: Real, const CAPACITY: usize>(
     chain: &Chain<T>,
     q: &[T],
@@ -63,7 +63,7 @@ fn regressor<T: Real, const CAPACITY: usize>(
     }
 }
 
-/// Power of each of the ten unit wrenches of a link along one joint axis written in the link's frame.
+/// Computes the power of each of the ten unit wrenches of a link along a joint axis in the link's frame.
 #[inline(always)]
 pub(super) fn link_columns<T: Real>(motion: &LinkMotion<T>, axis: &Motion<T>, block: &mut [T]) {
     let (spin, turning, proper) = (motion.velocity, motion.acceleration, motion.proper);

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 
 use super::{COLUMNS, Chain, JointGeometry, JointKind, column};
 
-/// A chain at some moment of its motion.
+/// A chain in a state of motion.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
     pub(super) geometry: Vec<JointGeometry<f64>>,
@@ -20,7 +20,7 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// A random chain of `n` joints; every link is a set of eight mass points, so a body that exists.
+    /// Returns a random chain of `n` joints. Every link is a set of eight mass points, so it is a real body.
     pub(super) fn random(n: usize, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ n as u64);
         let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
@@ -31,7 +31,7 @@ impl Sample {
                 } else {
                     JointKind::Prismatic
                 },
-                // Every third twist is a quarter turn, as on robots that are built.
+                // Every third twist is a quarter turn, as on real robots.
                 alpha: match uniform(0.0, 3.0) {
                     x if x < 1.0 => core::f64::consts::FRAC_PI_2 * (4.0 * x - 2.0).round(),
                     x => x - 2.0,
@@ -82,7 +82,7 @@ impl Sample {
         }
     }
 
-    /// Chains of 1 to 8 joints, `each` of every length.
+    /// Returns chains of 1 to 8 joints, `each` of every length.
     pub(super) fn many(each: u64) -> impl Iterator<Item = Self> {
         (1..=8).flat_map(move |n| (0..each).map(move |seed| Self::random(n, seed)))
     }
@@ -95,7 +95,7 @@ impl Sample {
         Chain::new(&self.geometry, self.gravity).unwrap()
     }
 
-    /// The same without drive inertia, friction and offsets.
+    /// Returns the same without drive inertia, friction and offsets.
     pub(super) fn links_only(&self) -> Self {
         let mut bare = self.clone();
         for row in &mut bare.parameters {
@@ -105,11 +105,11 @@ impl Sample {
     }
 }
 
-/// Largest difference of two vectors, over the larger of 1 and the largest entry.
+/// Returns the largest difference of two vectors over the larger of 1 and the largest entry.
 pub(super) fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let scale = a.iter().chain(b).fold(1.0, |m: f64, x| m.max(x.abs()));
-    // A NaN must not get lost in `max`.
+    // `max` would lose a NaN.
     a.iter().zip(b).fold(0.0, |m: f64, (x, y)| {
         let difference = (x - y).abs() / scale;
         if difference <= m { m } else { difference }

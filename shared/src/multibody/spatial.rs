@@ -1,7 +1,7 @@
-//! Vectors of space, motions, wrenches and inertias, as the recursions over a chain need them.
+//! Space vectors, motions, wrenches and inertias for the recursions over a chain.
 //!
-//! Motions and wrenches are taken at the origin of the frame they are written in (Featherstone 2008, ch. 2),
-//! but kept as pairs of three-vectors: the structure of a 6×6 transform is then never multiplied out.
+//! Motions and wrenches refer to the origin of their frame (Featherstone 2008, ch. 2). They are pairs of three-vectors,
+//! so that no 6×6 transform is multiplied out.
 
 use core::ops::{Add, AddAssign, Neg, Sub};
 
@@ -26,7 +26,7 @@ impl<T: Real> Vector3<T> {
         Self([y * c - z * b, z * a - x * c, x * b - y * a])
     }
 
-    /// self × (0, 0, `height`), without the products with 0.
+    /// Returns self × (0, 0, `height`), without the products with 0.
     #[inline(always)]
     pub(super) fn cross_z(self, height: T) -> Self {
         let [x, y, _] = self.0;
@@ -45,7 +45,7 @@ impl<T: Real> Vector3<T> {
         z
     }
 
-    /// The same vector with `height` added along z.
+    /// Returns the vector with `height` added along z.
     #[inline(always)]
     pub(super) fn plus_z(self, height: T) -> Self {
         let [x, y, z] = self.0;
@@ -108,7 +108,7 @@ impl<T: Real> Symmetric3<T> {
         zz: T::ZERO,
     };
 
-    /// Its rows, which are its columns too.
+    /// Returns its rows, which equal its columns.
     #[inline(always)]
     pub(super) fn rows(self) -> [Vector3<T>; 3] {
         [
@@ -118,7 +118,7 @@ impl<T: Real> Symmetric3<T> {
         ]
     }
 
-    /// Less a·bᵀ, where that is symmetric.
+    /// Returns the matrix minus a·bᵀ, which must be symmetric.
     #[inline(always)]
     pub(super) fn minus_outer(self, a: Vector3<T>, b: Vector3<T>) -> Self {
         let ([ax, ay, az], [bx, by, bz]) = (a.0, b.0);
@@ -153,7 +153,7 @@ impl<T: Real> Symmetric3<T> {
         }
     }
 
-    /// 2(a·b)·1 − (a·bᵀ + b·aᵀ): what the mixed term of the parallel-axis theorem adds.
+    /// Returns 2(a·b)·1 − (a·bᵀ + b·aᵀ): the mixed term of the parallel-axis theorem.
     #[inline(always)]
     fn mixed(a: Vector3<T>, b: Vector3<T>) -> Self {
         let ([ax, ay, az], [bx, by, bz]) = (a.0, b.0);
@@ -169,7 +169,7 @@ impl<T: Real> Symmetric3<T> {
     }
 }
 
-/// Velocity or acceleration of a rigid body: of rotation, and of the body's point at the frame's origin.
+/// Velocity or acceleration of a rigid body: rotation, and motion of the body's point at the frame's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion<T> {
     pub(super) angular: Vector3<T>,
@@ -198,7 +198,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// self × other, the derivative of a motion fixed in a frame that moves with `self` (Featherstone 2008, eq. 2.31).
+    /// Returns self × other: the rate of a motion fixed in a frame that moves with `self` (Featherstone 2008, eq. 2.31).
     #[inline(always)]
     pub(super) fn cross(self, other: Self) -> Self {
         Self {
@@ -207,7 +207,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// self ×* wrench, the same for a wrench or momentum (Featherstone 2008, eq. 2.32).
+    /// Returns self ×* wrench: the same for a wrench or momentum (Featherstone 2008, eq. 2.32).
     #[inline(always)]
     pub(super) fn cross_wrench(self, wrench: Wrench<T>) -> Wrench<T> {
         Wrench {
@@ -216,7 +216,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// Power of a wrench along this motion.
+    /// Returns the power of a wrench along this motion.
     #[inline(always)]
     pub(super) fn dot(self, wrench: Wrench<T>) -> T {
         self.angular.dot(wrench.moment) + self.linear.dot(wrench.force)
@@ -271,7 +271,7 @@ impl<T: Real> Inertia<T> {
         }
     }
 
-    /// Momentum of the body at a velocity (or the inertial wrench at an acceleration from rest).
+    /// Returns the momentum of the body at a velocity (or the inertial wrench at an acceleration from rest).
     #[inline(always)]
     pub(super) fn times(self, motion: Motion<T>) -> Wrench<T> {
         Wrench {
@@ -281,9 +281,9 @@ impl<T: Real> Inertia<T> {
     }
 }
 
-/// Where frame i lies in frame i − 1 at some joint position.
+/// Pose of frame i in frame i − 1 at some joint position.
 ///
-/// The rotation is RotX(α)·RotZ(θ); the two factors are applied one after the other, eight products instead of nine.
+/// The rotation is RotX(α)·RotZ(θ). The two factors are applied one after the other: eight products instead of nine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transform<T> {
     pub(super) sin_alpha: T,
@@ -295,7 +295,7 @@ pub(super) struct Transform<T> {
 }
 
 impl<T: Real> Transform<T> {
-    /// The transform that changes nothing.
+    /// The identity transform.
     pub(super) const IDENTITY: Self = Self {
         sin_alpha: T::ZERO,
         cos_alpha: T::ONE,
@@ -304,7 +304,7 @@ impl<T: Real> Transform<T> {
         origin: Vector3::ZERO,
     };
 
-    /// A direction of frame i − 1, written in frame i.
+    /// Transforms a direction from frame i − 1 to frame i.
     #[inline(always)]
     pub(super) fn direction_to_child(&self, v: Vector3<T>) -> Vector3<T> {
         let [x, y, z] = v.0;
@@ -316,7 +316,7 @@ impl<T: Real> Transform<T> {
         ])
     }
 
-    /// A direction of frame i, written in frame i − 1.
+    /// Transforms a direction from frame i to frame i − 1.
     #[inline(always)]
     pub(super) fn direction_to_parent(&self, v: Vector3<T>) -> Vector3<T> {
         let [x, y, z] = v.0;
@@ -328,7 +328,7 @@ impl<T: Real> Transform<T> {
         ])
     }
 
-    /// A motion of frame i − 1, at the origin of frame i and written in it.
+    /// Transforms a motion of frame i − 1 to the origin and the axes of frame i.
     #[inline(always)]
     pub(super) fn motion_to_child(&self, motion: Motion<T>) -> Motion<T> {
         Motion {
@@ -337,7 +337,7 @@ impl<T: Real> Transform<T> {
         }
     }
 
-    /// A wrench of frame i, about the origin of frame i − 1 and written in it.
+    /// Transforms a wrench of frame i to the origin and the axes of frame i − 1.
     #[inline(always)]
     pub(super) fn wrench_to_parent(&self, wrench: Wrench<T>) -> Wrench<T> {
         let force = self.direction_to_parent(wrench.force);
@@ -347,10 +347,10 @@ impl<T: Real> Transform<T> {
         }
     }
 
-    /// A symmetric tensor of frame i, written in frame i − 1.
+    /// Transforms a symmetric tensor from frame i to frame i − 1.
     #[inline(always)]
     pub(super) fn symmetric_to_parent(&self, s: Symmetric3<T>) -> Symmetric3<T> {
-        // R·S·Rᵀ: the rows of S are turned, then the columns of what came out.
+        // R·S·Rᵀ: rotates the rows of S, then the columns of the result.
         let [x, y, z] = s.rows().map(|row| self.direction_to_parent(row));
         let ([ax, bx, cx], [ay, by, cy], [az, bz, cz]) = (x.0, y.0, z.0);
         let Vector3([xx, _, _]) = self.direction_to_parent(Vector3([ax, ay, az]));
@@ -366,7 +366,7 @@ impl<T: Real> Transform<T> {
         }
     }
 
-    /// An inertia of frame i, about the origin of frame i − 1 and written in it.
+    /// Transforms an inertia of frame i to the origin and the axes of frame i − 1.
     #[inline(always)]
     pub(super) fn inertia_to_parent(&self, body: Inertia<T>) -> Inertia<T> {
         let rotated = self.symmetric_to_parent(body.inertia);

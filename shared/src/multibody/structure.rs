@@ -1,5 +1,5 @@
-//! Properties that the equations of motion have whatever the chain: symmetry, definiteness, passivity, energy
-//! balance, and agreement of the functions with one another and between precisions.
+//! Tests of general properties of the equations of motion: symmetry, definiteness, passivity, energy balance, and
+//! agreement of the functions with one another and between precisions.
 #![allow(clippy::unwrap_used)]
 
 use std::vec;
@@ -36,7 +36,7 @@ fn times(matrix: &[f64], x: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Derivative of a vector function at 0 by central differences of sixth order; truncation and rounding are
+/// Returns the derivative of a vector function at 0 by central differences of sixth order. Truncation and rounding are
 /// both near 1e-11 of the function at this step for signals of a few rad/s.
 fn derivative(f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     let h = 2e-3;
@@ -50,7 +50,7 @@ fn derivative(f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     total
 }
 
-/// A chain of dual numbers with its parameters.
+/// Returns a chain of dual numbers with its parameters.
 fn dual(s: &Sample) -> (Chain<Dual<f64, 1>>, Vec<[Dual<f64, 1>; COLUMNS]>) {
     let parameters = s.parameters.iter().map(|row| row.map(Dual::constant));
     (
@@ -59,7 +59,7 @@ fn dual(s: &Sample) -> (Chain<Dual<f64, 1>>, Vec<[Dual<f64, 1>; COLUMNS]>) {
     )
 }
 
-/// Values with their derivatives in one direction.
+/// Returns values with their derivatives in one direction.
 fn with_slope(values: &[f64], slope: &[f64]) -> Vec<Dual<f64, 1>> {
     let pairs = values.iter().zip(slope);
     pairs
@@ -70,7 +70,7 @@ fn with_slope(values: &[f64], slope: &[f64]) -> Vec<Dual<f64, 1>> {
         .collect()
 }
 
-/// Exact derivatives of the inertia matrix: by every joint's position, and by time.
+/// Returns exact derivatives of the inertia matrix: by every joint's position, and by time.
 fn slopes(s: &Sample) -> (Vec<Vec<f64>>, Vec<f64>) {
     let (chain, parameters) = dual(s);
     let n = s.n();
@@ -89,7 +89,7 @@ fn slopes(s: &Sample) -> (Vec<Vec<f64>>, Vec<f64>) {
     (by_joint, along(&s.qd))
 }
 
-/// Exact rate of a function of q and q̇ along the motion.
+/// Returns the exact rate of a function of q and q̇ along the motion.
 fn along_motion(
     s: &Sample,
     f: impl Fn(&Chain<Dual<f64, 1>>, &[Dual<f64, 1>], &[Dual<f64, 1>], &mut [Dual<f64, 1>]),
@@ -118,7 +118,7 @@ proptest! {
         let n = s.n();
         let mut y = vec![f64::NAN; n * n * COLUMNS];
         differential_regressor(&s.chain(), &s.q, &s.qd, &s.qdd, &mut y).unwrap();
-        // Any vector of numbers will do here, bodies that cannot exist included.
+        // Any numbers serve here, even those of no real body.
         let mut odd = s.clone();
         for (k, row) in odd.parameters.iter_mut().enumerate() {
             for (c, value) in row.iter_mut().enumerate() {
@@ -156,7 +156,7 @@ proptest! {
                 prop_assert_eq!(a[j * n + k], a[k * n + j]);
             }
         }
-        // xᵀ·A·x is twice the kinetic energy, computed by another recursion; positive for x ≠ 0.
+        // xᵀ·A·x is twice the kinetic energy, which another recursion computes; positive for x ≠ 0.
         let quadratic: f64 = times(&a, &s.qd).iter().zip(&s.qd).map(|(p, x)| p * x).sum();
         let energy = kinetic_energy(&s.chain(), &s.parameters, &s.q, &s.qd).unwrap();
         prop_assert!(energy > 0.0);
@@ -266,7 +266,7 @@ proptest! {
 
     #[test]
     fn velocity_coefficients_are_the_derivatives_of_the_inertia_matrix(s in sample()) {
-        // The element formulas, with exact derivatives of A by dual numbers, one direction a joint.
+        // The formulas of the entries, with exact derivatives of A by dual numbers, one direction per joint.
         let n = s.n();
         let (slope, _) = slopes(&s);
         let pairs = n * (n - 1) / 2;
@@ -285,7 +285,7 @@ proptest! {
         }
         prop_assert!(relative_difference(&b, &expected_b) < 1e-12);
         prop_assert!(relative_difference(&c, &expected_c) < 1e-12);
-        // And they make the torque of the Coriolis matrix.
+        // The coefficients give the torque of the Coriolis matrix.
         let products: Vec<f64> = (0..n)
             .flat_map(|j| (j + 1..n).map(move |k| (j, k)))
             .map(|(j, k)| s.qd[j] * s.qd[k])
@@ -327,7 +327,7 @@ proptest! {
             .map(|c| (0..s.n()).map(|j| s.qd[j] * y[j * width + c]).sum())
             .collect();
         prop_assert!(relative_difference(&row, &expected) < 1e-13);
-        // The exact rate of the energy's row, by dual numbers, and the friction's.
+        // The exact rate of the energy's row, by dual numbers, plus the friction's row.
         let rate = along_motion(&s, |chain, q, qd, out| energy_regressor(chain, q, qd, out).unwrap(), width);
         let mut friction = vec![f64::NAN; width];
         friction_power_regressor(&chain, &s.qd, &mut friction).unwrap();
@@ -346,7 +346,7 @@ proptest! {
         differential_regressor(&chain, &s.q, &s.qd, &s.qdd, &mut y).unwrap();
         let total: Vec<f64> = rate.iter().zip(&rest).map(|(r, l)| r + l).collect();
         prop_assert!(relative_difference(&total, &y) < 1e-12);
-        // And the momentum is that of the inertia matrix.
+        // The momentum equals that of the inertia matrix.
         let mut p = vec![f64::NAN; length];
         momentum_regressor(&chain, &s.q, &s.qd, &mut p).unwrap();
         let momentum = times(&p, s.parameters.as_flattened());
@@ -355,8 +355,8 @@ proptest! {
 
     #[test]
     fn a_tilted_base_is_a_turned_gravity(s in sample()) {
-        // A motionless joint before the first one that turns the whole arm by β about x, gravity as before, against the arm
-        // itself under gravity turned by −β.
+        // Two equal cases: a motionless first joint that turns the whole arm by β about x, and the arm itself under
+        // gravity turned by −β.
         let beta = 0.7;
         let mut long = s.clone();
         long.geometry.insert(0, JointGeometry { kind: JointKind::Prismatic, alpha: beta, a: 0.3, theta: 0.0, d: -0.2 });
@@ -400,7 +400,7 @@ proptest! {
         let chain = Chain::<f32>::new(&s.geometry, s.gravity).unwrap();
         let narrow = |v: &[f64]| v.iter().map(|&x| x as f32).collect::<Vec<_>>();
         let wide = |v: &[f32]| v.iter().map(|&x| f64::from(x)).collect::<Vec<_>>();
-        // The double side sees the rounded inputs, so that only the arithmetic differs.
+        // The double side gets the rounded inputs, so that only the arithmetic differs.
         let (q, qd, qdd) = (narrow(&s.q), narrow(&s.qd), narrow(&s.qdd));
         let mut found = vec![f32::NAN; s.n() * s.n() * COLUMNS];
         differential_regressor(&chain, &q, &qd, &qdd, &mut found).unwrap();

@@ -1,4 +1,4 @@
-//! Chains whose equations of motion are known in closed form.
+//! Tests of chains with equations of motion in closed form.
 #![allow(clippy::unwrap_used)]
 
 use core::f64::consts::FRAC_PI_2;
@@ -31,7 +31,7 @@ fn one_link_is_the_model_of_the_rig() {
     let chain = Chain::new(&[joint(JointKind::Revolute, FRAC_PI_2, 0.0)], DOWN).unwrap();
     let (m, mx, my, izz, ia) = (1.0, 0.3, -0.07, 0.12, 0.05);
     let (fv, fc, off) = (0.3, 0.4, -0.02);
-    // What stands in the columns that cannot matter must not matter.
+    // Values in columns that cannot matter must not matter.
     let row = [
         m, mx, my, 0.21, 0.4, 0.02, 0.03, 0.5, 0.01, izz, ia, fv, fc, off,
     ];
@@ -56,7 +56,7 @@ fn one_link_is_the_model_of_the_rig() {
     }
 }
 
-/// A slide along the horizontal: m·q̈ and nothing of gravity, turn or products of inertia.
+/// A slide along the horizontal: only m·q̈, without gravity and inertia.
 #[test]
 fn horizontal_slide_shows_its_mass_only() {
     let chain = Chain::new(&[joint(JointKind::Prismatic, FRAC_PI_2, 0.0)], DOWN).unwrap();
@@ -137,11 +137,11 @@ fn planar_arm_of_two_links() {
     near(g[1], second);
 }
 
-/// A mass sliding out on a turning arm: τ = (I + m·r²)·θ̈ + 2·m·r·ṙ·θ̇, f = m·(r̈ − r·θ̇²). A revolute joint before
-/// a prismatic one, the pair that shows the Coriolis force.
+/// A mass that slides out on a turning arm: τ = (I + m·r²)·θ̈ + 2·m·r·ṙ·θ̇, f = m·(r̈ − r·θ̇²). A revolute joint before
+/// a prismatic one shows the Coriolis force.
 #[test]
 fn mass_sliding_on_a_turning_arm() {
-    // z of frame 2 lies along x of frame 1 turned: z₁ up, slide horizontal.
+    // z of frame 2 lies along the turned x of frame 1: z₁ up, slide horizontal.
     let chain = Chain::new(
         &[
             joint(JointKind::Revolute, 0.0, 0.0),

@@ -12,7 +12,7 @@ use super::*;
 
 fn nanoseconds(mut call: impl FnMut()) -> f64 {
     const CALLS: u32 = 100_000;
-    // The best of several: whatever else the machine does only ever adds.
+    // The minimum of several runs: other load on the machine can only add time.
     (0..7)
         .map(|_| {
             let start = Instant::now();

@@ -1,24 +1,24 @@
-//! Parameters gathered where they act alike.
+//! Parameters grouped by their action.
 
 use super::super::chain::Chain;
 use super::super::parameters::{COLUMNS, column, inertia};
 use super::super::spatial::{Inertia, Symmetric3, Vector3};
 
-/// The parameters of a joint after gathering, and those of its drive and friction.
+/// The parameters of a joint after grouping, and those of its drive and friction.
 ///
-/// A thin rod along the axis of a revolute joint (mass m, first moment (0, 0, mz), inertia diag(Iyy, Iyy, 0)) does not
-/// notice the joint turning: it may as well belong to the link before. A body without mass and first moment does not
-/// notice a prismatic joint sliding. Handing these parts down from the tip to the base leaves every torque and the inertia
-/// matrix what they were, and takes three parameters out of every revolute joint, six out of every prismatic one
-/// (Gautier & Khalil 1990; the grouping of customised Newton–Euler, Khalil & Kleinfinger 1987).
-/// What arrives at the base acts on no joint.
+/// A thin rod along the axis of a revolute joint (mass m, first moment (0, 0, mz), inertia diag(Iyy, Iyy, 0)) is not
+/// affected by the joint's rotation, so it may belong to the link before. A body without mass and first moment is not
+/// affected by a prismatic joint. Moving these parts from the tip to the base changes neither the torques nor the
+/// inertia matrix. It removes three parameters from every revolute joint and six from every prismatic one (Gautier &
+/// Khalil 1990; the grouping of customised Newton–Euler, Khalil & Kleinfinger 1987). The parts that reach the base act
+/// on no joint.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// Zero where revolute.
+    /// Zero if revolute.
     pub(super) mass: f64,
-    /// z component zero where revolute.
+    /// z component zero if revolute.
     pub(super) first_moment: [f64; 3],
-    /// Zero where prismatic; `yy` zero where revolute.
+    /// Zero if prismatic; `yy` zero if revolute.
     pub(super) inertia: Symmetric3<f64>,
     pub(super) drive: f64,
     pub(super) viscous: f64,
@@ -27,7 +27,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Gathers the `parameters`, one row a joint of `chain`, into `bodies` (both of the chain's length).
+    /// Groups the `parameters`, one row per joint of `chain`, into `bodies` (both of the chain's length).
     pub fn gather(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]], bodies: &mut [Self]) {
         let nothing = Inertia {
             mass: 0.0,
@@ -87,12 +87,12 @@ impl Body {
                 coulomb: row[column::COULOMB],
                 offset: row[column::OFFSET],
             };
-            // Where the joint stands does not matter to what is handed down.
+            // The joint's position does not affect the parts that are passed on.
             handed = joint.transform(0.0).inertia_to_parent(handed_down);
         }
     }
 
-    /// No body at all, to be overwritten.
+    /// An empty body, to be overwritten.
     pub const NOTHING: Self = Self {
         mass: 0.0,
         first_moment: [0.0; 3],

@@ -1,13 +1,13 @@
-//! Where a block's results go.
+//! Destination of a block's results.
 
 use super::{LANES, Lane};
 
-/// Columns of results, of which a block writes its own samples.
+/// Columns of results, in which a block writes its own samples.
 pub(super) trait Columns {
-    /// The block's samples in a column.
+    /// Returns the block's samples in a column.
     fn lane(&mut self, column: usize) -> &mut [f64; LANES];
 
-    /// The block's samples in two columns, the first before the second.
+    /// Returns the block's samples in two columns, the first before the second.
     fn two(&mut self, first: usize, second: usize) -> [&mut [f64; LANES]; 2];
 }
 
@@ -24,7 +24,7 @@ impl Columns for [Lane] {
     }
 }
 
-/// The place of a block in columns of many samples that lie one after the other.
+/// The samples of a block within columns of many samples, stored one after the other.
 #[derive(Debug)]
 pub struct Section<'a> {
     data: &'a mut [f64],
@@ -39,7 +39,7 @@ impl<'a> Section<'a> {
         Self { data, stride, at }
     }
 
-    /// The block's samples in `N` columns from `first` on.
+    /// Returns the block's samples in `N` columns from `first` on.
     #[inline(always)]
     pub(super) fn lanes<const N: usize>(&mut self, first: usize) -> [&mut [f64; LANES]; N] {
         let (stride, at) = (self.stride, self.at);
@@ -68,7 +68,7 @@ impl Columns for Section<'_> {
     }
 }
 
-/// The [`LANES`] entries from `at` on.
+/// Returns the [`LANES`] entries from `at` on.
 #[inline(always)]
 fn block(data: &mut [f64], at: usize) -> &mut [f64; LANES] {
     &mut data[at..at + LANES].as_chunks_mut().0[0]

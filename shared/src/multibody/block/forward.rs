@@ -5,7 +5,7 @@ use super::inverse::inverse_dynamics;
 use super::{Body, Frame, JointBlock, LANES, Lane, ZERO};
 use crate::lanes::MulAdd;
 
-/// Sample and joint at which a pivot of the inertia matrix was not positive, the first sample of the block.
+/// First sample of a block with a pivot of the inertia matrix that is not positive, and the joint of that pivot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotPositive {
     /// Sample within the block.
@@ -14,11 +14,11 @@ pub struct NotPositive {
     pub joint: usize,
 }
 
-/// Accelerations under the torques `tau`: the torques at rest of acceleration by Newton–Euler, the inertia matrix by
-/// composite bodies, and its factorisation L·D·Lᵀ.
+/// Computes the accelerations under the torques `tau`: the torques without acceleration by Newton–Euler, the inertia
+/// matrix by composite bodies, and its factorisation L·D·Lᵀ.
 ///
-/// `frames`, `bodies`, `work` and the signals have one entry a joint, `matrix` has n(n + 1)/2. Returns the first lane
-/// whose matrix is not positive definite (or holds a NaN); the accelerations of such lanes mean nothing.
+/// `frames`, `bodies`, `work` and the signals have one entry per joint, `matrix` has n(n + 1)/2. Returns the first lane
+/// whose matrix is not positive definite (or holds a NaN); the accelerations of such lanes are invalid.
 #[inline(always)]
 pub fn forward_dynamics<F: MulAdd>(
     frames: &[Frame],
@@ -57,7 +57,7 @@ pub fn forward_dynamics<F: MulAdd>(
             for k in 0..LANES {
                 factor[k] = column[k] * inverse[k];
             }
-            // Rows up to i still hold the column without the division, below them it is not needed again.
+            // Rows up to i still hold the column without the division; below them it is no longer needed.
             for r in j + 1..i {
                 let above = matrix[lower(r, j)];
                 subtract::<F>(&mut matrix[lower(i, r)], &column, &above);

@@ -6,7 +6,7 @@ use super::{LANES, Lane};
 use crate::lanes::{self, MulAdd};
 use core::marker::PhantomData;
 
-/// A joint of the chain with what is known of it before any sample.
+/// A joint of the chain with the values that are the same for all samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
     pub(super) prismatic: bool,
@@ -20,7 +20,7 @@ pub struct Frame {
     pub(super) cos_theta: f64,
 }
 
-/// Kinds of twist α that have loop bodies of their own.
+/// Kinds of twist α with loop bodies of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Twist {
     /// α = 0: parallel axes.
@@ -34,7 +34,7 @@ pub(super) enum Twist {
 }
 
 impl Frame {
-    /// The joints of a chain, base first.
+    /// Returns the joints of a chain, base first.
     pub fn of(chain: &Chain<f64>) -> impl Iterator<Item = Self> {
         chain.joints.iter().map(|joint| Self {
             prismatic: joint.kind == JointKind::Prismatic,
@@ -54,7 +54,7 @@ impl Frame {
         })
     }
 
-    /// Sine and cosine of the angle about z.
+    /// Computes sine and cosine of the angle about z.
     #[inline(always)]
     pub(super) fn angle<F: MulAdd>(&self, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
         if self.prismatic {
@@ -62,7 +62,7 @@ impl Frame {
             cos.fill(self.cos_theta);
             return;
         }
-        // An integer, because a maximum of floats is not a vector operation where NaN may occur.
+        // An integer, because a maximum of floats is no vector operation if NaN may occur.
         let mut beyond = 0;
         for k in 0..LANES {
             let angle = self.theta + q[k];
@@ -79,7 +79,7 @@ impl Frame {
     }
 }
 
-/// The same for any angle.
+/// The same for large angles.
 #[cold]
 #[inline(never)]
 fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
@@ -88,10 +88,10 @@ fn large_angles(theta: f64, q: &Lane, sin: &mut Lane, cos: &mut Lane) {
     }
 }
 
-/// The constant part of a joint's place, with the kinds of twist and the zeros known to the compiler.
+/// The constant part of a joint's pose; the compiler knows its kind of twist and its zeros.
 ///
-/// Between frames i − 1 and i lies the frame that α alone has turned; the origin of frame i has there the
-/// coordinates (a, 0, d) whatever the twist, and offsets are therefore applied there.
+/// Between frames i − 1 and i lies the frame that is turned by α only. In it the origin of frame i has the coordinates
+/// (a, 0, d) for any twist, so offsets are applied there.
 #[derive(Clone, Copy)]
 pub(super) struct Place<F, const TWIST: u8, const A: bool, const D: bool> {
     arithmetic: PhantomData<F>,
@@ -118,7 +118,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         }
     }
 
-    /// A direction of frame i − 1 in the turned frame.
+    /// Transforms a direction from frame i − 1 to the turned frame.
     #[inline(always)]
     pub(super) fn turn(&self, v: Vector3<f64>) -> Vector3<f64> {
         let [x, y, z] = v.0;
@@ -131,7 +131,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         }
     }
 
-    /// A direction of the turned frame in frame i − 1.
+    /// Transforms a direction from the turned frame to frame i − 1.
     #[inline(always)]
     pub(super) fn turn_back(&self, v: Vector3<f64>) -> Vector3<f64> {
         let [x, y, z] = v.0;
@@ -144,7 +144,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         }
     }
 
-    /// `v` plus the acceleration of the origin of frame i against that of frame i − 1 at angular velocity
+    /// Returns `v` plus the acceleration of the origin of frame i relative to that of frame i − 1 at angular velocity
     /// `w` and acceleration `e`, all in the turned frame: ė × p + w × (w × p) with p = (a, 0, d).
     #[inline(always)]
     pub(super) fn carry(&self, v: Vector3<f64>, w: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
@@ -162,7 +162,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         Vector3([x, y, z])
     }
 
-    /// `v` plus the velocity of the origin of frame i against that of frame i − 1 at angular velocity `w`: w × p.
+    /// Returns `v` plus the velocity of the origin of frame i against that of frame i − 1 at angular velocity `w`: w × p.
     #[inline(always)]
     pub(super) fn sweep(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);
@@ -177,7 +177,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         Vector3([x, y, z])
     }
 
-    /// A wrench after the turn about z, in frame i − 1.
+    /// Transforms a wrench after the turn about z to frame i − 1.
     #[inline(always)]
     pub(super) fn wrench_back(
         &self,
@@ -191,7 +191,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         (self.turn_back(f), self.turn_back(m))
     }
 
-    /// `m` plus p × f with p = (a, 0, d).
+    /// Returns `m` plus p × f with p = (a, 0, d).
     #[inline(always)]
     pub(super) fn lever(&self, m: Vector3<f64>, f: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [fx, fy, fz]) = (m.0, f.0);
@@ -207,7 +207,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
     }
 }
 
-/// The constant part of a prismatic joint's place at position `q`.
+/// Returns the constant part of a prismatic joint's pose at position `q`.
 #[inline(always)]
 pub(super) fn slid<F: MulAdd>(frame: &Frame, q: f64) -> Place<F, GENERAL, true, true> {
     Place {
@@ -216,22 +216,22 @@ pub(super) fn slid<F: MulAdd>(frame: &Frame, q: f64) -> Place<F, GENERAL, true, 
     }
 }
 
-/// A direction before the turn about z, written after it.
+/// Transforms a direction by the turn about z, forwards.
 #[inline(always)]
 pub(super) fn spin<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, s * y), F::mul_add(c, y, -(s * x)), z])
 }
 
-/// A direction after the turn about z, written before it.
+/// Transforms a direction by the turn about z, backwards.
 #[inline(always)]
 pub(super) fn spin_back<F: MulAdd>(s: f64, c: f64, v: Vector3<f64>) -> Vector3<f64> {
     let [x, y, z] = v.0;
     Vector3([F::mul_add(c, x, -(s * y)), F::mul_add(c, y, s * x), z])
 }
 
-/// Runs an expression with a function that gives the [`Place`] of a joint at a lane, its kind of twist and zeros known to the
-/// compiler: one copy of the expression for each kind of revolute joint and one for prismatic joints, whose position is `q`.
+/// Runs an expression with a function that returns the [`Place`] of a joint at a lane. The expression has one copy for
+/// each kind of revolute joint (twist and zeros known to the compiler), and one for prismatic joints at position `q`.
 macro_rules! at_each_lane {
     ($arithmetic:ty, $frame:expr, $q:expr, $place:ident => $body:expr) => {{
         let frame: &$crate::multibody::block::Frame = $frame;
@@ -249,7 +249,7 @@ macro_rules! at_each_lane {
 }
 pub(super) use at_each_lane;
 
-/// Runs an expression with the [`Place`] of a revolute joint whose kind of twist and zeros are known to the compiler.
+/// Runs an expression with the [`Place`] of a revolute joint; the compiler knows its kind of twist and its zeros.
 macro_rules! placed {
     ($arithmetic:ty, $frame:expr, $place:ident => $body:expr) => {{
         use $crate::multibody::block::frame::{

@@ -6,7 +6,7 @@ use super::frame::{MINUS_QUARTER, NONE, Place, QUARTER, at_each_lane, spin_back}
 use super::{Body, Frame, JointBlock, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 
-/// Room for the links from one joint outwards as one body in that joint's frame, and for its wrench at unit acceleration.
+/// Buffer for the links from a joint outwards, as one body in its frame, and for its wrench at unit acceleration.
 #[derive(Clone, Copy, Debug)]
 pub struct CompositeBlock {
     first_moment: Lane3,
@@ -26,16 +26,16 @@ impl CompositeBlock {
     };
 }
 
-/// Place of the entry (i, j), j ≤ i, of a lower triangle stored row by row.
+/// Returns the index of the entry (i, j), j ≤ i, of a lower triangle stored row by row.
 #[inline(always)]
 pub const fn lower(i: usize, j: usize) -> usize {
     i * (i + 1) / 2 + j
 }
 
-/// Lower triangle of the inertia matrix, row by row, drive inertias included: composite-rigid-body algorithm (Walker &
-/// Orin 1982) on gathered bodies.
+/// Computes the lower triangle of the inertia matrix, row by row, with drive inertias: composite-rigid-body algorithm
+/// (Walker & Orin 1982) on gathered bodies.
 ///
-/// `frames`, `bodies`, `q` and `work` have one entry a joint, `out` has n(n + 1)/2 columns, each written once; what `composite` holds does not matter.
+/// `frames`, `bodies`, `q`, `work`: one entry per joint. `out`: n(n + 1)/2 columns, each written once. `composite`: buffer.
 #[inline(always)]
 pub fn inertia_matrix<F: MulAdd>(
     frames: &[Frame],
@@ -45,14 +45,14 @@ pub fn inertia_matrix<F: MulAdd>(
     composite: &mut CompositeBlock,
     out: &mut Section,
 ) {
-    // Where the first joint stands does not matter.
+    // The position of the first joint does not matter.
     for ((frame, q), joint) in frames.iter().zip(q).zip(&mut *work).skip(1) {
         frame.angle::<F>(q, &mut joint.sin, &mut joint.cos);
     }
     composite_bodies::<F>(frames, bodies, q, work, composite, out);
 }
 
-/// The same with the sines and cosines already in `work`.
+/// The same with sines and cosines already in `work`.
 #[inline(always)]
 pub(super) fn composite_bodies<F: MulAdd>(
     frames: &[Frame],
@@ -71,7 +71,7 @@ pub(super) fn composite_bodies<F: MulAdd>(
         composite.first_moment = tip.first_moment.map(|x| Lane([x; LANES]));
         composite.inertia = six(tip).map(|x| Lane([x; LANES]));
     }
-    // It does not depend on the sample.
+    // The mass does not depend on the sample.
     let mut mass = tip.mass;
     for i in (1..n).rev() {
         let (frame, joint, slides) = (&frames[i], &work[i], frames[i - 1].prismatic);
@@ -102,14 +102,14 @@ pub(super) fn composite_bodies<F: MulAdd>(
     }
 }
 
-/// The inertia of a body, entry by entry.
+/// Returns the inertia of a body, entry by entry.
 #[inline(always)]
 fn six(body: &Body) -> [f64; 6] {
     let i = body.inertia;
     [i.xx, i.xy, i.xz, i.yy, i.yz, i.zz]
 }
 
-/// What a body and its drive oppose to the body's own joint.
+/// Returns the inertia of a body and its drive at the body's own joint.
 #[inline(always)]
 fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
     let inertia = if frame.prismatic {
@@ -120,12 +120,12 @@ fn own_diagonal(frame: &Frame, body: &Body) -> f64 {
     inertia + body.drive
 }
 
-/// Over a joint to the one before: the wrench of the composite body at unit acceleration along the joint, in the frame before,
-/// with its part along that frame's joint (`entry`); the composite body in that frame with the frame's `own`; and
-/// what it opposes to that frame's joint (`diagonal`).
+/// Moves inwards across a joint. Computes the wrench of the composite body at unit acceleration along the joint, in the
+/// frame before, with its part along that frame's joint (`entry`). Also computes the composite body in that frame with
+/// the frame's `own`, and its inertia at that frame's joint (`diagonal`).
 ///
-/// The body, of the given `mass`, is the `TIP` itself or `composite`; where the frame before is the `LAST`, the entries are all that is asked for.
-/// The turn about z is made once for both.
+/// The body has the given `mass` and is the `TIP` or `composite`. If the frame before is the `LAST`, only the entries
+/// are needed. The turn about z is computed once for both.
 #[inline(always)]
 fn inwards<
     F: MulAdd,
@@ -247,7 +247,7 @@ fn inwards<
     }
 }
 
-/// The entries xx, xy, yy of a tensor whose frame is turned back by an angle about z, given its sine and cosine.
+/// Returns the entries xx, xy, yy of a tensor after a turn back by an angle about z, given its sine and cosine.
 #[inline(always)]
 fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
     let u = F::mul_add(s, xx - yy, c * (xy + xy));
@@ -258,7 +258,7 @@ fn turned<F: MulAdd>(s: f64, c: f64, xx: f64, xy: f64, yy: f64) -> [f64; 3] {
     ]
 }
 
-/// The wrench one frame further.
+/// Transforms the wrench to the next frame inwards.
 #[inline(always)]
 fn onwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool, const LAST: bool>(
     place: impl Fn(usize) -> Place<F, TWIST, A, D>,

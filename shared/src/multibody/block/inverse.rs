@@ -6,7 +6,7 @@ use super::{Body, Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
 
-/// What the way outwards leaves at a joint for the way back.
+/// Results of the outward pass at a joint for the inward pass.
 #[derive(Clone, Copy, Debug)]
 pub struct JointBlock {
     pub(super) sin: Lane,
@@ -26,17 +26,17 @@ impl JointBlock {
     };
 }
 
-/// Angular velocity and acceleration of a link and the acceleration of its origin less gravity, in its frame.
+/// Angular velocity and acceleration of a link, and the acceleration of its origin minus gravity, in its frame.
 struct MotionBlock {
     spin: Lane3,
     turning: Lane3,
     proper: Lane3,
 }
 
-/// Torques of the links and drives, friction and offsets: recursive Newton–Euler (Luh, Walker & Paul 1980) in its
-/// customised form (Khalil & Kleinfinger 1987).
+/// Computes the torques of the links and drives, friction and offsets: recursive Newton–Euler (Luh, Walker & Paul 1980)
+/// in its customised form (Khalil & Kleinfinger 1987).
 ///
-/// `frames`, `bodies`, `work` and the signals have one entry a joint; without `qdd` the accelerations are zero.
+/// `frames`, `bodies`, `work` and the signals have one entry per joint; without `qdd` the accelerations are zero.
 #[inline(always)]
 pub fn inverse_dynamics<F: MulAdd>(
     frames: &[Frame],
@@ -101,7 +101,7 @@ pub fn inverse_dynamics<F: MulAdd>(
     }
 }
 
-/// Over a revolute joint to the next link outwards, and that link's inertial wrench.
+/// Moves across a revolute joint to the next link outwards, and computes that link's inertial wrench.
 #[inline(always)]
 fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: Place<F, TWIST, A, D>,
@@ -129,7 +129,7 @@ fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
         let [vx, vy, vz] = v.0;
         let (xx, yy, zz) = (wx * wx, wy * wy, wz * wz);
         let (xy, xz, yz) = (wx * wy, wx * wz, wy * wz);
-        // The matrix of the acceleration field, ė× + ω×ω×; its entries serve force and moment alike.
+        // The matrix of the acceleration field, ė× + ω×ω×. Its entries serve force and moment.
         let (u21, u12) = (xy + ez, xy - ez);
         let (u31, u13) = (xz - ey, xz + ey);
         let (u32, u23) = (yz + ex, yz - ex);
@@ -150,8 +150,8 @@ fn outwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     }
 }
 
-/// Over the first joint, where it is revolute: the base does not move, and of the link's wrench only the moment along
-/// the joint is ever asked for.
+/// The same for a revolute first joint: the base does not move, and only the moment of the link's wrench along the
+/// joint is needed.
 #[inline(always)]
 fn first_revolute<F: MulAdd>(
     frame: &Frame,
@@ -174,7 +174,7 @@ fn first_revolute<F: MulAdd>(
     }
 }
 
-/// Over a prismatic joint likewise.
+/// The same for a prismatic joint.
 #[inline(always)]
 fn outwards_prismatic<F: MulAdd>(
     frame: &Frame,
@@ -224,7 +224,7 @@ fn inwards<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     }
 }
 
-/// Likewise, where only the moment along the parent's axis is asked for.
+/// The same if only the moment along the parent's axis is needed.
 #[inline(always)]
 fn inwards_along_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: impl Fn(usize) -> Place<F, TWIST, A, D>,

@@ -1,17 +1,16 @@
 //! The model mathematics over blocks of samples, written for vector registers.
 //!
-//! A block holds [`LANES`] samples, every quantity as a [`Lane`]: one array, one entry a sample. Each step of a recursion is one
-//! loop over the lanes whose body is the formula for one sample without branches, which compilers turn into vector
-//! instructions of whatever width the CALLER is compiled for: every function here is inlined into it, so a caller compiled for a
-//! wider instruction set gets it throughout. Whether a product is rounded before it goes into a sum is the caller's choice
-//! ([`MulAdd`](crate::lanes::MulAdd)): with [`Rounded`](crate::lanes::Rounded) results are the same to the last bit whatever the
-//! instruction set.
+//! A block holds [`LANES`] samples. Every quantity is a [`Lane`]: an array with one entry per sample. Each step of a
+//! recursion is one loop over the lanes, and its body is the formula for one sample without branches. Compilers turn it
+//! into vector instructions of the width for which the CALLER is compiled: every function here is inlined, so a caller
+//! compiled for a wider instruction set gets it throughout. The caller also chooses whether a product is rounded before
+//! it is added ([`MulAdd`](crate::lanes::MulAdd)). With [`Rounded`](crate::lanes::Rounded) results are the same to the
+//! last bit for any instruction set.
 //!
-//! What is known before the samples come saves work in every one of them: which twists are quarter turns and which
-//! lengths are zero picks one of a few loop bodies for each joint ([`Frame`]), and parameters that act alike are gathered
-//! in one place beforehand ([`Body`]).
+//! Knowledge of the chain saves work in every sample. Twists of a quarter turn and zero lengths select one of a few
+//! loop bodies for each joint ([`Frame`]). Parameters with the same action are grouped beforehand ([`Body`]).
 //!
-//! Angles beyond [`ANGLE_LIMIT`](crate::lanes::ANGLE_LIMIT) take the slow way, sample by sample, with the same accuracy.
+//! Angles beyond [`ANGLE_LIMIT`](crate::lanes::ANGLE_LIMIT) take one sample at a time: slower, equally accurate.
 
 mod body;
 mod columns;
@@ -36,7 +35,7 @@ pub use regressor::{AxisBlock, differential_regressor, energy_regressor};
 /// Samples in a block.
 pub const LANES: usize = 32;
 
-/// One quantity at the samples of a block; so aligned that no vector of it straddles two lines of the cache.
+/// One quantity at the samples of a block, aligned so that no vector crosses a cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub struct Lane(pub [f64; LANES]);
@@ -65,7 +64,7 @@ impl DerefMut for Lane {
 /// A vector at the samples of a block.
 pub type Lane3 = [Lane; 3];
 
-/// The vector of one sample.
+/// Returns the vector of one sample.
 #[inline(always)]
 fn get(v: &Lane3, k: usize) -> Vector3<f64> {
     Vector3([v[0][k], v[1][k], v[2][k]])

@@ -8,13 +8,13 @@ use super::{Frame, LANES, Lane, Lane3, ZERO, ZERO3, get, set};
 use crate::lanes::MulAdd;
 use crate::scalar::Real;
 
-/// How a link moves: what all its columns are made of.
+/// Motion of a link, from which all its columns are computed.
 struct LinkBlock {
     /// Angular velocity ω.
     spin: Lane3,
     /// Angular acceleration.
     turning: Lane3,
-    /// Acceleration of the origin less gravity.
+    /// Acceleration of the origin minus gravity.
     proper: Lane3,
     /// ωx·ωy, ωx·ωz, ωy·ωz
     mixed: Lane3,
@@ -22,13 +22,13 @@ struct LinkBlock {
     sums: Lane3,
     /// ωx² − ωy², ωz² − ωx², ωy² − ωz²
     differences: Lane3,
-    /// Entries 21, 31, 32 of U = ė× + ω×ω×, by which points of the link accelerate against its origin.
+    /// Entries 21, 31, 32 of U = ė× + ω×ω×: the acceleration of the link's points relative to its origin.
     below: Lane3,
     /// Entries 12, 13, 23 of U.
     above: Lane3,
 }
 
-/// A joint's axis in the frame of some link further out: rotation, and velocity of that frame's origin.
+/// A joint's axis in the frame of a link further out: rotation, and velocity of that frame's origin.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisBlock {
     angular: Lane3,
@@ -43,12 +43,12 @@ impl AxisBlock {
     };
 }
 
-/// Regressor of the differential model (Atkeson, An & Hollerbach 1986), every torque linear in the 14·n parameters.
+/// Computes the regressor of the differential model (Atkeson, An & Hollerbach 1986), linear in the 14·n parameters.
 ///
-/// Parameter c of joint j has the column `j * 14 * n + c` of `out`. Written are only columns that depend on the
-/// sample: of joint j, those of the links from j outwards, and of its own drive and friction. All others
-/// are left as they are: what is zero for every motion, and the offset's, whose entries are 1. `frames`, `axes` and the
-/// signals have one entry a joint.
+/// Parameter c of joint j has the column `j * 14 * n + c` of `out`. Only columns that depend on the sample are written:
+/// for joint j those of the links from j outwards, and of its own drive and friction. The others are left unchanged:
+/// columns that are zero for every motion, and that of the offset, whose entries are 1. `frames`, `axes` and the
+/// signals have one entry per joint.
 #[inline(always)]
 pub fn differential_regressor<F: MulAdd>(
     frames: &[Frame],
@@ -93,7 +93,7 @@ pub fn differential_regressor<F: MulAdd>(
     }
 }
 
-/// Over a joint to the next link outwards (Luh, Walker & Paul 1980).
+/// Moves across a joint to the next link outwards (Luh, Walker & Paul 1980).
 #[inline(always)]
 fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
@@ -104,7 +104,7 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     qdd: &Lane,
     motion: &mut LinkBlock,
 ) {
-    // Both kinds in one body: what belongs to the other kind is multiplied by 0.
+    // Both kinds in one body: terms of the other kind are multiplied by 0.
     let (turns, slides) = if prismatic { (0.0, 1.0) } else { (1.0, 0.0) };
     for k in 0..LANES {
         let place = place(k);
@@ -135,9 +135,9 @@ fn next_link<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     }
 }
 
-/// Carries a joint's axis over to this link, and the power of the link's ten unit wrenches along it.
-// Ten parameters and not an array of ten: only of references that are parameters does the compiler know that none
-// overlaps another, and only then does it turn the loop into vector code.
+/// Transforms a joint's axis to this link, and computes the power of the link's ten unit wrenches along it.
+// Ten parameters instead of an array of ten: only for reference parameters does the compiler know that they do not
+// overlap, and only then does it vectorise the loop.
 #[inline(always)]
 fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: &impl Fn(usize) -> Place<F, TWIST, A, D>,
@@ -199,7 +199,7 @@ fn carried_axis<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     }
 }
 
-/// The same for the joint that carries the link, whose axis is z of the frame. `own` is the first of its columns.
+/// The same for the joint of the link itself, whose axis is z of the frame. `own` is the first of its columns.
 #[inline(always)]
 fn own_axis(
     prismatic: bool,
@@ -242,7 +242,7 @@ fn negated(lane: &Lane, out: &mut [f64; LANES]) {
     }
 }
 
-/// Row of the total mechanical energy, column by column of the 14·n. Friction and offset columns are not written.
+/// Computes the row of the total mechanical energy in 14·n columns. Friction and offset columns are not written.
 #[inline(always)]
 pub fn energy_regressor<F: MulAdd>(
     frames: &[Frame],
@@ -266,7 +266,7 @@ pub fn energy_regressor<F: MulAdd>(
     }
 }
 
-/// Over a joint to the next link outwards, and the columns of that link's energy and of the drive's.
+/// Moves across a joint to the next link outwards, and computes the energy columns of that link and of the drive.
 #[inline(always)]
 fn link_energy<F: MulAdd, const TWIST: u8, const A: bool, const D: bool>(
     place: impl Fn(usize) -> Place<F, TWIST, A, D>,
