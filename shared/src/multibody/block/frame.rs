@@ -162,7 +162,7 @@ impl<F: MulAdd, const TWIST: u8, const A: bool, const D: bool> Place<F, TWIST, A
         Vector3([x, y, z])
     }
 
-    /// Returns `v` plus the velocity of the origin of frame i against that of frame i − 1 at angular velocity `w`: w × p.
+    /// Returns `v` plus the velocity of the origin of frame i against frame i − 1's at angular velocity `w`: w × p.
     #[inline(always)]
     pub(super) fn sweep(&self, v: Vector3<f64>, w: Vector3<f64>) -> Vector3<f64> {
         let ([mut x, mut y, mut z], [wx, wy, wz]) = (v.0, w.0);

@@ -35,7 +35,8 @@ pub const fn lower(i: usize, j: usize) -> usize {
 /// Computes the lower triangle of the inertia matrix, row by row, with drive inertias: composite-rigid-body algorithm
 /// (Walker & Orin 1982) on gathered bodies.
 ///
-/// `frames`, `bodies`, `q`, `work`: one entry per joint. `out`: n(n + 1)/2 columns, each written once. `composite`: buffer.
+/// `frames`, `bodies`, `q` and `work` have one entry per joint, `out` has n(n + 1)/2 columns, each written once. The
+/// initial content of `composite` does not matter.
 #[inline(always)]
 pub fn inertia_matrix<F: MulAdd>(
     frames: &[Frame],
