@@ -1,7 +1,7 @@
 //! Motor and gear: a DC motor, or a brushless one seen through its field-oriented controller as a DC motor.
 //!
-//! u = R·i + L·di/dt + k·ωm, τm = k·i, with the same k for both in SI units (N·m/A = V·s/rad), joint torque N·k·i
-//! and motor speed N·q̇ for N motor turns a joint turn; N is negative where the gear turns the sense round.
+//! u = R·i + L·di/dt + k·ωm, τm = k·i, with the same k for both in SI units (N·m/A = V·s/rad), joint torque N·k·i and
+//! motor speed N·q̇ for N motor turns per joint turn; N is negative if the gear reverses the direction.
 //!
 //! Leaves out: gear losses (they are joint friction, see [`friction`](crate::friction)), iron loss, cogging and
 //! torque ripple, saturation of the torque constant, the change of R and k with temperature, brush voltage,
@@ -13,9 +13,9 @@ use crate::scalar::Real;
 /// Parameters of motor and gear, motor-side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive<T> {
-    /// Motor turns per joint turn N; negative where the gear reverses the sense.
+    /// Motor turns per joint turn N; negative if the gear reverses the direction.
     pub gear_ratio: T,
-    /// Inertia of the rotor and all that turns with it, kg·m².
+    /// Inertia of the rotor and the parts that turn with it, kg·m².
     pub rotor_inertia: T,
     /// Torque constant k, N·m/A, which is also the back-EMF constant, V·s/rad.
     pub torque_constant: T,
@@ -26,49 +26,49 @@ pub struct Drive<T> {
 }
 
 impl<T: Real> Drive<T> {
-    /// Joint torque of a motor current in A, N·m: N·k·i.
+    /// Returns the joint torque of a motor current in A, N·m: N·k·i.
     #[inline(always)]
     pub fn joint_torque(&self, current: T) -> T {
         self.gear_ratio * self.torque_constant * current
     }
 
-    /// Motor current for a joint torque in N·m, A. Gear ratio and torque constant must not be zero.
+    /// Returns the motor current for a joint torque in N·m, A. Gear ratio and torque constant must not be zero.
     #[inline(always)]
     pub fn current(&self, joint_torque: T) -> T {
         joint_torque / (self.gear_ratio * self.torque_constant)
     }
 
-    /// Motor speed at a joint speed in rad/s, rad/s.
+    /// Returns the motor speed at a joint speed in rad/s, rad/s.
     #[inline(always)]
     pub fn motor_velocity(&self, joint_velocity: T) -> T {
         self.gear_ratio * joint_velocity
     }
 
-    /// Back-EMF at a joint speed in rad/s, V.
+    /// Returns the back-EMF at a joint speed in rad/s, V.
     #[inline(always)]
     pub fn back_emf(&self, joint_velocity: T) -> T {
         self.torque_constant * self.motor_velocity(joint_velocity)
     }
 
-    /// Terminal voltage for a current (A), its rate (A/s) and a joint speed (rad/s), V.
+    /// Returns the terminal voltage for a current (A), its rate (A/s) and a joint speed (rad/s), V.
     #[inline(always)]
     pub fn voltage(&self, current: T, current_rate: T, joint_velocity: T) -> T {
         self.resistance * current + self.inductance * current_rate + self.back_emf(joint_velocity)
     }
 
-    /// Rate of the current, A/s, under a terminal voltage (V). The inductance must not be zero.
+    /// Returns the rate of the current, A/s, under a terminal voltage (V). The inductance must not be zero.
     #[inline(always)]
     pub fn current_rate(&self, voltage: T, current: T, joint_velocity: T) -> T {
         (voltage - self.resistance * current - self.back_emf(joint_velocity)) / self.inductance
     }
 
-    /// Electrical time constant L/R, s.
+    /// Returns the electrical time constant L/R, s.
     #[inline(always)]
     pub fn electrical_time_constant(&self) -> T {
         self.inductance / self.resistance
     }
 
-    /// Inertia that the rotor adds at the joint, N²·Jm, kg·m².
+    /// Returns the rotor's inertia at the joint, N²·Jm, kg·m².
     #[inline(always)]
     pub fn reflected_inertia(&self) -> T {
         self.gear_ratio.squared() * self.rotor_inertia

@@ -1,8 +1,8 @@
 //! Dual numbers: a value together with its exact derivatives in `N` directions.
 //!
-//! a + a'·ε with ε² = 0 (Clifford 1873; Griewank & Walther 2008, ch. 3): every formula over [`Real`] evaluated
-//! with [`Dual`] gives its value and, without truncation error, its directional derivatives. Where a function has
-//! a kink or a jump (`abs`, `sgn`, `select`) the derivative is that of the branch taken; of `sgn` it is 0.
+//! a + a'·ε with ε² = 0 (Clifford 1873; Griewank & Walther 2008, ch. 3). Every formula over [`Real`] evaluated with
+//! [`Dual`] gives its value and, without truncation error, its directional derivatives. At a kink or a jump (`abs`,
+//! `sgn`, `select`) the derivative is that of the branch taken; for `sgn` it is 0.
 
 use core::array;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -19,7 +19,7 @@ pub struct Dual<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Dual<T, N> {
-    /// A constant.
+    /// Returns a constant.
     #[inline(always)]
     pub fn constant(value: T) -> Self {
         Self {
@@ -28,7 +28,7 @@ impl<T: Real, const N: usize> Dual<T, N> {
         }
     }
 
-    /// The independent variable with that index; a constant where there is none.
+    /// Returns the independent variable with that index; a constant if the index is out of range.
     #[inline(always)]
     pub fn variable(value: T, index: usize) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl<T: Real, const N: usize> Dual<T, N> {
         }
     }
 
-    /// The value of a function there, and the chain rule with its slope.
+    /// Returns the value of a function, with the chain rule for its slope.
     #[inline(always)]
     fn chain(self, value: T, slope: T) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl<T: Real, const N: usize> Sub for Dual<T, N> {
     }
 }
 
-// The product and quotient rules mix operators by nature.
+// The product and quotient rules mix operators.
 #[allow(clippy::suspicious_arithmetic_impl)]
 impl<T: Real, const N: usize> Mul for Dual<T, N> {
     type Output = Self;
@@ -165,8 +165,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         let tanh = self.value.tanh();
         self.chain(tanh, T::ONE - tanh * tanh)
     }
-    /// The derivative by a varying exponent needs a logarithm, which [`Real`] does not have: exponents are taken
-    /// as constants.
+    /// The derivative by the exponent needs a logarithm, which [`Real`] does not have: exponents count as constants.
     #[inline(always)]
     fn powf(self, exponent: Self) -> Self {
         let e = exponent.value;
@@ -224,7 +223,7 @@ mod tests {
 
     #[test]
     fn the_torque_s_slope_over_acceleration_is_the_inertia() {
-        // A point mass of 2 kg at 0.5 m: 0.5 kg·m², whatever the position.
+        // A point mass of 2 kg at 0.5 m: 0.5 kg·m² at any position.
         let joint = JointGeometry {
             kind: JointKind::Revolute,
             alpha: core::f64::consts::FRAC_PI_2,

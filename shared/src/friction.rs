@@ -1,8 +1,8 @@
 //! Friction laws.
 //!
-//! τ = s·(Fc + F_id·exp(−(q̇/vs)²) + μ·|τl|) + ΔFc·s² + Fv·q̇ + ΔFv·|q̇| with the direction s, where F_id is what
-//! breakaway friction exceeds Coulomb friction by and vs the Stribeck velocity (Armstrong-Hélouvry, Dupont and
-//! Canudas de Wit 1994, sec. 2.1, with the Gaussian exponent); |τl| is the torque transmitted by the gear.
+//! τ = s·(Fc + F_id·exp(−(q̇/vs)²) + μ·|τl|) + ΔFc·s² + Fv·q̇ + ΔFv·|q̇| with the direction s. F_id is breakaway minus
+//! Coulomb friction, vs the Stribeck velocity (Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, sec. 2.1, with the
+//! Gaussian exponent), and |τl| the torque transmitted by the gear.
 //!
 //! Leaves out: everything with memory (presliding displacement, frictional lag, rising breakaway with dwell time),
 //! the dependence on position, temperature and running time, and drag that grows faster than speed.
@@ -21,7 +21,7 @@ pub struct Friction<T> {
     pub coulomb: T,
     /// Viscous friction Fv, N·m·s/rad.
     pub viscous: T,
-    /// Breakaway minus Coulomb friction (the book's F_id), N·m; 0 leaves the Stribeck effect out.
+    /// Breakaway minus Coulomb friction (the book's F_id), N·m; 0 for no Stribeck effect.
     pub breakaway_excess: T,
     /// Stribeck velocity, rad/s.
     pub stribeck_velocity: T,
@@ -33,7 +33,7 @@ pub struct Friction<T> {
     pub load_coefficient: T,
 }
 
-/// What makes a friction law impossible; the name is that of the field in [`Friction`].
+/// Reason why a friction law is invalid, with the name of the field in [`Friction`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionError {
     /// Not a finite number.
@@ -72,20 +72,20 @@ impl fmt::Display for FrictionError {
 impl core::error::Error for FrictionError {}
 
 impl<T: Real> Friction<T> {
-    /// What breakaway exceeds Coulomb friction by that is left at a speed in rad/s, N·m.
+    /// Returns the part of the breakaway excess that remains at a speed in rad/s, N·m.
     #[inline(always)]
     pub fn stribeck_excess(&self, speed: T) -> T {
-        // A law without Stribeck effect may carry a zero velocity: 0/0 must not get in.
+        // A law without Stribeck effect may have a zero velocity: avoids 0/0.
         let valid = T::ZERO.lt(self.stribeck_velocity);
         let velocity = T::select(valid, self.stribeck_velocity, T::ONE);
         let excess = T::select(valid, self.breakaway_excess, T::ZERO);
         excess * (-(speed / velocity).squared()).exp()
     }
 
-    /// Friction torque, N·m, positive where it takes a positive torque to overcome it.
+    /// Returns the friction torque, N·m, positive if a positive torque has to overcome it.
     ///
-    /// `sign` is −1, 0 or 1 and stands apart from the velocity (rad/s) because at rest the direction is the
-    /// caller's to know; `load` is the torque transmitted by the gear, N·m.
+    /// `sign` is −1, 0 or 1. It is not derived from the velocity (rad/s), because at rest the caller decides the
+    /// direction. `load` is the torque transmitted by the gear, N·m.
     #[inline(always)]
     pub fn torque(&self, velocity: T, sign: T, load: T) -> T {
         let dry =
@@ -98,11 +98,11 @@ impl<T: Real> Friction<T> {
 }
 
 impl<T: Real<Mask = bool>> Friction<T> {
-    /// Whether the law can only brake; else which parameter is at fault.
+    /// Checks that the law can only brake.
     ///
     /// # Errors
-    /// [`FrictionError`] with the name of the first parameter that is not finite, negative, or a difference
-    /// larger than what it is a difference of.
+    /// [`FrictionError`] with the first parameter that is not finite, is negative, or is a difference larger than its
+    /// base value.
     pub fn check(&self) -> Result<(), FrictionError> {
         let largest = T::from_f64(1.0e30);
         for (name, value, may_be_negative) in [

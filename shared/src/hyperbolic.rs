@@ -1,9 +1,9 @@
-//! The hyperbolic tangent in single precision, by one exponential where it needs one: control ticks ask for it several times,
-//! and mostly far from 0, where it is ±1.
+//! The hyperbolic tangent in single precision, with one exponential if needed. Control ticks call it several times,
+//! mostly far from 0, where it is ±1.
 
-/// From here on the nearest single to tanh is 1: 2·exp(−2x) is below half of the last digit before 1.
+/// From this |x| on the single nearest to tanh is 1: 2·exp(−2x) is below half of the last digit before 1.
 const ONE_FROM: f32 = 9.02;
-/// Below it the odd series up to x¹¹ is the nearer one: what it leaves out is 1.2·10⁻⁸ of the value.
+/// Up to this |x| the odd series up to x¹¹ is more accurate: its truncation error is 1.2·10⁻⁸ of the value.
 const SERIES_TO: f32 = 0.35;
 
 /// Coefficients of x³ to x¹¹ (Abramowitz and Stegun 1964, 4.5.64).
@@ -28,7 +28,7 @@ pub(crate) fn tanhf(x: f32) -> f32 {
         let tail = a + square * (b + square * (c + square * (d + square * e)));
         return x + x * square * tail;
     }
-    // NaN comes this way and out as NaN.
+    // NaN reaches this line and stays NaN.
     let value = 1.0 - 2.0 / (libm::expf(2.0 * size) + 1.0);
     value.copysign(x)
 }

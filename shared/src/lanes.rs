@@ -1,12 +1,13 @@
 //! Several samples side by side, so that one formula serves a batch.
 //!
-//! [`Lanes<N>`] is an array of `f64`; every operation is a loop over it that the compiler turns into vector
-//! instructions of whatever width the caller is compiled for. Four or eight lanes fit the desktop's registers.
+//! [`Lanes<N>`] is an array of `f64`. Every operation is a loop over it, which the compiler turns into vector
+//! instructions of the caller's width. Four or eight lanes fit the desktop's registers.
 //!
-//! [`Real::sin_cos`] is branch-free (Cody and Waite 1980: reduction by π/2 in three parts, then polynomials of
-//! degree 13 and 14) with an error of at most 2 units in the last place for |x| ≤ [`ANGLE_LIMIT`] (measured: it
-//! differs from libm by at most 1, also at the doubles nearest to the multiples of π/2); beyond it the error grows, and from 2³¹ on the result means nothing.
-//! With fused operations ([`MulAdd`]), as the kernels over blocks use them where they can, the same bound holds. `exp`, `tanh` and `powf` go lane by lane through libm.
+//! [`Real::sin_cos`] is branch-free (Cody and Waite 1980: reduction by π/2 in three parts, then polynomials of degree
+//! 13 and 14). Its error is at most 2 units in the last place for |x| ≤ [`ANGLE_LIMIT`] (measured: it differs from libm
+//! by at most 1, also at the doubles nearest to the multiples of π/2). Beyond it the error grows, and from 2³¹ on the
+//! result is invalid. The same bound holds with fused operations ([`MulAdd`]), which the block kernels use if
+//! available. `exp`, `tanh` and `powf` use libm lane by lane.
 
 use core::array;
 use core::ops::{
@@ -15,13 +16,13 @@ use core::ops::{
 
 use crate::scalar::{Mask, Real};
 
-/// Largest |x|, rad, for which [`Real::sin_cos`] of [`Lanes`] holds its stated error: the whole turns still
-/// fit into the 16 bits that the first two parts of π/2 leave free.
+/// Largest |x|, rad, for which [`Real::sin_cos`] of [`Lanes`] keeps its stated error: the number of quarter turns still
+/// fits into the 16 bits that the first two parts of π/2 leave free.
 pub const ANGLE_LIMIT: f64 = 1.0e5;
 
-/// How a product is added to a number.
+/// Rule for adding a product to a number.
 pub trait MulAdd: Copy {
-    /// Whether the product goes into the sum unrounded.
+    /// True if the product is added without rounding.
     const FUSED: bool;
 
     /// a·b + c
@@ -30,8 +31,7 @@ pub trait MulAdd: Copy {
 
 /// Product and sum rounded one after the other: the same bits on every machine.
 ///
-/// The fused kind is left to the caller, who knows whether the machine has an instruction for it: without one it is
-/// a slow function.
+/// The caller chooses the fused kind if the machine has an instruction for it; otherwise it is a slow function.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounded;
 
@@ -49,13 +49,13 @@ impl MulAdd for Rounded {
 #[repr(transparent)]
 pub struct Lanes<const N: usize>(pub [f64; N]);
 
-/// `N` truth values, all bits set where true: comparisons and selections then stay in vector registers.
+/// `N` truth values, with all bits set if true, so that comparisons and selections stay in vector registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct LaneMask<const N: usize>([u64; N]);
 
 impl<const N: usize> LaneMask<N> {
-    /// The truth values one by one.
+    /// Returns the truth values as an array.
     #[inline(always)]
     pub fn to_array(self) -> [bool; N] {
         array::from_fn(|k| self.0[k] != 0)
@@ -155,18 +155,18 @@ const HALF_PI: [f64; 3] = [
     1.0562999066987428e-23,
 ];
 
-/// π/2 in three parts of 53 bits, for products that go into the sum unrounded.
+/// π/2 in three parts of 53 bits, for products that are added without rounding.
 const HALF_PI_FUSED: [f64; 3] = [
     core::f64::consts::FRAC_PI_2,
     6.123233995736766e-17,
     -1.4973849048591698e-33,
 ];
 
-/// 1.5·2⁵²: adding it rounds to the nearest integer and leaves that integer in the low bits of the sum.
+/// 1.5·2⁵²: its addition rounds to the nearest integer and leaves that integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
 
-/// (sin r − r)/r³ as a polynomial in r², |r| ≤ π/4: interpolated at the Chebyshev points with 70 digits, which
-/// is minimax but for a small factor; truncation below 2·10⁻¹⁷ of sin r.
+/// (sin r − r)/r³ as a polynomial in r², |r| ≤ π/4, interpolated at the Chebyshev points with 70 digits. It is minimax
+/// up to a small factor; truncation below 2·10⁻¹⁷ of sin r.
 const SINE: [f64; 6] = [
     -0.16666666666666666,
     0.008333333333330946,
@@ -214,7 +214,7 @@ pub(crate) fn sin_cos<F: MulAdd>(x: f64) -> (f64, f64) {
     let sine_sign = (quadrant & 2) << 62;
     let cosine_sign = (quadrant.wrapping_add(1) & 2) << 62;
     let (s, c) = if F::FUSED {
-        // Processors with fused operations pick by the sign bit.
+        // Processors with fused operations select by the sign bit.
         let odd = (quadrant << 63).cast_signed() < 0;
         if odd { (cosine, sine) } else { (sine, cosine) }
     } else {
@@ -227,10 +227,10 @@ pub(crate) fn sin_cos<F: MulAdd>(x: f64) -> (f64, f64) {
     )
 }
 
-/// Sine and cosine of x less `count` right angles.
+/// Returns sine and cosine of x minus `count` right angles.
 #[inline(always)]
 fn first_quadrant(x: f64, count: f64) -> (f64, f64) {
-    // The remainder as a sum r + tail: near multiples of π/2 the leading digits cancel and the tail carries them.
+    // The remainder as a sum r + tail: near multiples of π/2 the leading digits cancel, and the tail holds them.
     let first = x - count * HALF_PI[0];
     let second = count * HALF_PI[1];
     let difference = first - second;
@@ -248,7 +248,7 @@ fn first_quadrant(x: f64, count: f64) -> (f64, f64) {
     (sine, head + (((1.0 - head) - half) + rest))
 }
 
-/// The same with fused operations, which need no tail: the remainder itself is right to half a unit in its last place.
+/// The same with fused operations. They need no tail: the remainder is accurate to half a unit in its last place.
 #[inline(always)]
 fn first_quadrant_fused<F: MulAdd>(x: f64, count: f64) -> (f64, f64) {
     // Exact: x and the product are multiples of 2⁻⁵³ (or x is below 0.8 and the count 0), their difference is below 1.
@@ -329,7 +329,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Distance in units in the last place of the expected value.
+    /// Returns the distance in units in the last place of the expected value.
     fn ulps(value: f64, expected: f64) -> f64 {
         let next = f64::from_bits(expected.abs().to_bits() + 1);
         (value - expected).abs() / (next - expected.abs())
@@ -346,7 +346,7 @@ mod tests {
         }
     }
 
-    /// Of the lanes and of the fused version.
+    /// Returns the errors of the lanes and of the fused version.
     fn worst(angles: &[f64]) -> [f64; 2] {
         let mut worst = [0.0_f64; 2];
         for chunk in angles.chunks_exact(8) {
@@ -370,7 +370,7 @@ mod tests {
 
     #[test]
     fn sin_cos_errs_by_two_ulps_at_most_over_the_stated_range() {
-        // The argument itself steps by an irrational amount so that all mantissas occur.
+        // The argument steps by an irrational amount so that all mantissas occur.
         let spread: Vec<f64> = (0..1_000_000)
             .map(|k| (f64::from(k) - 500_000.0) * 0.199_999_123_456_789)
             .collect();

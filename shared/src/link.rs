@@ -16,7 +16,7 @@ use crate::scalar::Real;
 /// Number of parameters of the one-link model.
 pub const PARAMETER_COUNT: usize = 6;
 
-/// Names of the parameters, in the order of every vector of them.
+/// Names of the parameters, in the order of every parameter vector.
 pub const PARAMETER_NAMES: [&str; PARAMETER_COUNT] = ["J", "gc", "gs", "fv", "fc", "off"];
 
 /// Parameters of τ = J·q̈ + gc·cos q + gs·sin q + fv·q̇ + fc·sgn q̇ + off, joint-side.
@@ -37,7 +37,7 @@ pub struct LinkParameters<T> {
 }
 
 impl<T: Real> LinkParameters<T> {
-    /// The parameters from a vector in the order of [`PARAMETER_NAMES`].
+    /// Returns the parameters of a vector in the order of [`PARAMETER_NAMES`].
     pub const fn from_array(theta: [T; PARAMETER_COUNT]) -> Self {
         let [inertia, gravity_cos, gravity_sin, viscous, coulomb, offset] = theta;
         Self {
@@ -50,7 +50,7 @@ impl<T: Real> LinkParameters<T> {
         }
     }
 
-    /// The parameters as a vector in the order of [`PARAMETER_NAMES`].
+    /// Returns a vector in the order of [`PARAMETER_NAMES`].
     pub const fn to_array(self) -> [T; PARAMETER_COUNT] {
         [
             self.inertia,
@@ -62,8 +62,8 @@ impl<T: Real> LinkParameters<T> {
         ]
     }
 
-    /// The same parameters with a drive's inertia added: N²·Jm for gear ratio N and rotor inertia Jm, kg·m²
-    /// on the motor side (Khalil and Dombre 2002, eq. 9.37).
+    /// Returns the parameters with a drive's inertia added: N²·Jm for gear ratio N and rotor inertia Jm, kg·m² on the
+    /// motor side (Khalil and Dombre 2002, eq. 9.37).
     #[inline(always)]
     #[must_use]
     pub fn with_drive(self, gear_ratio: T, rotor_inertia: T) -> Self {
@@ -73,21 +73,21 @@ impl<T: Real> LinkParameters<T> {
         }
     }
 
-    /// Torque that holds the link at `position` (rad) against gravity, N·m.
+    /// Returns the torque that holds the link at `position` (rad) against gravity, N·m.
     #[inline(always)]
     pub fn gravity_torque(&self, position: T) -> T {
         let (sine, cosine) = position.sin_cos();
         self.gravity_cos * cosine + self.gravity_sin * sine
     }
 
-    /// Friction torque, N·m, positive where it takes a positive torque to overcome it; `sign` is −1, 0 or 1
-    /// and stands apart from the velocity (rad/s) because at rest the direction is the caller's to know.
+    /// Returns the friction torque, N·m, positive if a positive torque has to overcome it. `sign` is −1, 0 or 1. It is
+    /// not derived from the velocity (rad/s), because at rest the caller decides the direction.
     #[inline(always)]
     pub fn friction_torque(&self, velocity: T, sign: T) -> T {
         self.viscous * velocity + self.coulomb * sign
     }
 
-    /// Joint torque, N·m, for a motion in rad, rad/s and rad/s².
+    /// Returns the joint torque, N·m, for a motion in rad, rad/s and rad/s².
     #[inline(always)]
     pub fn inverse_dynamics(&self, position: T, velocity: T, acceleration: T) -> T {
         self.inertia * acceleration
@@ -96,8 +96,8 @@ impl<T: Real> LinkParameters<T> {
             + self.offset
     }
 
-    /// Acceleration, rad/s², under a joint torque, N·m. The inertia must not be zero. At exactly zero velocity
-    /// Coulomb friction is zero here: sticking is not modelled.
+    /// Returns the acceleration, rad/s², under a joint torque, N·m. The inertia must not be zero. At exactly zero
+    /// velocity Coulomb friction is zero here: sticking is not modelled.
     #[inline(always)]
     pub fn forward_dynamics(&self, position: T, velocity: T, torque: T) -> T {
         (torque
@@ -107,20 +107,20 @@ impl<T: Real> LinkParameters<T> {
             / self.inertia
     }
 
-    /// Kinetic energy at a velocity in rad/s, J.
+    /// Returns the kinetic energy at a velocity in rad/s, J.
     #[inline(always)]
     pub fn kinetic_energy(&self, velocity: T) -> T {
         T::from_f64(0.5) * self.inertia * velocity.squared()
     }
 
-    /// Potential energy at a position in rad, J: gc·sin q − gs·cos q, whose derivative is the gravity torque.
+    /// Returns the potential energy at a position in rad, J: gc·sin q − gs·cos q. Its derivative is the gravity torque.
     #[inline(always)]
     pub fn potential_energy(&self, position: T) -> T {
         let (sine, cosine) = position.sin_cos();
         self.gravity_cos * sine - self.gravity_sin * cosine
     }
 
-    /// Power that friction and the constant torque take from the link, W.
+    /// Returns the power that friction and the constant torque take from the link, W.
     #[inline(always)]
     pub fn dissipated_power(&self, velocity: T) -> T {
         (self.friction_torque(velocity, velocity.sgn()) + self.offset) * velocity
@@ -128,7 +128,7 @@ impl<T: Real> LinkParameters<T> {
 }
 
 impl LinkParameters<f64> {
-    /// The same parameters in single precision, as the rig takes them.
+    /// Returns the parameters in single precision, as the rig uses them.
     pub const fn to_f32(self) -> LinkParameters<f32> {
         LinkParameters {
             inertia: self.inertia as f32,
@@ -141,10 +141,10 @@ impl LinkParameters<f64> {
     }
 }
 
-/// Inverse dynamics of a batch: `torque[k]` from `position[k]`, `velocity[k]` and `acceleration[k]`.
+/// Computes the inverse dynamics of a batch: `torque[k]` from `position[k]`, `velocity[k]` and `acceleration[k]`.
 ///
-/// Runs over the shortest of the four slices and returns how many torques it wrote: `N` samples at a time,
-/// then the rest one by one. Four or eight lanes suit desktop processors.
+/// Runs over the shortest of the four slices: `N` samples at a time, then the rest one by one. Returns the number of
+/// written torques. Four or eight lanes suit desktop processors.
 pub fn inverse_dynamics_batch<const N: usize>(
     parameters: &LinkParameters<f64>,
     position: &[f64],
@@ -198,7 +198,7 @@ mod tests {
         offset: 0.05,
     };
 
-    /// One Runge–Kutta step of position, velocity and the energy given away to friction and offset.
+    /// One Runge–Kutta step of position, velocity and the energy lost to friction and offset.
     fn step(link: &LinkParameters<f64>, x: [f64; 3], h: f64) -> [f64; 3] {
         let f = |x: [f64; 3]| {
             [
@@ -227,7 +227,7 @@ mod tests {
             offset: 0.0,
             ..LINK
         };
-        // With Coulomb friction only up to the first reversal: beyond it the step straddles the jump of sgn.
+        // With Coulomb friction only up to the first reversal: there the step crosses the jump of sgn.
         for (link, steps) in [(frictionless, 200_000), (LINK, 40_000)] {
             let mut x = [0.9, 0.0, 0.0];
             x[1] = -0.5;

@@ -1,8 +1,8 @@
-//! The scalar that every formula of this crate is written over.
+//! The scalar type of every formula of this crate.
 //!
-//! One source serves `f32` on the microcontroller, `f64` on the desktop and [`Lanes`](crate::lanes::Lanes)
-//! of samples in batches. Formulas are therefore written without `if` on a value: comparisons give a
-//! [`Mask`], and [`Real::select`] picks from two results that were both computed.
+//! One source serves `f32` on the microcontroller, `f64` on the desktop and [`Lanes`](crate::lanes::Lanes) of samples
+//! in batches. Formulas therefore have no `if` on a value: comparisons return a [`Mask`], and [`Real::select`] selects
+//! one of two results that were both computed.
 //!
 //! # The functions behind `f32`
 //!
@@ -10,13 +10,14 @@
 //!
 //! | function | range | micromath 2.1 | libm 0.2 | measure | taken |
 //! | --- | --- | --- | --- | --- | --- |
-//! | sin, cos | −2π to 2π | 1.1·10⁻³ | 3.0·10⁻⁸ | absolute | `sincos.rs` of this crate, 8.4·10⁻⁸ and 9.2·10⁻⁸: a regressor column off by 10⁻³ biases its parameter, and libm works in `f64`, which the microcontroller has no hardware for |
+//! | sin, cos | −2π to 2π | 1.1·10⁻³ | 3.0·10⁻⁸ | absolute | `sincos.rs` of this crate, 8.4·10⁻⁸ and 9.2·10⁻⁸: a regressor column off by 10⁻³ biases its parameter, and libm works in `f64`, for which the microcontroller has no hardware |
 //! | sqrt | 10⁻⁶ to 100 | 6.1·10⁻² | 6.0·10⁻⁸ | relative | libm |
-//! | exp | −20 to 0 | 1.2·10⁻³ | 4.6·10⁻⁸ | absolute | libm: harmless in a Stribeck law, but filters take their poles exp(−ωT) ≈ 0.99 from the same function, and 10⁻³ there is a tenth of the time constant |
+//! | exp | −20 to 0 | 1.2·10⁻³ | 4.6·10⁻⁸ | absolute | libm: 10⁻³ is harmless in a Stribeck law, but filter poles exp(−ωT) ≈ 0.99 use the same function, and there it is a tenth of the time constant |
 //! | tanh | −10 to 10 | 1.1·10⁻³ | 8.1·10⁻⁸ | absolute | `hyperbolic.rs` of this crate, 8.1·10⁻⁸: in half the time of libm's (micromath has none; 1 − 2/(exp 2x + 1) with its exp) |
 //! | powf 1.5 | 10⁻³ to 10 | 1.7·10⁻¹ | 6.7·10⁻⁸ | relative | libm |
 //!
-//! From micromath the firmware therefore takes rounding to whole numbers alone, which is exact below 2²³ (test `micromath_rounds_exactly`).
+//! From micromath the firmware therefore uses only rounding to whole numbers, which is exact below 2²³ (test
+//! `micromath_rounds_exactly`).
 
 use core::fmt::Debug;
 use core::ops::{
@@ -27,9 +28,9 @@ use core::ops::{
 pub trait Mask:
     Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self>
 {
-    /// Whether every lane is true.
+    /// Returns true if every lane is true.
     fn all(self) -> bool;
-    /// Whether some lane is true.
+    /// Returns true if any lane is true.
     fn any(self) -> bool;
 }
 
@@ -44,7 +45,7 @@ impl Mask for bool {
     }
 }
 
-/// A real number, or several of them side by side.
+/// A real number, or several of them in lanes.
 pub trait Real:
     Copy
     + Debug
@@ -59,16 +60,16 @@ pub trait Real:
     + MulAssign
     + DivAssign
 {
-    /// What a comparison gives.
+    /// Result of a comparison.
     type Mask: Mask;
     /// Zero in every lane.
     const ZERO: Self;
     /// One in every lane.
     const ONE: Self;
 
-    /// The nearest representable value, the same in every lane.
+    /// Returns the nearest representable value, the same in every lane.
     fn from_f64(value: f64) -> Self;
-    /// The nearest representable value of a whole number, the same in every lane.
+    /// Returns the nearest representable value of a whole number, the same in every lane.
     #[inline(always)]
     fn from_u32(value: u32) -> Self {
         Self::from_f64(f64::from(value))
@@ -130,9 +131,9 @@ pub trait Real:
     }
 }
 
-/// A [`Real`] that is one number: what a controller or a trajectory of one rig runs on.
+/// A [`Real`] that is a single number, as used by a controller or a trajectory of one rig.
 pub trait Scalar: Real<Mask = bool> {
-    /// The value in double precision, exactly.
+    /// Returns the exact value in double precision.
     fn to_f64(self) -> f64;
 }
 
@@ -207,7 +208,7 @@ impl Real for f32 {
     fn from_f64(value: f64) -> Self {
         value as f32
     }
-    // Without the detour over f64, which the microcontroller has no hardware for.
+    // Without a conversion through f64, for which the microcontroller has no hardware.
     #[inline(always)]
     fn from_u32(value: u32) -> Self {
         value as f32
@@ -255,7 +256,7 @@ mod tests {
     use super::*;
     use micromath::F32Ext;
 
-    /// Largest absolute and relative error over an even grid.
+    /// Returns the largest absolute and relative error over an even grid.
     fn largest(
         low: f64,
         high: f64,
@@ -277,7 +278,7 @@ mod tests {
         (absolute, relative)
     }
 
-    /// Both directions: a statement that is too good or more than a tenth too bad fails.
+    /// Checks both directions: fails if the stated error is too small, or more than a tenth too large.
     fn assert_stated(name: &str, measured: f64, stated: f64) {
         assert!(
             measured <= stated && measured > 0.9 * stated,

@@ -1,13 +1,13 @@
-//! Sine and cosine in single precision alone.
+//! Sine and cosine with single-precision arithmetic only.
 //!
-//! libm's work in double precision inside, which the microcontroller has no hardware for: some 2000 of its
-//! cycles, in a control tick that has 17 000 for everything.
+//! libm computes in double precision, for which the microcontroller has no hardware: some 2000 of its cycles, in a
+//! control tick that has 17 000 in total.
 //!
-//! x = k·π/2 + r with |r| ≤ π/4, the multiple of π/2 taken off in three parts so short that k times the first two
-//! is exact (Cody and Waite 1980, ch. 8); then the polynomials of least largest error on that interval,
-//! x³·P(x²) and x⁴·Q(x²) (Remez's exchange, largest error 1.8·10⁻⁹ and 1.0·10⁻¹⁰ before rounding).
+//! x = k·π/2 + r with |r| ≤ π/4. The multiple of π/2 is subtracted in three parts, so short that k times the first two
+//! is exact (Cody and Waite 1980, ch. 8). Minimax polynomials on that interval follow, x³·P(x²) and x⁴·Q(x²) (Remez's
+//! exchange, largest error 1.8·10⁻⁹ and 1.0·10⁻¹⁰ before rounding).
 
-/// Beyond it k times the parts of π/2 is no longer exact.
+/// Largest |x|, rad, up to which k times the parts of π/2 is exact.
 const FURTHEST: f32 = 8192.0;
 
 /// π/2 in parts of 8, 11 and 24 bits.
@@ -16,12 +16,12 @@ const HALF_PI: [f32; 3] = [1.570_312_5, 4.837_513e-4, 7.549_79e-8];
 const SINE: [f32; 3] = [-0.166_666_51, 8.331_978e-3, -1.949_557e-4];
 const COSINE: [f32; 3] = [4.166_664_7e-2, -1.388_736_7e-3, 2.443_838e-5];
 
-/// Sine and cosine of an angle in rad.
+/// Returns sine and cosine of an angle in rad.
 ///
-/// Not inlined: models, effects and motions ask for them, and the chip's fast memory has no room for copies.
+/// Not inlined: models, effects and motions call it, and the chip's fast memory has no room for copies.
 #[inline(never)]
 pub(crate) fn sincosf(x: f32) -> (f32, f32) {
-    // Written so that NaN goes the long way round too, and comes out as NaN.
+    // The negation sends NaN to `far`, which returns NaN.
     if !(x.abs() <= FURTHEST) {
         return far(x);
     }
@@ -40,7 +40,7 @@ pub(crate) fn sincosf(x: f32) -> (f32, f32) {
     }
 }
 
-/// Beyond [`FURTHEST`]: large, slow, and never asked for by a rig.
+/// Angles beyond [`FURTHEST`]: slow, and never used by a rig.
 #[cold]
 #[inline(never)]
 fn far(x: f32) -> (f32, f32) {

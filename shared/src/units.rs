@@ -1,4 +1,4 @@
-//! Raw codes of the hardware as their own types, and where each becomes a quantity.
+//! Types for raw hardware codes, and their conversion to quantities.
 
 /// The encoder timer's counter: 16 bits, wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,7 +12,7 @@ impl AdcCode {
     /// Largest code of the 12-bit converter.
     pub const FULL_SCALE: u16 = 4095;
 
-    /// Whether the code is at either end of the converter's range, where it no longer measures.
+    /// Returns true if the code is at either end of the converter's range, where it no longer measures.
     #[inline]
     pub const fn at_rail(self) -> bool {
         self.0 == 0 || self.0 >= Self::FULL_SCALE

@@ -3,10 +3,10 @@
 use super::Row;
 use crate::scalar::Real;
 
-/// Row of τ = row·θ at position `q` (rad), velocity `qd` (rad/s) and acceleration `qdd` (rad/s²).
+/// Returns the row of τ = row·θ at position `q` (rad), velocity `qd` (rad/s) and acceleration `qdd` (rad/s²).
 ///
-/// The units of the entries are those of torque over those of the parameter. Source: Khalil & Dombre
-/// (2002), eq. 12.2, for one joint with Coulomb, viscous friction and offset.
+/// The units of the entries are torque over the parameter's unit. Source: Khalil & Dombre (2002), eq. 12.2, for one
+/// joint with Coulomb, viscous friction and offset.
 #[inline]
 pub fn row<T: Real>(q: T, qd: T, qdd: T) -> Row<T> {
     let (sin, cos) = q.sin_cos();

@@ -1,21 +1,21 @@
 //! The filtered differential model: the differential model behind a low-pass filter, without q̈.
 //!
-//! Filtering both sides of τ = row·θ with the same F(s) leaves θ as it is and turns the column q̈ into
-//! s·F applied to q̇, which the filter's own state gives (state-variable filter; Hsu, Bodson, Sastry & Paden 1987,
-//! "Adaptive identification and control for manipulators without using joint accelerations";
-//! Slotine & Li 1991, sec. 9.2). F(s) = (ω/(s+ω))³: three equal real poles, the best conditioned in `f32`.
+//! The same filter F(s) on both sides of τ = row·θ does not change θ. It turns the column q̈ into s·F applied to q̇,
+//! which the filter's state gives (state-variable filter; Hsu, Bodson, Sastry & Paden 1987, "Adaptive identification
+//! and control for manipulators without using joint accelerations"; Slotine & Li 1991, sec. 9.2). F(s) = (ω/(s+ω))³ has
+//! three equal real poles, the best conditioned in `f32`.
 //!
-//! Discretisation: every section by the bilinear rule s = (2/T)(z−1)/(z+1), for every column and the torque alike. The
-//! identity s·y = ω·(u − y) of a section then holds exactly in discrete time, so q̈ needs no difference quotient.
-//! The one error is frequency warping: q̈ of a motion at f comes out (tan x)/x too large, x = πfT; at T = 1 ms
-//! that is 3·10⁻⁵ at 3 Hz and 3·10⁻³ at 30 Hz.
+//! Discretisation: the bilinear rule s = (2/T)(z−1)/(z+1) for every section, every column and the torque. The identity
+//! s·y = ω·(u − y) of a section then holds exactly in discrete time, so q̈ needs no difference quotient. The only error
+//! is frequency warping: q̈ of a motion at f is (tan x)/x too large, x = πfT. At T = 1 ms that is 3·10⁻⁵ at 3 Hz and
+//! 3·10⁻³ at 30 Hz.
 //!
-//! Absolute position enters through sine and cosine alone; give it reduced to one turn and precision does not
-//! degrade with turns made.
+//! Absolute position is used only in sine and cosine. Reduce it to one turn, so that precision does not degrade with
+//! the turns.
 //!
-//! Validity: sgn q̇ is not what friction does in presliding, and the filter remembers. A row counts as valid once
-//! the speed has stayed above the slip velocity, with one sign, for the filter's memory. This says
-//! nothing about information.
+//! Validity: in presliding sgn q̇ does not describe friction, and the filter has a memory. A row is valid once the
+//! speed has stayed above the slip velocity, with one sign, for the filter's memory. A valid row need not be
+//! informative.
 //!
 //! Leaves out: delay between torque and velocity measurement (it acts as an error of the J column).
 
@@ -24,7 +24,7 @@ use crate::scalar::Real;
 
 /// −3 dB frequency of (1/(s+1))³: √(2^⅓ − 1), rad/s.
 const CORNER_OF_TRIPLE_POLE: f64 = 0.509_824_528_533_959_4;
-/// ω·t after which the step response of the triple pole is within e⁻ˣ(1+x+x²/2) = 0.28 % of its end.
+/// ω·t after which the step response of the triple pole is within e⁻ˣ(1+x+x²/2) = 0.28 % of its final value.
 const MEMORY_TIMES_POLE: f64 = 10.0;
 
 /// Constants of the filter.
@@ -36,15 +36,15 @@ pub struct Config<T> {
     feedback: T,
     /// Feed-in of a bilinear section, for the sum of new and old input.
     feed: T,
-    /// Below this speed the Coulomb column is not trusted, rad/s.
+    /// Speed below which the Coulomb column is not valid, rad/s.
     slip_velocity: T,
     /// Samples of memory.
     memory: T,
 }
 
 impl<T: Real> Config<T> {
-    /// `bandwidth_hz` is the −3 dB frequency of F, `rate_hz` the sample rate (at least ten times it),
-    /// `slip_velocity` the speed (rad/s) below which friction may be in presliding.
+    /// `bandwidth_hz`: −3 dB frequency of F. `rate_hz`: sample rate, at least ten times the bandwidth. `slip_velocity`:
+    /// speed (rad/s) below which friction may be in presliding.
     pub fn new(bandwidth_hz: T, rate_hz: T, slip_velocity: T) -> Self {
         let pole = bandwidth_hz * T::from_f64(core::f64::consts::TAU / CORNER_OF_TRIPLE_POLE);
         let half = pole / (rate_hz + rate_hz);
@@ -57,7 +57,7 @@ impl<T: Real> Config<T> {
         }
     }
 
-    /// Samples that the filter remembers: a row is valid so many samples after a reversal or the start.
+    /// Returns the filter's memory in samples: a row is valid this many samples after a reversal or the start.
     pub fn memory_samples(&self) -> T {
         self.memory
     }
@@ -80,7 +80,7 @@ impl<T: Real> Section<T> {
     }
     #[inline(always)]
     fn step(&mut self, config: &Config<T>, input: T) -> T {
-        // Written as a correction so that rounding in `f32` does not shift the gain at standstill.
+        // Written as a correction, so that rounding in `f32` does not shift the gain at standstill.
         self.output += config.feed * ((input - self.output) + (self.input - self.output));
         self.input = input;
         self.output
@@ -104,7 +104,7 @@ impl<T: Real> Cascade<T> {
     }
 }
 
-/// Memory of the filter.
+/// State of the filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State<T> {
     started: bool,
@@ -115,7 +115,7 @@ pub struct State<T> {
     sign: Cascade<T>,
     torque: Cascade<T>,
     previous_sign: T,
-    /// Samples since the motion last was slow or turned.
+    /// Samples since the motion was last slow or reversed.
     steady: T,
 }
 
@@ -126,14 +126,14 @@ pub struct Filtered<T: Real> {
     pub row: Row<T>,
     /// Torque through the same filter, N·m.
     pub torque: T,
-    /// Whether the Coulomb column, and the filter's start, may be trusted.
+    /// True if the Coulomb column is valid and the filter's start is forgotten.
     pub valid: T::Mask,
 }
 
-/// One sample: position (rad, best reduced to one turn), velocity (rad/s), joint torque (N·m).
+/// Processes one sample: position (rad, best reduced to one turn), velocity (rad/s), joint torque (N·m).
 ///
-/// At the first sample the filter starts as if its inputs had always been those; the row becomes valid
-/// when that assumption is forgotten. Cost: one sine and cosine, 17 sections of five operations.
+/// At the first sample the filter starts as if its inputs had always been the same. The row becomes valid when that
+/// assumption is forgotten. Cost: one sine and cosine, 17 sections of five operations.
 #[inline]
 pub fn step<T: Real>(config: &Config<T>, state: &mut State<T>, q: T, qd: T, tau: T) -> Filtered<T> {
     let (sin, cos) = q.sin_cos();
@@ -163,7 +163,7 @@ pub fn step<T: Real>(config: &Config<T>, state: &mut State<T>, q: T, qd: T, tau:
     let fast = config.slip_velocity.lt(qd.abs());
     let same = T::ZERO.lt(sign * state.previous_sign);
     state.previous_sign = sign;
-    // Stops counting once valid: a count in `f32` would otherwise end at 2²⁴.
+    // Stops counting once valid: a count in `f32` would end at 2²⁴.
     let counted = (state.steady + T::ONE).min(config.memory + T::ONE);
     state.steady = T::select(fast & same, counted, T::ZERO);
 
@@ -204,7 +204,7 @@ mod tests {
             }
         }
         assert!(valid > 6000, "{valid}");
-        // Friction jumps at reversals leave what the filter remembers: 0.3 % of 2·fc.
+        // The filter's memory after friction jumps at reversals: 0.3 % of 2·fc.
         assert!(worst < 3e-3 && largest > 2.0, "{worst} of {largest}");
     }
 

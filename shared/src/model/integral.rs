@@ -1,4 +1,4 @@
-//! The integral (energy) model: work done on the link over a window against the change of its energy.
+//! The integral (energy) model: work on the link over a window equals the change of its energy.
 //!
 //! ∫τ·q̇ dt = J·½Δ(q̇²) + gc·Δ(sin q) − gs·Δ(cos q) + fv·∫q̇² dt + fc·∫|q̇| dt + off·∫q̇ dt.
 //!
@@ -6,14 +6,12 @@
 //! parameters of robots"; Kozłowski (1998), "Modelling and Identification in Robotics", ch. 3;
 //! the power form is Gautier (1997), "Dynamic identification of robots with power model".
 //!
-//! Quadrature is the trapezoid rule for every integral, the work among them, on purpose: friction and
-//! offset columns are then consistent with the work sample by sample, also where q̇ passes zero and
-//! the torque jumps. What is left is the rule's error on the smooth conservative power J·q̈·q̇ +
-//! (gc·cos q + gs·sin q)·q̇ =: p, which is dt²/12·(ṗ(t₂) − ṗ(t₁)) + O(dt⁴) (Euler–Maclaurin); at a jump of
-//! q̈ inside a step it is up to ½·J·|Δq̈|·|q̇|·dt once.
+//! Every integral, the work too, uses the trapezoid rule. Friction and offset columns are then consistent with the work
+//! sample by sample, also where q̇ passes zero and the torque jumps. What remains is the rule's error on the smooth
+//! conservative power p := J·q̈·q̇ + (gc·cos q + gs·sin q)·q̇, which is dt²/12·(ṗ(t₂) − ṗ(t₁)) + O(dt⁴)
+//! (Euler–Maclaurin). A jump of q̈ inside a step adds up to ½·J·|Δq̈|·|q̇|·dt once.
 //!
-//! Leaves out: everything that the one-link model leaves out; sums are plain, so in `f32` a window
-//! should stay below some 10⁴ samples.
+//! Leaves out: the same as the one-link model. Sums are plain, so in `f32` a window should stay below some 10⁴ samples.
 
 use super::Row;
 use crate::scalar::Real;
@@ -30,7 +28,7 @@ pub struct Accumulator<T> {
     intervals: u32,
 }
 
-/// What is needed of a sample once it is past.
+/// Values of the previous sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Edge<T> {
     sin: T,
@@ -40,13 +38,13 @@ struct Edge<T> {
 }
 
 impl<T: Real> Accumulator<T> {
-    /// An empty window.
+    /// Returns an empty window.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a sample: position (rad, may be wrapped to a turn), velocity (rad/s), torque (N·m) and the
-    /// time since the sample before (s; ignored for the first).
+    /// Adds a sample: position (rad, may be wrapped to a turn), velocity (rad/s), torque (N·m) and the time since the
+    /// previous sample (s; ignored for the first).
     #[inline]
     pub fn push(&mut self, q: T, qd: T, tau: T, dt: T) {
         let (sin, cos) = q.sin_cos();
@@ -65,8 +63,8 @@ impl<T: Real> Accumulator<T> {
         self.last = Some(now);
     }
 
-    /// Closes the window: the row and the work y (J) with y = row·θ; `None` below two samples.
-    /// The next window starts at this one's last sample, so that windows join without a gap.
+    /// Closes the window. Returns the row and the work y (J) with y = row·θ; `None` below two samples. The next window
+    /// starts at the last sample, so that windows join without a gap.
     #[inline]
     pub fn finish(&mut self) -> Option<(Row<T>, T)> {
         let (first, last) = (self.first?, self.last?);
@@ -97,12 +95,12 @@ pub(super) mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The truth of all model tests, in the order of the parameter names.
+    /// The true parameters of all model tests, in the order of the parameter names.
     pub(crate) const TRUTH: [f64; 6] = [0.12, 2.9, -0.7, 0.3, 0.4, 0.15];
 
-    /// Forward dynamics by RK4 at 16 sub-steps a sample, driven by a torque held over the sample (as a
-    /// power stage holds it) plus Coulomb friction compensated away from zero so that the link keeps moving.
-    /// Returns (q, q̇, τ at the start of the step, τ at its end) per sample.
+    /// Simulates forward dynamics by RK4 with 16 sub-steps per sample. The torque is held over the sample, as a power
+    /// stage does, plus compensation of Coulomb friction away from zero so that the link keeps moving. Returns (q, q̇,
+    /// τ at the start of the step, τ at its end) per sample.
     pub(crate) fn simulate(dt: f64, samples: usize, torque: impl Fn(f64) -> f64) -> Vec<[f64; 3]> {
         let [j, gc, gs, fv, fc, off] = TRUTH;
         let acceleration = |t: f64, q: f64, qd: f64| {
@@ -131,7 +129,7 @@ pub(super) mod tests {
         out
     }
 
-    /// Smooth torque that swings the link through reversals.
+    /// Returns a smooth torque that swings the link through reversals.
     pub(crate) fn drive(t: f64) -> f64 {
         3.0 * (2.0 * t).sin() + 1.5 * (5.1 * t).cos() + 1.0
     }

@@ -4,7 +4,7 @@
 //!
 //! | model | needs | error it brings |
 //! | --- | --- | --- |
-//! | [`differential`] | q, q̇, q̈ | whatever differentiating q̇ brings |
+//! | [`differential`] | q, q̇, q̈ | that of the derivative of q̇ |
 //! | [`filtered`] | q, q̇ | none beyond frequency warping, stated there |
 //! | [`integral`] | q, q̇ | quadrature, stated there |
 //!
@@ -16,5 +16,5 @@ pub mod integral;
 
 use crate::link::PARAMETER_COUNT;
 
-/// One row of the regressor: what each parameter is multiplied by.
+/// One row of the regressor: the factor of each parameter.
 pub type Row<T> = [T; PARAMETER_COUNT];
