@@ -410,7 +410,7 @@ impl<T: Scalar> Compensation<T> {
             instant.load += total(last(&state.planned, self.on_link));
         }
         instant.period = now.period * self.round;
-        // The middle of the time for which the value is held.
+        // To the middle of the time for which the value is held.
         let way = T::from_f64(0.5) * (instant.period - now.period) * measured;
         instant.position += way;
         instant.motor_angle += way * now.gear_ratio;
@@ -436,7 +436,7 @@ impl<T: Scalar> Compensation<T> {
             };
             (&mut state.planned, planned)
         };
-        // Dry friction gives no torque where the direction is 0, whatever the hidden state.
+        // Dry friction gives no torque where the direction is 0, for any hidden state.
         let rests = one.role == Role::Dry && instant.direction.abs().le(T::ZERO);
         if let Some(bent) = bent {
             instant.direction = bent;

@@ -5,7 +5,7 @@
 //! * **Direction near rest.** The sign of a measured velocity near zero is noise. Below `velocity_threshold` the
 //!   direction is the reference's, above twice the threshold the measurement's, with a smooth blend in between. The
 //!   reference carries no noise, so its sign may saturate early: tanh of velocity over [`REFERENCE_SHARE`] of the
-//!   threshold. A reference at rest asks for no torque, whatever the link does: friction then helps to stop the link. A
+//!   threshold. A reference at rest asks for no torque, however the link moves: friction then helps to stop it. A
 //!   torque that followed the measured speed would cancel that help and keep a limit cycle alive (seen on the emulated
 //!   rig: a disturbance of 0.03 N·m was enough to start one).
 //! * **Over-compensation.** With a friction estimate above the true friction, the friction model drives the compensated

@@ -103,8 +103,8 @@ fn periodic() -> impl Iterator<Item = Kind> {
     kinds.filter(|kind| kind.periodic().is_some() && Role::of(*kind).is_some())
 }
 
-/// Eight effects of each periodic kind. The given torque equals the formula at the time when it acts, and the
-/// explained torque equals the formula now, at any speed at which the waves exist.
+/// Eight effects of each periodic kind, at any speed at which the waves exist. The given torque equals the formula at
+/// the time when it acts, and the explained torque equals the formula now.
 #[test]
 fn every_periodic_effect_is_its_formula_at_any_speed() {
     let lead = 3.7 * PERIOD;

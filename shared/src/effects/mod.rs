@@ -133,7 +133,7 @@ trait Law {
         at: &Instant<T>,
     ) -> [T; GAINS];
 
-    /// Advances the hidden state over a gap of so many seconds, s. By default it is reset.
+    /// Advances the hidden state over a gap of `_seconds`, s. By default it is reset.
     fn rested<T: Real>(_shapes: &[T; SHAPES], memory: &mut [T; MEMORY], _seconds: T) {
         *memory = [T::ZERO; MEMORY];
     }
@@ -175,7 +175,7 @@ macro_rules! registry {
                 }
             }
 
-            /// Returns the torque per unit of each gain, N·m, and advances the hidden state by one period from 0.
+            /// Returns the torque per unit of each gain, N·m, and advances the hidden state, 0 at first, by a period.
             #[inline(always)]
             pub fn terms<T: Real>(
                 self,
@@ -280,7 +280,7 @@ registry! {
 }
 
 impl Kind {
-    /// Returns true for what pulls on a joint from outside the robot (cables, hoses, springs), so that it can be taken off.
+    /// Returns true for pulls on a joint from outside the robot (cables, hoses, springs), which can be taken off.
     pub const fn is_external(self) -> bool {
         matches!(self, Self::TorqueOffset | Self::Spring)
     }

@@ -1,6 +1,6 @@
 //! Serial chains of rigid links, any length up to [`MAX_JOINTS`], revolute and prismatic joints mixed.
 //!
-//! Everything is linear in one vector π of [`COLUMNS`] parameters a joint, named by [`COLUMN_NAMES`]:
+//! Everything is linear in one vector π of [`COLUMNS`] parameters per joint, named by [`COLUMN_NAMES`]:
 //! the ten inertial parameters of link i in frame i (inertia about the ORIGIN of that frame), the drive's
 //! inertia seen at the joint, viscous and Coulomb friction, and a constant torque:
 //!

@@ -1,6 +1,6 @@
 //! Drives coupled to joints: motor coordinates Ψ as functions of the joint coordinates q (the book's φ).
 //!
-//! One motor a joint. Motor k turns by
+//! One motor per joint. Motor k turns by
 //!
 //! Ψ_k = F_k(q) = Σ_j g_kj·q_j + (2π/p)·√(s + m·cos φ − n·sin φ) + zero, φ = Σ_j c_j·q_j + offset,
 //!
@@ -52,7 +52,7 @@ pub use inverse::MOST_STEPS;
 use crate::multibody::{MAX_JOINTS, MultibodyError};
 use crate::scalar::Real;
 
-/// Number of parameters, and so of columns, that a motor adds.
+/// Number of parameters, and so of regressor columns, of a motor.
 pub const MOTOR_COLUMNS: usize = 3;
 
 /// Names of the motor parameters in their order; the motor's number (from 1) is appended.
