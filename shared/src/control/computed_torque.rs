@@ -14,7 +14,7 @@ use crate::precompensation;
 use crate::scalar::Real;
 use crate::trajectory::Reference;
 
-/// Returns the joint torque for one tick; `feed` is a known additional torque, N·m. `design_inertia` must be above zero.
+/// Returns the joint torque for one tick; `feed` is a known additional torque, N·m. `design_inertia` must be > 0.
 pub fn step<T: Real<Mask = bool>>(
     config: &Config<T>,
     measured: Measured<T>,

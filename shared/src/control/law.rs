@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// Returns the RMS tracking error over the last of `seconds`, the final state, and V's largest rise and final value.
+    /// Returns the RMS tracking error over the last of `seconds`, the final state, V's largest rise and final value.
     fn track(
         config: &Config<f64>,
         start: LinkParameters<f64>,

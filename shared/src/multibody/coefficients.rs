@@ -6,7 +6,7 @@ use super::parameters::COLUMNS;
 use super::with_capacity;
 use crate::scalar::Real;
 
-/// Computes the matrices B(q), n × n(n−1)/2, and C̄(q), n × n, row-major, so that the Coriolis and centrifugal torques are
+/// Computes B(q), n × n(n−1)/2, and C̄(q), n × n, row-major, so that the Coriolis and centrifugal torques are
 /// B(q)·[q̇₁q̇₂, q̇₁q̇₃, …, q̇₁q̇ₙ, q̇₂q̇₃, …]ᵀ + C̄(q)·[q̇₁², …, q̇ₙ²]ᵀ
 /// (Kozłowski 1998, nomenclature; Khalil & Dombre 2002, eq. 9.11; Craig 1986, sec. 6.9):
 ///

@@ -198,7 +198,7 @@ impl<T: Real> Motion<T> {
         }
     }
 
-    /// Returns self × other: the rate of a motion fixed in a frame that moves with `self` (Featherstone 2008, eq. 2.31).
+    /// Returns self × other: the rate of a motion fixed in a frame moving with `self` (Featherstone 2008, eq. 2.31).
     #[inline(always)]
     pub(super) fn cross(self, other: Self) -> Self {
         Self {

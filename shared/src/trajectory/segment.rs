@@ -24,7 +24,7 @@ pub(super) enum Shape<T> {
 }
 
 impl<T: Real<Mask = bool>> Segment<T> {
-    /// Returns the reference `micros` and a `fraction` after the start. Not inlined: the chip's linker finds it by name.
+    /// Returns the reference `micros` and `fraction` after the start. Not inlined: the chip's linker finds it by name.
     #[inline(never)]
     pub(super) fn at(&self, micros: u32, fraction: T) -> Reference<T> {
         let f = T::from_f64;
