@@ -1,8 +1,8 @@
 //! Dynamics over whole recordings: one call, many samples.
 //!
-//! The unit of work is a recording. Signals come as one column of samples a joint (`&[Vec<f64>]`, `&[&[f64]]`, `[[f64;
-//! N]; n]`, …), all columns of the same length N. Results go into flat slices of the caller, column after column, each
-//! of N samples: entry `c` of sample `k` is `out[c * N + k]`. No memory is allocated per sample.
+//! The unit of work is a recording. Signals come as one column of samples a joint (`&[Vec<f64>]`, `&[&[f64]]`,
+//! `[[f64; N]; n]`, …), all columns of the same length N. Results go into flat slices of the caller, column after
+//! column, each of N samples: entry `c` of sample `k` is `out[c * N + k]`. No memory is allocated per sample.
 //!
 //! [`ModelBatch`] uses the parameters of a robot. [`ChainBatch`] computes regressors, which need only the geometry. The
 //! differential regressor is large (14·n² columns, more than half of them zero) and has its own store,
