@@ -254,8 +254,7 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> Strin
     )
 }
 
-/// A ratio is read from ROS 1, ROS 2 or Drake. A value of 1 beside another is ignored; two different values are
-/// refused.
+/// ROS 1, ROS 2 and Drake state ratios. A value of 1 beside another is ignored; two different values are refused.
 #[test]
 fn gear_ratios_are_read_in_every_form() {
     let read = |transmission: &str| {
