@@ -52,7 +52,7 @@ impl Speaker {
             true
         };
         for &byte in bytes {
-            // The decoder has counted a damaged frame; the host repeats its request without an answer.
+            // The decoder has counted a damaged frame. The host gets no answer and repeats its request.
             if let Some(Ok(request)) = decoder.push(byte)
                 && clerk
                     .serve(

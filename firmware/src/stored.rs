@@ -35,7 +35,7 @@ static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 pub enum Copy {
     /// Erased, never written.
     Empty,
-    /// Changed after writing, or not written completely.
+    /// Content that differs from the written one.
     Damaged,
     /// Whole, but in another firmware's format.
     Foreign {

@@ -108,7 +108,7 @@ async fn hand_over(
 ) {
     let taken = match decoded {
         None => return,
-        // The host repeats a request without an answer.
+        // The host gets no answer and repeats its request.
         Some(Err(_)) => {
             BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
             true

@@ -68,8 +68,8 @@ impl Storage {
         if !FLASH.optr().read().dbank() {
             return Err(Refused);
         }
-        // A page endures ten thousand erasures (DS12288, "Flash memory endurance"). A damaged other place still needs a
-        // copy.
+        // Unchanged settings are skipped: a page endures ten thousand erasures (DS12288, "Flash memory endurance").
+        // They are written if the other place is damaged, because there would be no second copy.
         if matches!(look(1 - self.place), Copy::Whole { number, settings: held }
             if number.wrapping_add(1) == self.number && held == *settings)
             && look(self.place) != Copy::Damaged

@@ -38,7 +38,7 @@ pub struct State<'a> {
     pub qd: &'a [f64],
     /// Accelerations, rad/s² or m/s².
     pub qdd: &'a [f64],
-    /// Angles of the motors, rad.
+    /// Angles of the motors.
     pub motor: &'a [f64],
     /// Torques from the motor currents, N·m or N.
     pub drive: &'a [f64],

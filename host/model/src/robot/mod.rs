@@ -420,8 +420,8 @@ impl Description {
     }
 }
 
-/// Reads the whole file as text. Returns its encoding too if that is not UTF-8. Refuses a path or size that cannot be a
-/// description before it reads.
+/// Reads the whole file as text. Returns its encoding too if that is not UTF-8. Refuses a directory, and a file that is
+/// too large, empty or not text.
 fn read_text(path: &Path) -> Result<(String, Option<&'static str>), RobotError> {
     let failed = |source| RobotError::Read {
         path: path.into(),

@@ -272,7 +272,7 @@ pub fn controllers(
     Ok((list, stand_ins))
 }
 
-/// Returns the first joint, from the tip, with almost no inertia to move while the joints before it are free. Its pivot
+/// Returns the first joint, from the tip, with almost no inertia to move while the joints beyond it are free. Its pivot
 /// of the inertia matrix (n × n, row-major) in the elimination from the tip (Featherstone 2008, sec. 7.3) is rounding.
 fn massless(mass: &[f64], n: usize) -> Option<usize> {
     let largest = (0..n).map(|i| mass[i * n + i]).fold(0.0, f64::max);
