@@ -1,4 +1,4 @@
-//! The current offset, measured at the start. Apart from the control tick, whose code fills the chip's fast memory.
+//! The current offset, measured at the start. Separate from the control tick, whose code fills the chip's fast memory.
 
 use rig_shared::safety::{Fault, Mode};
 use rig_shared::units::AdcCode;
@@ -6,7 +6,7 @@ use rig_shared::units::AdcCode;
 use crate::config::Config;
 use crate::state::State;
 
-/// Measures the current offset while the bridge is off; a fault where it is implausible.
+/// Measures the current offset while the bridge is off. Returns a fault if it is implausible.
 #[inline(never)]
 pub(crate) fn calibrate(
     config: &Config,

@@ -1,33 +1,33 @@
-//! A burst of control ticks kept in RAM at the full control rate: what the telemetry averages away.
+//! A burst of control ticks kept in RAM at the full control rate, without the averaging of the telemetry.
 //!
-//! The ring turns until it is triggered, by the host or by a fault, and stands still a chosen number of ticks
-//! later, so that it holds what came before and after.
+//! The ring runs until the host or a fault triggers it, and stops a chosen number of ticks later. So it holds ticks
+//! before and after the trigger.
 
 use rig_shared::safety::SnapshotSample;
 
 /// Control ticks that the capture keeps: 0.15 s at 10 kHz.
 pub const CAPTURE_TICKS: usize = 1536;
 
-/// A tick in less memory: its number follows from its place, its position from the last one's; duty and supply are kept
-/// finer than the bridge sets and the converter reads them.
+/// A tick in less memory. Its number follows from its place, its position from the position of the last tick. Duty and
+/// supply are finer than the resolution of bridge and converter.
 #[derive(Clone, Copy, Debug)]
 struct Packed {
     counts: i32,
     current: f32,
     reference: f32,
-    /// −1 to 1 in 65 534 steps about 32 768; the bridge has 8500.
+    /// Range −1 to 1 in 65 534 steps about 32 768; the bridge has 8500.
     duty: u16,
-    /// 2⁻¹⁰ V, up to 64 V; the converter's code is 9 mV.
+    /// Unit 2⁻¹⁰ V, up to 64 V; the converter's code is 9 mV.
     supply: u16,
 }
 
 /// Steps of the duty from 0 to 1, and the code of 0.
 const DUTY: f32 = 32_767.0;
 const ZERO: f32 = 32_768.0;
-/// Steps of the supply in a volt.
+/// Steps of the supply per volt.
 const SUPPLY: f32 = 1024.0;
 
-/// To the nearest; what is not there saturates. By way of 32 bits, which the microcontroller converts in one instruction.
+/// Rounds to the nearest; values out of range saturate. Via 32 bits, which the chip converts in one instruction.
 #[inline(always)]
 fn packed(x: f32) -> u16 {
     ((x + 0.5) as u32).min(0xFFFF) as u16
@@ -48,7 +48,7 @@ pub struct Capture {
     next: usize,
     filled: usize,
     phase: Phase,
-    /// The last tick kept, whole.
+    /// The last tick kept, unpacked.
     last: SnapshotSample,
 }
 
@@ -59,10 +59,10 @@ impl Default for Capture {
 }
 
 impl Capture {
-    /// Ticks kept after a fault: an eighth shows what the fault reaction did.
+    /// Ticks kept after a fault: an eighth is enough to show the fault reaction.
     pub const AFTER_FAULT: u16 = (CAPTURE_TICKS / 8) as u16;
 
-    /// Turning, empty.
+    /// Returns a running, empty capture.
     pub const fn new() -> Self {
         Self {
             ring: [Packed {
@@ -99,7 +99,7 @@ impl Capture {
         }
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = Packed {
-                // The low half: the rest follows from the last tick, for no joint turns 2³¹ counts in a burst.
+                // The low half: the rest follows from the last tick, because no joint turns 2³¹ counts in a burst.
                 counts: sample.position as i32,
                 current: sample.current,
                 reference: sample.reference,
@@ -116,7 +116,7 @@ impl Capture {
         self.filled = (self.filled + 1).min(CAPTURE_TICKS);
     }
 
-    /// Has the ring stand still `after` ticks from now, at most its length. A complete capture is given up for a new one.
+    /// Stops the ring `after` ticks from now, at most its length. Discards a complete capture for a new one.
     pub fn trigger(&mut self, after: u16) {
         if self.is_complete() {
             self.next = 0;
@@ -125,41 +125,41 @@ impl Capture {
         self.phase = Phase::Awaited(after.min(CAPTURE_TICKS as u16));
     }
 
-    /// A fault triggers too, unless a capture is under way or waits to be fetched.
+    /// Triggers by a fault, unless a capture is being taken or waits to be fetched.
     pub fn trigger_by_fault(&mut self) {
         if self.phase == Phase::Turning {
             self.trigger(Self::AFTER_FAULT);
         }
     }
 
-    /// Has the ring turn again.
+    /// Starts the ring again.
     pub fn release(&mut self) {
         self.next = 0;
         self.filled = 0;
         self.phase = Phase::Turning;
     }
 
-    /// Whether a trigger has come and ticks are still to come.
+    /// Returns true if a trigger has come and more ticks are to follow.
     pub fn is_awaited(&self) -> bool {
         matches!(self.phase, Phase::Awaited(_))
     }
 
-    /// Whether the ring stands still.
+    /// Returns true if the ring has stopped.
     pub fn is_complete(&self) -> bool {
         self.phase == Phase::Complete
     }
 
-    /// Ticks kept.
+    /// Returns the number of ticks kept.
     pub fn len(&self) -> usize {
         self.filled
     }
 
-    /// Whether nothing has been kept yet.
+    /// Returns true if no tick was kept yet.
     pub fn is_empty(&self) -> bool {
         self.filled == 0
     }
 
-    /// The `index`-th kept tick, 0 the oldest.
+    /// Returns the `index`-th kept tick, 0 the oldest.
     pub fn get(&self, index: usize) -> Option<SnapshotSample> {
         if index >= self.filled {
             return None;

@@ -1,4 +1,4 @@
-//! The conversation's half that belongs to the control tick: requests in, notes out, a bounded time each.
+//! Part of the conversation that runs in the control tick: requests in, notes out, each in bounded time.
 
 use rig_shared::safety::SnapshotSample;
 use rig_shared::wire::Ledger;
@@ -12,12 +12,12 @@ use crate::request::carry_out;
 use crate::state::State;
 use crate::step::Output;
 
-/// Where notes go; false where there is no room.
+/// Destination of notes.
 pub trait Notes {
-    /// Takes a note, or nothing of it.
+    /// Takes a whole note, or returns false if there is no room.
     fn put(&mut self, note: Note) -> bool;
 
-    /// Whether there is room for the parts of a snapshot beside everything else.
+    /// Returns true if there is room for the parts of a snapshot in addition to other notes.
     fn roomy(&self) -> bool {
         true
     }
@@ -29,30 +29,30 @@ impl<F: FnMut(Note) -> bool> Notes for F {
     }
 }
 
-/// What the tick remembers of the conversation.
+/// State of the conversation in the tick.
 #[derive(Clone, Debug, Default)]
 pub struct Clerk {
     ledger: Ledger,
-    /// Next tick of the snapshot to send, while it is being sent.
+    /// Next tick of the snapshot to send, while it is sent.
     snapshot: Option<u16>,
-    /// Next tick of the capture to send, while it is being sent.
+    /// Next tick of the capture to send, while it is sent.
     capture: Option<u16>,
-    /// Number of the request to store the settings that is under way.
+    /// Number of the pending request to store the settings.
     storing: Option<u16>,
-    /// Telemetry windows that found no room since the last that did.
+    /// Telemetry windows that found no room since the last sent one.
     missed: u32,
     /// The same since power on.
     dropped: u32,
 }
 
 impl Clerk {
-    /// Nothing said yet.
+    /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Carries out a request and notes the answer. Gives the settings where they are to be stored: call
-    /// [`Clerk::stored`] when that is done. Nothing is answered before. Not inlined: it is seldom.
+    /// Carries out a request and notes the answer. Returns the settings if they must be stored: call [`Clerk::stored`]
+    /// afterwards, which sends the answer. Not inlined because it is rare.
     #[inline(never)]
     pub fn serve(
         &mut self,
@@ -71,7 +71,7 @@ impl Clerk {
             notes.put(Note::Answer(earlier, Topic::None));
             return None;
         }
-        // Asked again while it is under way: the answer is still to come.
+        // A repeated request while storing: the answer is still to come.
         if self.storing == Some(id) {
             return None;
         }
@@ -89,7 +89,7 @@ impl Clerk {
         None
     }
 
-    /// Says that storing the settings has ended, and answers the request. Not inlined: it is seldom.
+    /// Ends storing the settings, and answers the request. Not inlined because it is rare.
     #[inline(never)]
     pub fn stored(
         &mut self,
@@ -116,7 +116,7 @@ impl Clerk {
             }
             RequestBody::Hello => Topic::Greeting,
             RequestBody::StartStream => {
-                // What found no room before the stream is nobody's.
+                // Windows that found no room before the stream do not count.
                 self.missed = 0;
                 Topic::StreamStart(state.window_start())
             }
@@ -133,7 +133,7 @@ impl Clerk {
         }
     }
 
-    /// Keeps what a control tick gave, and notes it.
+    /// Keeps the output of a control tick, and notes it.
     pub fn report(
         &mut self,
         state: &State,
@@ -158,27 +158,27 @@ impl Clerk {
                 missed.saturating_add(1)
             };
         }
-        // One kept tick per control tick, so that it never crowds out the stream.
+        // One kept tick per control tick, so that the stream always has room.
         if (self.snapshot.is_some() || self.capture.is_some()) && notes.roomy() {
             self.pass_kept(state, capture, notes);
         }
     }
 
-    /// Passes on a tick of the snapshot and one of the capture. Not inlined: it is seldom.
+    /// Passes on one tick of the snapshot and one of the capture. Not inlined because it is rare.
     #[inline(never)]
     fn pass_kept(&mut self, state: &State, capture: &Capture, notes: &mut impl Notes) {
         self.pass_snapshot(state, notes);
         self.pass_capture(capture, notes);
     }
 
-    /// Telemetry windows that found no room since power on.
+    /// Returns the telemetry windows that found no room since power on.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
     fn pass_snapshot(&mut self, state: &State, notes: &mut impl Notes) {
         let Some(index) = self.snapshot else { return };
-        // A ring that still turns would put parts of different times together. Without a fault there is nothing.
+        // A running ring would mix parts of different times. Without a fault there is no snapshot.
         let faulty = state.latch.first().is_some();
         if faulty && !state.snapshot.is_frozen() {
             return;

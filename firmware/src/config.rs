@@ -1,4 +1,4 @@
-//! What is fixed while the rig runs: rates, nameplate, thresholds; and what the host may replace.
+//! Values that are fixed while the rig runs (rates, nameplate, thresholds), and values that the host may replace.
 
 use micromath::F32Ext;
 use rig_shared::compensation::Effects;
@@ -43,12 +43,12 @@ impl Rates {
         estimate_report_decimation: 50,
     };
 
-    /// Estimator updates per second.
+    /// Returns the estimator updates per second.
     pub fn estimator_hz(&self) -> f32 {
         self.control_hz as f32 / f32::from(self.estimator_decimation.max(1))
     }
 
-    /// Telemetry samples per second.
+    /// Returns the telemetry samples per second.
     pub fn telemetry_hz(&self) -> f32 {
         self.control_hz as f32 / f32::from(self.telemetry_decimation.max(1))
     }
@@ -61,11 +61,11 @@ pub struct Encoder {
     pub counts_per_motor_turn: u32,
     /// Bandwidth of the velocity observer, Hz.
     pub observer_bandwidth: f32,
-    /// Levels of A (2) and B (1) at which the index pulse stands.
+    /// Levels of A (2) and B (1) during the index pulse.
     pub index_levels: u8,
 }
 
-/// Fixed while the rig runs.
+/// Values that are fixed while the rig runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Rates.
@@ -78,22 +78,22 @@ pub struct Config {
     pub encoder: Encoder,
     /// Thresholds of the checks.
     pub monitor: MonitorConfig,
-    /// What the rig's parts stand: no limits may lie beyond ([`ratings`]).
+    /// Ratings of the rig's parts: no limit may exceed them ([`ratings`]).
     pub ratings: Limits<f32>,
-    /// Ticks over which the current offset is measured at start.
+    /// Ticks for measuring the current offset at the start.
     pub calibration_ticks: u32,
     /// Largest plausible current offset, A.
     pub largest_offset: f32,
-    /// Silence of the host after which the rig comes to rest, ticks.
+    /// Silence of the host after which the rig stops, ticks.
     pub host_silent_ticks: u32,
-    /// Time that the bridge takes from its enable to its outputs, ticks: nothing is asked of it meanwhile.
+    /// Time from the bridge's enable to active outputs, ticks; no motion is commanded meanwhile.
     pub wake_ticks: u32,
-    /// Further silence after which the bridge goes off and the fault latches, ticks.
+    /// Further silence after which the bridge is switched off and the fault latches, ticks.
     pub host_lost_ticks: u32,
 }
 
 impl Config {
-    /// What follows from the parts, the rates and the limits that the parts were chosen for.
+    /// Derives the configuration from the parts, the rates and the limits for which the parts were chosen.
     pub fn new(rates: Rates, drive: Drive<f32>, encoder: Encoder, limits: &Limits<f32>) -> Self {
         let rate = rates.control_hz;
         let counts_per_radian =
@@ -111,7 +111,7 @@ impl Config {
                 current_margin: 1.5,
                 velocity_margin: 1.25,
                 position_margin: 0.1,
-                // Four times the fastest allowed speed: beyond it no motor turns, only a fault counts so fast.
+                // Four times the fastest allowed speed: no motor is faster, so larger steps are a fault.
                 largest_step: F32Ext::ceil(4.0 * limits.velocity * counts_per_radian * period)
                     as i32
                     + 4,
@@ -130,25 +130,25 @@ impl Config {
         }
     }
 
-    /// Codes of the current, lower and upper, beyond which comparators switch the bridge off: what the checks call an
-    /// over-current at the highest limit that the parts stand.
+    /// Returns the lower and upper current codes at which comparators switch the bridge off: the over-current threshold
+    /// of the checks at the highest rated limit.
     pub fn current_thresholds(&self) -> [u16; 2] {
         let most = self.monitor.current_margin * self.ratings.peak_current;
         let codes = most / self.scaling.current_per_code.abs();
-        // Casts saturate at 0; a threshold at the converter's own end is none, and the checks are left.
+        // Casts saturate at 0. A threshold at the converter's own end does not act, and only the checks remain.
         [-codes, codes].map(|codes| ((self.scaling.current_zero + codes) as u16).min(4095))
     }
 }
 
-/// Ticks that the bridge of the parts list takes from its enable to its outputs: 1 ms at most (DRV8874, SLVSF66, t_WAKE), and
-/// a tick in which that ends.
+/// Returns the ticks from the enable of the listed bridge to active outputs: at most 1 ms (DRV8874, SLVSF66, t_WAKE),
+/// plus one partial tick.
 pub const fn wake_ticks(control_hz: u32) -> u32 {
     control_hz.div_ceil(1000) + 1
 }
 
-/// What parts stand that were chosen for these limits: currents and torque by a quarter more, as over-current is found at
-/// one and a half times the peak current and the bridge of the parts list bears 6 A; twice the speed and four times the
-/// acceleration, which the checks of the encoder still follow; and positions whose counts an `f32` names one by one.
+/// Returns the ratings of parts that were chosen for these limits. Currents and torque: 25 % more, because over-current
+/// is detected at one and a half times the peak current and the listed bridge bears 6 A. Speed: twice, acceleration:
+/// four times, which the encoder checks still follow. Positions: the range in which an `f32` holds every count exactly.
 pub fn ratings(limits: &Limits<f32>, radians_per_count: f32) -> Limits<f32> {
     const FARTHEST: f32 = 16_777_216.0;
     let farthest = FARTHEST * radians_per_count.abs();
@@ -163,7 +163,7 @@ pub fn ratings(limits: &Limits<f32>, radians_per_count: f32) -> Limits<f32> {
     }
 }
 
-/// What the host may replace while the rig stands.
+/// Values that the host may replace while the rig stands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Control law.
@@ -172,11 +172,11 @@ pub struct Settings {
     pub gains: Gains<f32>,
     /// Model behind the feed-forward.
     pub model: LinkParameters<f32>,
-    /// Friction law behind the precompensation.
+    /// Friction law for the precompensation.
     pub friction: Friction<f32>,
-    /// How the friction law is used near zero speed.
+    /// Use of the friction law near zero speed.
     pub precompensation: PrecompensationSettings<f32>,
-    /// Effects that are compensated beside the friction law.
+    /// Effects compensated in addition to the friction law.
     pub effects: Effects<f32>,
     /// Limits.
     pub limits: Limits<f32>,
@@ -190,7 +190,7 @@ mod tests {
     fn comparators_act_between_the_checks_and_the_ends_of_the_converter() {
         let (config, settings) = crate::nameplate::one_link();
         let [lower, upper] = config.current_thresholds();
-        // 6 A of 8.06 mA a code: what the bridge of the parts list bears.
+        // 6 A at 8.06 mA a code: the rating of the listed bridge.
         assert_eq!([lower, upper], [1303, 2792]);
         let checked = settings.limits.peak_current * config.monitor.current_margin;
         let of = |code: u16| (f32::from(code) - 2048.0) * config.scaling.current_per_code;

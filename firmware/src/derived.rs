@@ -1,4 +1,4 @@
-//! Constants that follow from configuration and settings; computed when those change, never in the tick.
+//! Constants derived from configuration and settings; computed when those change, never in the tick.
 
 use rig_shared::control::{adaptive, current, law};
 use rig_shared::encoder;
@@ -6,13 +6,13 @@ use rig_shared::encoder;
 use crate::config::{Config, Settings};
 use crate::sample::EDGE_CLOCK_HZ;
 
-/// |s| below which the adaptive law learns nothing, rad/s: about the velocity observer's ripple and the
-/// tracking noise of a rig at rest, where learning would only be drift.
+/// Bound on |s| below which the adaptive law does not learn, rad/s. It is about the velocity observer's ripple and the
+/// tracking noise of a rig at rest, where learning would only drift.
 const ADAPTATION_DEAD_ZONE: f32 = 0.02;
-/// Largest share of the supply that the bridge may use: the rest is dead time and the bootstrap's refresh.
+/// Largest share of the supply that the bridge may use. The rest is for dead time and bootstrap refresh.
 const DUTY_LIMIT: f32 = 0.95;
 
-/// Share of the peak current below which the bridge loses less voltage.
+/// Share of the peak current below which the bridge's voltage loss fades.
 const FADE: f32 = 0.02;
 
 /// Constants of the tick.
@@ -28,11 +28,11 @@ pub struct Derived {
     pub motor_radians_per_count: f32,
     /// Joint torque per motor current, N·m/A.
     pub torque_per_ampere: f32,
-    /// Control ticks in a period of the clock that times the encoder's edges.
+    /// Control ticks per period of the clock that times the encoder's edges.
     pub ticks_per_edge_period: f32,
-    /// Whole ticks of the current loop's lag, and the share of one that is left.
+    /// Lag of the current loop: whole ticks, and the remaining share of a tick.
     pub lag: (u8, f32),
-    /// Share of the bridge's loss that is made up for, per wanted ampere, 1/A.
+    /// Compensated share of the bridge's loss per wanted ampere, 1/A.
     pub fade_per_ampere: f32,
     /// Velocity observer.
     pub observer: encoder::Config<f32>,
@@ -43,7 +43,7 @@ pub struct Derived {
 }
 
 impl Derived {
-    /// Works them out.
+    /// Computes the constants.
     #[inline(never)]
     pub fn new(config: &Config, settings: &Settings) -> Self {
         let rate = config.rates.control_hz as f32;
@@ -52,7 +52,7 @@ impl Derived {
             config.encoder.counts_per_motor_turn as f32 * config.drive.gear_ratio;
         let limits = &settings.limits;
         let current = current::Config::design(&config.drive, &settings.gains, period, DUTY_LIMIT);
-        // Bandwidths that give more ticks than are remembered are refused (`usable`).
+        // `usable` refuses bandwidths whose lag exceeds the remembered ticks.
         let lag = current.lag * rate;
         let whole = lag as u8;
         Self {

@@ -1,4 +1,4 @@
-//! The conversation's half that takes its time: notes in, frames out.
+//! Part of the conversation without a deadline: notes in, frames out.
 
 use heapless::{String, Vec};
 use rig_shared::safety::SnapshotSample;
@@ -8,9 +8,9 @@ use rig_shared::wire::{Batcher, MAX_FRAME, PROTOCOL_VERSION, encode, schema};
 use crate::config::Config;
 use crate::note::{Kept, Note, Topic};
 
-/// Takes one frame for the host; false where the transmit queue has no room for it.
+/// Destination of frames.
 pub trait Transmit {
-    /// Queues a whole frame or nothing.
+    /// Queues a whole frame, or returns false if there is no room.
     fn frame(&mut self, bytes: &[u8]) -> bool;
 }
 
@@ -28,7 +28,7 @@ struct Part {
 }
 
 impl Part {
-    /// Adds a tick; gives a part when one is full or the last.
+    /// Adds a tick; returns a part if it is full or the last.
     fn push(&mut self, kept: &Kept) -> Option<SnapshotPart> {
         if kept.index == 0 || self.samples.is_full() {
             self.samples.clear();
@@ -49,7 +49,7 @@ impl Part {
     }
 }
 
-/// What the conversation's end remembers.
+/// State of the conversation.
 #[derive(Default)]
 pub struct Desk {
     batcher: Batcher,
@@ -58,12 +58,12 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Nothing said yet.
+    /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Tells the host what a note says.
+    /// Sends the content of a note to the host.
     pub fn tell(&mut self, config: &Config, note: &Note, transmit: &mut impl Transmit) {
         match note {
             Note::Answer(acknowledge, topic) => {
@@ -100,7 +100,7 @@ impl Desk {
         }
     }
 
-    /// What follows an acknowledgement.
+    /// Sends the consequences of an acknowledgement.
     fn converse(&mut self, config: &Config, topic: &Topic, transmit: &mut impl Transmit) {
         match topic {
             Topic::None => {}
@@ -134,14 +134,14 @@ impl Desk {
     }
 }
 
-/// Frames a report and queues it; false where it could not be queued.
+/// Frames a report and queues it; returns false if it was not queued.
 fn send(report: &Report, transmit: &mut impl Transmit) -> bool {
     let mut frame = [0; MAX_FRAME];
     match encode(report, &mut frame) {
         Ok(length) => frame
             .get(..length)
             .is_some_and(|bytes| transmit.frame(bytes)),
-        // The longest report fits (tested with the wire format); an unsendable one counts as refused.
+        // The longest report fits (tested with the wire format); one that does not fit counts as refused.
         Err(_) => false,
     }
 }

@@ -1,4 +1,4 @@
-//! Requests with everything worked out and checked that takes longer than a control tick has.
+//! Requests whose slow computations and checks are done outside the control tick.
 
 use rig_shared::compensation::{Compensation, EffectFault, Effects};
 use rig_shared::estimation::one_link;
@@ -8,22 +8,22 @@ use rig_shared::wire::message::{Refusal, Request, RequestBody};
 use crate::config::Config;
 use crate::usable;
 
-/// A request, and what follows from it.
+/// A request with the result of its examination.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Examined {
-    /// As the host sent it.
+    /// The request as the host sent it.
     pub request: Request,
-    /// What follows, or why it is refused whatever the rig does.
+    /// The result, or the refusal if the request is invalid in every state of the rig.
     pub finding: Result<Finding, Refusal>,
 }
 
-/// What follows from a request.
+/// Result of an examination.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // four of them lie in a queue, and nowhere else
 pub enum Finding {
-    /// Nothing: it says all by itself.
+    /// No further result.
     Plain,
-    /// How far a trajectory goes, and its preparation.
+    /// Extremes of a trajectory, and its preparation.
     Motion(Extremes<f32>, Preparation<f32>),
     /// Effects, checked.
     Effects(Compensation<f32>),
@@ -31,7 +31,7 @@ pub enum Finding {
     Estimator(one_link::Config<f32>),
 }
 
-/// Examines a request. A Fourier series is evaluated some thousand times: do this outside the tick.
+/// Examines a request. Evaluates a Fourier series about a thousand times: call this outside the tick.
 pub fn examine(config: &Config, request: Request) -> Examined {
     let finding = find(config, &request.body);
     Examined { request, finding }

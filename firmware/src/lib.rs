@@ -1,12 +1,11 @@
-//! The control application of the rig, free of hardware.
+//! The control application of the rig, independent of hardware.
 //!
-//! One pure function, [`step`](step::step), is the whole control tick: it takes the raw [`Sample`](sample::Sample)
-//! of one trigger and gives the [`Command`](sample::Command) that acts from the next one on. A board calls
-//! it from its converter interrupt; the emulated rig and the tests call it in a loop. Beside it,
-//! [`speaker::Speaker`] turns bytes from the host into changes of [`State`](state::State) and what a
-//! tick gave into bytes for the host.
+//! One pure function, [`step`](step::step), is the whole control tick. It takes the raw [`Sample`](sample::Sample) of
+//! one trigger and returns the [`Command`](sample::Command) that acts from the next trigger on. A board calls it from
+//! its converter interrupt; the emulated rig and the tests call it in a loop. [`speaker::Speaker`] turns bytes from the
+//! host into changes of [`State`](state::State), and the output of a tick into bytes for the host.
 //!
-//! Nothing here knows a pin, a clock or a buffer; nothing allocates, blocks or panics.
+//! No code here depends on a pin, a clock or a buffer. It never allocates, blocks or panics.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -29,5 +28,5 @@ pub mod stored;
 pub mod usable;
 pub mod window;
 
-/// Version of the firmware, as the greeting tells it.
+/// Version of the firmware, as the greeting reports it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -7,7 +7,7 @@
 //!  LPUART1 ──DMA──► command task: decode, examine ──┘    telemetry task: frames ──DMA──► LPUART1
 //! ```
 //!
-//! The interrupt shares nothing with the tasks but queues without locks and a few atomic words.
+//! The interrupt and the tasks share only queues without locks and a few atomic words.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -16,7 +16,7 @@ mod board;
 #[cfg(target_os = "none")]
 use board::start;
 
-/// On the desktop there is no board to run on.
+/// Refuses to run on the desktop: there is no board.
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
     eprintln!(

@@ -1,7 +1,7 @@
-//! What the board is told about its rig: the one file to change for another motor, gear, encoder or sensor.
+//! Data of the rig: the one file to change for another motor, gear, encoder or sensor.
 //!
-//! The numbers are those of `host/robots/one-link.toml`, which `rig init one-link` writes; a test of the host
-//! holds them together. What the host may replace (limits, gains, laws, models) it sends or stores over the wire.
+//! The numbers equal those of `host/robots/one-link.toml`, which `rig init one-link` writes; a test of the host
+//! compares them. The host sends or stores its own values (limits, gains, laws, models) over the wire.
 
 use rig_shared::compensation::Effects;
 use rig_shared::control::{ControlKind, Gains};
@@ -14,10 +14,10 @@ use rig_shared::safety::Limits;
 
 use crate::config::{Config, Encoder, Rates, Settings};
 
-/// How often what is done.
+/// Rates of all periodic work.
 pub const RATES: Rates = Rates::TEMPLATE;
 
-/// The one-link rig of the template: what is fixed, and what holds until the host says otherwise.
+/// Returns the one-link rig of the template: its fixed values, and the settings until the host replaces them.
 pub fn one_link() -> (Config, Settings) {
     one_link_at(RATES)
 }

@@ -1,9 +1,9 @@
-//! What a control tick has to say, small enough to pass on in a queue; bytes are made of it elsewhere.
+//! Messages of a control tick, small enough for a queue; other code converts them to bytes.
 
 use rig_shared::safety::{FaultRecord, SnapshotSample};
 use rig_shared::wire::message::{Acknowledge, Estimate, Health, StateSample};
 
-/// One thing to be told to the host.
+/// One message for the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // the estimate is 70 bytes; a queue of notes is small all the same
 pub enum Note {
@@ -24,11 +24,11 @@ pub enum Note {
     Snapshot(Kept),
     /// One control tick of the triggered capture.
     Capture(Kept),
-    /// How the board is.
+    /// State of the board.
     Health(Health),
 }
 
-/// What an accepted request means for the conversation.
+/// Consequence of an accepted request for the conversation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Topic {
     /// Nothing.
@@ -39,16 +39,16 @@ pub enum Topic {
     StreamStart(u64),
     /// The stream ends.
     StreamEnd,
-    /// A snapshot is about to come, of this fault if there is one.
+    /// A snapshot follows, of this fault if there is one.
     Snapshot(Option<FaultRecord>),
 }
 
-/// One kept control tick, with its place.
+/// One kept control tick with its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kept {
     /// Index, 0 the oldest.
     pub index: u16,
-    /// Ticks kept in all; 0 where there is nothing, and then `sample` means nothing.
+    /// Number of ticks kept; 0 if there are none: `sample` is then not valid.
     pub total: u16,
     /// The tick.
     pub sample: SnapshotSample,

@@ -1,8 +1,8 @@
-//! Where the reference is, mode by mode.
+//! Reference position in each mode.
 
 use rig_shared::trajectory::Reference;
 
-/// A reference that comes to rest at constant deceleration, one control tick at a time.
+/// A reference that stops at constant deceleration, one control tick at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Braking {
     position: f32,
@@ -10,7 +10,7 @@ pub struct Braking {
 }
 
 impl Braking {
-    /// Starts from where the reference is now.
+    /// Starts from the present reference.
     pub fn from(reference: Reference<f32>) -> Self {
         Self {
             position: reference.position,
@@ -18,7 +18,7 @@ impl Braking {
         }
     }
 
-    /// One tick of `period` seconds at `deceleration` rad/s². The velocity ends at exactly zero.
+    /// Advances one tick of `period` seconds at `deceleration` rad/s². The velocity ends at exactly zero.
     pub fn step(&mut self, deceleration: f32, period: f32) -> Reference<f32> {
         let change = deceleration * period;
         let before = self.velocity;
@@ -35,7 +35,7 @@ impl Braking {
         }
     }
 
-    /// Whether the reference stands.
+    /// Returns true if the reference is at rest.
     pub fn at_rest(&self) -> bool {
         self.velocity == 0.0
     }

@@ -1,4 +1,4 @@
-//! What the host may change, when, and what it is refused.
+//! Requests of the host: when they are allowed, and when they are refused.
 
 use micromath::F32Ext;
 use rig_shared::control::{adaptive, current};
@@ -11,15 +11,15 @@ use crate::examined::{Examined, Finding};
 use crate::state::{Calibration, Run, State};
 use crate::step::brake;
 
-/// Carries out a request, or says why not; nothing has changed then.
+/// Carries out a request, or refuses it without any change.
 ///
-/// Requests about the conversation itself (`Hello`, streams, snapshot, capture) are the
-/// [`Clerk`](crate::clerk::Clerk)'s and are accepted here without effect.
+/// Requests about the conversation itself (`Hello`, streams, snapshot, capture) belong to the
+/// [`Clerk`](crate::clerk::Clerk) and are accepted here without effect.
 ///
-/// Not inlined: it is rare, and the chip's fast memory is for what runs in every tick.
+/// Not inlined because it is rare; the chip's fast memory is for code that runs in every tick.
 ///
 /// # Errors
-/// The [`Refusal`] that goes back to the host.
+/// The [`Refusal`] that is sent to the host.
 #[inline(never)]
 pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Result<(), Refusal> {
     let body = &examined.request.body;
@@ -37,7 +37,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
             }
             Ok(())
         }
-        // While the flash is being written nothing may start that depends on every tick.
+        // No action that depends on every tick may start while the flash is being written.
         _ if state.storing => Err(Refusal::Busy),
         RequestBody::Store => store(state),
         RequestBody::Arm => arm(config, state),
@@ -54,7 +54,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
         RequestBody::SetPosition(position) => set_position(state, *position),
         RequestBody::SetLimits(_) if state.mode.drives() => Err(Refusal::WrongMode),
         _ => {
-            // Checks that act may not be moved, nor laws that drive a motion.
+            // Active checks must not change during a motion, nor laws that drive it.
             refuse_in_motion(state)?;
             replace(
                 state,
@@ -65,7 +65,7 @@ pub fn carry_out(config: &Config, state: &mut State, examined: &Examined) -> Res
     }
 }
 
-/// Puts what has been examined in the place of what was.
+/// Replaces settings by examined ones.
 fn replace(state: &mut State, body: &RequestBody, finding: &Finding) -> Result<(), Refusal> {
     match (body, finding) {
         (RequestBody::SetTrajectory(trajectory), Finding::Motion(extremes, prepared)) => {
@@ -89,7 +89,7 @@ fn replace(state: &mut State, body: &RequestBody, finding: &Finding) -> Result<(
             state.settings.precompensation = *precompensation;
         }
         (RequestBody::SetLimits(limits), _) => state.settings.limits = *limits,
-        // What was found belongs to another request.
+        // The result belongs to another request.
         _ => return Err(Refusal::BadValue),
     }
     state.stale = true;
@@ -104,7 +104,7 @@ fn refuse_in_motion(state: &State) -> Result<(), Refusal> {
     }
 }
 
-/// Why the present mode does not allow what is asked: a latched fault has its own remedy.
+/// Returns why the present mode refuses the request: a latched fault has its own refusal.
 fn wrong_mode(state: &State) -> Refusal {
     match state.mode {
         Mode::Fault => Refusal::FaultLatched,
@@ -112,7 +112,7 @@ fn wrong_mode(state: &State) -> Refusal {
     }
 }
 
-/// Only while the bridge is off and nothing moves.
+/// Stores the settings, only while the bridge is off and nothing moves.
 fn store(state: &mut State) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
         return Err(wrong_mode(state));
@@ -147,19 +147,19 @@ fn start(config: &Config, state: &mut State) -> Result<(), Refusal> {
     fits(extremes, &state.settings.limits, Some(state.run.base))?;
     let rate = u64::from(config.rates.control_hz);
     state.run.length = (trajectory.duration_micros().saturating_mul(rate)).div_ceil(1_000_000);
-    // A bridge that is not yet awake is waited for.
+    // Waits for a bridge that is not yet awake.
     state.run.start = state.tick.max(state.run.awake);
     state.mode = Mode::Running;
     Ok(())
 }
 
-/// Shifts the origin of the counts so that the link stands at `position` now, to the nearest count.
+/// Shifts the origin of the counts so that the link is at `position` now, to the nearest count.
 fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     if state.mode != Mode::Disarmed {
         return Err(wrong_mode(state));
     }
     let counts = position / state.derived.radians_per_count;
-    // From 2²³ counts on x ± ½, by which it is rounded, is no f32.
+    // From 2²³ counts on, x ± ½, which rounding needs, is not an f32.
     if counts.is_nan() || counts.abs() >= 8_388_608.0 {
         return Err(Refusal::BadValue);
     }
@@ -169,12 +169,12 @@ fn set_position(state: &mut State, position: f32) -> Result<(), Refusal> {
     state.position = state.counts as f32 * state.derived.radians_per_count;
     state.reference.position = state.position;
     state.placed = true;
-    // Windows that are open hold counts from the old origin.
+    // Open windows hold counts from the old origin.
     state.telemetry.position += shift * i64::from(state.telemetry.ticks);
     state.estimation.position += shift * i64::from(state.estimation.ticks);
     state.previous = None;
     if shift != 0 {
-        // gc and gs belong to the angle that they were learnt for.
+        // gc and gs belong to the old angle.
         state.restart_estimator();
     }
     Ok(())
@@ -187,12 +187,12 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     if state.cause_acting {
         return Err(Refusal::CauseActing);
     }
-    // An implausible offset is measured again: it may have been a motor turned by hand.
+    // An implausible offset is measured again: the cause may have been a motor turned by hand.
     let offset = state
         .latch
         .first()
         .is_some_and(|record| record.fault == Fault::CurrentOffset);
-    // A fault that came in the middle of the measurement leaves it to be done.
+    // After a fault during the measurement, the measurement must be completed.
     let offset = offset || state.calibration.ticks < config.calibration_ticks;
     state.latch.clear();
     state.snapshot.release();
@@ -208,10 +208,10 @@ fn clear_fault(config: &Config, state: &mut State) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Whether a trajectory keeps to the limits: speed and acceleration always, position once it is known
-/// about which point it will run. Written so that NaN is refused.
+/// Checks a trajectory against the limits: speed and acceleration always, position only if the base point is known.
+/// Written so that NaN is refused.
 fn fits(extremes: &Extremes<f32>, limits: &Limits<f32>, base: Option<f32>) -> Result<(), Refusal> {
-    // Rounding of the peak itself must not refuse a motion designed to touch its limit.
+    // Rounding of the peak must not refuse a motion designed to touch its limit.
     const SLACK: f32 = 1.0 + 1e-6;
     let moves = extremes.velocity <= limits.velocity * SLACK
         && extremes.acceleration <= limits.acceleration * SLACK;

@@ -1,18 +1,18 @@
-//! The seam between the control application and whatever carries it: board or emulated rig.
+//! Interface between the control application and the board or emulated rig.
 
 use rig_shared::units::{AdcCode, Duty, EncoderCount};
 
 /// Clock of the timer that captures the encoder's edges, Hz.
 pub const EDGE_CLOCK_HZ: u32 = 170_000_000;
 
-/// What one control tick sees, begun by one hardware trigger. A converter takes its inputs one after the other, and the
-/// encoder is read when it has done: on the board some 9 µs after the middle of the current's samples.
+/// Inputs of one control tick, started by one hardware trigger. A converter reads its inputs one after the other, and
+/// the encoder is read afterwards: on the board about 9 µs after the middle of the current's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Encoder timer, motor side.
     pub encoder: EncoderCount,
-    /// Time from the encoder's last edge to that reading, in periods of [`EDGE_CLOCK_HZ`], where a timer has captured
-    /// the edge.
+    /// Time from the encoder's last edge to that reading, in periods of [`EDGE_CLOCK_HZ`], if a timer has captured the
+    /// edge.
     pub edge_age: Option<u32>,
     /// Motor current, converter code.
     pub current: AdcCode,
@@ -20,34 +20,34 @@ pub struct Sample {
     pub supply: AdcCode,
     /// Motor temperature, converter code.
     pub temperature: AdcCode,
-    /// The driver has pulled the break input, or something inside the chip has.
+    /// The driver, or a fault inside the chip, has pulled the break input.
     pub driver_fault: bool,
-    /// A comparator has pulled it: too much current.
+    /// A comparator has pulled the break input: over-current.
     pub comparator: bool,
     /// The previous tick had not finished when this one was due.
     pub overrun: bool,
-    /// The encoder's signals contradict each other: by how many counts its index is off, 0 where both channels
-    /// changed at once.
+    /// Counts by which the encoder's index disagrees, or 0 if both channels changed at once; `None` without
+    /// contradiction.
     pub encoder_wrong: Option<i32>,
-    /// Nothing drives one of the encoder's wires.
+    /// One of the encoder's wires is undriven.
     pub encoder_open: bool,
-    /// The stack has come near its end: bytes that are left.
+    /// Remaining bytes if the stack is near its end.
     pub stack_left: Option<u32>,
 }
 
-/// What one control tick orders. It takes effect at the next tick's sampling instant (preloaded PWM).
+/// Output of one control tick. It takes effect at the next tick's sampling instant (preloaded PWM).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
     /// Bridge duty cycle; 0 while the bridge is off.
     pub duty: Duty,
-    /// Whether the bridge's outputs are driven. Off leaves the motor open-circuit.
+    /// True if the bridge's outputs are driven. Off leaves the motor open-circuit.
     pub bridge: bool,
 }
 
-/// How converter codes become quantities, linear: quantity = (code − zero) · per_code.
+/// Linear conversion of converter codes: quantity = (code − zero) · per_code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scaling {
-    /// Code at no current (nominal; the offset is measured at start).
+    /// Code at zero current (nominal; the offset is measured at start).
     pub current_zero: f32,
     /// A per code.
     pub current_per_code: f32,
@@ -59,12 +59,12 @@ pub struct Scaling {
     pub temperature_per_code: f32,
 }
 
-/// Converter's references, over the nominal one, that a working regulator can give.
+/// Allowed ratio of the converter's reference to the nominal one: the range of a working regulator.
 const SUPPLY: [f32; 2] = [0.94, 1.06];
 
 impl Scaling {
-    /// Takes codes as those of a converter whose reference is so many times its nominal 3.3 V; not where no working board
-    /// has that. The current's zero stays: amplifier and converter share that reference.
+    /// Corrects the scaling for a converter reference of `supply` times its nominal 3.3 V. Returns false if no working
+    /// board has that reference. The current's zero stays: amplifier and converter share that reference.
     pub fn correct(&mut self, supply: f32) -> bool {
         let possible = (SUPPLY[0]..=SUPPLY[1]).contains(&supply);
         if possible {
@@ -77,8 +77,8 @@ impl Scaling {
 }
 
 impl Default for Scaling {
-    /// Mid-supply current sense of ±16.5 A, a 1:11 supply divider and a 10 mV/K sensor with 0.5 V at 0 °C
-    /// (the common analogue one) into a 3.3 V, 12-bit converter.
+    /// Returns the scaling of a mid-supply current sense of ±16.5 A, a 1:11 supply divider and a 10 mV/K sensor with
+    /// 0.5 V at 0 °C (the common analogue one) into a 3.3 V, 12-bit converter.
     fn default() -> Self {
         Self {
             current_zero: 2048.0,

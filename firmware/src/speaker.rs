@@ -1,8 +1,8 @@
-//! The rig's end of the conversation in one piece: bytes in, requests carried out, reports out.
+//! The rig's whole end of the conversation: bytes in, requests carried out, reports out.
 //!
-//! For whoever has all the time between two ticks, as the emulated rig has. On a board its three parts
-//! run apart: requests are decoded and [examined](crate::examined) in a task, served by the
-//! [`Clerk`] in the tick, and made into frames by the [`Desk`] in another task.
+//! For programs without a time limit between two ticks, such as the emulated rig. On a board its three parts run
+//! separately: a task decodes and [examines](crate::examined) requests, the [`Clerk`] serves them in the tick, and the
+//! [`Desk`] makes frames of the answers in another task.
 
 use rig_shared::wire::MessageDecoder;
 use rig_shared::wire::message::{Refusal, Request};
@@ -17,7 +17,7 @@ use crate::note::Note;
 use crate::state::State;
 use crate::step::Output;
 
-/// What the conversation remembers.
+/// State of the conversation.
 #[derive(Default)]
 pub struct Speaker {
     decoder: MessageDecoder<Request>,
@@ -27,13 +27,13 @@ pub struct Speaker {
 }
 
 impl Speaker {
-    /// Nothing said yet.
+    /// Returns the state at power on.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes in bytes from the host: carries out what they ask for and answers. Settings are not kept: a
-    /// request to store them is answered with [`Refusal::NoStorage`].
+    /// Receives bytes from the host, carries out the requests and answers. Settings are not kept: a request to store
+    /// them is answered with [`Refusal::NoStorage`].
     pub fn receive(
         &mut self,
         config: &Config,
@@ -52,7 +52,7 @@ impl Speaker {
             true
         };
         for &byte in bytes {
-            // A damaged frame was counted by the decoder; the host, unanswered, will repeat its request.
+            // The decoder has counted a damaged frame. The host gets no answer and repeats its request.
             if let Some(Ok(request)) = decoder.push(byte)
                 && clerk
                     .serve(
@@ -69,7 +69,7 @@ impl Speaker {
         }
     }
 
-    /// Sends what a control tick gave.
+    /// Sends the output of a control tick.
     pub fn publish(
         &mut self,
         config: &Config,

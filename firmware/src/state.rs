@@ -1,4 +1,4 @@
-//! What changes while the rig runs.
+//! State of the running rig.
 
 use rig_shared::compensation::{self, Compensation};
 use rig_shared::control::{current, law};
@@ -16,61 +16,61 @@ use crate::window::Window;
 /// Control ticks that the fault snapshot keeps.
 pub const SNAPSHOT_TICKS: usize = 512;
 
-/// Everything that one control tick hands to the next.
+/// Everything that one control tick passes to the next.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Index of the next control tick, from 0 at power on.
     pub tick: u64,
     /// Mode.
     pub mode: Mode,
-    /// The loaded trajectory, and how far it goes.
+    /// The loaded trajectory and its extremes.
     pub trajectory: Option<(Course<f32>, Extremes<f32>)>,
-    /// Settings are being stored: nothing but `Disarm` and the conversation is carried out meanwhile.
+    /// True while settings are being stored: then only `Disarm` and the conversation are carried out.
     pub storing: bool,
     /// The first fault since the last clearing.
     pub latch: FaultLatch,
     /// The ticks around that fault.
     pub snapshot: Snapshot<SNAPSHOT_TICKS>,
-    /// Tick at which the host was last heard.
+    /// Tick of the last message from the host.
     pub heard: u64,
-    /// Joint position as last measured, rad; 0 where the link stood at power on.
+    /// Measured joint position, rad; 0 is the position at power on until the host sets it.
     pub position: f32,
-    /// Joint velocity as last estimated, rad/s.
+    /// Estimated joint velocity, rad/s.
     pub velocity: f32,
-    /// Somebody has said where the link stands since power on.
+    /// True if the host has set the position of the link since power on.
     pub placed: bool,
     /// Reference of the last tick.
     pub reference: Reference<f32>,
     /// Limits that acted in the last tick.
     pub limits: LimitSet,
-    /// The cause of a fault acts now, whether or not one is latched.
+    /// True if the cause of a fault acts now, latched or not.
     pub cause_acting: bool,
     /// The on-line estimator.
     pub estimator: OneLinkEstimator<f32>,
     pub(crate) settings: Settings,
     pub(crate) derived: Derived,
-    /// The settings have changed since `derived` was worked out.
+    /// The settings have changed since `derived` was computed.
     pub(crate) stale: bool,
-    /// The effects have changed since `settings` was told.
+    /// The effects have changed since `settings` was updated.
     pub(crate) renewed: bool,
     /// This tick has time for a request.
     serves: bool,
     /// The effects of the settings, checked.
     pub(crate) compensation: Compensation<f32>,
     pub(crate) effects: compensation::State<f32>,
-    /// Constant error of the current that the effects know of, A.
+    /// Constant current error according to the effects, A.
     pub(crate) current_error: f32,
-    /// Voltage that the effects know the bridge to lose, V.
+    /// Voltage loss of the bridge according to the effects, V.
     pub(crate) lost_voltage: f32,
-    /// What of that was made up for in the last tick, V.
+    /// Part of this loss compensated in the last tick, V.
     pub(crate) regained: f32,
-    /// What the effects have taken off the position in this tick, rad.
+    /// Correction of the position by the effects in this tick, rad.
     pub(crate) position_error: f32,
     /// Torque ordered in the last tick, N·m.
     pub(crate) drive_torque: f32,
     /// Temperature at the end of the calibration, °C.
     pub(crate) start_temperature: f32,
-    /// Temperature above that one, K.
+    /// Temperature rise above that one, K.
     pub(crate) warming: f32,
     pub(crate) calibration: Calibration,
     pub(crate) encoder: encoder::State<f32>,
@@ -83,12 +83,12 @@ pub struct State {
     pub(crate) current_loop: current::State<f32>,
     pub(crate) telemetry: Window,
     pub(crate) estimation: Window,
-    /// The estimator's previous window: its regressor lies midway between two.
+    /// The estimator's previous window: its regressor belongs to the instant between two.
     pub(crate) previous: Option<Window>,
-    /// The estimator is to start anew.
+    /// The estimator must restart.
     pub(crate) forget: bool,
     pub(crate) updates_since_report: u16,
-    /// The estimate is to be reported with the next tick.
+    /// The estimate must be reported with the next tick.
     pub(crate) report_due: bool,
     /// Duty cycle that acts during this tick.
     pub(crate) duty: f32,
@@ -102,11 +102,11 @@ pub(crate) struct Run {
     pub(crate) start: u64,
     /// Ticks that it takes.
     pub(crate) length: u64,
-    /// Tick from which on the bridge, just enabled, does as told.
+    /// Tick from which the bridge, just enabled, follows commands.
     pub(crate) awake: u64,
-    /// Position that trajectory or hold is about, rad.
+    /// Base position of trajectory or hold, rad.
     pub(crate) base: f32,
-    /// The stop under way.
+    /// The stop in progress.
     pub(crate) braking: Braking,
 }
 
@@ -125,9 +125,9 @@ pub(crate) struct Calibration {
 }
 
 impl Calibration {
-    /// Standard deviation of the mean code, from the codes' own spread: n·Σc² − (Σc)² in integers, as the
-    /// difference is small against its terms. Noise is taken as white from tick to tick; the converter's
-    /// rounding counts as it is dithered by the noise.
+    /// Returns the standard deviation of the mean code, from the spread of the codes: n·Σc² − (Σc)² in integers,
+    /// because the difference is small against its terms. Noise is assumed white from tick to tick; it dithers the
+    /// converter's rounding, which is included.
     pub(crate) fn std_of_mean(&self) -> f32 {
         let n = u128::from(self.ticks.max(1));
         let spread = (n * u128::from(self.squares))
@@ -138,20 +138,20 @@ impl Calibration {
 }
 
 impl State {
-    /// The state at power on: calibrating, bridge off.
+    /// Returns the state at power on: calibrating, bridge off.
     ///
     /// # Errors
-    /// What is wrong with the estimator's settings.
+    /// The fault of the estimator's settings.
     pub fn new(config: &Config, settings: Settings) -> Result<Self, SettingsFault> {
         let estimator = OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz())?;
         Ok(Self::with(config, settings, estimator))
     }
 
-    /// The state at power on with an estimator of these settings. Apart from [`State::new`] so that it can be
-    /// made where it is to lie: it is too large to be passed about on a chip's stack.
+    /// Returns the state at power on with an estimator of these settings. Separate from [`State::new`] so that it can
+    /// be built in place: it is too large to be passed on a chip's stack.
     pub fn with(config: &Config, settings: Settings, estimator: OneLinkEstimator<f32>) -> Self {
         let derived = Derived::new(config, &settings);
-        // The firmware's own settings have none, stored ones were checked when they were read.
+        // The firmware's own settings have no effects; stored settings were checked when they were read.
         let compensation = Compensation::new(&settings.effects).unwrap_or_default();
         Self {
             tick: 0,
@@ -203,38 +203,38 @@ impl State {
         }
     }
 
-    /// How warm the winding is by its own current, as a filtered square, A²: what a reset must not make forgotten.
+    /// Returns the winding's heat from its own current, as a filtered square, A². It must survive a reset.
     pub fn heat(&self) -> f32 {
         self.monitor.heat
     }
 
-    /// Goes on from a winding as warm as that ([`State::heat`]); a heat that is no number is none. Whether it was overloaded is
-    /// not known, so that it must be cool first: an overload where it is not.
+    /// Continues with the heat of the winding ([`State::heat`]); an invalid number counts as zero. The overload state
+    /// is unknown, so an overload is assumed until the winding is cool.
     pub fn warm_up(&mut self, heat: f32) {
         self.monitor.heat = if heat > 0.0 { heat } else { 0.0 };
         self.monitor.overloaded = true;
     }
 
-    /// What the host may replace, as it is now.
+    /// Returns the present values of the settings that the host may replace.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Control tick at which the telemetry window now open began.
+    /// Returns the control tick at which the open telemetry window began.
     pub fn window_start(&self) -> u64 {
         self.tick - u64::from(self.telemetry.ticks)
     }
 
-    /// Whether the tick has time for what is seldom: it neither turns periodic effects, nor evaluates a law, nor has the
-    /// estimator learn. Where that learns so often that there is no such tick, every one must do.
+    /// Returns true if the tick has time for rare work: no periodic effect turns, no law is evaluated, and the
+    /// estimator does not learn. If the estimator learns too often for such ticks, every tick counts as idle.
     fn is_idle(&self, config: &Config) -> bool {
         let rates = &config.rates;
         let learns = self.estimation.ticks + 1 >= rates.estimator_decimation;
         rates.estimator_decimation < 4 || (self.tick & 1 == 0 && !learns)
     }
 
-    /// Works out what follows from settings or effects that have changed, in a tick that has time, and says whether a
-    /// request may be served in this one.
+    /// Applies changed settings or effects in a tick that has time, and decides if a request may be served in this
+    /// tick.
     #[inline(always)]
     pub(crate) fn follow(&mut self, config: &Config) {
         self.serves = false;
@@ -252,20 +252,20 @@ impl State {
         }
     }
 
-    /// Whether the tick that has just been done has time for a request beside. While what follows from the last one is still
-    /// to be worked out it has not, so that where this is asked each is in force before the next is looked at.
+    /// Returns true if the finished tick also has time for a request. It is false while changes of the last request are
+    /// pending, so each request is in force before the next is served.
     pub fn has_time(&self) -> bool {
         self.serves
     }
 
-    /// Replaces the effects. What was learnt without them is forgotten: it holds what they now explain.
+    /// Replaces the effects and restarts the estimator: its old estimate includes torque that the effects now explain.
     pub(crate) fn replace_effects(&mut self, compensation: &Compensation<f32>) {
         self.compensation = *compensation;
         self.renewed = true;
         self.restart_estimator();
     }
 
-    /// What follows from effects that have been replaced. Not inlined: the tick's fast memory has no room for what is seldom.
+    /// Updates values after the effects were replaced. Not inlined: rare code must not use the tick's fast memory.
     #[inline(never)]
     fn renew(&mut self) {
         self.settings.effects = self.compensation.effects();
@@ -276,14 +276,14 @@ impl State {
         self.lost_voltage = self.compensation.lost_voltage();
     }
 
-    /// Has the estimator forget everything.
+    /// Requests a restart of the estimator.
     ///
-    /// It does so in its own time: the tick that serves a request has enough to do.
+    /// It restarts in a later tick, because the tick that serves a request has a high load.
     pub(crate) fn restart_estimator(&mut self) {
         self.forget = true;
     }
 
-    /// Replaces the estimator's constants. It forgets in its own time, as with [`State::restart_estimator`].
+    /// Replaces the estimator's constants. It restarts later, as with [`State::restart_estimator`].
     pub(crate) fn replace_estimator(&mut self, config: &one_link::Config<f32>) {
         self.estimator.reconfigure(config);
         self.restart_estimator();

@@ -1,4 +1,4 @@
-//! The control tick: the one function that board, emulated rig and tests all call.
+//! The control tick: one function for board, emulated rig and tests.
 
 mod compensate;
 mod learning;
@@ -18,14 +18,14 @@ use crate::sample::{Command, Sample};
 use crate::state::{Run, State};
 use crate::window::Tick;
 
-/// What a control tick gives.
+/// Output of a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
     /// For the bridge.
     pub command: Command,
-    /// A telemetry window that is complete: the tick it began at, and its sample.
+    /// A complete telemetry window: the tick at which it began, and its sample.
     pub state: Option<(u64, StateSample)>,
-    /// The on-line estimate, when one is due.
+    /// The on-line estimate, if it is due.
     pub estimate: Option<Estimate>,
     /// This tick itself, as snapshot and capture keep it.
     pub tick: SnapshotSample,
@@ -33,7 +33,7 @@ pub struct Output {
     pub fault: Option<FaultRecord>,
 }
 
-/// One control tick. Takes the samples of one trigger, gives the command that acts from the next one on.
+/// Runs one control tick. Takes the samples of one trigger, returns the command that acts from the next trigger on.
 ///
 /// Not inlined: `firmware/fast_code.list` names it.
 #[inline(never)]
@@ -104,7 +104,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample) -> Output {
     output
 }
 
-/// Raw codes to quantities: the one place where units begin.
+/// Converts raw codes to quantities. Units begin only here.
 fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let scaling = &config.scaling;
     let age = sample
@@ -118,11 +118,11 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     );
     let origin = *state.origin.get_or_insert(motion.counts);
     let counts = motion.counts - origin;
-    // At the first tick both are zero: where the counter stands at power on is no jump.
+    // At the first tick both are zero: the counter's value at power on is not a jump.
     let step = counts - state.counts;
     state.counts = counts;
-    // Exact to a count up to 2²⁴ counts, some 40 joint turns; the position limits keep a rig far below.
-    // In 32 bits, which the chip converts by hardware: 5000 joint turns.
+    // Exact to a count up to 2²⁴ counts, about 40 joint turns; the position limits keep a rig far below. In 32 bits,
+    // which the chip converts by hardware: 5000 joint turns.
     state.position = counts as i32 as f32 * state.derived.radians_per_count;
     state.velocity = motion.velocity * state.derived.radians_per_count;
     let (position, velocity) = (state.position, state.velocity);
@@ -130,7 +130,7 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     let temperature = scaling.temperature_at_zero
         + f32::from(sample.temperature.0) * scaling.temperature_per_code;
     state.warming = temperature - state.start_temperature;
-    // The checks see what the sensors say, the laws what is true of it.
+    // The checks use the sensor readings, the laws the corrected values.
     Readings {
         driver_fault: sample.driver_fault,
         comparator: sample.comparator,
@@ -151,7 +151,7 @@ fn read(config: &Config, state: &mut State, sample: Sample) -> Readings {
     }
 }
 
-/// What the board has found wrong with itself and its encoder.
+/// Returns a fault that the board found in itself or its encoder.
 fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
     if let Some(counts) = sample.encoder_wrong {
         return Some((Fault::EncoderSignal, counts as f32));
@@ -159,7 +159,7 @@ fn board_fault(sample: &Sample) -> Option<(Fault, f32)> {
     sample.stack_left.map(|left| (Fault::Stack, left as f32))
 }
 
-/// A silent host: first a controlled stop, then, if it stays silent, the fault.
+/// Handles a silent host: first a controlled stop, then the fault.
 fn listen(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
     if !state.mode.drives() {
         return None;
@@ -173,7 +173,7 @@ fn listen(config: &Config, state: &mut State) -> Option<(Fault, f32)> {
         .then_some((Fault::HostSilent, silent as f32 * state.derived.period))
 }
 
-/// Bridge off, fault latched, snapshot kept.
+/// Switches the bridge off, latches the fault and keeps the snapshot.
 fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
     let record = FaultRecord {
         fault,
@@ -185,7 +185,7 @@ fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
         fault,
         Fault::EncoderJump | Fault::EncoderLost | Fault::EncoderSignal
     ) {
-        // Where the link stands is what the encoder says no longer.
+        // After this fault the encoder no longer gives the position of the link.
         state.placed = false;
     }
     let first = state.latch.latch(record);
@@ -195,13 +195,13 @@ fn fall(state: &mut State, fault: Fault, value: f32) -> Option<FaultRecord> {
     first.then_some(record)
 }
 
-/// Begins a controlled stop from where the reference is.
+/// Begins a controlled stop from the present reference.
 pub(crate) fn brake(state: &mut State) {
     state.run.braking = Braking::from(state.reference);
     state.mode = Mode::Stopping;
 }
 
-/// The reference of this tick, by mode; modes that end by themselves end here.
+/// Returns the reference of this tick by mode. Ends modes that end by themselves.
 fn reference(config: &Config, state: &mut State, limits: &mut LimitSet) -> Reference<f32> {
     let Run {
         start,
@@ -272,7 +272,7 @@ fn within_range(
     }
 }
 
-/// What driving comes to in a tick.
+/// Result of driving in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Driven {
     duty: f32,
@@ -282,7 +282,7 @@ struct Driven {
     explained: f32,
 }
 
-/// Effects and position law, then current loop.
+/// Computes effects and position law, then the current loop.
 fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitSet) -> Driven {
     let measured = Measured {
         position: state.position,
@@ -301,7 +301,7 @@ fn drive(config: &Config, state: &mut State, now: &Readings, limits: &mut LimitS
     let peak = state.settings.limits.peak_current;
     let wanted = wish.max(-peak).min(peak);
     limits.set(Limit::Current, wanted != wish);
-    // In the direction that the current will have, not in that of the noisy or of the wanted one, and fading where the ripple
+    // The direction is that of the expected current, not of the noisy or the wanted one. It fades where the ripple
     // crosses zero.
     let expected = current::expect(&state.derived.current, &mut state.current_loop, wanted);
     let fade = (expected * state.derived.fade_per_ampere).clamp(-1.0, 1.0);
@@ -354,8 +354,8 @@ mod tests {
     use rig_shared::units::AdcCode;
     use rig_shared::wire::message::{Request, RequestBody};
 
-    /// 5 A of the sensor are an over-current although an effect says that 0.4 A of them are its error, and 4.6 A are none; what
-    /// is recorded is the sensor's.
+    /// A sensor reading of 5 A is an over-current although an effect counts 0.4 A of it as an error; 4.6 A is none. The
+    /// record holds the sensor's reading.
     #[test]
     fn the_checks_see_the_sensor_s_current() {
         let (config, settings) = one_link();
@@ -397,8 +397,8 @@ mod tests {
         assert_eq!(found.map(|record| record.fault), Some(Fault::OverCurrent));
     }
 
-    /// Effects that replace others begin anew: what is left of a cogging in N·m is never read as radians of an encoder's error,
-    /// whichever tick the request comes in.
+    /// New effects start from zero: the state of a cogging in N·m is never used as radians of an encoder's error, in
+    /// any tick of the request.
     #[test]
     fn effects_that_are_replaced_leave_nothing_behind() {
         let (config, settings) = one_link();

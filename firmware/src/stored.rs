@@ -1,12 +1,12 @@
-//! Settings as they lie in the board's memory: two copies, of which one is always whole.
+//! Settings in the board's memory: two copies, one of which is always whole.
 //!
 //! ```text
 //!  magic u32 · schema u64 · number u32 · length u16 · postcard(Settings) · CRC-32C u32, little-endian
 //! ```
 //!
-//! A new copy is written over the older one, so that a supply that fails in the middle leaves the newer one as
-//! it was. The number counts up; the whole copy with the higher number holds. `schema` is the fingerprint of the wire
-//! types ([`rig_shared::wire::schema()`]), of which [`Settings`] is made: another firmware's form is not guessed at.
+//! A new copy is written over the older one, so the newer one survives a supply failure. The number counts up; the
+//! whole copy with the higher number holds. `schema` is the fingerprint of the wire types
+//! ([`rig_shared::wire::schema()`]) that make up [`Settings`]: another firmware's format is never interpreted.
 
 use crc::{CRC_32_ISCSI, Crc, Table};
 use heapless::Vec;
@@ -16,7 +16,7 @@ use rig_shared::wire::schema;
 use crate::config::{Config, Settings};
 use crate::usable;
 
-/// Bytes that a copy takes at most; a whole number of 64-bit words, which flash is written in.
+/// Largest size of a copy, bytes; a whole number of 64-bit words, the unit of writing flash.
 pub const IMAGE: usize = 1024;
 
 /// "RIG1".
@@ -29,15 +29,15 @@ const _: () = assert!(HEAD + 2 * size_of::<Settings>() + CHECK <= IMAGE);
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
-/// What one place holds.
+/// Content of one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // read once, at power on
 pub enum Copy {
     /// Erased, never written.
     Empty,
-    /// Not what was written.
+    /// Content that differs from the written one.
     Damaged,
-    /// Whole, but of another firmware's form.
+    /// Whole, but in another firmware's format.
     Foreign {
         /// Its number.
         number: u32,
@@ -46,12 +46,12 @@ pub enum Copy {
     Whole {
         /// Its number.
         number: u32,
-        /// What it holds.
+        /// Its content.
         settings: Settings,
     },
 }
 
-/// Reads a place; any bytes will do.
+/// Reads a place; accepts any bytes.
 pub fn read(bytes: &[u8]) -> Copy {
     if bytes.iter().all(|&byte| byte == 0xff) {
         return Copy::Empty;
@@ -80,7 +80,7 @@ fn whole(bytes: &[u8]) -> Option<Copy> {
     left.is_empty().then_some(Copy::Whole { number, settings })
 }
 
-/// The bytes of a copy, padded with erased ones to whole words.
+/// Returns the bytes of a copy, padded with erased ones to whole words.
 pub fn write(settings: &Settings, number: u32) -> Option<Vec<u8, IMAGE>> {
     let mut body = [0; IMAGE];
     let body = postcard::to_slice(settings, &mut body).ok()?;
@@ -100,12 +100,12 @@ pub fn write(settings: &Settings, number: u32) -> Option<Vec<u8, IMAGE>> {
     Some(bytes)
 }
 
-/// What the two places say together.
+/// Result of reading both places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// The settings to start with; `None`: the firmware's own.
     pub settings: Option<Settings>,
-    /// Why these.
+    /// Reason of this choice.
     pub origin: SettingsOrigin,
     /// The place to write next, 0 or 1.
     pub place: usize,
@@ -113,14 +113,14 @@ pub struct Found {
     pub number: u32,
 }
 
-/// Chooses: the newest copy that is whole and can be used on this rig.
+/// Chooses the newest copy that is whole and usable on this rig.
 pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     let number = |copy: &Copy| match copy {
         Copy::Empty | Copy::Damaged => None,
         Copy::Foreign { number } | Copy::Whole { number, .. } => Some(*number),
     };
     let [first, second] = copies.each_ref().map(number);
-    // None is below every number. A board is not stored to four thousand million times.
+    // None is below every number. No board stores four thousand million times.
     let newer = usize::from(second > first);
     let highest = first.max(second);
     let good = |copy: &Copy| match copy {
@@ -141,7 +141,7 @@ pub fn choose(config: &Config, copies: [Copy; 2]) -> Found {
     Found {
         settings,
         origin,
-        // Never over the one that is in force: over the one that cannot be used, the empty one, the older one.
+        // Never the copy in force, but the unusable one, the empty one, or the older one.
         place: match (newest, older) {
             (None, Some(_)) => newer,
             _ if highest.is_none() => 0,
@@ -163,7 +163,7 @@ mod tests {
         settings
     }
 
-    /// Two places of flash that are written as the board does; gives what it would start with.
+    /// Two places of flash, written as the board does. Returns the settings that it would start with.
     struct Places([[u8; IMAGE]; 2]);
 
     impl Places {
@@ -207,7 +207,7 @@ mod tests {
             places.store(&settings(3.0), words);
             let found = places.find();
             assert_eq!(found.settings, Some(settings(2.0)), "{words}");
-            // And the next store mends the damaged place, not the whole one.
+            // The next store repairs the damaged place, not the whole one.
             places.store(&settings(4.0), usize::MAX / 8);
             let found = places.find();
             assert_eq!(found.settings, Some(settings(4.0)), "{words}");
@@ -221,7 +221,7 @@ mod tests {
         for bit in 0..8 * bytes.len() {
             let mut place = bytes.clone();
             place[bit / 8] ^= 1 << (bit % 8);
-            // Beyond the check sum there is only padding.
+            // Only padding follows the check sum.
             let found = read(&place);
             let padding =
                 matches!(found, Copy::Whole { number: 7, .. }) && bit / 8 + 8 > bytes.len();
@@ -246,7 +246,7 @@ mod tests {
         );
     }
 
-    /// Flashed with another firmware, stored by that one, flashed back: what this one stored before still holds.
+    /// Flashed with another firmware, stored by that one, flashed back: the copy stored before still holds.
     #[test]
     fn a_newer_copy_of_another_firmware_does_not_hide_an_older_one() {
         let mut places = Places([[0xff; IMAGE]; 2]);
@@ -261,7 +261,7 @@ mod tests {
         let found = places.find();
         assert_eq!(found.settings, Some(settings(1.0)));
         assert_eq!(found.origin, SettingsOrigin::OlderCopy);
-        // Over the one that is of no use to this firmware.
+        // Over the copy that this firmware cannot use.
         assert_eq!((found.place, found.number), (1, 2));
     }
 

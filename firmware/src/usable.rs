@@ -1,4 +1,4 @@
-//! Which values are physical and within what the rig's parts stand; everything written so that NaN is refused.
+//! Checks that values are physical and within the ratings of the rig's parts; written so that NaN is refused.
 
 use core::fmt;
 
@@ -10,19 +10,20 @@ use rig_shared::safety::Limits;
 
 use crate::config::{Config, Settings};
 
-/// Slowest current loop, as a share of the control rate: what effects give is ahead by its lag, which the tick remembers
-/// ([`GIVEN`](rig_shared::compensation::GIVEN)). At 10 kHz 39 Hz, enough for a position loop of 4 Hz ([`Gains::design`]).
+/// Slowest current loop, as a share of the control rate. Its lag must fit the remembered ticks of the effects
+/// ([`GIVEN`](rig_shared::compensation::GIVEN)). At 10 kHz 39 Hz, enough for a position loop of 4 Hz
+/// ([`Gains::design`]).
 const SLOWEST_CURRENT_LOOP: f32 = 1.0 / 256.0;
-/// Fastest: at a tenth the loop's delay of a tick leaves it a damping ratio of 0.45, and above it less (the poles of
-/// z² − z + 1 − exp(−2π·share)).
+/// Fastest current loop, as a share of the control rate. At a tenth the loop's delay of a tick gives a damping ratio of
+/// 0.45, and less above it (the poles of z² − z + 1 − exp(−2π·share)).
 const FASTEST_CURRENT_LOOP: f32 = 0.1;
-/// Largest share of the velocity that an eccentric encoder may make up, lest the correction turn its sense round.
+/// Largest share of the velocity that an eccentric encoder may cause; above it a correction could change its sign.
 const LARGEST_SLOPE: f32 = 0.5;
-/// Share of the least supply above which no bridge loses voltage: what is said to be lost is hidden from the check of the
-/// encoder.
+/// Largest voltage loss of a bridge as a share of the lowest supply: the check of the encoder cannot see a voltage that
+/// counts as lost.
 const LARGEST_LOSS: f32 = 0.125;
 
-/// All that the host may replace.
+/// Checks all settings that the host may replace.
 pub(crate) fn settings(config: &Config, settings: &Settings) -> bool {
     limits(config, &settings.limits)
         && gains(config, &settings.gains)
@@ -54,33 +55,33 @@ pub(crate) fn model(model: &LinkParameters<f32>) -> bool {
 
 pub(crate) fn precompensation(settings: &PrecompensationSettings<f32>) -> bool {
     settings.check().is_ok()
-        // The adaptive law smooths its sign by it, whether or not friction is precompensated.
+        // The adaptive law smooths its sign with it, with or without friction precompensation.
         && settings.velocity_threshold > 0.0
         && settings.velocity_threshold.is_finite()
 }
 
-/// A correction beyond what a sensor or a bridge can be wrong by: it would hide a fault, or turn a loop round.
+/// A correction beyond the possible error of a sensor or bridge: it would hide a fault, or reverse a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Excess {
     /// The current's constant error, A.
     CurrentOffset {
-        /// By the effects.
+        /// Value of the effects.
         found: f32,
-        /// At most.
+        /// Largest allowed value.
         most: f32,
     },
-    /// The voltage that the bridge loses, V.
+    /// The voltage loss of the bridge, V.
     DriveDeadzone {
-        /// By the effects.
+        /// Value of the effects.
         found: f32,
-        /// At most.
+        /// Largest allowed value.
         most: f32,
     },
-    /// What the encoder's error makes up of the velocity, as a share of it.
+    /// Velocity caused by the encoder's error, as a share of the velocity.
     EncoderEccentricity {
-        /// By the effects.
+        /// Value of the effects.
         found: f32,
-        /// At most.
+        /// Largest allowed value.
         most: f32,
     },
 }
@@ -106,12 +107,12 @@ impl fmt::Display for Excess {
 
 impl core::error::Error for Excess {}
 
-/// Whether corrections of what is measured stay within what sensors and bridge can be wrong by.
+/// Checks that corrections of measured values stay within the possible errors of sensors and bridge.
 ///
 /// # Errors
-/// The first that does not.
+/// The first correction that does not.
 pub fn effects(config: &Config, effects: &Compensation<f32>) -> Result<(), Excess> {
-    // Not so for what is no number, either.
+    // False for NaN too.
     let within = |found: f32, most: f32| found <= most;
     let found = effects.current_error(config.drive.joint_torque(1.0)).abs();
     let most = config.largest_offset;
@@ -162,7 +163,7 @@ mod tests {
         assert!(offset(1.24) && offset(-1.24) && !offset(1.26) && !offset(-8.0));
         let loss = |volts| allowed(Effect::new(Kind::DriveDeadzone, &[volts], &[]));
         assert!(loss(2.0) && !loss(3.0) && !loss(24.0));
-        // 0.5 rad of the position by the motor's angle a turn of it: order · 50 · amplitude is the share of the velocity.
+        // 0.5 rad of the position with one period per motor turn: order · 50 · amplitude is the share of the velocity.
         let of_motor = |order: f32, amplitude: f32| {
             let gains = [0.6 * amplitude, 0.8 * amplitude];
             allowed(Effect::new(
@@ -183,7 +184,7 @@ mod tests {
         assert!(of_joint(1.0) && of_joint(24.0) && !of_joint(26.0));
     }
 
-    /// Every bandwidth that is allowed has a lag that the tick remembers, and gains that are numbers.
+    /// Every allowed bandwidth has a lag within the remembered ticks, and finite gains.
     #[test]
     fn current_loops_are_neither_too_slow_nor_too_fast() {
         let (config, mut settings) = one_link();

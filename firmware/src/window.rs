@@ -2,8 +2,8 @@
 
 use rig_shared::safety::LimitSet;
 
-/// Sums over the ticks of one window. Position and current are taken in the same ticks, so their means
-/// belong to the same time but for the delay between the two readings ([`Sample`](crate::sample::Sample)).
+/// Sums over the ticks of one window. Position and current are read in the same ticks. So their means belong to the
+/// same time, except for the delay between the two readings ([`Sample`](crate::sample::Sample)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Window {
     /// Ticks so far.
@@ -22,13 +22,13 @@ pub struct Window {
     pub torque: f32,
     /// Torque that effects beyond the standard model explain, N·m.
     pub explained: f32,
-    /// What effects have taken off the position, rad.
+    /// Correction of the position by effects, rad.
     pub position_error: f32,
     /// Limits that acted at some tick.
     pub limits: LimitSet,
 }
 
-/// What one control tick adds to a window.
+/// Contribution of one control tick to a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tick {
     /// Unwrapped counts.
@@ -45,14 +45,14 @@ pub struct Tick {
     pub torque: f32,
     /// Torque that effects beyond the standard model explain, N·m.
     pub explained: f32,
-    /// What effects have taken off the position, rad.
+    /// Correction of the position by effects, rad.
     pub position_error: f32,
     /// Limits acting.
     pub limits: LimitSet,
 }
 
 impl Window {
-    /// Adds a tick; gives the finished window once `length` ticks are in, and starts anew.
+    /// Adds a tick; returns the finished window once `length` ticks are in, and restarts.
     pub fn push(&mut self, tick: &Tick, length: u16) -> Option<Self> {
         self.ticks += 1;
         self.position += tick.position;
@@ -67,7 +67,7 @@ impl Window {
         (self.ticks >= length).then(|| core::mem::take(self))
     }
 
-    /// Mean of one of the window's sums.
+    /// Returns the mean of one of the window's sums.
     pub fn mean(&self, sum: f32) -> f32 {
         sum / f32::from(self.ticks.max(1))
     }

@@ -1,9 +1,9 @@
-//! Puts the control tick's code where it runs: into the CCM SRAM, before anything else happens.
+//! Copies the control tick's code into the CCM SRAM, before anything else happens.
 
 use core::arch::global_asm;
 
-// In assembly because it runs before any variable has its value, and because a copying loop in Rust may become a
-// call of a function that is itself among what is copied. Section and lengths, whole words, are build.rs's.
+// In assembly because it runs before any variable has its value. A copying loop in Rust may become a call of a function
+// that is itself among the copied code. Section and lengths (whole words) come from build.rs.
 #[allow(unsafe_code)]
 mod before_everything {
     use super::global_asm;

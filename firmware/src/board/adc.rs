@@ -1,9 +1,9 @@
-//! ADC1: current, supply and temperature, triggered by TIM4 in step with the PWM, and by nothing else.
+//! ADC1: current, supply and temperature, triggered only by TIM4 in step with the PWM.
 //!
-//! An injected sequence of three; each conversion is the mean of four (RM0440, ADC, "Oversampler"), taken within 3.5 µs:
-//! with 12-bit codes as before, white noise is halved. The current, converted first, is held at 0.62, 1.49, 2.37 and
-//! 3.24 µs after the trigger, 1.93 µs ([`LEAD`]) in the mean. So much before the middle of a braking interval the trigger
-//! comes: behind that middle the current would read low by (R·i + Kₑ·ω)/L times the delay, as if friction were smaller.
+//! An injected sequence of three. Each conversion is the mean of four (RM0440, ADC, "Oversampler"), taken within 3.5
+//! µs: with 12-bit codes as before, this halves white noise. The current comes first. It is held at 0.62, 1.49, 2.37
+//! and 3.24 µs after the trigger, 1.93 µs ([`LEAD`]) in the mean. The trigger comes this time before the middle of a
+//! braking interval. Otherwise the current would read low by (R·i + Kₑ·ω)/L times the delay, like a smaller friction.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::adc::vals::{Adcaldif, Difsel, Exten, SampleTime};
@@ -16,35 +16,35 @@ use super::pins::{AnalogPins, CURRENT_CHANNEL, SUPPLY_CHANNEL, TEMPERATURE_CHANN
 
 /// TIM4_TRGO among the injected triggers of ADC1 (RM0440, table "ADC1/2 - External triggers for injected channels").
 const TRIGGER: u8 = 5;
-/// Core's cycles per converter's cycle: 170 MHz / 4 = 42.5 MHz, below the 60 MHz of one converter alone (DS12288).
+/// Core cycles per converter cycle: 170 MHz / 4 = 42.5 MHz, below the 60 MHz of a single converter (DS12288).
 const PRESCALER: u16 = 4;
-/// Conversions that make one code.
+/// Conversions averaged for one code.
 const CONVERSIONS: u16 = 4;
-/// Half cycles of the converter from the trigger to the first sampling, typical (DS12288, t_LATRINJ), of sampling, and of
-/// the approximation after it (RM0440, ADC, "Channel-wise programmable sampling time").
+/// Half cycles of the converter: from the trigger to the first sampling, typical (DS12288, t_LATRINJ), for sampling,
+/// and for the approximation after it (RM0440, ADC, "Channel-wise programmable sampling time").
 const LATENCY: u16 = 2 * 2;
 const SAMPLING: u16 = 2 * 24 + 1;
 const APPROXIMATION: u16 = 2 * 12 + 1;
-/// Core's cycles from the trigger to the mean of the instants at which the current's samples are held, each at the end of
-/// its sampling time.
+/// Core cycles from the trigger to the mean instant at which the current's samples are held, each at the end of its
+/// sampling time.
 pub(crate) const LEAD: u16 =
     (2 * (LATENCY + SAMPLING) + (CONVERSIONS - 1) * (SAMPLING + APPROXIMATION)) * PRESCALER / 4;
 /// Start-up time of the voltage regulator, µs (DS12288, t_ADCVREG_STUP).
 const REGULATOR_US: u32 = 20;
 
-/// Channel of the chip's own reference, its buffer's start-up in µs (DS12288, V_REFINT and t_start_vrefint), and how often
-/// it is read.
+/// Channel of the chip's own reference, start-up of its buffer in µs (DS12288, V_REFINT and t_start_vrefint), and
+/// number of readings.
 const REFERENCE_CHANNEL: u8 = 18;
 const REFERENCE_US: u32 = 20;
 const REFERENCE_READINGS: u32 = 16;
-/// What the factory measured it at, over what codes are taken for, V (DS12288, "Internal voltage reference calibration
-/// values"): 3.0 over 3.3, as whole numbers.
+/// Ratio of the supply during factory measurement to the nominal one (DS12288, "Internal voltage reference calibration
+/// values"): 3.0 V over 3.3 V, as whole numbers.
 const CALIBRATED_AT: [u32; 2] = [10, 11];
 
 /// The converter.
 pub(crate) struct Converter;
 
-/// What one sequence gave.
+/// Codes of one sequence.
 pub(crate) struct Codes {
     pub(crate) current: AdcCode,
     pub(crate) supply: AdcCode,
@@ -52,8 +52,8 @@ pub(crate) struct Codes {
 }
 
 impl Converter {
-    /// Calibrates the converter and has it wait for its trigger. The interrupt is not yet enabled. Gives, too, the
-    /// converter's reference, which is the chip's supply, over the 3.3 V that it is taken for.
+    /// Calibrates the converter and makes it wait for its trigger. The interrupt is not yet enabled. Also returns the
+    /// ratio of the converter's reference (the chip's supply) to its nominal 3.3 V.
     pub(crate) fn new(pins: AnalogPins) -> (Self, f32) {
         pins.connect();
         RCC.ahb2enr().modify(|w| w.set_adc12en(true));
@@ -71,7 +71,7 @@ impl Converter {
         adc.cr().modify(|w| w.set_adcaldif(Adcaldif::SINGLE_ENDED));
         adc.cr().modify(|w| w.set_adcal(true));
         while adc.cr().read().adcal() {}
-        // ADEN may not be set within four converter clocks of the calibration's end (RM0440, ADC, "ADC on-off control").
+        // ADEN must not be set within four converter clocks after calibration (RM0440, ADC, "ADC on-off control").
         cortex_m::asm::delay(64);
         adc.isr().write(|w| w.set_adrdy(true));
         adc.cr().modify(|w| w.set_aden(true));
@@ -90,11 +90,11 @@ impl Converter {
         });
         adc.cfgr2().write(|w| {
             w.set_jovse(true);
-            // The sum of [`CONVERSIONS`] shifted right by two: a code of 12 bits again.
+            // The sum of [`CONVERSIONS`] shifted right by two is a 12-bit code again.
             w.set_ovsr(0b001);
             w.set_ovss(2);
         });
-        // No queue of contexts: the sequence stays as it is.
+        // No queue of contexts: the sequence never changes.
         adc.cfgr().modify(|w| w.set_jqdis(true));
         adc.jsqr().write(|w| {
             w.set_jl(2);
@@ -109,21 +109,21 @@ impl Converter {
         (Self, supply)
     }
 
-    /// Lets the interrupt come, above every other.
+    /// Enables the interrupt, with the highest priority.
     pub(crate) fn listen(&mut self) {
         interrupt::ADC1_2.set_priority(TICK_PRIORITY);
-        // The handler finds everything it owns in place: it was put there before this.
+        // Everything that the handler owns was initialised before.
         #[allow(unsafe_code)]
         unsafe {
             interrupt::ADC1_2.enable();
         }
     }
 
-    /// Takes the sequence that has just ended.
+    /// Reads the sequence that has just ended.
     #[inline(always)]
     pub(crate) fn take(&mut self) -> Codes {
         let adc = ADC1;
-        // Written with one a flag is cleared.
+        // Writing one clears a flag.
         adc.isr().write(|w| {
             w.set_jeoc(true);
             w.set_jeos(true);
@@ -135,14 +135,14 @@ impl Converter {
         }
     }
 
-    /// Whether another sequence has ended since the last was taken.
+    /// Returns true if another sequence has ended since the last was read.
     #[inline(always)]
     pub(crate) fn is_waiting(&self) -> bool {
         ADC1.isr().read().jeos()
     }
 }
 
-/// The chip's supply over 3.3 V, from its own reference.
+/// Returns the ratio of the chip's supply to 3.3 V, from its own reference.
 fn supply() -> f32 {
     let adc = ADC1;
     cortex_m::asm::delay(REFERENCE_US * (CORE_HZ / 1_000_000));

@@ -1,9 +1,9 @@
-//! COMP3 and COMP4: over-current in hardware. Both see the current sense, COMP3 against a threshold above its middle, COMP4
-//! against one below; either acts on TIM1's break input, without processor or clock, some 0.1 µs after the current has come
-//! there (DS12288, comparator: t_D 17 ns typical; the amplifier before it takes 1 µs and more).
+//! COMP3 and COMP4: over-current protection in hardware. COMP3 compares the current sense with a threshold above its
+//! middle, COMP4 with one below. Either acts on TIM1's break input without processor or clock, about 0.1 µs after the
+//! current gets there (DS12288, comparator: t_D 17 ns typical; the amplifier before it takes 1 µs and more).
 //!
-//! The thresholds are DAC3's two channels, which lead nowhere else (RM0440, COMP, "inverting input assignment": DAC3_CH1 to
-//! COMP3, DAC3_CH2 to COMP4). DAC and converter have one reference, so that a threshold is a code of the converter.
+//! The two channels of DAC3 give the thresholds (RM0440, COMP, "inverting input assignment": DAC3_CH1 to COMP3,
+//! DAC3_CH2 to COMP4). DAC and converter have one reference, so a threshold is a code of the converter.
 
 use embassy_stm32::pac::comp::vals::{Hysteresis, Inm, Polarity};
 use embassy_stm32::pac::dac::vals::Mode;
@@ -11,14 +11,14 @@ use embassy_stm32::pac::{COMP3, COMP4, DAC3, RCC};
 
 use super::clock::CORE_HZ;
 
-/// Start-up of DAC and comparator, µs (DS12288: t_WAKEUP of the DAC without buffer 5 at most, t_START of the comparator 5 at
-/// most), one after the other.
+/// Start-up of DAC and comparator in sequence, µs (DS12288: t_WAKEUP of the DAC without buffer at most 5, t_START of
+/// the comparator at most 5).
 const START_US: u32 = 20;
-/// DAC_MCR.HFSEL for an AHB clock above 160 MHz.
+/// Value of DAC_MCR.HFSEL for an AHB clock above 160 MHz.
 const ABOVE_160_MHZ: u8 = 2;
 
-/// Sets both up with thresholds, lower and upper, as codes of the converter. SYSCFG's clock, which is the comparators', must
-/// be on.
+/// Starts both with thresholds, lower and upper, as codes of the converter. The clock of SYSCFG, which the comparators
+/// use, must be on.
 pub(crate) fn start([lower, upper]: [u16; 2]) {
     RCC.ahb2enr().modify(|w| w.set_dac3en(true));
     DAC3.mcr().write(|w| {
@@ -32,7 +32,7 @@ pub(crate) fn start([lower, upper]: [u16; 2]) {
         w.set_en(0, true);
         w.set_en(1, true);
     });
-    // PC1 is the second of COMP3's inputs, PB0 the first of COMP4's. COMP4 is high below its threshold.
+    // PC1 is COMP3's second input, PB0 is COMP4's first. COMP4 is high below its threshold.
     for (comparator, second, polarity) in [
         (COMP3, true, Polarity::NOT_INVERTED),
         (COMP4, false, Polarity::INVERTED),

@@ -8,7 +8,7 @@ pub(crate) fn start(dcb: &mut DCB, dwt: &mut DWT) {
     dwt.enable_cycle_counter();
 }
 
-/// Cycles since some moment, wrapping.
+/// Returns the cycle count; it wraps.
 #[inline(always)]
 pub(crate) fn now() -> u32 {
     DWT::cycle_count()

@@ -1,19 +1,19 @@
 //! TIM2: the motor's quadrature encoder, with input filter and index.
 //!
-//! The counter runs freely over 32 bits and wraps. Where the index is wired it sets the counter to 0 counting
-//! up, to its top counting down (RM0440, TIM2, "Encoder index"); between two index pulses lie whole turns, so that the
-//! step of a tick with an index is known modulo a turn. What the step then is beside what the motor can have
-//! moved is counts that were lost or made up on the way. Between two of them the counter stays within a turn of 0; beyond it
-//! one has not come. The timer's own check of the index (TIM2_SR.IERRF) compares with the counter's ends, which a counter of
-//! 32 bits has elsewhere, and is not used; that both channels changed at once (TERRF) is.
+//! The counter runs freely over 32 bits and wraps. If the index is wired it sets the counter to 0 when counting up, and
+//! to its top when counting down (RM0440, TIM2, "Encoder index"). Whole turns lie between two index pulses, so the step
+//! of a tick with an index is known modulo a turn. A difference to the possible motion of the motor means lost or false
+//! counts. Between two pulses the counter stays within a turn of 0; beyond that a pulse is missing. The timer's own
+//! check of the index (TIM2_SR.IERRF) compares with the counter's ends and does not fit a 32-bit counter, so it is not
+//! used. The flag for a change of both channels at once (TERRF) is used.
 //!
-//! The index acts in one of the four states of the channels (TIM2_ECR.IPOS), so that its own width does not matter.
+//! The index acts in one of the four states of the channels (TIM2_ECR.IPOS), so its own width does not matter.
 //!
-//! TIM5 times the edges: TIM2 sends the clock of its counter out as a trigger (TIM2_CR2.MMS = 8, "encoder clock
-//! output"), which is TIM5's ITR1 (RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"); there it captures a
-//! count that runs freely at 170 MHz (CC1S = 3: channel 1 captures on TRC, the internal trigger). Edge and count pass
-//! the same filter, so that they belong together; the filter's own delay, 1.1 µs, is left in both, and its step of 0.19 µs
-//! is what an edge is timed to.
+//! TIM5 times the edges. TIM2 outputs the clock of its counter as a trigger (TIM2_CR2.MMS = 8, "encoder clock output"),
+//! which is TIM5's ITR1 (RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"). There it captures a count that
+//! runs freely at 170 MHz (CC1S = 3: channel 1 captures on TRC, the internal trigger). Edge and count pass the same
+//! filter, so they belong together. Both keep the filter's delay, 1.1 µs. Its step, 0.19 µs, is the resolution of an
+//! edge time.
 
 use core::num::NonZeroU32;
 
@@ -28,23 +28,23 @@ use rig_shared::units::EncoderCount;
 use super::clock::CORE_HZ;
 use super::pins::EncoderPins;
 
-// TIM5 counts the core's clock: its bus is not divided.
+// TIM5 counts the core clock: its bus is not divided.
 const _: () = assert!(EDGE_CLOCK_HZ == CORE_HZ);
 
-/// How far the step of a tick may be from that of the tick before, besides half of that step, counts: four times
-/// the hardest acceleration that the limits allow (60 rad/s² at the joint are 0.04 counts in a tick squared).
+/// Allowed change of step between two ticks, in addition to half of the last step, counts: four times the hardest
+/// allowed acceleration (60 rad/s² at the joint are 0.04 counts per tick squared).
 const SLACK: u32 = 4;
 
-/// What the counter says in one tick.
+/// Reading of the counter in one tick.
 pub(crate) struct Reading {
     pub(crate) count: EncoderCount,
-    /// Age of the last edge, periods of [`EDGE_CLOCK_HZ`].
+    /// Time since the last edge, periods of [`EDGE_CLOCK_HZ`].
     pub(crate) edge_age: u32,
-    /// The index disagrees by so many counts, or the channels changed both at once (0).
+    /// Counts by which the index disagrees, or 0 if both channels changed at once.
     pub(crate) wrong: Option<i32>,
 }
 
-/// The step that is the same modulo a turn and the shortest.
+/// Returns the shortest step that is equal to `step` modulo a turn.
 fn within_half_a_turn(step: i32, turn: NonZeroU32) -> i32 {
     let rest = step.unsigned_abs() % turn;
     let shortest = if rest > turn.get() / 2 {
@@ -59,7 +59,7 @@ fn within_half_a_turn(step: i32, turn: NonZeroU32) -> i32 {
     }
 }
 
-/// The counter, made into one that no index resets.
+/// The counter, extended so that the index does not reset it.
 pub(crate) struct EncoderTimer {
     counts_per_turn: NonZeroU32,
     last: u32,
@@ -91,7 +91,7 @@ impl EncoderTimer {
             w.set_etps(Etps::DIV1);
             w.set_etp(Etp::NOT_INVERTED);
         });
-        // Where and when before whether (RM0440, TIM2_ECR: with IE reset).
+        // Direction and position are set before the index is enabled (RM0440, TIM2_ECR: with IE reset).
         timer.ecr().write(|w| {
             w.set_idir(Idir::BOTH);
             w.set_ipos(encoder.index_levels);
@@ -99,7 +99,7 @@ impl EncoderTimer {
         timer.ecr().modify(|w| w.set_ie(true));
         timer.sr().write_value(Default::default());
         timer.cr2().write(|w| w.set_mms(Mms::ENCODER_CLOCK_OUTPUT));
-        // The slave listens before the master begins.
+        // The slave must be ready before the master starts.
         time_edges();
         timer.cr1().modify(|w| w.set_cen(true));
         Self {
@@ -116,14 +116,14 @@ impl EncoderTimer {
     #[inline(always)]
     pub(crate) fn read(&mut self) -> Reading {
         let timer = TIM2;
-        // Before the count: of an edge that comes in between, the time is known to a few periods. After it would be
-        // an edge that the count does not have yet.
+        // Read before the count: if an edge comes in between, its time is known to a few periods. Read after the count,
+        // the time could belong to an edge that is not yet counted.
         let now = TIM5.cnt().read();
         let mut raw = timer.cnt().read();
         let flags = timer.sr().read();
         let mut wrong = None;
         if flags.idxif() || flags.terrif() {
-            // Written with zero a flag is cleared, with one it is left (rc_w0): one that has risen since it was read is for
+            // Writing zero clears a flag, writing one keeps it (rc_w0): a flag that rises after the reading stays for
             // the next tick.
             let mut others = flags;
             others.0 = !flags.0;
@@ -131,7 +131,7 @@ impl EncoderTimer {
             if flags.terrif() {
                 wrong = Some(0);
             }
-            // Again, as the index may have come between counter and flags.
+            // Read again, because the index may have come between counter and flags.
             raw = timer.cnt().read();
         }
         let mut step = raw.wrapping_sub(self.last) as i32;
@@ -139,12 +139,12 @@ impl EncoderTimer {
             let within = within_half_a_turn(step, self.counts_per_turn);
             let beside = within.wrapping_sub(self.step);
             if !self.indexed {
-                // The first one only says where the turn begins: the motion goes on as it was.
+                // The first index only gives the start of a turn: the motion continues unchanged.
                 self.indexed = true;
                 step = self.step;
             } else {
                 if beside.unsigned_abs() > SLACK + self.step.unsigned_abs() / 2 {
-                    // Counts that were lost, or an index that is none: nobody knows, so the motion goes on as it was.
+                    // Lost counts or a false index: the cause is unknown, so the motion continues unchanged.
                     wrong = Some(beside);
                     step = self.step;
                 } else {
@@ -156,7 +156,7 @@ impl EncoderTimer {
         let place = raw as i32;
         let beyond = place >= turn + SLACK as i32 || place < -turn - SLACK as i32;
         if self.indexed && beyond {
-            // Told once: without index the counter is as good as any.
+            // Reported once: without index the counter is still valid.
             self.indexed = false;
             wrong = Some(if place < 0 { -turn } else { turn });
         }
@@ -166,7 +166,7 @@ impl EncoderTimer {
         self.count = self.count.wrapping_add(step as u16);
         Reading {
             count: EncoderCount(self.count),
-            // An edge since `now` is a negative age.
+            // An edge after `now` would have a negative age.
             edge_age: if age > u32::MAX / 2 { 0 } else { age },
             wrong,
         }

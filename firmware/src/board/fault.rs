@@ -1,4 +1,4 @@
-//! When the program itself fails: the bridge goes off before anything else, then the chip starts anew.
+//! Handles failures of the program: it switches the bridge off first, then the chip restarts.
 
 // The compiler counts assembly that defines a symbol as unsafe code.
 #![allow(unsafe_code)]
@@ -10,7 +10,7 @@ use embassy_stm32::pac::FLASH;
 
 use super::pwm;
 
-/// A program error. The rig starts again disarmed, and tells in its health report why.
+/// Handles a program error. The rig restarts disarmed and gives the reason in its health report.
 #[panic_handler]
 fn panic(_info: &PanicInfo) -> ! {
     fault()
@@ -22,8 +22,8 @@ fn defmt_panic() -> ! {
     fault()
 }
 
-// A fault of the processor. The stack may be what has failed, so it is set to its beginning first, and nothing
-// is saved: nobody returns from here.
+// A processor fault. The stack may be the cause, so it is first reset to its beginning. Nothing is saved, because this
+// code never returns.
 global_asm!(
     ".section .HardFault.rig, \"ax\"",
     ".global HardFault",
@@ -36,27 +36,27 @@ global_asm!(
     handler = sym fault,
 );
 
-/// A flash word of the stored settings that has two wrong bits, as a supply that failed while it was written
-/// leaves it, is read as it is: the check sum finds it. Every other non-maskable interrupt is a fault.
+/// Handles a flash word of the stored settings with two wrong bits, caused by a supply failure while writing: it is
+/// read unchanged, and the check sum detects it. Every other non-maskable interrupt is a fault.
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
     let flag = FLASH.eccr().read();
     if flag.eccd() && flag.bk_ecc() {
-        // Written with one it is cleared.
+        // Writing one clears it.
         FLASH.eccr().modify(|w| w.set_eccd(true));
     } else {
         fault()
     }
 }
 
-/// An exception that nobody has asked for.
+/// An unexpected exception.
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(_number: i16) {
     fault()
 }
 
 extern "C" fn fault() -> ! {
-    // One instruction, before the bridge: a control tick in between would switch it on again.
+    // This comes before the bridge is switched off: a control tick in between would switch it on again.
     cortex_m::interrupt::disable();
     pwm::off();
     cortex_m::peripheral::SCB::sys_reset()

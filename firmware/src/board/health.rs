@@ -1,4 +1,4 @@
-//! What the health report says, and where the tick's cycles are counted.
+//! The health report and the cycle count of the ticks.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -8,10 +8,10 @@ use rig_shared::wire::message::{Health, ResetCause, SettingsOrigin};
 use super::clock::CORE_HZ;
 use super::stack;
 
-/// Requests that came damaged; counted by the command task.
+/// Damaged requests; counted by the command task.
 pub(crate) static BAD_REQUESTS: AtomicU32 = AtomicU32::new(0);
 
-/// Cycles of the ticks since the last report, and what does not change.
+/// Cycles of the ticks since the last report, and constant values.
 pub(crate) struct Checkup {
     start: Start,
     every: u32,
@@ -20,7 +20,7 @@ pub(crate) struct Checkup {
     max: u32,
 }
 
-/// What was found at the start.
+/// Findings at the start.
 #[derive(Clone, Copy)]
 pub(crate) struct Start {
     pub(crate) reset: ResetCause,
@@ -29,7 +29,7 @@ pub(crate) struct Start {
 }
 
 impl Checkup {
-    /// A report every so many ticks.
+    /// Makes a report after every `every` ticks.
     pub(crate) fn new(start: Start, every: u32) -> Self {
         Self {
             start,
@@ -40,7 +40,7 @@ impl Checkup {
         }
     }
 
-    /// Counts a tick; gives the report where one is due. `tick` is its number, `dropped` the windows lost so far.
+    /// Counts a tick; returns the report if it is due. `tick` is its number, `dropped` the windows lost so far.
     #[inline(always)]
     pub(crate) fn count(&mut self, cycles: u32, tick: u64, dropped: u32) -> Option<Health> {
         self.ticks += 1;
@@ -56,7 +56,7 @@ impl Checkup {
             clock_hz: CORE_HZ,
             crystal: self.start.crystal,
             tick_cycles_max: self.max,
-            // At 10 kHz the sum of a second is below 2³² by far: every tick is shorter than its period.
+            // At 10 kHz the sum of a second is far below 2³²: every tick is shorter than its period.
             tick_cycles_mean: self.sum / self.ticks.max(1),
             stack_free: stack::free(),
             bad_requests: BAD_REQUESTS.load(Ordering::Relaxed),
@@ -67,11 +67,11 @@ impl Checkup {
     }
 }
 
-/// Why the chip last started; forgets it, so that the next start sees its own cause alone.
+/// Returns the cause of the last reset and clears it, so that the next start reads only its own cause.
 pub(crate) fn reset_cause() -> ResetCause {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    // The reset pin is pulled low by every internal reset too, so it comes last (RM0440, RCC, "System reset").
+    // Every internal reset pulls the reset pin low too, so the pin is tested last (RM0440, RCC, "System reset").
     if flags.iwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {

@@ -1,21 +1,21 @@
-//! How warm the motor is, in RAM that no start clears: a reset does not cool a winding.
+//! Motor heat, kept in RAM that no start clears: a reset does not cool a winding.
 //!
-//! Two places are written in turn, each with its complement, so that a reset in between leaves one whole. What RAM holds after
-//! the power has been off passes as such by chance once in 2³¹ times, and is then a heat like another: the motor must cool.
+//! Two places are written in turn, each with its complement, so one stays valid if a reset comes in between. After
+//! power-off, random RAM contents pass as valid once in 2³¹ times, and are then treated like any other heat.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-/// A place: the number's bits and their complement.
+/// One place: the bits of the number and their complement.
 type Place = [u32; 2];
 
 struct Kept(UnsafeCell<MaybeUninit<[Place; 2]>>);
 
-// Before the control interrupt is enabled the start alone looks at it, and then that interrupt alone.
+// Only the start uses it before the control interrupt is enabled, and afterwards only that interrupt.
 #[allow(unsafe_code)]
 unsafe impl Sync for Kept {}
 
-// Where `cortex-m-rt` puts nothing at the start.
+// `cortex-m-rt` does not initialise this section.
 #[allow(unsafe_code)]
 #[unsafe(link_section = ".uninit.heat")]
 static KEPT: Kept = Kept(UnsafeCell::new(MaybeUninit::uninit()));
@@ -27,11 +27,11 @@ fn word(place: usize, half: usize) -> *mut u32 {
         .wrapping_add(2 * (place & 1) + (half & 1))
 }
 
-/// Keeps the heat, A²; `tick` counts up.
+/// Stores the heat, A²; `tick` counts up.
 #[inline(always)]
 pub(crate) fn keep(tick: u64, heat: f32) {
     let place = tick as usize & 1;
-    // Within the static, aligned; volatile, as the next reader is the next start.
+    // Within the static, aligned; volatile, because the next reader is the next start.
     #[allow(unsafe_code)]
     unsafe {
         word(place, 0).write_volatile(heat.to_bits());
@@ -39,10 +39,10 @@ pub(crate) fn keep(tick: u64, heat: f32) {
     }
 }
 
-/// The heat that was kept, A²; none where nothing whole is found.
+/// Returns the stored heat, A²; `None` if no place is valid.
 pub(crate) fn kept() -> Option<f32> {
     let read = |place| {
-        // As above; any bits are a number.
+        // As above; any bits are a valid number.
         #[allow(unsafe_code)]
         let [bits, check] = [0, 1].map(|half| unsafe { word(place, half).read_volatile() });
         (bits == !check).then(|| f32::from_bits(bits))

@@ -1,4 +1,4 @@
-//! LPUART1 to the ST-LINK's serial port: what comes in by a ring of DMA, what goes out by DMA.
+//! LPUART1 to the ST-LINK's serial port: input by a DMA ring, output by DMA.
 
 use core::sync::atomic::Ordering;
 
@@ -27,11 +27,11 @@ use super::watchdog::{Part, report};
 
 /// Bit rate: batches and estimates need 0.4 Mbit/s (`docs/formats.md`).
 const BAUD: u32 = 921_600;
-/// Bytes that may come in while the command task is away: 11 ms of line.
+/// Input buffer while the command task is busy, bytes: 11 ms of data.
 const RING: usize = 1024;
-/// Bytes that go out at a time: two of the longest frames.
+/// Output buffer, bytes: two of the longest frames.
 const SEND: usize = 2 * MAX_FRAME;
-/// Longest wait for bytes, so that the command task reports to the watchdog while nobody talks.
+/// Longest wait for bytes, so that the command task reports to the watchdog while no data arrive.
 const SILENCE: Duration = Duration::from_millis(20);
 
 static RING_BUFFER: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
@@ -91,7 +91,7 @@ pub(crate) async fn telemetry(
         if bytes.is_empty() {
             continue;
         }
-        // All of it or nothing: the buffer is longer, so that frames stay whole.
+        // All or nothing: the buffer is longer than a frame, so frames stay whole.
         let _taken = probe.write(bytes);
         if line.write(bytes).await.is_err() {
             defmt::warn!("the serial line did not take {} bytes", bytes.len());
@@ -99,8 +99,8 @@ pub(crate) async fn telemetry(
     }
 }
 
-/// Passes a request on to the tick. Others have their turn afterwards: to examine a request may take a fifth of a second, and
-/// as long as bytes wait, reading does not.
+/// Passes a request to the tick, then yields to other tasks. Examining a request may take a fifth of a second, and
+/// reading does not yield while bytes wait.
 async fn hand_over(
     config: &Config,
     decoded: Option<Result<Request, DecodeError>>,
@@ -108,7 +108,7 @@ async fn hand_over(
 ) {
     let taken = match decoded {
         None => return,
-        // Unanswered, the host repeats it.
+        // The host gets no answer and repeats its request.
         Some(Err(_)) => {
             BAD_REQUESTS.fetch_add(1, Ordering::Relaxed);
             true
@@ -122,7 +122,7 @@ async fn hand_over(
     Timer::after_ticks(0).await;
 }
 
-/// Takes bytes from the host, makes requests of them and hands these to the tick.
+/// Reads bytes from the host, decodes requests and passes them to the tick.
 #[embassy_executor::task]
 pub(crate) async fn commands(
     config: &'static Config,
@@ -137,7 +137,7 @@ pub(crate) async fn commands(
         report(Part::Commands);
         let count = match with_timeout(SILENCE, line.read(&mut bytes)).await {
             Ok(Ok(count)) => count,
-            // A damaged byte or one too many: the frame's check sum finds it, the host repeats its request.
+            // A damaged or additional byte: the check sum of the frame detects it, and the host repeats its request.
             Ok(Err(_)) => {
                 defmt::warn!("an error on the serial line");
                 0

@@ -1,4 +1,4 @@
-//! Everything that knows the chip. `unsafe` stands only where hardware needs it, with the reason beside it.
+//! All code that depends on the chip. `unsafe` is used only where hardware needs it, with the reason beside it.
 
 mod accelerated;
 mod adc;

@@ -1,4 +1,4 @@
-//! Which wire goes where: the one file that names pins. The table in `docs/firmware.md` says the same.
+//! Wiring: the only file that names pins. The table in `docs/firmware.md` has the same content.
 
 use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac::gpio::vals::{Idr, Pupdr};
@@ -21,7 +21,7 @@ pub(crate) const CURRENT_CHANNEL: u8 = 7; // PC1
 pub(crate) const SUPPLY_CHANNEL: u8 = 6; // PC0
 pub(crate) const TEMPERATURE_CHANNEL: u8 = 8; // PC2
 
-/// The bridge's side of the wiring, its pins not yet driven.
+/// The pins of the bridge, not yet driven.
 pub(crate) struct BridgePins {
     pub(crate) enable: Output<'static>,
     in1: Peri<'static, PA8>,
@@ -38,7 +38,7 @@ pub(crate) struct LinkPins {
     pub(crate) rx_dma: Peri<'static, DMA1_CH2>,
 }
 
-/// All of it.
+/// All pins.
 pub(crate) struct Pins {
     pub(crate) bridge: BridgePins,
     pub(crate) encoder: EncoderPins,
@@ -59,14 +59,14 @@ pub(crate) struct EncoderPins {
 pub(crate) struct AnalogPins {
     /// Also the positive input of COMP3 (DS12288, pin definitions; RM0440, COMP, "non-inverting input assignment").
     current: Peri<'static, PC1>,
-    /// The same wire once more, to the positive input of COMP4.
+    /// The same wire, connected to the positive input of COMP4.
     current_again: Peri<'static, PB0>,
     supply: Peri<'static, PC0>,
     temperature: Peri<'static, PC2>,
 }
 
 impl Pins {
-    /// Sorts the chip's pins; the bridge's enable is driven low at once.
+    /// Sorts the chip's pins. Drives the bridge's enable low at once.
     pub(crate) fn new(p: Peripherals) -> Self {
         let enable: Peri<'static, PB5> = p.PB5;
         let led: Peri<'static, PA5> = p.PA5;
@@ -101,38 +101,38 @@ impl Pins {
     }
 }
 
-/// Pins of channels A and B in GPIOA, and how their pulls are set there (RM0440, GPIOx_PUPDR: 1 up, 2 down).
+/// Pins of channels A and B in GPIOA, and the register values of their pulls (RM0440, GPIOx_PUPDR: 1 up, 2 down).
 const CHANNELS: [usize; 2] = [0, 1];
 
-/// Pin of a channel. Not looked up by index: rustc 1.90 then no longer sees that it is below 16, and guards the register's
-/// access with a panic.
+/// Returns the pin of a channel. Not looked up by index: then rustc 1.90 does not see that it is below 16, and adds a
+/// panic to the register access.
 #[inline(always)]
 fn pin(channel: usize) -> usize {
     let [a, b] = CHANNELS;
     if channel & 1 == 0 { a } else { b }
 }
 
-/// Pulls a channel of the encoder up or down: what drives it does not care.
+/// Pulls a channel of the encoder up or down. This does not change a driven line.
 #[inline(always)]
 pub(crate) fn pull(channel: usize, up: bool) {
     let pull = if up { Pupdr::PULL_UP } else { Pupdr::PULL_DOWN };
     GPIOA.pupdr().modify(|w| w.set_pupdr(pin(channel), pull));
 }
 
-/// Whether a channel of the encoder is high.
+/// Returns true if a channel of the encoder is high.
 #[inline(always)]
 pub(crate) fn is_high(channel: usize) -> bool {
     GPIOA.idr().read().idr(pin(channel)) == Idr::HIGH
 }
 
-/// Whether the bridge holds its fault line low.
+/// Returns true if the bridge holds its fault line low.
 #[inline(always)]
 pub(crate) fn driver_faults() -> bool {
     GPIOB.idr().read().idr(12) == Idr::LOW
 }
 
 impl BridgePins {
-    /// Gives the outputs and the break input to TIM1, which must already hold its outputs idle.
+    /// Connects the outputs and the break input to TIM1, which must already hold its outputs idle.
     pub(crate) fn connect(self) -> Output<'static> {
         let output = AfType::output(OutputType::PushPull, Speed::Medium);
         // The driver's fault output is an open drain.
@@ -145,9 +145,9 @@ impl BridgePins {
 }
 
 impl EncoderPins {
-    /// Gives the encoder to TIM2.
+    /// Connects the encoder to TIM2.
     pub(crate) fn connect(self) {
-        // A wire that is off rests at a level instead of counting noise.
+        // A disconnected wire stays at a level instead of counting noise.
         keep(Flex::new(self.a), AF_TIM2, AfType::input(Pull::Up));
         keep(Flex::new(self.b), AF_TIM2, AfType::input(Pull::Up));
         keep(
@@ -159,7 +159,7 @@ impl EncoderPins {
 }
 
 impl AnalogPins {
-    /// Gives the inputs to the converter and the comparators.
+    /// Connects the inputs to the converter and the comparators.
     pub(crate) fn connect(self) {
         for mut pin in [
             Flex::new(self.current),
@@ -173,7 +173,7 @@ impl AnalogPins {
     }
 }
 
-/// Sets a pin to an alternate function for good: a `Flex` that goes out of use disconnects its pin.
+/// Sets a pin to an alternate function permanently: a dropped `Flex` disconnects its pin.
 fn keep(mut pin: Flex<'static>, function: u8, kind: AfType) {
     pin.set_as_af_unchecked(function, kind);
     core::mem::forget(pin);

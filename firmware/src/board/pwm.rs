@@ -1,14 +1,14 @@
-//! TIM1: the bridge's two inputs and the break input; TIM4, started by it: the trigger of every sample.
+//! TIM1: the two bridge inputs and the break input. TIM4, started by TIM1: the trigger of every sample.
 //!
-//! Centre-aligned at 20 kHz. With d > 0 input 1 is high and input 2 low for the share d of a period, both high
-//! for the rest (drive and brake, so-called slow decay): the motor's current flows on through the bridge, the
-//! ripple is the smallest, and the mean voltage is d times the supply. With d < 0 the inputs change places.
+//! Centre-aligned at 20 kHz. With d > 0 input 1 is high and input 2 low for the share d of a period; both are high for
+//! the rest (drive and brake, called slow decay). The motor current continues through the bridge, the ripple is
+//! smallest, and the mean voltage is d times the supply. With d < 0 the inputs change places.
 //!
-//! The repetition counter lets every fourth overflow or underflow through as an update, 10 000 a second, always
-//! at the underflow: there the new duty takes effect. It is the middle of a braking interval, where the current equals
-//! its mean over the period. The samples are to lie about that instant, so their trigger comes [`LEAD`] before it: TIM4
-//! counts the same clock with the period of the updates, starts with TIM1's counter (trigger mode, TIM1's enable as TRGO,
-//! ITR0; RM0440, TIM2/TIM3/TIM4/TIM5, "Internal trigger connection") so much ahead, and never again loses or gains a count.
+//! The repetition counter makes every fourth overflow or underflow an update, 10 000 a second, always at the underflow.
+//! There the new duty takes effect. It is the middle of a braking interval, where the current equals its mean over the
+//! period. Samples must be centred on it, so their trigger comes [`LEAD`] before it. TIM4 counts the same clock with
+//! the period of the updates. It starts with TIM1's counter (trigger mode, TIM1's enable as TRGO, ITR0; RM0440,
+//! TIM2/TIM3/TIM4/TIM5, "Internal trigger connection"), ahead by this lead, and never loses or gains a count.
 
 use embassy_stm32::gpio::Output;
 use embassy_stm32::pac::timer::vals::{
@@ -27,23 +27,23 @@ use super::pins::{BridgePins, driver_faults};
 pub(crate) const PWM_HZ: u32 = 20_000;
 // A whole number of pulses between two ticks: every update is then an underflow.
 const _: () = assert!(PWM_HZ.is_multiple_of(nameplate::RATES.control_hz));
-/// Top of the ramp: up and down are one pulse.
+/// Top of the ramp: up and down form one pulse.
 const TOP: u16 = (CORE_HZ / PWM_HZ / 2) as u16;
-/// Above the top: never low.
+/// Compare value above the top: never low.
 const HIGH: u16 = TOP + 1;
 
-/// PWR_CR2.PLS: a chip's supply below 2.8 V counts as broken down (RM0440, PVD level 5). Its own lowest is 1.71 V.
+/// PWR_CR2.PLS: the chip's supply has failed below 2.8 V (RM0440, PVD level 5). Its lowest allowed supply is 1.71 V.
 const SUPPLY_LEVEL: u8 = 5;
 
 /// COMP3 and COMP4, counted from 0.
 const COMPARATORS: [usize; 2] = [2, 3];
 
-/// What switches the outputs off without the program.
+/// Causes that switch the outputs off without the program.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Break {
-    /// The bridge's fault line, or the chip's own troubles.
+    /// The bridge's fault line, or a fault inside the chip.
     Driver,
-    /// Too much current.
+    /// Over-current.
     Comparator,
 }
 
@@ -53,19 +53,19 @@ pub(crate) struct Bridge {
 }
 
 impl Bridge {
-    /// Sets TIM1 up with its outputs idle and the bridge disabled; `thresholds` are the comparators'.
+    /// Sets TIM1 up with idle outputs and a disabled bridge; `thresholds` are those of the comparators.
     pub(crate) fn new(pins: BridgePins, control_hz: u32, thresholds: [u16; 2]) -> Self {
         RCC.apb2enr().modify(|w| {
             w.set_tim1en(true);
             w.set_syscfgen(true);
         });
-        // The chip's own supply is watched (RM0440, PWR_CR2). Before PVDL, which locks these bits as they are.
+        // Watches the chip's supply (RM0440, PWR_CR2). Set before PVDL, which locks these bits.
         PWR.cr2().modify(|w| {
             w.set_pls(SUPPLY_LEVEL);
             w.set_pvde(true);
         });
-        // A processor that has locked up, a flash word beyond repair or a supply that breaks down act on the
-        // break input too (RM0440, SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).
+        // A processor lock-up, an uncorrectable flash word and a supply failure act on the break input too (RM0440,
+        // SYSCFG_CFGR2: CLL, ECCL, PVDL; once set they stay until the next reset).
         SYSCFG.cfgr2().modify(|w| {
             w.set_cll(true);
             w.set_eccl(true);
@@ -75,7 +75,7 @@ impl Bridge {
         timer.cr1().write(|w| {
             w.set_cms(Cms::CENTER_ALIGNED1);
             w.set_arpe(true);
-            // Only the counter itself makes updates, and with them triggers.
+            // Only the counter makes updates, and so triggers.
             w.set_urs(Urs::COUNTER_ONLY);
         });
         timer.psc().write_value(0);
@@ -96,8 +96,8 @@ impl Bridge {
             w.set_cce(0, true);
             w.set_cce(1, true);
         });
-        // The break input, active low; its sources are the pin and the comparators, which are high where they find too much
-        // current (RM0440, TIM1_AF1: BKCMP3E and BKCMP4E with their polarities).
+        // The break input, active low. Its sources are the pin and the comparators, which are high at over-current
+        // (RM0440, TIM1_AF1: BKCMP3E and BKCMP4E with their polarities).
         comparator::start(thresholds);
         timer.af1().write(|w| {
             w.set_bkine(true);
@@ -110,8 +110,8 @@ impl Bridge {
         timer.bdtr().write(|w| {
             w.set_bke(0, true);
             w.set_bkp(0, Bkp::ACTIVE_LOW);
-            // No filter: a filtered input needs the timer's clock, which may be what has failed. A capacitor at the pin
-            // keeps off the spikes that the bridge itself couples in.
+            // No filter: a filtered input needs the timer's clock, which may have failed. A capacitor at the pin
+            // removes the spikes that the bridge couples in.
             w.set_bkf(0, FilterValue::NO_FILTER);
             w.set_aoe(false);
             w.set_ossi(Ossi::IDLE_LEVEL);
@@ -126,38 +126,38 @@ impl Bridge {
         }
     }
 
-    /// Starts the ramp, and with it the sampling: after the converter is set up, whom every trigger must find ready. The
-    /// outputs stay idle.
+    /// Starts the ramp and the sampling. The converter must be set up before, ready for every trigger. The outputs stay
+    /// idle.
     pub(crate) fn run(&mut self) {
         TIM1.cr1().modify(|w| w.set_cen(true));
     }
 
-    /// What has acted on the outputs since the bridge was last switched on, or acts now.
+    /// Returns the cause that has switched the outputs off since the bridge was last switched on, or acts now.
     #[inline(always)]
     pub(crate) fn broken(&self) -> Option<Break> {
         let flags = TIM1.sr().read();
-        // What goes wrong inside the chip has a flag of its own, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
+        // A fault inside the chip has its own flag, which also keeps the outputs off (RM0440, TIM1_SR.SBIF).
         if flags.sbif() || flags.bif(0) && driver_faults() {
             Some(Break::Driver)
         } else if flags.bif(0) {
-            // The line is up: a bridge that is in trouble holds it for a millisecond and more.
+            // The line is up, so the bridge is not the cause: a bridge fault holds it low for a millisecond or more.
             Some(Break::Comparator)
         } else {
             None
         }
     }
 
-    /// Puts a command on the outputs, effective from the next update on; switching off is at once.
+    /// Applies a command to the outputs, effective from the next update. Switching off acts at once.
     #[inline(always)]
     pub(crate) fn apply(&mut self, command: Command) {
         let timer = TIM1;
         if !command.bridge {
             off();
-            // The update before the next command takes this over: the bridge starts from standstill, not with its last duty.
+            // The update before the next command loads this: the bridge starts with duty 0, not with its last duty.
             brake();
-            // A fault that has gone may be cleared: its flag rises again at once if it has not.
+            // A fault that has ended may be cleared: a fault that still acts sets its flag again at once.
             timer.sr().write(|w| {
-                // Written with zero a flag is cleared, with one it is left (rc_w0).
+                // Writing zero clears a flag, writing one keeps it (rc_w0).
                 *w = embassy_stm32::pac::timer::regs::SrAdv(!0);
                 w.set_bif(0, false);
                 w.set_sbif(false);
@@ -179,7 +179,7 @@ impl Bridge {
     }
 }
 
-/// What the outputs compare with from the next update on.
+/// Sets the compare values of the outputs from the next update on.
 #[inline(always)]
 fn compare(one: u16, two: u16) {
     TIM1.ccr(0).write(|w| w.set_ccr(one));
@@ -192,7 +192,7 @@ fn brake() {
     compare(HIGH, HIGH);
 }
 
-/// Sets TIM4 up to start with TIM1 and to trigger the converter [`LEAD`] before each of its updates.
+/// Sets TIM4 up to start with TIM1 and to trigger the converter [`LEAD`] before each of TIM1's updates.
 fn follow(control_hz: u32) {
     RCC.apb1enr1().modify(|w| w.set_tim4en(true));
     let timer = TIM4;
@@ -208,7 +208,7 @@ fn follow(control_hz: u32) {
     TIM1.cr2().write(|w| w.set_mms(Mms::ENABLE));
 }
 
-/// Switches the bridge off from anywhere, with nothing but two stores.
+/// Switches the bridge off from anywhere, with only two stores.
 #[inline(always)]
 pub(crate) fn off() {
     TIM1.bdtr().modify(|w| w.set_moe(false));

@@ -1,37 +1,37 @@
-//! Queues between the tick and the tasks: heapless's, which take no lock, with one thing told to the compiler.
+//! Lock-free queues between the tick and the tasks (heapless), with a hint for the compiler.
 
 use heapless::spsc::{Consumer, Producer};
 use rig_firmware::clerk::Notes;
 use rig_firmware::note::Note;
 
-/// Longer than any queue here.
+/// Bound on the length of every queue here.
 const LONGEST: usize = 1024;
 
-/// The end that things are put into.
+/// The input end.
 pub(crate) struct Inlet<T: 'static>(pub(crate) Producer<'static, T>);
 
-/// The end that they come out of.
+/// The output end.
 pub(crate) struct Outlet<T: 'static>(pub(crate) Consumer<'static, T>);
 
 impl<T> Inlet<T> {
-    /// Puts something in; false where there is no room.
+    /// Adds an element; returns false if the queue is full.
     #[inline(always)]
     pub(crate) fn put(&mut self, thing: T) -> bool {
         self.has_places();
         self.0.enqueue(thing).is_ok()
     }
 
-    /// Things inside.
+    /// Returns the number of elements.
     #[inline(always)]
     fn len(&self) -> usize {
         self.has_places();
         self.0.len()
     }
 
-    /// The ring's length is no constant to the compiler, which would guard the division by it with a panic.
+    /// Tells the compiler that the length is not 0. It would otherwise guard the division by the length with a panic.
     #[inline(always)]
     fn has_places(&self) {
-        // Every queue here has a place: its length is a constant above 0 where it is made.
+        // The length of every queue here is a constant above 0.
         #[allow(unsafe_code)]
         unsafe {
             core::hint::assert_unchecked(self.0.capacity() < LONGEST);
@@ -40,14 +40,14 @@ impl<T> Inlet<T> {
 }
 
 impl<T> Outlet<T> {
-    /// The oldest, where it lies: things here are large, and copying takes a tick's time.
+    /// Returns the oldest element in place: elements are large, and copying takes time of the tick.
     #[inline(always)]
     pub(crate) fn oldest(&self) -> Option<&T> {
         self.has_places();
         self.0.peek()
     }
 
-    /// Gives the oldest's place free.
+    /// Removes the oldest element.
     #[inline(always)]
     pub(crate) fn release(&mut self) {
         self.has_places();
@@ -70,7 +70,7 @@ impl Notes for Inlet<Note> {
         Self::put(self, note)
     }
 
-    /// Half of the places are for everything but snapshots and answers.
+    /// Returns true if more than half is free. The other half is reserved for everything except snapshots and answers.
     #[inline(always)]
     fn roomy(&self) -> bool {
         self.len() < self.0.capacity() / 2

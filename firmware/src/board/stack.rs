@@ -1,10 +1,10 @@
-//! How much of the stack has been used: it was painted before the program began.
+//! Use of the stack, which was painted before the program began.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// What `cortex-m-rt` paints the stack with (its feature `paint-stack`).
+/// Paint of `cortex-m-rt` (its feature `paint-stack`).
 const PAINT: u32 = 0xcccc_cccc;
-/// Bytes from the stack's end where the tick looks: enough for an interrupt on top of whatever came so far.
+/// Bytes from the stack's end where the tick checks: room for one interrupt in addition to the deepest use so far.
 const GUARD: usize = 1024;
 
 // Symbols of memory.x; only their addresses are used.
@@ -16,18 +16,18 @@ unsafe extern "C" {
 
 static FREE: AtomicU32 = AtomicU32::new(u32::MAX);
 
-/// Whether a word, counted from the stack's end, has never been used. Below the stack pointer nothing else lies.
+/// Returns true if a word, counted from the stack's end, was never used. Only the stack lies in this region.
 #[inline(always)]
 fn untouched(word: usize) -> bool {
     let end = &raw const _stack_end;
-    // Within the stack's own region; volatile, because whoever uses it does so behind the compiler's back.
+    // Within the stack's own region; volatile, because the compiler does not see the use of the stack.
     #[allow(unsafe_code)]
     unsafe {
         end.add(word).read_volatile() == PAINT
     }
 }
 
-/// Bytes left where the stack has reached its guard.
+/// Returns the remaining bytes if the stack has reached its guard.
 #[inline(always)]
 pub(crate) fn near_end() -> Option<u32> {
     let word = GUARD / 4;
@@ -37,14 +37,14 @@ pub(crate) fn near_end() -> Option<u32> {
     (!clean).then_some(GUARD as u32)
 }
 
-/// Counts the bytes never used; takes a while.
+/// Counts the bytes that were never used; slow.
 pub(crate) fn survey() {
     let words = (&raw const _stack_start as usize - &raw const _stack_end as usize) / 4;
     let free = (0..words).take_while(|&word| untouched(word)).count();
     FREE.store(4 * free as u32, Ordering::Relaxed);
 }
 
-/// Bytes never used, as last counted.
+/// Returns the bytes that were never used, at the last count.
 #[inline(always)]
 pub(crate) fn free() -> u32 {
     FREE.load(Ordering::Relaxed)

@@ -1,4 +1,4 @@
-//! From reset to the first tick.
+//! Start of the board, from reset to the first tick.
 
 use embassy_executor::{Executor, InterruptExecutor};
 use embassy_stm32::interrupt;
@@ -36,11 +36,11 @@ static CAPTURE: ConstStaticCell<Capture> = ConstStaticCell::new(Capture::new());
 static NOTE_QUEUE: StaticCell<spsc::Queue<Note, { NOTES + 1 }>> = StaticCell::new();
 static REQUEST_QUEUE: StaticCell<spsc::Queue<Examined, { REQUESTS + 1 }>> = StaticCell::new();
 static STORE_QUEUE: StaticCell<spsc::Queue<Settings, 2>> = StaticCell::new();
-/// Tasks that may not wait while a trajectory is being examined, which takes some 0.1 s.
+/// Tasks that must not wait while a trajectory is examined, which takes about 0.1 s.
 static PUNCTUAL: InterruptExecutor = InterruptExecutor::new();
 static EXECUTOR: StaticCell<Executor> = StaticCell::new();
 
-/// Brings the board up and runs it.
+/// Initialises the board and runs it.
 pub(crate) fn run() -> ! {
     let (probe_out, probe_in) = probe::open();
     let reset = health::reset_cause();
@@ -101,7 +101,7 @@ pub(crate) fn run() -> ! {
         to_store: Inlet(to_store),
     });
     defmt::info!("rig firmware {=str} is up", rig_firmware::VERSION);
-    // Each is spawned once, and its place is reserved at compile time.
+    // Each task is spawned once. Its memory is reserved at compile time.
     let placed = (
         link::telemetry(config, sender, probe_out, note_out),
         indicator(watchdog, pins.led),
@@ -121,27 +121,27 @@ pub(crate) fn run() -> ! {
     })
 }
 
-/// Runs the punctual tasks: the interrupt of a peripheral that is not used, raised by software.
+/// Runs the punctual tasks: the interrupt of an unused peripheral, raised by software.
 #[interrupt]
 fn CORDIC() {
-    // This is the interrupt that the executor was started with.
+    // The executor was started with this interrupt.
     #[allow(unsafe_code)]
     unsafe {
         PUNCTUAL.on_interrupt();
     }
 }
 
-/// The state at power on, made in its place: it is half as large as the stack.
+/// Returns the state at power on, built in place: it is half as large as the stack.
 #[inline(never)]
 fn state(config: &Config, settings: Settings) -> &'static mut State {
     match OneLinkEstimator::new(&settings.estimator, config.rates.estimator_hz()) {
         Ok(estimator) => STATE.init_with(|| State::with(config, settings, estimator)),
-        // The firmware's own settings are tested on the desktop, stored ones were checked when they were read.
+        // Tests on the desktop check the firmware's own settings; stored settings were checked when they were read.
         Err(_) => unreachable!(),
     }
 }
 
-/// Feeds the watchdog and blinks: a light that stands still is a program that does.
+/// Feeds the watchdog and blinks. A light that stands still means that the program has stopped.
 #[embassy_executor::task]
 async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
     let mut ticker = Ticker::every(Duration::from_millis(10));
@@ -153,14 +153,14 @@ async fn indicator(mut watchdog: Watchdog, mut led: Output<'static>) -> ! {
         if count.is_multiple_of(50) {
             led.toggle();
         }
-        // At the first turn too: the first report of health comes after one second.
+        // Also in the first pass: the first health report comes after one second.
         if count % 100 == 1 {
             stack::survey();
         }
     }
 }
 
-/// Writes settings to flash when the tick hands some over.
+/// Writes settings to flash when the tick passes some on.
 #[embassy_executor::task]
 async fn keeper(mut storage: Storage, mut from_tick: spsc::Consumer<'static, Settings>) -> ! {
     let mut ticker = Ticker::every(Duration::from_millis(5));

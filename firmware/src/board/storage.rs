@@ -1,6 +1,7 @@
 //! Settings in the last two pages of flash bank 2. The program runs from bank 1, which can be read meanwhile.
 //!
-//! Registers and sequences: RM0440, embedded flash memory, "Erase and program operations" (page erase, standard programming of 64-bit words).
+//! Registers and sequences: RM0440, embedded flash memory, "Erase and program operations" (page erase, standard
+//! programming of 64-bit words).
 
 use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Sr;
@@ -12,7 +13,8 @@ use rig_firmware::stored::{self, Copy, Found, IMAGE};
 const PAGE: usize = 2048;
 /// Pages of a bank.
 const PAGES: u8 = 128;
-/// A page erase takes at most 25 ms, a word 0.13 ms (DS12288, "Flash memory characteristics").
+/// Longest wait for the flash. Erasing a page takes at most 25 ms, a word 0.13 ms (DS12288, "Flash memory
+/// characteristics").
 const PATIENCE: Duration = Duration::from_millis(100);
 
 // Symbols of memory.x; only their addresses are used.
@@ -28,7 +30,7 @@ pub(crate) struct Storage {
     number: u32,
 }
 
-/// The flash did not do as told.
+/// The flash did not carry out an operation.
 pub(crate) struct Refused;
 
 /// Address of a place.
@@ -40,8 +42,8 @@ fn address(place: usize) -> *mut u32 {
 fn look(place: usize) -> Copy {
     let mut bytes = [0; IMAGE];
     for (word, chunk) in bytes.chunks_exact_mut(4).enumerate() {
-        // Inside the page, aligned; volatile, because the flash changes behind the compiler's back. A word that
-        // cannot be corrected ends in `fault::non_maskable`, which lets it be read as it is.
+        // Inside the page, aligned; volatile, because the compiler does not see changes of the flash. A word that
+        // cannot be corrected ends in `fault::non_maskable`, which allows it to be read unchanged.
         #[allow(unsafe_code)]
         let value = unsafe { address(place).wrapping_add(word).read_volatile() };
         chunk.copy_from_slice(&value.to_le_bytes());
@@ -50,7 +52,7 @@ fn look(place: usize) -> Copy {
 }
 
 impl Storage {
-    /// Looks at what is stored.
+    /// Reads the stored settings.
     pub(crate) fn open(config: &Config) -> (Self, Found) {
         let found = stored::choose(config, [look(0), look(1)]);
         let storage = Self {
@@ -60,13 +62,14 @@ impl Storage {
         (storage, found)
     }
 
-    /// Stores settings, over the older copy, and reads them back.
+    /// Stores settings over the older copy, and reads them back.
     pub(crate) async fn store(&mut self, settings: &Settings) -> Result<(), Refused> {
         // With one bank, pages are twice as large, and writing would stall the control tick.
         if !FLASH.optr().read().dbank() {
             return Err(Refused);
         }
-        // Erasing wears a page: ten thousand times at most (DS12288, "Flash memory endurance"). Where the other place is damaged there would be no second copy.
+        // Unchanged settings are skipped: a page endures ten thousand erasures (DS12288, "Flash memory endurance").
+        // They are written if the other place is damaged, because there would be no second copy.
         if matches!(look(1 - self.place), Copy::Whole { number, settings: held }
             if number.wrapping_add(1) == self.number && held == *settings)
             && look(self.place) != Copy::Damaged
@@ -104,7 +107,7 @@ impl Storage {
             w.set_per(false);
             w.set_bker(false);
         });
-        // What was read before must not come from the data cache again.
+        // Earlier readings must not come from the data cache again.
         FLASH.acr().modify(|w| w.set_dcen(false));
         FLASH.acr().modify(|w| w.set_dcrst(true));
         FLASH.acr().modify(|w| w.set_dcrst(false));
@@ -140,7 +143,7 @@ fn unlock() {
     }
 }
 
-/// Error flags are cleared by writing them with one.
+/// Writing one clears an error flag.
 fn clear_errors() {
     FLASH.sr().write_value(Sr(ERRORS | 1));
 }
@@ -148,7 +151,7 @@ fn clear_errors() {
 /// OPERR, PROGERR, WRPERR, PGAERR, SIZERR, PGSERR, MISERR, FASTERR.
 const ERRORS: u32 = 0x3fa;
 
-/// Waits for the flash without stopping anyone else.
+/// Waits for the flash without blocking other tasks.
 async fn ready() -> Result<(), Refused> {
     let start = Instant::now();
     while FLASH.sr().read().bsy() {

@@ -32,7 +32,7 @@ pub(crate) const NOTES: usize = 64;
 /// Requests that the queue from the command task holds.
 pub(crate) const REQUESTS: usize = 4;
 
-/// Everything the interrupt owns.
+/// Everything that the interrupt owns.
 pub(crate) struct Tick {
     pub(crate) config: &'static Config,
     pub(crate) state: &'static mut State,
@@ -63,7 +63,7 @@ impl Tick {
         let entered = cycles::now();
         let codes = self.converter.take();
         let motion = self.encoder.read();
-        // A tick and a half since the last one: an interrupt came late or not at all.
+        // A tick and a half since the last one: an interrupt was late or missing.
         let apart = entered.wrapping_sub(self.entered);
         let overrun = self.late || apart > self.period_cycles + self.period_cycles / 2;
         self.entered = entered;
@@ -78,7 +78,7 @@ impl Tick {
             overrun,
             comparator: broken == Some(Break::Comparator),
             encoder_wrong: motion.wrong,
-            // Not in the tick of the estimator's update, which is an even one, and has enough to do.
+            // Not in the tick of the estimator's update, an even one with a high load.
             encoder_open: self.wires.look(self.state.tick & 1 != 0),
             stack_left: stack::near_end(),
         };
@@ -99,7 +99,7 @@ impl Tick {
 }
 
 impl Tick {
-    /// At most one request, in a tick that has the time.
+    /// Serves at most one request, in a tick that has time.
     #[inline(always)]
     fn serve(&mut self) {
         let outcome = match STORED.load(Ordering::Acquire) {
@@ -134,30 +134,30 @@ impl Tick {
     }
 }
 
-/// How storing ended, from the storage task to the tick.
+/// Result of storing, from the storage task to the tick.
 static STORED: AtomicU8 = AtomicU8::new(NOT_YET);
 const NOT_YET: u8 = 0;
 const DONE: u8 = 1;
 const FAILED: u8 = 2;
 
-/// Says how storing ended.
+/// Reports the result of storing.
 pub(crate) fn stored(done: bool) {
     STORED.store(if done { DONE } else { FAILED }, Ordering::Release);
 }
 
-/// The one [`Tick`], handed to the interrupt before it is enabled.
+/// The one [`Tick`], passed to the interrupt before it is enabled.
 struct Owned(UnsafeCell<MaybeUninit<Tick>>);
 
-// Only the interrupt looks inside once it is enabled, and it does not interrupt itself.
+// Only the interrupt uses it once it is enabled, and it does not interrupt itself.
 #[allow(unsafe_code)]
 unsafe impl Sync for Owned {}
 
 static TICK: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Hands everything to the interrupt and starts the sampling.
+/// Passes everything to the interrupt and starts the sampling.
 pub(crate) fn start(mut tick: Tick) {
     tick.entered = cycles::now();
-    // The interrupt is still disabled: nobody else looks.
+    // The interrupt is still disabled, so nothing else uses it.
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).write(tick) };
     tick.converter.listen();
@@ -166,7 +166,7 @@ pub(crate) fn start(mut tick: Tick) {
 
 #[interrupt]
 fn ADC1_2() {
-    // `start` has put it there before it enabled this interrupt.
+    // `start` wrote it before it enabled this interrupt.
     #[allow(unsafe_code)]
     let tick = unsafe { (*TICK.0.get()).assume_init_mut() };
     tick.run();

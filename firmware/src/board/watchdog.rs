@@ -1,4 +1,4 @@
-//! The independent watchdog, fed only when every part of the program has reported since the last time.
+//! The independent watchdog, fed only if every part of the program has reported since the last feeding.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -8,8 +8,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 
 /// Longest silence of the tick or the telemetry, µs: a thousand control ticks.
 const PATIENCE_US: u32 = 100_000;
-/// Feedings in a row that tasks without haste may miss: one examines a trajectory in up to 0.2 s, beside which the other does
-/// not run. At 100 a second they are half a second.
+/// Feedings in a row that tasks without a deadline may miss. One examines a trajectory in up to 0.2 s, and the other
+/// does not run meanwhile. At 100 feedings a second this is half a second.
 const MAY_MISS: u32 = 50;
 
 /// Parts that report, one bit each.
@@ -31,7 +31,7 @@ const ALL: u8 = PUNCTUAL | Part::Commands as u8 | Part::Keeper as u8;
 
 static REPORTED: AtomicU8 = AtomicU8::new(0);
 
-/// Says that a part is alive.
+/// Reports that a part is alive.
 #[inline(always)]
 pub(crate) fn report(part: Part) {
     REPORTED.fetch_or(part as u8, Ordering::Relaxed);
@@ -44,14 +44,14 @@ pub(crate) struct Watchdog {
 }
 
 impl Watchdog {
-    /// Starts it. Nothing but a reset stops it.
+    /// Starts it. Only a reset stops it.
     pub(crate) fn start(peripheral: Peri<'static, IWDG>) -> Self {
         let mut inner = IndependentWatchdog::new(peripheral, PATIENCE_US);
         inner.unleash();
         Self { missed: 0, inner }
     }
 
-    /// Feeds it if every part has reported. Parts without haste may do so within several feedings.
+    /// Feeds it if every part has reported. Parts without a deadline may report once in several feedings.
     pub(crate) fn feed(&mut self) {
         let reported = REPORTED.load(Ordering::Relaxed);
         let all = reported & ALL == ALL;

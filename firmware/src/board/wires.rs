@@ -1,22 +1,22 @@
-//! Whether the encoder's wires are driven, told from a motor at rest too: each is pulled up and down in an irregular order by
-//! the chip's own 40 kΩ. What drives it does not care; a wire that nothing drives follows.
+//! Detects undriven encoder wires, also with the motor at rest. The chip's own 40 kΩ pull each wire up and down in an
+//! irregular order. A driven wire does not change; an undriven wire follows.
 //!
-//! The channels are pulled one after the other, never both at once, which would be a wrong step. A cut wire is told after
-//! [`AGREEMENTS`] looks at it, one every fourth tick: 12.8 ms at 10 kHz. The order repeats every 127 pulls and has no
-//! more than seven alike in a row, so that a line at rest agrees with no more than those; that a moving one follows 32 of them
-//! would need edges as irregular as they are.
+//! The channels are pulled one after the other, never both at once, which would be a wrong step. A cut wire is found
+//! after [`AGREEMENTS`] checks, one every fourth tick: 12.8 ms at 10 kHz. The order repeats every 127 pulls and has at
+//! most seven equal values in a row, so a line at rest agrees with at most seven. A moving line follows 32 of them only
+//! if its edges are equally irregular.
 //!
-//! Left out: a wire that is cut and touches another, or an encoder without supply that holds its outputs low. Those show in
-//! motion.
+//! Not detected: a cut wire that touches another, or an encoder without supply that holds its outputs low. Motion shows
+//! these.
 
 use super::pins::{is_high, pull};
 
-/// Looks in a row in which a channel was as it was pulled.
+/// Number of consecutive checks in which a channel followed its pull.
 const AGREEMENTS: u8 = 32;
 
-/// What is remembered of the wires.
+/// State of the wires.
 pub(crate) struct Wires {
-    /// Shift register of seven bits, x⁷ + x⁶ + 1 (Golomb 1967, "Shift Register Sequences"): one order for both.
+    /// Shift register of seven bits, x⁷ + x⁶ + 1 (Golomb 1967, "Shift Register Sequences"), for both channels.
     order: u8,
     turn: usize,
     pulled: [bool; 2],
@@ -24,7 +24,7 @@ pub(crate) struct Wires {
 }
 
 impl Wires {
-    /// Both pulled up, as [`EncoderPins`](super::pins::EncoderPins) leaves them.
+    /// Starts with both pulled up, as [`EncoderPins`](super::pins::EncoderPins) leaves them.
     pub(crate) const fn new() -> Self {
         Self {
             order: 1,
@@ -34,7 +34,7 @@ impl Wires {
         }
     }
 
-    /// Looks at one channel in its `turn`, and pulls it anew for the next time. Whether nothing drives one.
+    /// Checks one channel if it is its `turn`, and pulls it for the next check. Returns true if a channel is undriven.
     #[inline(always)]
     pub(crate) fn look(&mut self, turn: bool) -> bool {
         if turn {

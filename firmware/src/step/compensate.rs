@@ -1,4 +1,4 @@
-//! Effects beyond the standard model in the control tick: what they are asked with, and where their answers go.
+//! Effects beyond the standard model in the control tick: their inputs and the use of their outputs.
 
 use rig_shared::compensation::{self, Now, Reading};
 use rig_shared::trajectory::Reference;
@@ -6,18 +6,17 @@ use rig_shared::trajectory::Reference;
 use crate::config::Config;
 use crate::state::State;
 
-/// A law is evaluated in every so manieth tick, a power of two: more of them do not fit into the tick's budget under every
-/// motion.
+/// Period of evaluating a law, ticks; a power of two. More evaluations exceed the tick's budget in some motions.
 const EVERY: u64 = 4;
 
-/// What the tick knows before its readings are corrected.
+/// Returns the inputs of the effects before the readings are corrected.
 #[inline(always)]
 pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
     let per_count = state.derived.motor_radians_per_count;
     let turn = config.encoder.counts_per_motor_turn as i32;
     // Exact to a count as long as the counts are below 2³¹.
     let counts = state.counts as i32;
-    // An odd tick: the estimator's update, the dearest thing that a tick does, comes in even ones.
+    // An odd tick: the estimator's update, the most expensive work of a tick, comes in even ones.
     let busy = state.tick & (EVERY - 1) != 1;
     let within = if busy {
         0
@@ -48,10 +47,10 @@ pub(crate) fn now(config: &Config, state: &State) -> Now<f32> {
     }
 }
 
-/// Turns periodic effects with the link, and takes the encoder's error off position and velocity.
+/// Turns periodic effects with the link, and subtracts the encoder's error from position and velocity.
 #[inline(always)]
 pub(crate) fn correct(config: &Config, state: &mut State) {
-    // Effects that have been replaced and not yet been taken over would run on what those before them remember.
+    // New effects that are not yet in force would use the state of the old ones.
     if state.renewed || !state.compensation.turns() {
         state.position_error = 0.0;
         return;
@@ -63,14 +62,14 @@ pub(crate) fn correct(config: &Config, state: &mut State) {
     state.position_error = error;
 }
 
-/// What the effects ask for while the rig drives.
+/// Returns the torques of the effects while the rig drives.
 #[inline(always)]
 pub(crate) fn torque(config: &Config, state: &mut State) -> compensation::Output<f32> {
     if state.renewed || !state.compensation.has_torque() {
         return compensation::Output::default();
     }
     let model = &state.settings.model;
-    // The planned load, as the friction law's: the feedback would carry measurement noise into it.
+    // The planned load, as for the friction law: feedback would add measurement noise.
     let load = if state.compensation.needs_load() {
         model.inertia * state.reference.acceleration + model.gravity_torque(state.position)
     } else {

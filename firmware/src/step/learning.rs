@@ -1,4 +1,4 @@
-//! What a control tick tells the on-line estimator, and what it reports.
+//! Inputs of the on-line estimator, and its reports.
 
 use rig_shared::link::PARAMETER_COUNT;
 use rig_shared::safety::Mode;
@@ -11,21 +11,21 @@ use crate::window::{Tick, Window};
 /// Place of `off` among the parameters: [`rig_shared::link::PARAMETER_NAMES`].
 const OFFSET: usize = PARAMETER_COUNT - 1;
 
-/// Feeds the on-line estimator when a window is full, and reports at its own, slower pace.
+/// Feeds the on-line estimator when a window is full, and reports at its own, slower rate.
 ///
-/// Velocity is the difference of two windows' mean positions, so position and torque are averaged over the
-/// same two windows: all belong to the instant between them, and no column lags another.
+/// Velocity is the difference of two windows' mean positions. So position and torque are averaged over the same two
+/// windows: all belong to the instant between them, and no column lags another.
 pub(super) fn estimate(config: &Config, state: &mut State, tick: &Tick) -> Option<Estimate> {
-    // In the tick after an update, which has enough to do.
+    // In the tick after an update, because the update has a high load.
     let due = core::mem::take(&mut state.report_due);
     update(config, state, tick);
     due.then(|| estimate_report(state))
 }
 
-/// Fills a window; updates when it is full.
+/// Fills a window; updates the estimator when it is full.
 fn update(config: &Config, state: &mut State, tick: &Tick) {
-    // Half a window later than the telemetry's, so that not both are made in one tick, and from an odd tick on, so that windows
-    // of an even number of ticks end in even ones, in which no effect is turned or evaluated.
+    // Half a window later than the telemetry's, so that one tick never completes both. It starts at an odd tick, so
+    // that windows of an even number of ticks end in even ticks, in which no effect is turned or evaluated.
     if state.tick < u64::from((config.rates.estimator_decimation / 2) | 1) {
         return;
     }
@@ -39,8 +39,8 @@ fn update(config: &Config, state: &mut State, tick: &Tick) {
         state.estimator.restart();
         return;
     }
-    // With the bridge off the link may be moved by hand, and after a fault the readings themselves are in
-    // doubt: neither says anything about the rig's parameters.
+    // With the bridge off a hand may move the link, and after a fault the readings are in doubt: neither is information
+    // on the rig's parameters.
     if !state.mode.drives() {
         state.previous = None;
         state.estimator.interrupt();
@@ -58,7 +58,7 @@ fn update(config: &Config, state: &mut State, tick: &Tick) {
     state.report_due = true;
 }
 
-/// One update from two consecutive windows.
+/// Runs one update from two consecutive windows.
 ///
 /// Not inlined: one tick in ten runs it, and `firmware/fast_code.list` ranks it apart from the rest of the tick.
 #[inline(never)]
@@ -66,19 +66,19 @@ fn learn(config: &Config, state: &mut State, before: &Window, window: &Window) {
     let ticks = f32::from(config.rates.estimator_decimation);
     let per_count = state.derived.radians_per_count / ticks;
     let errors = [before, window].map(|w| w.mean(w.position_error));
-    // The difference is taken in integers: exact at any position.
+    // The difference is computed in integers: exact at any position.
     let qd = ((window.position - before.position) as f32 * per_count - (errors[1] - errors[0]))
         / state.derived.estimator_period;
     let q =
         0.5 * ((window.position + before.position) as f32 * per_count - (errors[0] + errors[1]));
     let current = 0.5 * (window.mean(window.current) + before.mean(before.current));
-    // What the effects explain is none of the model's: left in, its parameters would take it for theirs.
+    // Torque explained by effects is removed; otherwise the model's parameters would absorb it.
     let explained = 0.5 * (window.mean(window.explained) + before.mean(before.explained));
     let torque = (current - state.current_error) * state.derived.torque_per_ampere - explained;
     state.estimator.step(q, qd, torque);
 }
 
-/// The estimate as it goes over the wire.
+/// Returns the estimate in wire format.
 fn estimate_report(state: &State) -> Estimate {
     let report = state.estimator.report();
     let mut estimate = Estimate {
@@ -90,8 +90,8 @@ fn estimate_report(state: &State) -> Estimate {
     };
     estimate.value = report.value;
     estimate.std = report.std;
-    // The current offset was measured from finitely many samples; its error is a constant torque that no motion
-    // shows, and goes into `off` alone.
+    // The current offset was measured from finitely many samples. Its error is a constant torque that no motion shows,
+    // and enters only `off`.
     let measured = state.calibration.std * state.derived.torque_per_ampere;
     estimate.std[OFFSET] =
         libm::sqrtf(estimate.std[OFFSET] * estimate.std[OFFSET] + measured * measured);

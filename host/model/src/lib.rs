@@ -1,8 +1,8 @@
 //! Robot descriptions and their dynamics.
 //!
-//! [`robot`] reads TOML and URDF, [`batch`] evaluates dynamics and regressors over whole recordings with the machine's vector
-//! instructions, [`effects`] holds what goes beyond the standard model, and [`simulate`] closes the loop of model and
-//! controller. The equations themselves are in `rig-shared`, which the firmware uses as well.
+//! [`robot`] reads TOML and URDF. [`batch`] evaluates dynamics and regressors over whole recordings with vector
+//! instructions. [`effects`] holds the effects beyond the standard model. [`simulate`] closes the loop of model and
+//! controller. The equations are in `rig-shared`, which the firmware uses as well.
 //!
 //! Torques of a six-joint arm along a motion, all samples in one call:
 //!

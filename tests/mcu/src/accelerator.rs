@@ -1,8 +1,8 @@
 //! The flash memory's instruction cache and prefetch, for the estimate of cycles.
 //!
-//! 32 lines of 32 bytes, replaced by least recent use (RM0440 rev 8, section 3.3.5 "Adaptive real-time memory
-//! accelerator"). A 64-bit word that is not there costs the wait states in full. With the prefetch on, the word
-//! after one that was fetched is under way while that one is executed: it costs what is then left of its time.
+//! 32 lines of 32 bytes, least recently used replaced (RM0440 rev 8, section 3.3.5 "Adaptive real-time memory
+//! accelerator"). A missing 64-bit word costs all wait states. With the prefetch on, the word after a fetched one is
+//! loaded while that one executes: it costs only its remaining time.
 
 use crate::cost::WAIT_STATES;
 
@@ -13,7 +13,7 @@ const WORD: u32 = 8;
 /// The cache's tags.
 #[derive(Clone, Debug)]
 pub struct Accelerator {
-    /// Line number and words present, the most recent first.
+    /// Line number and present words, the most recent first.
     lines: [(u32, u8); LINES],
 }
 
@@ -26,8 +26,8 @@ impl Default for Accelerator {
 }
 
 impl Accelerator {
-    /// Cycles lost to fetch the block of `size` bytes at `address`, which takes `cycles` to execute. `follows`: it
-    /// was reached without a branch, so that a prefetch had begun.
+    /// Returns the cycles lost to fetch the block of `size` bytes at `address`, which takes `cycles` to execute.
+    /// `follows`: reached without a branch, so a prefetch had begun.
     pub fn fetch(
         &mut self,
         address: u32,
@@ -57,7 +57,7 @@ impl Accelerator {
         lost
     }
 
-    /// Words of `line` that were there; it is the most recent one afterwards, with `wanted`.
+    /// Returns the words of `line` that were present. Then the line is the most recent one, with `wanted`.
     fn touch(&mut self, line: u32, wanted: u8) -> u8 {
         let place = self.lines.iter().position(|(tag, _)| *tag == line);
         let place_or_last = place.unwrap_or(LINES - 1);
@@ -76,7 +76,7 @@ mod test {
         cache.fetch(address, size, 100, false, false)
     }
 
-    /// Four words of three cycles each: the first waits in full, the others for what is left.
+    /// Four words of three cycles each: the first waits in full, the others for the remaining time.
     #[test]
     fn the_prefetch_hides_what_is_executed_meanwhile() {
         let mut cache = Accelerator::default();
@@ -92,7 +92,7 @@ mod test {
         assert_eq!(plain(&mut cache, 0x0800_0000, 16), 2 * WAIT_STATES);
         assert_eq!(plain(&mut cache, 0x0800_0000, 16), 0);
         assert_eq!(plain(&mut cache, 0x0800_0010, 16), 2 * WAIT_STATES);
-        // 31 further lines: the first is still there; one more and it is gone.
+        // After 31 more lines the first is still present; after one more it is not.
         for line in 1..=31 {
             plain(&mut cache, 0x0800_0000 + 32 * line, 2);
         }

@@ -1,8 +1,8 @@
 //! The board around the chip: half bridges on TIM1, the emulated rig behind them, its sensors on the pins.
 //!
-//! The rig moves in control periods of 0.1 ms. What the bridge did within one is averaged, so a bridge that goes
-//! off in the middle of a period acts to a period's resolution. Between two periods the shaft turns on at its
-//! last speed for the encoder, which so counts at the instant it is read.
+//! The rig moves in control periods of 0.1 ms. The output of the bridge is averaged over a period, so switching off in
+//! the middle acts with the resolution of a period. Between two periods the shaft turns at its last speed, so the
+//! encoder counts at the instant of reading.
 
 use rig_firmware::sample::Command;
 use rig_plant::{Plant, PlantConfig, Truth};
@@ -14,70 +14,70 @@ use crate::time::{Instant, from_seconds, to_seconds};
 /// The chip's supply, V.
 const NOMINAL: f64 = 3.3;
 
-/// What the two half bridges do.
+/// State of the two half bridges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bridge {
     /// Mean of the first minus the second, −1 to 1 of the supply.
     pub duty: f64,
-    /// The driver's enable input is high, and its inputs are not both low, which leaves the motor open.
+    /// True if the driver's enable input is high, and its inputs are not both low (motor open).
     pub enabled: bool,
-    /// The driver's enable input is high.
+    /// True if the driver's enable input is high.
     pub enable: bool,
 }
 
-/// From the enable input to the outputs, at most (DRV8874, SLVSF66, t_WAKE), s.
+/// Longest time from the enable input to the outputs (DRV8874, SLVSF66, t_WAKE), s.
 const WAKE: f64 = 1e-3;
 
-/// Faults on the board; what is wrong with the rig itself goes through [`Plant::faults_mut`].
+/// Faults on the board; [`Plant::faults_mut`] has the faults of the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoardFaults {
-    /// The encoder's channel A is cut: its input is where the chip's own pull takes it.
+    /// The encoder's channel A is cut: the chip's own pull sets its input.
     pub channel_a_cut: bool,
-    /// Channel B likewise.
+    /// Channel B is cut.
     pub channel_b_cut: bool,
-    /// The index likewise.
+    /// The index is cut.
     pub index_cut: bool,
-    /// The index comes once where it should not. Taken when it does.
+    /// The index comes once at a wrong place. Cleared when it comes.
     pub false_index: bool,
-    /// Both channels change once at the same time. Taken when they do.
+    /// Both channels change once at the same time. Cleared when they do.
     pub skewed: bool,
-    /// The motor's wires touch: while the bridge drives, so much flows, A.
+    /// The motor's wires touch: current while the bridge drives, A.
     pub short: Option<f64>,
-    /// Codes that the converter gives whatever is on its pins: current, supply, temperature.
+    /// Codes of the converter, independent of its pins: current, supply, temperature.
     pub stuck: [Option<u16>; 3],
-    /// The driver reports a fault: its output pulls the break input low and its bridge is off.
+    /// The driver reports a fault: its output pulls the break input low and switches its bridge off.
     pub driver: bool,
     /// The fault line is pulled low, but the driver does not switch off by itself.
     pub fault_line: bool,
-    /// The chip's own supply, V, where it is not its 3.3: the converter's reference, and the current amplifier's. Too low for the processor is nothing that is modelled.
+    /// The chip's own supply, V, if not 3.3: reference of converter and current amplifier. Brown-out is not modelled.
     pub logic_supply: Option<f64>,
-    /// The crystal does not swing.
+    /// The crystal does not oscillate.
     pub crystal_dead: bool,
-    /// The comparators find nothing.
+    /// The comparators detect nothing.
     pub comparators_dead: bool,
     /// The converter's trigger does not come.
     pub trigger_lost: bool,
-    /// The serial line takes no byte.
+    /// The serial line accepts no byte.
     pub line_blocked: bool,
 }
 
-/// The encoder's index has passed.
+/// Passage of the encoder's index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Index {
-    /// In the positive direction.
+    /// True in the positive direction.
     pub upwards: bool,
     /// Counts since then.
     pub since: u32,
 }
 
-/// What came on the encoder's wires.
+/// Signals on the encoder's wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edges {
-    /// Edges counted up less edges counted down.
+    /// Edges counted up minus edges counted down.
     pub counts: i64,
-    /// When the last one came, where any did.
+    /// Time of the last edge, if any.
     pub last: Option<Instant>,
-    /// The index, where it passed.
+    /// The index, if it passed.
     pub index: Option<Index>,
     /// Both channels changed at once.
     pub skewed: bool,
@@ -86,7 +86,7 @@ pub struct Edges {
 /// The board.
 pub struct Board {
     plant: Plant,
-    /// What is broken.
+    /// Present faults.
     pub faults: BoardFaults,
     period: u64,
     next: Instant,
@@ -94,31 +94,31 @@ pub struct Board {
     aligned: bool,
     bridge: Bridge,
     since: Instant,
-    /// Integrals over the period under way: duty while on, and time on.
+    /// Integrals over the present period: duty while on, and time on.
     duty_time: f64,
     on_time: f64,
     codes: [u16; 3],
     truth: Truth,
     counts_per_radian: f64,
     turn: i64,
-    /// The rig's own count at its last sampling instant, unwrapped, and the register that it came from.
+    /// The rig's own count at its last sampling instant, unwrapped, and the register value behind it.
     sampled: i64,
     register: u16,
     true_count: i64,
-    /// Levels of A and B as the chip last had them.
+    /// Last levels of A and B at the chip.
     levels: [bool; 2],
-    /// When the bridge's outputs follow its enable.
+    /// Time from which the bridge's outputs follow its enable.
     awake: Instant,
-    /// When the encoder was last looked at.
+    /// Time of the last reading of the encoder.
     looked: Instant,
-    /// Times at which the bridge came on or went off.
+    /// Times at which the bridge was switched on or off.
     pub enable_edges: Vec<(Instant, bool)>,
-    /// What the half bridges did when they last came on.
+    /// Duty of the half bridges when last switched on.
     pub first_duty: f64,
 }
 
 impl Board {
-    /// A board with this rig, at rest. `seed` is for the rig's noise.
+    /// Returns a board with this rig, at rest. `seed` is for the rig's noise.
     pub fn new(config: PlantConfig, seed: u64) -> Self {
         let encoder = config.sensors.encoder;
         let counts_per_radian = encoder.counts_per_turn / core::f64::consts::TAU;
@@ -153,32 +153,32 @@ impl Board {
         }
     }
 
-    /// The rig.
+    /// Returns the rig.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The rig, to injure it.
+    /// Returns the rig, to set faults.
     pub fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
 
-    /// What the half bridges do now.
+    /// Returns the present state of the half bridges.
     pub fn bridge(&self) -> Bridge {
         self.bridge
     }
 
-    /// When the rig moves on next.
+    /// Returns the next instant at which the rig moves.
     pub fn due(&self) -> Instant {
         self.next
     }
 
-    /// Whether the break input's pin is high.
+    /// Returns true if the break input's pin is high.
     pub fn fault_pin(&self) -> bool {
         !(self.faults.driver || self.faults.fault_line)
     }
 
-    /// The half bridges change at `now`.
+    /// Changes the half bridges at `now`.
     pub fn set_bridge(&mut self, now: Instant, bridge: Bridge) {
         if bridge == self.bridge {
             return;
@@ -205,8 +205,8 @@ impl Board {
         self.since = now;
     }
 
-    /// The converter's trigger at `now`: the first one sets the phase of the rig's periods. The rig stands
-    /// until then, as its bridge is off.
+    /// Handles the converter's trigger at `now`: the first one sets the phase of the rig's periods. The rig stands
+    /// until then, because its bridge is off.
     pub fn align(&mut self, now: Instant) {
         if !self.aligned {
             self.aligned = true;
@@ -214,7 +214,7 @@ impl Board {
         }
     }
 
-    /// The rig moves on by one period, to `now`.
+    /// Moves the rig by one period, to `now`.
     pub fn advance(&mut self, now: Instant) {
         self.integrate(now);
         let on = 2.0 * self.on_time >= self.period as f64;
@@ -242,7 +242,7 @@ impl Board {
         self.next = now + self.period;
     }
 
-    /// Code of the analogue input: 0 current, 1 supply, 2 temperature.
+    /// Returns the code of an analogue input: 0 current, 1 supply, 2 temperature.
     pub fn code(&self, input: usize) -> u16 {
         let stuck = self.faults.stuck.get(input).copied().flatten();
         stuck.unwrap_or_else(|| {
@@ -254,18 +254,18 @@ impl Board {
         })
     }
 
-    /// The chip's supply over the nominal one.
+    /// Returns the chip's supply over the nominal one.
     fn reference(&self) -> f64 {
         self.faults.logic_supply.unwrap_or(NOMINAL) / NOMINAL
     }
 
-    /// What is on an input, in codes of the converter, whose reference is the chip's supply: `zero` moves with that.
+    /// Returns the level of an input in codes of the converter. Its reference is the chip's supply, which moves `zero`.
     fn level(&self, input: usize, zero: f64) -> f64 {
         let nominal = f64::from(self.codes.get(input).copied().unwrap_or(0));
         zero + (nominal - zero) / self.reference()
     }
 
-    /// What is on the current sense, in codes of the converter, without limits; the ripple within a pulse is left out.
+    /// Returns the current sense in codes of the converter, without limits and without the ripple within a pulse.
     pub fn sense(&self) -> f64 {
         let scaling = self.plant.config().sensors.scaling;
         let zero = f64::from(scaling.current_zero);
@@ -277,17 +277,17 @@ impl Board {
         }
     }
 
-    /// What the chip's own reference reads: 1500 at the nominal supply, which is 1.2085 V (DS12288, V_REFINT: 1.182 to 1.232).
+    /// Returns the code of the chip's reference: 1500 at nominal supply, 1.2085 V (DS12288, V_REFINT: 1.182 to 1.232).
     pub fn reference_code(&self) -> u16 {
         (1500.0 / self.reference()).round() as u16
     }
 
-    /// Levels of the encoder's channels at the chip.
+    /// Returns the levels of the encoder's channels at the chip.
     pub fn levels(&self) -> [bool; 2] {
         self.levels
     }
 
-    /// What the current varies by within a pulse now.
+    /// Returns the present ripple of the current within a pulse.
     pub fn ripple(&self) -> Ripple {
         if !self.bridge.enabled {
             return Ripple::default();
@@ -303,25 +303,25 @@ impl Board {
         }
     }
 
-    /// What an encoder without steps would read at `now`, counts, not wrapped.
+    /// Returns the reading of an encoder without steps at `now`, counts, not wrapped.
     fn reading(&self, now: Instant) -> f64 {
         let ahead = self.truth.motor_velocity * to_seconds(now - self.last);
         let config = self.plant.config();
         let encoder = config.sensors.encoder;
-        // How far into the count that was sampled: by the encoder's own zero, or edges would come twice.
+        // Position within the sampled count, from the encoder's own zero; otherwise edges would come twice.
         let reading = encoder.reading(self.truth.motor_position, config.mechanism.ratio);
         let phase = reading.rem_euclid(1.0);
         self.sampled as f64 + phase + ahead * self.counts_per_radian
     }
 
-    /// When the edge before `now` came, the count having changed since the last look: by the last speed, and not before
-    /// that look.
+    /// Returns the time of the edge before `now`, if the count has changed since the last reading: from the last speed,
+    /// not before that reading.
     fn edge(&self, now: Instant, reading: f64, upwards: bool) -> Instant {
         let within = reading.rem_euclid(1.0);
         let since = if upwards { within } else { 1.0 - within };
         let speed = (self.truth.motor_velocity * self.counts_per_radian).abs();
         let longest = to_seconds(now - self.looked);
-        // No speed: it has only just come to rest.
+        // Zero speed: it has just come to rest.
         let age = if speed * longest > since {
             since / speed
         } else {
@@ -330,10 +330,10 @@ impl Board {
         now - from_seconds(age)
     }
 
-    /// Counts that the timer sees up to `now` since the last call, whose inputs pull a wire that is cut high or low. The index
-    /// stands where the true count is a multiple of a turn.
+    /// Returns the counts that the timer sees from the last call to `now`. Its inputs pull a cut wire high or low. The
+    /// index is at multiples of a turn of the true count.
     ///
-    /// With one channel cut, the other's edges count to and fro: the timer sees a step and takes it back.
+    /// With one channel cut, the other's edges count up and down: the timer sees a step and its reverse.
     pub fn edges(&mut self, now: Instant, pulls: [bool; 2]) -> Edges {
         let reading = self.reading(now);
         let count = reading.floor() as i64;
@@ -353,7 +353,7 @@ impl Board {
         let broken = cut.contains(&true);
         let mut index = (passed && !self.faults.index_cut).then_some(Index {
             upwards,
-            // With a channel cut nothing worth counting comes after it either.
+            // With a cut channel, counts after the index are not valid.
             since: if broken { 0 } else { since as u32 },
         });
         if core::mem::take(&mut self.faults.false_index) {
@@ -375,7 +375,7 @@ impl Board {
                 skewed,
             };
         }
-        // Two states on: both have changed, and nobody knows which way.
+        // Two states on: both channels have changed, and the direction is unknown.
         let counts = [0, 1, 0, -1].get(step as usize).copied().unwrap_or(0);
         Edges {
             counts,

@@ -28,7 +28,7 @@ use crate::peripheral::syscfg::Syscfg;
 use crate::peripheral::tim::Tim;
 use crate::time::{Instant, UNITS_PER_SECOND};
 
-/// What an access to a peripheral costs beside the load or store itself, cycles: the bridge from AHB to APB.
+/// Additional cost of an access to a peripheral, cycles: the bridge from AHB to APB.
 const BRIDGE: u64 = 3;
 /// Timers of the chip.
 const TIMERS: [u8; 12] = [1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 17, 20];
@@ -45,22 +45,22 @@ const NON_MASKABLE: u16 = 2;
 const TIM4_TRGO: u32 = 5;
 const TIM1_TRGO2: u32 = 8;
 
-/// What went wrong in the emulated chip.
+/// Errors of the emulated chip.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ChipError {
-    /// An access that the model does not have.
+    /// An access that is not modelled.
     #[error("{access} of {place} by the code at {pc:#010x}: {refusal}")]
     NotModelled {
         /// Load or store.
         access: &'static str,
         /// Peripheral and offset.
         place: String,
-        /// First address of the block that did it.
+        /// First address of the block with the access.
         pc: u32,
-        /// Why.
+        /// Reason.
         refusal: Refusal,
     },
-    /// Something that happened by itself.
+    /// An error without an access.
     #[error("{0}")]
     Hardware(Refusal),
     /// A floating-point instruction while the unit is off.
@@ -74,11 +74,11 @@ pub struct Chip {
     pub work: Work,
     /// Units per cycle of the processor.
     period: u64,
-    /// When the processor has to stop for an event.
+    /// Time at which the processor has to stop for an event.
     deadline: Instant,
-    /// The run ends here.
+    /// End of the run.
     pub limit: Instant,
-    /// Nothing runs before this: what holds the processor up from outside.
+    /// Time until which something outside holds the processor up.
     pub held_until: Instant,
     /// Address that follows the last block.
     expected: u32,
@@ -88,7 +88,7 @@ pub struct Chip {
     waits: bool,
     /// Event register of WFE.
     pub event: bool,
-    /// What went wrong first.
+    /// The first error.
     pub failure: Option<ChipError>,
     /// Interrupt controller.
     pub nvic: Nvic,
@@ -113,22 +113,22 @@ pub struct Chip {
     pub iwdg: Iwdg,
     cycle_counter: (bool, u64),
     debug_unit: [u32; 4],
-    /// The watchdog has bitten.
+    /// True if the watchdog has reset the chip.
     pub bitten: bool,
     /// Stores into the flash memory that wait for the controller.
     stores: Vec<(u32, u32, u32)>,
-    /// What has changed in the flash memory: first address and bytes, the emulation's to collect.
+    /// Changes in the flash memory: first address and bytes, for the emulation to collect.
     pub changed: Vec<(u32, u32)>,
     /// Converter triggers by the timer so far.
     pub triggers: u64,
-    /// What surrounds the chip.
+    /// The board around the chip.
     pub board: Board,
-    /// Loads from the encoder's counter, the timing of its edges and the converter's results in the control interrupt,
-    /// where wanted.
+    /// If present, collects loads in the control interrupt from the encoder's counter, its edge timing and the
+    /// converter's results.
     pub readings: Option<Vec<Reading>>,
 }
 
-/// What the firmware read in the control interrupt.
+/// A value that the firmware read in the control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// Address of the register.
@@ -144,7 +144,7 @@ fn timer_index(number: u8) -> usize {
 }
 
 impl Chip {
-    /// A chip at power on.
+    /// Returns a chip at power on.
     pub fn new(board: Board) -> Self {
         let mut chip = Self {
             work: Work::default(),
@@ -186,7 +186,7 @@ impl Chip {
         chip
     }
 
-    /// Resets the chip; board and time go on.
+    /// Resets the chip; board and time continue.
     pub fn reset(&mut self, cause: Cause) {
         self.board.set_bridge(self.work.now, Bridge::default());
         self.period = UNITS_PER_SECOND / 16_000_000;
@@ -215,7 +215,7 @@ impl Chip {
         self.set_pins();
     }
 
-    /// The processor has locked up: an input of the break where it is let through (SYSCFG_CFGR2.CLL).
+    /// Handles a locked-up processor: an input of the break if enabled (SYSCFG_CFGR2.CLL).
     pub fn lock_up(&mut self) {
         if self.syscfg.breaks_on_lockup() {
             self.tim[0].set_system_break(true);
@@ -225,8 +225,8 @@ impl Chip {
         }
     }
 
-    /// A flash word with two wrong bits has been read from bank 1 or 2: the non-maskable interrupt, and the break where it is
-    /// let through (SYSCFG_CFGR2.ECCL).
+    /// Handles a flash word with two wrong bits in bank 1 or 2: the non-maskable interrupt, and the break if enabled
+    /// (SYSCFG_CFGR2.ECCL).
     pub fn flash_error(&mut self, bank: u8) {
         self.flash.double_error(bank);
         self.nvic.pend(NON_MASKABLE);
@@ -238,12 +238,12 @@ impl Chip {
         }
     }
 
-    /// A timer by its number.
+    /// Returns a timer by its number.
     pub fn timer(&mut self, number: u8) -> &mut Tim {
         &mut self.tim[timer_index(number)]
     }
 
-    /// Stops at the next block, whatever is due.
+    /// Stops at the next block in any case.
     pub fn interrupt_run(&mut self) {
         self.deadline = 0;
     }
@@ -257,16 +257,16 @@ impl Chip {
     pub fn spend(&mut self, cycles: u64) {
         self.work.cycles += cycles;
         self.work.now += cycles * self.period;
-        // What follows is not what the pipeline holds.
+        // The next code is not in the pipeline.
         self.expected = 0;
     }
 
-    /// A sleep that is met again after a pause of the run is no second instruction.
+    /// Uncounts a sleep instruction that is repeated after a pause of the run.
     pub fn uncount_sleep(&mut self) {
         self.work.instructions -= 1;
     }
 
-    /// When the next event is due.
+    /// Returns the time of the next event.
     pub fn next_event(&self) -> Instant {
         let mut due = self
             .board
@@ -282,7 +282,7 @@ impl Chip {
         due
     }
 
-    /// Lets happen what is due by now, in order.
+    /// Handles all events that are due, in order.
     pub fn settle(&mut self, memory: &mut dyn Memory) {
         self.settle_stores(memory);
         if self.work.now >= self.deadline {
@@ -319,7 +319,7 @@ impl Chip {
         self.deadline = 0;
     }
 
-    /// All that happens at one instant.
+    /// Handles all events of one instant.
     fn happen(&mut self, at: Instant, memory: &mut dyn Memory) -> Result<(), Refusal> {
         for tim in &mut self.tim {
             tim.advance(at);

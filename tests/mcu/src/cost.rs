@@ -1,34 +1,33 @@
-//! What a block of Thumb-2 code costs: instructions exactly, cycles by class.
+//! Cost of a block of Thumb-2 code: instructions exactly, cycles by class.
 //!
-//! Cycles are those of the Cortex-M4 Technical Reference Manual (ARM DDI 0439B, table 3-1 and table 7-1), each
-//! taken at its worst where the manual gives a range: loads 2, but 1 right behind another load or store, with
-//! which they pipeline (section 3.3.2); division 12, multiply with
-//! accumulate 2, load and store multiple 1+N, a taken branch refills the pipeline in 3 (P = 1 to 3), VDIV and
-//! VSQRT 14, VMLA and VFMA 3, VLDM 1+N. Literals of code in flash pay the wait states each time, as if
-//! there were no data cache; those of code in the CCM SRAM wait for nothing (RM0440 rev 8, section 2.4). Left out:
-//! contention of DMA and processor for the bus, and of a literal's load and the next fetch for the CCM SRAM.
+//! Cycles are those of the Cortex-M4 Technical Reference Manual (ARM DDI 0439B, table 3-1 and table 7-1), with the
+//! worst value of each range: loads 2, but 1 right behind another load or store, with which they pipeline (section
+//! 3.3.2); division 12, multiply with accumulate 2, load and store multiple 1+N, a taken branch refills the pipeline in
+//! 3 (P = 1 to 3), VDIV and VSQRT 14, VMLA and VFMA 3, VLDM 1+N. Literals of code in flash pay the wait states each
+//! time, as if there were no data cache; those of code in the CCM SRAM have no wait (RM0440 rev 8, section 2.4). Left
+//! out: contention of DMA and processor for the bus, and of a literal's load and the next fetch for the CCM SRAM.
 
 use crate::cpu::Block;
 use crate::map;
 
 /// Wait states of the flash at 170 MHz, boost range (RM0440 rev 8, table 29).
 pub const WAIT_STATES: u64 = 4;
-/// Refill of the pipeline after a taken branch.
+/// Cycles to refill the pipeline after a taken branch.
 pub const REFILL: u64 = 3;
 
-/// Length in bytes of the instruction that begins with `first`.
+/// Returns the length in bytes of the instruction that begins with `first`.
 pub fn length(first: u16) -> usize {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }
 
-/// Costs of the block `code` at `address`.
+/// Returns the costs of the block `code` at `address`.
 pub fn of_block(address: u32, code: &[u8]) -> Block {
     let mut block = Block {
         address,
         size: code.len() as u16,
         ..Block::default()
     };
-    // A literal lies beside the code that loads it.
+    // A literal is in the same memory as the code that loads it.
     let literal = if map::FLASH.contains(&address) {
         2 + WAIT_STATES
     } else {
@@ -64,7 +63,7 @@ pub fn of_block(address: u32, code: &[u8]) -> Block {
     block
 }
 
-/// Whether it loads or stores one word or less, not by a literal: such neighbours pipeline.
+/// Returns true if it loads or stores at most one word, but not a literal: such neighbours pipeline.
 fn is_single_access(first: u16) -> bool {
     match first >> 12 {
         5..=9 => true,
@@ -96,7 +95,7 @@ fn narrow_cycles(op: u16, literal: u64) -> u64 {
     }
 }
 
-/// Cycles, and whether it is a floating-point instruction.
+/// Returns the cycles, and true for a floating-point instruction.
 fn wide_cycles(a: u16, b: u16, literal: u64) -> (u64, bool) {
     let op1 = a >> 11 & 3;
     let op2 = a >> 4 & 0x7F;
@@ -181,7 +180,7 @@ fn float_cycles(a: u16, b: u16, by_literal: u64) -> u64 {
         8 => 14,
         // VFNMA, VFNMS, VFMA, VFMS.
         9 | 0xA => 3,
-        // Others: VSQRT apart, one cycle.
+        // Others take one cycle, except VSQRT.
         0xB if a & 0xF == 1 && b & 0xC0 == 0xC0 => 14,
         _ => 1,
     }
@@ -220,7 +219,7 @@ mod test {
         assert_eq!(cycles(&[0xBF40, 0x1840]), (2, 2), "sev; adds");
     }
 
-    /// `ldr r0, [pc, #4]`, `ldr.w r0, [pc, #4]` and `vldr s0, [pc, #4]` wait in flash alone.
+    /// `ldr r0, [pc, #4]`, `ldr.w r0, [pc, #4]` and `vldr s0, [pc, #4]` wait only in flash.
     #[test]
     fn literals_wait_in_flash_alone() {
         for code in [

@@ -1,8 +1,8 @@
-//! The processor behind one trait, so that the engine can be replaced.
+//! The processor behind a trait, so that the engine can be replaced.
 
 use crate::time::Instant;
 
-/// Registers that exceptions need. Stack pointer: the main stack alone, as embassy uses it.
+/// Registers that exceptions need. Stack pointer: only the main stack, as embassy uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Register {
     /// R0 to R12.
@@ -15,11 +15,11 @@ pub enum Register {
     Pc,
     /// Flags, IT state and exception number.
     Xpsr,
-    /// Bit 0 masks all but the faults.
+    /// Bit 0 masks all exceptions except faults.
     Primask,
     /// Masks priorities from its value on.
     Basepri,
-    /// Bit 0 masks all but NMI.
+    /// Bit 0 masks all exceptions except NMI.
     Faultmask,
     /// nPRIV, SPSEL, FPCA.
     Control,
@@ -29,25 +29,25 @@ pub enum Register {
     Single(u8),
 }
 
-/// Why the processor stopped.
+/// Reason why the processor stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The bus wanted the processor to stop: an event is due, or an exception is to be taken.
+    /// The bus stopped the processor: an event is due, or an exception must be taken.
     Attention,
-    /// WFI or WFE, already past it.
+    /// WFI or WFE, already passed.
     Sleep {
-        /// WFE, which an event wakes as well.
+        /// True for WFE, which an event also ends.
         event: bool,
     },
     /// A branch to this EXC_RETURN value.
     ExceptionReturn(u32),
-    /// SVC, already past it.
+    /// SVC, already passed.
     SupervisorCall,
-    /// An access to memory that is not there, or may not be written.
+    /// An access to memory that does not exist or is read-only.
     Memory {
         /// Address.
         address: u32,
-        /// A store, not a load or fetch.
+        /// True for a store, false for a load or fetch.
         write: bool,
     },
     /// An instruction that the processor does not have.
@@ -56,16 +56,16 @@ pub enum Stop {
     Breakpoint,
 }
 
-/// What a block of instructions costs.
+/// Cost of a block of instructions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Block {
     /// First instruction.
     pub address: u32,
     /// Bytes.
     pub size: u16,
-    /// Instructions, exact. One that is skipped in an IT block counts: it is issued.
+    /// Instructions, exact. A skipped instruction of an IT block counts, because it is issued.
     pub instructions: u16,
-    /// Cycles with everything in the instruction cache and the closing branch not taken, estimated.
+    /// Estimated cycles with all code in the instruction cache and the closing branch not taken.
     pub cycles: u16,
     /// Has a floating-point instruction.
     pub float: bool,
@@ -73,15 +73,15 @@ pub struct Block {
     pub event: bool,
 }
 
-/// What the processor sees beside its code and RAM.
+/// The processor's interface to everything except code and RAM.
 pub trait Bus {
-    /// A block is about to run. False: stop before it.
+    /// Called before a block runs. Returns false to stop before it.
     fn block(&mut self, block: &Block, masks: &dyn Fn() -> Masks) -> bool;
-    /// Load from a peripheral.
+    /// Loads from a peripheral.
     fn read(&mut self, memory: &mut dyn Memory, address: u32, size: u32) -> u32;
-    /// Store to a peripheral.
+    /// Stores to a peripheral.
     fn write(&mut self, memory: &mut dyn Memory, address: u32, size: u32, value: u32);
-    /// Store to the flash memory.
+    /// Stores to the flash memory.
     fn flash_write(&mut self, address: u32, size: u32, value: u32);
 }
 
@@ -98,27 +98,27 @@ pub struct Masks {
 
 /// Code and RAM as the other bus masters see them.
 pub trait Memory {
-    /// Reads; false where there is no memory.
+    /// Reads; returns false if there is no memory.
     fn load(&mut self, address: u32, into: &mut [u8]) -> bool;
-    /// Writes, flash included; false where there is no memory.
+    /// Writes, also to flash; returns false if there is no memory.
     fn store(&mut self, address: u32, bytes: &[u8]) -> bool;
 }
 
 /// A Cortex-M4F without its interrupt controller.
 pub trait Cpu<B: Bus>: Memory {
-    /// The bus.
+    /// Returns the bus.
     fn bus(&mut self) -> std::cell::RefMut<'_, B>;
-    /// A register.
+    /// Returns a register.
     fn get(&self, register: Register) -> u32;
     /// Sets a register.
     fn set(&mut self, register: Register, value: u32);
-    /// Runs until something stops it.
+    /// Runs until it must stop.
     fn run(&mut self) -> Stop;
-    /// Has the bus act on memory from outside a run.
+    /// Lets the bus access memory outside a run.
     fn with_memory<T>(&mut self, act: impl FnOnce(&mut B, &mut dyn Memory) -> T) -> T;
-    /// So many bytes from an address on have changed: whatever was derived from code there is forgotten.
+    /// Discards everything derived from code in `size` changed bytes from `address` on.
     fn forget_code(&mut self, address: u32, size: u32);
-    /// The mask registers.
+    /// Returns the mask registers.
     fn masks(&self) -> Masks {
         Masks {
             primask: self.get(Register::Primask) & 1 != 0,
@@ -128,7 +128,7 @@ pub trait Cpu<B: Bus>: Memory {
     }
 }
 
-/// Work done, as the bus counts it.
+/// Work done, counted by the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
     /// Time.
@@ -137,10 +137,10 @@ pub struct Work {
     pub instructions: u64,
     /// Cycles, estimated, without sleep.
     pub cycles: u64,
-    /// Of these, lost to refills of the pipeline after branches.
+    /// Part of the cycles lost to refills of the pipeline after branches.
     pub refills: u64,
-    /// Of these, lost to waits for code from the flash memory.
+    /// Part of the cycles lost to waits for code from the flash memory.
     pub fetches: u64,
-    /// Of these, lost on the way to peripherals.
+    /// Part of the cycles lost on the way to peripherals.
     pub bridge: u64,
 }

@@ -1,4 +1,4 @@
-//! The emulated board as a whole: the processor's exceptions, sleep and reset, and the run itself.
+//! The whole emulated board: the processor's exceptions, sleep and reset, and the run.
 
 mod exceptions;
 
@@ -16,49 +16,49 @@ use crate::time::{self, Instant, NEVER};
 /// Exception entry and return on a Cortex-M4 without wait states (ARM DDI 0439B, section 3.9.1).
 const ENTRY: u64 = 12;
 const RETURN: u64 = 10;
-/// What untouched RAM holds, to see how far the stack came down.
+/// Content of untouched RAM, to find the deepest use of the stack.
 const PAINT: u8 = 0xA5;
-/// What `cortex-m-rt` paints the stack with (its feature `paint-stack`), which the image itself looks for.
+/// Stack paint of `cortex-m-rt` (its feature `paint-stack`), which the image itself reads.
 const PAINTED: u8 = 0xCC;
 
-/// Why a run ended before its time.
+/// Reason why a run ended early.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum EmulationError {
-    /// Something that the model does not have, or that the chip does not stand.
+    /// An access that is not modelled, or a misuse of the chip.
     #[error("in {function}: {error}")]
     Chip {
-        /// Function that runs.
+        /// Running function.
         function: String,
-        /// What.
+        /// The error.
         error: ChipError,
     },
     /// The processor faulted, and no fault was expected.
     #[error("{what} at {pc:#010x} in {function}: the processor goes to HardFault")]
     Fault {
-        /// What happened.
+        /// The fault.
         what: String,
-        /// Where.
+        /// Program counter.
         pc: u32,
         /// Function.
         function: String,
     },
-    /// Something about the processor that is not modelled.
+    /// An unmodelled behaviour of the processor.
     #[error("{0}")]
     Processor(String),
 }
 
-/// What an exception's handler cost, without those that preempted it.
+/// Cost of an exception's handler, without handlers that preempted it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Times it ran.
+    /// Number of runs.
     pub count: u64,
     /// Instructions in all.
     pub instructions: u64,
-    /// Instructions, most in one run.
+    /// Most instructions in one run.
     pub worst_instructions: u64,
     /// Cycles in all, estimated, with entry and return.
     pub cycles: u64,
-    /// Cycles, most in one run.
+    /// Most cycles in one run.
     pub worst_cycles: u64,
 }
 
@@ -67,12 +67,12 @@ struct Running {
     exception: u16,
     instructions: u64,
     cycles: u64,
-    /// Of these, others' that preempted it.
+    /// Part of handlers that preempted it.
     nested_instructions: u64,
     nested_cycles: u64,
 }
 
-/// Bits of a byte in memory, and the exception at whose beginning they are cleared.
+/// Bits of a byte in memory that are cleared whenever an exception begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Silenced {
     /// Number of the exception.
@@ -83,7 +83,7 @@ pub struct Silenced {
     pub bits: u8,
 }
 
-/// An image that runs.
+/// A running image.
 pub struct Emulation<C> {
     cpu: C,
     image: Image,
@@ -94,9 +94,9 @@ pub struct Emulation<C> {
     pub resets: Vec<(Instant, Cause)>,
     /// Faults so far: program counter and what happened.
     pub faults: Vec<(u32, String)>,
-    /// Bits that are taken away whenever an exception begins: as if the program that sets them had stopped.
+    /// Bits cleared whenever an exception begins, as if the program that sets them had stopped.
     pub silenced: Option<Silenced>,
-    /// Faults lead to the image's HardFault handler instead of ending the run.
+    /// True if faults run the image's HardFault handler instead of ending the run.
     pub faults_expected: bool,
     failure: Option<EmulationError>,
 }
@@ -142,15 +142,15 @@ impl<C: Cpu<Chip>> Emulation<C> {
         self.cpu.set(Register::Sp, sp);
         self.cpu.set(Register::Lr, 0xFFFF_FFFF);
         self.cpu.set(Register::Pc, pc);
-        // The boot loader's choice of memory leaves the vectors where the flash memory begins.
+        // The boot loader's choice of memory puts the vectors at the start of the flash memory.
         let mut chip = self.cpu.bus();
         let now = chip.work.now;
         let period = time::UNITS_PER_SECOND / 16_000_000;
-        // VTOR is 0 after reset, where the flash memory shows as well; the emulation has it at its own place.
+        // VTOR is 0 after reset, where the flash memory has an alias. The emulation uses its own address.
         let _ = chip.nvic.write(now, period, 0xD08, 4, vectors);
     }
 
-    /// Resets the chip. The flash memory and the RAM keep what they hold.
+    /// Resets the chip. Flash memory and RAM keep their contents.
     pub fn reset(&mut self, cause: Cause) {
         let now = {
             let mut chip = self.cpu.bus();
@@ -161,24 +161,24 @@ impl<C: Cpu<Chip>> Emulation<C> {
         self.start();
     }
 
-    /// A word of memory; 0 where there is none.
+    /// Returns a word of memory; 0 if there is none.
     pub fn word(&mut self, address: u32) -> u32 {
         let mut bytes = [0; 4];
         self.cpu.load(address, &mut bytes);
         u32::from_le_bytes(bytes)
     }
 
-    /// The processor.
+    /// Returns the processor.
     pub fn cpu(&mut self) -> &mut C {
         &mut self.cpu
     }
 
-    /// The image.
+    /// Returns the image.
     pub fn image(&self) -> &Image {
         &self.image
     }
 
-    /// The chip, to look into or to act upon. The processor stops at the next block to see what has changed.
+    /// Gives access to the chip. The processor stops at the next block to see the changes.
     pub fn with_chip<T>(&mut self, act: impl FnOnce(&mut Chip) -> T) -> T {
         let mut chip = self.cpu.bus();
         let result = act(&mut chip);
@@ -187,17 +187,17 @@ impl<C: Cpu<Chip>> Emulation<C> {
         result
     }
 
-    /// The board.
+    /// Gives access to the board.
     pub fn with_board<T>(&mut self, act: impl FnOnce(&mut Board) -> T) -> T {
         self.with_chip(|chip| act(&mut chip.board))
     }
 
-    /// Time now, s since power on.
+    /// Returns the time since power on, s.
     pub fn seconds(&mut self) -> f64 {
         time::to_seconds(self.cpu.bus().work.now)
     }
 
-    /// Cost of an exception's handler so far.
+    /// Returns the cost of an exception's handler so far.
     pub fn cost(&self, exception: u16) -> Cost {
         self.costs
             .get(usize::from(exception))
@@ -205,17 +205,17 @@ impl<C: Cpu<Chip>> Emulation<C> {
             .unwrap_or_default()
     }
 
-    /// Forgets the costs so far.
+    /// Resets the costs.
     pub fn clear_costs(&mut self) {
         self.costs = [Cost::default(); 128];
     }
 
-    /// What ended the run for good.
+    /// Returns the error that ended the run for good.
     pub fn failure(&self) -> Option<&EmulationError> {
         self.failure.as_ref()
     }
 
-    /// Where the stack may go down to, and where it begins.
+    /// Returns the lowest allowed end of the stack, and its beginning.
     fn stack_range(&mut self) -> (u32, u32) {
         let top = self.word(map::FLASH.start);
         let bottom = ["__euninit", "__ebss", "_stack_end"]
@@ -228,8 +228,8 @@ impl<C: Cpu<Chip>> Emulation<C> {
         (bottom, top)
     }
 
-    /// Bytes of the stack that were used since the start or since [`forget_stack`](Self::forget_stack), and bytes that it may
-    /// take before it meets the statics.
+    /// Returns the bytes of the stack used since the start or [`forget_stack`](Self::forget_stack), and the bytes
+    /// available before the statics.
     pub fn stack(&mut self) -> (u32, u32) {
         let (bottom, top) = self.stack_range();
         let mut bytes = vec![0; (top - bottom) as usize];
@@ -239,7 +239,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
         (top - bottom - untouched as u32, top - bottom)
     }
 
-    /// Forgets how deep the stack was: what lies below it now is painted anew.
+    /// Forgets the deepest use of the stack: paints the stack below its present end again.
     pub fn forget_stack(&mut self) {
         let (bottom, _) = self.stack_range();
         let now = self.cpu.get(Register::Sp);
@@ -247,10 +247,10 @@ impl<C: Cpu<Chip>> Emulation<C> {
             .store(bottom, &vec![PAINTED; now.saturating_sub(bottom) as usize]);
     }
 
-    /// Runs for so many seconds.
+    /// Runs for `seconds`.
     ///
     /// # Errors
-    /// What ended the run.
+    /// The error that ended the run.
     pub fn run_for(&mut self, seconds: f64) -> Result<(), EmulationError> {
         let until = self.cpu.bus().work.now + time::from_seconds(seconds);
         self.run_until(until)
@@ -259,7 +259,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
     /// Runs to a point of time.
     ///
     /// # Errors
-    /// What ended the run; the same again afterwards.
+    /// The error that ended the run; the same again afterwards.
     pub fn run_until(&mut self, until: Instant) -> Result<(), EmulationError> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
@@ -310,7 +310,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
         }
     }
 
-    /// Lets the peripherals do what is due, and sees to reset and failure.
+    /// Handles due events of the peripherals, reset and failure.
     fn settle(&mut self) -> Result<(), EmulationError> {
         let (failure, changed, bitten, reset) = self.cpu.with_memory(|chip, memory| {
             chip.settle(memory);
@@ -345,7 +345,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
             .map_or_else(|| "unknown code".to_owned(), |f| f.name.clone())
     }
 
-    /// Whether the processor is held up; time has gone on to the next event then.
+    /// Returns true if the processor is held up; then time has advanced to the next event.
     fn waits(&mut self, until: Instant) -> bool {
         let mut chip = self.cpu.bus();
         let held = if self.locked { NEVER } else { chip.held_until };
@@ -379,7 +379,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
             }
             if chip.work.now >= until {
                 drop(chip);
-                // Asleep still: the instruction is met again.
+                // Still asleep: the instruction is repeated.
                 let pc = self.cpu.get(Register::Pc);
                 self.cpu.set(Register::Pc, pc - 2);
                 self.cpu.bus().uncount_sleep();
@@ -391,7 +391,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
     }
 }
 
-/// System memory as the factory leaves it: unique identifier, flash size, calibration values (RM0440 section 48,
+/// Returns the system memory with factory data: unique identifier, flash size, calibration values (RM0440 section 48,
 /// DS12288 tables 5 and 6).
 fn factory_data() -> Vec<u8> {
     let mut bytes = vec![0xFF; (map::SYSTEM.end - map::SYSTEM.start) as usize];

@@ -1,4 +1,4 @@
-//! The firmware's image: what is loaded, where the symbols lie, what it takes of flash and RAM.
+//! The firmware's image: loaded data, symbols, and use of flash and RAM.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::map;
 
-/// Why an image cannot be used.
+/// Reason why an image cannot be used.
 #[derive(Debug, Error)]
 pub enum ImageError {
     /// The file cannot be read.
@@ -57,13 +57,13 @@ pub struct Function {
 /// A loaded image.
 #[derive(Clone, Debug)]
 pub struct Image {
-    /// Contents of the flash memory, from its start; erased where nothing is loaded.
+    /// Contents of the flash memory from its start; erased where no data are loaded.
     pub flash: Vec<u8>,
     /// Bytes of flash that are loaded.
     pub flash_used: usize,
-    /// Bytes of RAM that statics take.
+    /// Bytes of RAM for statics.
     pub ram_used: usize,
-    /// Bytes of the CCM SRAM that code takes.
+    /// Bytes of the CCM SRAM for code.
     pub code_used: usize,
     functions: Vec<Function>,
     symbols: BTreeMap<String, (u32, u32)>,
@@ -145,13 +145,13 @@ impl Image {
         })
     }
 
-    /// First instruction of the function whose symbol ends so: compilers put their own marks before it.
+    /// Returns the first instruction of the function whose symbol has this end. Compilers add their own prefix.
     pub fn function_ending(&self, name: &str) -> Option<u32> {
         let found = self.functions.iter().find(|f| f.name.ends_with(name));
         found.map(|function| function.address)
     }
 
-    /// The function that an address lies in.
+    /// Returns the function that contains an address.
     pub fn function_at(&self, address: u32) -> Option<&Function> {
         let after = self.functions.partition_point(|f| f.address <= address);
         self.functions
@@ -162,14 +162,14 @@ impl Image {
             .find(|f| address < f.address + f.size.max(2))
     }
 
-    /// Address and size of the one symbol with this in its name, which compilers put their own marks about.
+    /// Returns address and size of the only symbol that contains `part`. Compilers add their own prefix and suffix.
     pub fn symbol_with(&self, part: &str) -> Option<(u32, u32)> {
         let mut found = self.symbols.iter().filter(|(name, _)| name.contains(part));
         let one = found.next().map(|(_, place)| *place);
         one.filter(|_| found.next().is_none())
     }
 
-    /// Address and size of a symbol.
+    /// Returns address and size of a symbol.
     pub fn symbol(&self, name: &str) -> Option<(u32, u32)> {
         self.symbols.get(name).copied()
     }

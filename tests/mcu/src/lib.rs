@@ -1,13 +1,12 @@
-//! The emulated microcontroller: runs the firmware's own image, down to the registers, closed around the
+//! The emulated microcontroller: runs the firmware's own image, down to the registers, in a closed loop with the
 //! emulated rig.
 //!
-//! [`cpu`] is the processor behind a trait, `unicorn` its implementation; [`nvic`] takes its exceptions,
-//! [`chip`] holds time and the peripherals ([`peripheral`], a file each, from the reference manual), [`board`]
-//! the half bridges, the rig and its sensors, and [`emulation`] runs it all. An access that is not modelled ends
-//! the run by name.
+//! [`cpu`] is the processor behind a trait, `unicorn` its implementation. [`nvic`] handles exceptions. [`chip`] has
+//! time and the peripherals ([`peripheral`], one file each, from the reference manual). [`board`] has the half bridges,
+//! the rig and its sensors. [`emulation`] runs all of it. An access that is not modelled ends the run and is named.
 //!
-//! Everything is deterministic: time is counted in the processor's cycles, estimated by class ([`cost`],
-//! [`accelerator`]); instructions are counted exactly.
+//! Everything is deterministic. Time is counted in processor cycles, estimated by class ([`cost`], [`accelerator`]);
+//! instructions are counted exactly.
 
 pub mod accelerator;
 pub mod board;

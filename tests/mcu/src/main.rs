@@ -1,5 +1,5 @@
-//! Runs the firmware's image on the emulated board, with a pseudo-terminal as its serial port: every command of
-//! the host works against it as against a real rig.
+//! Runs the firmware's image on the emulated board, with a pseudo-terminal as its serial port. Every command of the
+//! host works with it as with a real rig.
 
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ enum Failure {
     Line(#[from] std::io::Error),
 }
 
-/// Emulated time between two looks at the serial port.
+/// Emulated time between two readings of the serial port.
 const SLICE: Duration = Duration::from_millis(1);
 
 fn main() -> ExitCode {
@@ -77,7 +77,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut terminal = if arguments.no_port {
         None
     } else {
-        // The far end is the host's alone: a second holder would keep the lock that the first host leaves behind.
+        // Only the host holds the far end: a second holder would keep the lock that the first host leaves.
         let (mut master, slave) = TTYPort::pair()?;
         master.set_timeout(Duration::from_millis(1))?;
         println!("serial port {}", slave.name().unwrap_or_default());
@@ -116,7 +116,7 @@ fn listen(master: &mut TTYPort, board: &mut EmulatedBoard) -> Result<(), Failure
     if waiting > 0 {
         let mut bytes = vec![0; waiting];
         let count = match master.read(&mut bytes) {
-            // Closed at the far end between the two looks; what was sent last is read when somebody opens it again.
+            // The far end was closed between two readings. The next reader gets the last data.
             Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),
             read => read?,
         };
@@ -126,8 +126,8 @@ fn listen(master: &mut TTYPort, board: &mut EmulatedBoard) -> Result<(), Failure
     Ok(())
 }
 
-/// A line that nobody listens to loses what is sent; one that is listened to slowly is waited for where time is
-/// the board's own.
+/// Writes to the line. Without a listener the data are lost. If `patient`, waits for a slow listener, because the board
+/// has its own time.
 fn tell(master: &mut TTYPort, bytes: &[u8], patient: bool) {
     let mut rest = bytes;
     let patience = Instant::now() + Duration::from_millis(if patient { 100 } else { 1 });
@@ -139,7 +139,7 @@ fn tell(master: &mut TTYPort, bytes: &[u8], patient: bool) {
                     return;
                 }
             }
-            // Nobody has the far end open.
+            // The far end is not open.
             Err(_) => return,
         }
     }

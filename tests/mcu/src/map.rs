@@ -1,4 +1,4 @@
-//! Where things lie (RM0440 rev 8, section 2.2 "Memory map").
+//! Memory map (RM0440 rev 8, section 2.2 "Memory map").
 
 use core::ops::Range;
 
@@ -15,7 +15,7 @@ pub const PERIPHERALS: Range<u32> = 0x4000_0000..0x5006_1000;
 /// Private peripheral bus of the core, and the debug unit.
 pub const CORE: Range<u32> = 0xE000_0000..0xE010_0000;
 
-/// A peripheral's place.
+/// A peripheral of the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Peripheral {
     /// Timer by its number.
@@ -93,7 +93,7 @@ const PLACES: [(u32, u32, Peripheral); 35] = [
     (0xE004_2000, 0x400, Peripheral::Dbgmcu),
 ];
 
-/// The peripheral at an address, with its base.
+/// Returns the peripheral at an address, with its base.
 pub fn peripheral(address: u32) -> Option<(Peripheral, u32)> {
     PLACES
         .iter()
@@ -101,7 +101,7 @@ pub fn peripheral(address: u32) -> Option<(Peripheral, u32)> {
         .map(|(base, _, peripheral)| (*peripheral, *base))
 }
 
-/// Peripherals of the chip that are not modelled, so that an access can be told by name.
+/// Peripherals of the chip that are not modelled, so that an access can be named.
 const UNMODELLED: [(u32, &str); 33] = [
     (0x4000_2000, "CRS"),
     (0x4000_2400, "TAMP"),
@@ -138,7 +138,7 @@ const UNMODELLED: [(u32, &str); 33] = [
     (0xE000_0000, "ITM"),
 ];
 
-/// Name of what lies at an address, modelled or not.
+/// Returns the name of the peripheral or memory at an address, modelled or not.
 pub fn name(address: u32) -> String {
     if let Some((peripheral, base)) = peripheral(address) {
         return format!("{peripheral:?}+{:#x}", address - base);

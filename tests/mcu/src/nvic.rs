@@ -29,7 +29,7 @@ const THREAD: i16 = 256;
 struct SysTick {
     control: u32,
     reload: u32,
-    /// When the count under way began, at `reload`.
+    /// Start of the present count, at `reload`.
     base: Instant,
     period: u64,
 }
@@ -41,7 +41,7 @@ pub struct Nvic {
     pending: [u32; WORDS],
     level: [u32; WORDS],
     priority: [u8; 16 + INTERRUPTS],
-    /// Pending system exceptions by number.
+    /// Pending system exceptions, by number.
     system_pending: u16,
     /// Active exceptions, the running one last.
     active: Vec<u16>,
@@ -59,7 +59,7 @@ pub struct Nvic {
     mpu: [u32; 4],
     /// Reset has been requested by AIRCR.
     pub reset_requested: bool,
-    /// The most urgent exception that is pending, and its priority.
+    /// The most urgent pending exception, and its priority.
     candidate: Option<(u16, i16)>,
 }
 
@@ -92,42 +92,42 @@ impl Default for Nvic {
 }
 
 impl Nvic {
-    /// Address of the vector table.
+    /// Returns the address of the vector table.
     pub fn vectors(&self) -> u32 {
         self.vectors
     }
 
-    /// Whether the floating-point unit may be used (CPACR, full access to CP10 and CP11).
+    /// Returns true if the floating-point unit may be used (CPACR, full access to CP10 and CP11).
     pub fn float_enabled(&self) -> bool {
         self.coprocessors >> 20 & 0xF == 0xF
     }
 
-    /// FPDSCR: what FPSCR begins with in a new context.
+    /// Returns FPDSCR: the initial FPSCR of a new context.
     pub fn float_default(&self) -> u32 {
         self.float_default
     }
 
-    /// Whether SCR.SEVONPEND is set.
+    /// Returns true if SCR.SEVONPEND is set.
     pub fn pending_wakes(&self) -> bool {
         self.sleep & 0x10 != 0
     }
 
-    /// Whether SCR.SLEEPONEXIT is set.
+    /// Returns true if SCR.SLEEPONEXIT is set.
     pub fn sleeps_on_exit(&self) -> bool {
         self.sleep & 2 != 0
     }
 
-    /// The running exception; none in thread mode.
+    /// Returns the running exception; `None` in thread mode.
     pub fn running(&self) -> Option<u16> {
         self.active.last().copied()
     }
 
-    /// How many exceptions are nested.
+    /// Returns the number of nested exceptions.
     pub fn depth(&self) -> usize {
         self.active.len()
     }
 
-    /// Group priority of an exception.
+    /// Returns the group priority of an exception.
     fn priority_of(&self, exception: u16) -> i16 {
         match exception {
             2 => -2,
@@ -139,13 +139,13 @@ impl Nvic {
         }
     }
 
-    /// The part of a priority that decides about preemption (AIRCR.PRIGROUP). Four bits are implemented.
+    /// Returns the part of a priority that decides on preemption (AIRCR.PRIGROUP). Four bits are implemented.
     fn group(&self, raw: u8) -> i16 {
         let split = self.grouping + 1;
         i16::from(raw & 0xF0) & !((1 << split) - 1)
     }
 
-    /// Priority at which the processor runs.
+    /// Returns the priority at which the processor runs.
     fn running_priority(&self, masks: Masks) -> i16 {
         let mut now = THREAD;
         for exception in &self.active {
@@ -163,7 +163,7 @@ impl Nvic {
         now
     }
 
-    /// Finds the most urgent pending exception anew.
+    /// Finds the most urgent pending exception.
     fn choose(&mut self) {
         let mut best: Option<(u16, i16, u8)> = None;
         let mut consider = |exception: u16, group: i16, raw: u8| {
@@ -190,7 +190,7 @@ impl Nvic {
         self.candidate = best.map(|(exception, group, _)| (exception, group));
     }
 
-    /// Pending bits: latched, or by a line that is up while its handler does not run.
+    /// Returns the pending bits: latched, or from a line that is up while its handler does not run.
     fn effective(&self, word: usize) -> u32 {
         let mut running = 0;
         for exception in &self.active {
@@ -203,7 +203,7 @@ impl Nvic {
         self.pending[word] | (self.level[word] & !running)
     }
 
-    /// Levels of the interrupt lines.
+    /// Sets the levels of the interrupt lines.
     pub fn set_lines(&mut self, lines: [u32; WORDS]) {
         if lines == self.level {
             return;
@@ -228,19 +228,19 @@ impl Nvic {
         self.choose();
     }
 
-    /// Whether an exception is pending that could preempt what runs, were nothing masked.
+    /// Returns true if a pending exception could preempt the running one with no masks set.
     pub fn is_interested(&self) -> bool {
         self.candidate
             .is_some_and(|(_, priority)| self.running_priority(Masks::default()) > priority)
     }
 
-    /// The exception to take now, if any.
+    /// Returns the exception to take now, if any.
     pub fn next(&self, masks: Masks) -> Option<u16> {
         let (exception, priority) = self.candidate?;
         (priority < self.running_priority(masks)).then_some(exception)
     }
 
-    /// Whether WFI ends: PRIMASK does not count (B1.5.19).
+    /// Returns true if WFI ends: PRIMASK is ignored (B1.5.19).
     pub fn wakes(&self, masks: Masks) -> bool {
         self.next(Masks {
             primask: false,
@@ -249,7 +249,7 @@ impl Nvic {
         .is_some()
     }
 
-    /// Whether anything enabled is pending, whatever its priority.
+    /// Returns true if any enabled exception is pending, at any priority.
     pub fn has_pending(&self) -> bool {
         self.candidate.is_some()
     }
@@ -275,7 +275,7 @@ impl Nvic {
         left
     }
 
-    /// When SysTick counts to zero next.
+    /// Returns the next instant at which SysTick counts to zero.
     pub fn due(&self) -> Instant {
         if self.tick.control & 3 == 3 && self.tick.reload != 0 {
             self.tick.base + (u64::from(self.tick.reload) + 1) * self.tick.period
@@ -284,7 +284,7 @@ impl Nvic {
         }
     }
 
-    /// Lets SysTick happen.
+    /// Advances SysTick.
     pub fn advance(&mut self, now: Instant) {
         while self.due() <= now {
             self.tick.base = self.due();
@@ -293,7 +293,7 @@ impl Nvic {
         }
     }
 
-    /// A fault with its status, address and cause for CFSR.
+    /// Records a fault with its status, address and cause for CFSR.
     pub fn fault(&mut self, status: u32, address: u32) {
         self.fault_status[0] |= status;
         // FORCED.

@@ -1,4 +1,4 @@
-//! The emulated board as a test or a host meets it.
+//! The emulated board for a test or a host.
 
 use std::time::Duration;
 
@@ -14,21 +14,21 @@ use crate::unicorn::{EngineError, UnicornCpu};
 /// A board run by unicorn.
 pub type EmulatedBoard = Emulation<UnicornCpu<Chip>>;
 
-/// An image on a board with this rig, at power on. `seed` is for the rig's noise.
+/// Returns an image on a board with this rig, at power on. `seed` is for the rig's noise.
 ///
 /// # Errors
-/// What the engine says.
+/// The error of the engine.
 pub fn power_on(image: Image, plant: PlantConfig, seed: u64) -> Result<EmulatedBoard, EngineError> {
     let cpu = UnicornCpu::new(Chip::new(Board::new(plant, seed)))?;
     Ok(Emulation::new(cpu, image))
 }
 
-/// The far end of a line whose time is the board's. A board that has failed says nothing more; what it failed
-/// of is told once on the standard error stream, and kept in [`Emulation::failure`].
+/// The far end of a line with the board's time. A failed board sends nothing more. Its error is printed once on the
+/// standard error stream, and kept in [`Emulation::failure`].
 pub struct Line {
     /// The board.
     pub board: EmulatedBoard,
-    /// Everything that came from it, where kept.
+    /// Everything that the board sent, if kept.
     pub heard: Option<Vec<u8>>,
 }
 

@@ -1,15 +1,15 @@
-//! The motor current within a pulse, which the emulated rig does not resolve: it moves by mean voltages.
+//! The motor current within a pulse. The emulated rig does not resolve it, because it moves by mean voltages.
 //!
-//! Between driving and braking the current is a sawtooth about its mean. Braking, both motor wires at one potential, it
-//! changes by −(R·i + Kₑ·ω)/L, and equals the mean in the middle; driving takes it back. Left out: its curvature, which is
-//! that of exp(−t·R/L) over a pulse of 50 µs against L/R of some 0.8 ms, and the change from pulse to pulse.
+//! Between driving and braking the current is a sawtooth about its mean. While braking, with both motor wires at one
+//! potential, it changes by −(R·i + Kₑ·ω)/L and equals the mean in the middle; driving reverses the change. Left out:
+//! the curvature exp(−t·R/L) over a pulse of 50 µs against L/R of about 0.8 ms, and the change from pulse to pulse.
 
 /// Pulses a second.
 const PULSES: f64 = 20_000.0;
 /// Largest code of the converter.
 const LARGEST: f64 = 4095.0;
 
-/// The sawtooth. The default is none.
+/// The sawtooth; zero by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ripple {
     /// Slope while braking, A/s.
@@ -21,7 +21,7 @@ pub struct Ripple {
 }
 
 impl Ripple {
-    /// Current beside its mean, A, so many seconds after the middle of a braking interval.
+    /// Returns the difference of the current from its mean, A, `after` seconds from the middle of a braking interval.
     pub fn at(&self, after: f64) -> f64 {
         let half = 0.5 / PULSES;
         let within = after - (after * PULSES).round() / PULSES;
@@ -35,7 +35,7 @@ impl Ripple {
         (self.braking * beside).copysign(self.braking * within)
     }
 
-    /// The code that the converter gives, from that of the mean.
+    /// Returns the converter's code, from the code of the mean.
     pub fn on(&self, code: u16, after: f64) -> u16 {
         let moved = f64::from(code) + self.codes_per_ampere * self.at(after);
         moved.round().clamp(0.0, LARGEST) as u16
@@ -56,7 +56,7 @@ mod test {
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(close(ripple.at(0.0), 0.0) && close(ripple.at(25e-6), 0.0));
         assert!(close(ripple.at(2e-6), -0.04) && close(ripple.at(-2e-6), 0.04));
-        // The edge at 15 µs, and half way back to the middle of driving.
+        // The edge at 15 µs, and the midpoint back to the middle of driving.
         assert!(close(ripple.at(15e-6), -0.3) && close(ripple.at(20e-6), -0.15));
         assert!(close(ripple.at(52e-6), -0.04) && close(ripple.at(-52e-6), 0.04));
         assert_eq!(ripple.on(2048, 2e-6), 2044);

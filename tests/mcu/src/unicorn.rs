@@ -20,7 +20,7 @@ use crate::cost;
 use crate::cpu::{Block, Bus, Cpu, Masks, Memory, Register, Stop};
 use crate::map;
 
-/// The engine cannot be set up, or lacks what is asked of it.
+/// The engine cannot be set up, or does not support a request.
 #[derive(Debug, thiserror::Error)]
 #[error("the processor's engine fails ({0:?}): is unicorn 2.1.5 what was built?")]
 pub struct EngineError(uc_error);
@@ -31,13 +31,13 @@ impl From<uc_error> for EngineError {
     }
 }
 
-/// An address at which no code can lie: the engine runs "until" it.
+/// An address without code: the engine runs "until" it.
 const NOWHERE: u64 = 0x3000_0000;
 
 const HALVES_OF_FLASH: usize = (map::FLASH.end - map::FLASH.start) as usize / 2;
 
-/// Place of a block's costs: those in flash first, then those in the CCM SRAM, where code is written once, before it
-/// runs; a block of another size is read anew.
+/// Returns the place of a block's costs: blocks in flash first, then in the CCM SRAM, where code is written once before
+/// it runs. A block of another size is read again.
 fn place(address: u32) -> Option<usize> {
     let within = |region: core::ops::Range<u32>| (address - region.start) as usize / 2;
     if map::FLASH.contains(&address) {
@@ -90,10 +90,10 @@ fn mask(engine: &Unicorn<'_, ()>, register: Register) -> u32 {
 }
 
 impl<B: Bus + 'static> UnicornCpu<B> {
-    /// A processor with the chip's memories, everything else on `bus`.
+    /// Returns a processor with the chip's memories, everything else on `bus`.
     ///
     /// # Errors
-    /// What the engine says.
+    /// The error of the engine.
     pub fn new(bus: B) -> Result<Self, EngineError> {
         let mut engine = Unicorn::new(Arch::ARM, Mode::MCLASS)?;
         engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
@@ -107,7 +107,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
             u64::from(map::RAM.end - map::RAM.start),
             Prot::ALL,
         )?;
-        // Its alias behind SRAM2 is other memory here: no image uses both.
+        // Its alias behind SRAM2 is separate memory here: no image uses both.
         engine.mem_map(
             map::CCM.start.into(),
             u64::from(map::CCM.end - map::CCM.start),
@@ -196,7 +196,7 @@ impl<B: Bus + 'static> UnicornCpu<B> {
                 };
                 if !go {
                     stop.set(Some(Stop::Attention));
-                    // Fails only when nothing runs.
+                    // Fails only if no code runs.
                     let _ = engine.emu_stop();
                 }
             })?;
@@ -278,11 +278,11 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
     fn set(&mut self, register: Register, value: u32) {
         let value = match register {
             Register::Pc => value | 1,
-            // The mode is Thumb for good.
+            // The mode is always Thumb.
             Register::Xpsr => value | 1 << 24,
             _ => value,
         };
-        // Fails for registers that do not exist only.
+        // Fails only for registers that do not exist.
         let _ = self.engine.reg_write(number(register), value.into());
         if register == Register::Xpsr {
             let _ = self
@@ -314,7 +314,7 @@ impl<B: Bus + 'static> Cpu<B> for UnicornCpu<B> {
             .is_some_and(|part| part.iter().any(|block| block.size != 0));
         if ran {
             blocks.fill(Block::default());
-            // Fails only where there is no translator.
+            // Fails only without a translator.
             let _ = self.engine.ctl_flush_tb();
         }
     }

@@ -8,22 +8,21 @@ use rig_shared::multibody::{COLUMNS, Chain, column};
 use super::signals::{in_place, lanes, load, output, samples, stretches};
 use super::{BatchError, dispatch};
 
-/// Numbers on a line of the cache.
+/// Numbers in a cache line.
 const LINE: usize = 8;
 
-/// A chain's geometry and gravity, prepared for batches of regressors.
+/// Geometry and gravity of a chain, prepared for batches of regressors.
 #[derive(Clone, Debug)]
 pub struct ChainBatch {
     frames: Vec<Frame>,
     gravity: [f64; 3],
 }
 
-/// The differential regressor of a number of samples, column by column: [`Self::column`].
+/// The differential regressor of several samples, column by column: [`Self::column`].
 ///
-/// It owns the room for as many samples as [`ChainBatch::block`] was asked for, be they a few that are looked at and
-/// overwritten or a whole recording, and is used again without a new allocation. Columns that are zero by structure,
-/// more than half of them, can be read like the others but are never written, so that the operating system never
-/// has to find memory for them.
+/// It has room for the number of samples given to [`ChainBatch::block`], a few or a whole recording, and is reused
+/// without a new allocation. More than half of the columns are zero by structure. They can be read but are never
+/// written, so the operating system need not assign memory for them.
 #[derive(Clone, Debug)]
 pub struct RegressorBlock {
     joints: usize,
@@ -32,7 +31,7 @@ pub struct RegressorBlock {
     len: usize,
     /// Column (joint, c) begins at `first + (joint * 14 * joints + c) * stride`.
     data: Vec<f64>,
-    /// What is left out so that columns begin with a line of the cache.
+    /// Numbers skipped so that columns begin at a cache line.
     first: usize,
     stride: usize,
     signals: [Vec<Lane>; 3],
@@ -40,30 +39,30 @@ pub struct RegressorBlock {
 }
 
 impl RegressorBlock {
-    /// Number of the first sample in the recording.
+    /// Returns the number of the first sample in the recording.
     pub fn start(&self) -> usize {
         self.start
     }
 
-    /// Number of samples that it holds now.
+    /// Returns the number of samples that it holds now.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether it holds no sample; never the case in a visit.
+    /// Returns true if it holds no sample; never the case in a visit.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Number of samples that it has room for.
+    /// Returns the number of samples that it has room for.
     pub fn room(&self) -> usize {
         self.room
     }
 
-    /// What multiplies parameter `c` (of the 14·n) in the torque of `joint` (from 0), sample by sample.
+    /// Returns the factor of parameter `c` (of the 14·n) in the torque of `joint` (from 0), sample by sample.
     ///
     /// # Panics
-    /// Where `joint` or `c` is past the end.
+    /// If `joint` or `c` is past the end.
     pub fn column(&self, joint: usize, c: usize) -> &[f64] {
         let width = self.joints * COLUMNS;
         assert!(c < width, "column {c} of {width}");
@@ -71,8 +70,8 @@ impl RegressorBlock {
         &self.data[at..at + self.len]
     }
 
-    /// Whether that column is 0 for every motion: a link does not load the joints beyond it, and the drive
-    /// inertia, friction and offset of a joint load that joint alone.
+    /// Returns true if that column is 0 for every motion. A link does not load the joints beyond it. Drive inertia,
+    /// friction and offset of a joint load only that joint.
     pub fn is_zero(joint: usize, c: usize) -> bool {
         let owner = c / COLUMNS;
         owner < joint || (owner > joint && c % COLUMNS >= column::DRIVE_INERTIA)
@@ -88,12 +87,12 @@ impl ChainBatch {
         }
     }
 
-    /// Number of joints n.
+    /// Returns the number of joints n.
     pub fn joint_count(&self) -> usize {
         self.frames.len()
     }
 
-    /// An empty block with room for `samples`, to be used again and again with this chain.
+    /// Returns an empty block with room for `samples`, to be reused with this chain.
     pub fn block(&self, samples: usize) -> RegressorBlock {
         let n = self.joint_count();
         let width = n * COLUMNS;
@@ -121,12 +120,12 @@ impl ChainBatch {
         }
     }
 
-    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) piece by piece, each as long
-    /// as `block` has room, and calls `visit` with each in the order of time. `block` comes from [`Self::block`] of the
-    /// same chain and is overwritten.
+    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) in pieces of at most the
+    /// room of `block`, and calls `visit` with each piece in the order of time. `block` comes from [`Self::block`] of
+    /// the same chain and is overwritten.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong; what `visit` gives ends the walk.
+    /// [`BatchError`] if a length is wrong; an error of `visit` ends the loop.
     pub fn each_differential_block<S: AsRef<[f64]>, E: From<BatchError>>(
         &self,
         q: &[S],
@@ -150,11 +149,11 @@ impl ChainBatch {
         Ok(())
     }
 
-    /// [`differential_regressor`](rig_shared::multibody::differential_regressor) of every sample, stored in `block`, which
-    /// comes from [`Self::block`] of the same chain.
+    /// Computes the [`differential_regressor`](rig_shared::multibody::differential_regressor) of every sample and
+    /// stores it in `block`, which comes from [`Self::block`] of the same chain.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong, or `block` has no room for all samples.
+    /// [`BatchError`] if a length is wrong, or `block` has no room for all samples.
     pub fn differential_regressor<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -173,7 +172,7 @@ impl ChainBatch {
         Ok(())
     }
 
-    /// Checks lengths, and gives that of the signals.
+    /// Checks lengths and returns the number of samples.
     fn fitting<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -191,7 +190,7 @@ impl ChainBatch {
         samples(expected, &[("q", q), ("qd", qd), ("qdd", qdd)])
     }
 
-    /// Puts the samples `range`, for which there is room, into the block.
+    /// Computes the samples `range` into the block, which has room for them.
     fn fill<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -216,17 +215,17 @@ impl ChainBatch {
                 &mut block.axes,
                 &mut block.data[block.first..],
                 block.stride,
-                // What a short stretch is filled up with goes to the unused end of the columns.
+                // The padding of a short stretch goes to the unused end of the columns.
                 part.start - start,
             );
         }
     }
 
-    /// [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample written out: `out` holds 14·n
+    /// Computes the [`energy_regressor`](rig_shared::multibody::energy_regressor) of every sample: `out` holds 14·n
     /// columns.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong.
+    /// [`BatchError`] if a length is wrong.
     pub fn energy_regressor<S: AsRef<[f64]>>(
         &self,
         q: &[S],

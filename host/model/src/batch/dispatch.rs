@@ -1,9 +1,9 @@
-//! The kernels, compiled for the vector instructions of the machine and chosen when the program runs.
+//! The kernels, compiled for the vector instructions of the machine and selected at run time.
 //!
-//! Users build for the oldest processor of their kind; a kernel compiled for AVX2 and FMA besides runs about twice as
-//! fast where there are both. There products go into sums unrounded ([`MulAdd`]), so the two versions differ by rounding (tested):
-//! results are the same to the last bit on one kind of machine, not between kinds. Processors of other kinds take the portable
-//! version, which for 64-bit Arm already is a vector one.
+//! Users build for the oldest processor of their kind. A kernel compiled for AVX2 and FMA runs about twice as fast
+//! where both exist. FMA adds unrounded products ([`MulAdd`]), so the two versions differ by rounding (tested): results
+//! are identical on one kind of machine, but not between kinds. Other processors use the portable version; on 64-bit
+//! Arm it already uses vectors.
 
 use multiversion::{multiversion, target::match_target};
 use rig_shared::lanes::{MulAdd, Rounded};
@@ -11,7 +11,7 @@ use rig_shared::multibody::block::{
     self, AxisBlock, Body, CompositeBlock, Frame, JointBlock, Lane, NotPositive, Section,
 };
 
-/// Products that go into sums unrounded, for processors that have an instruction for it.
+/// Adds products without rounding them, on processors with such an instruction.
 #[derive(Clone, Copy)]
 struct Fused;
 
@@ -24,7 +24,7 @@ impl MulAdd for Fused {
     }
 }
 
-/// Makes a function that takes the best version for the machine, and the portable version for comparison in tests.
+/// Makes a function that selects the best version for the machine, and the portable version for tests.
 macro_rules! versions {
     ($(#[$doc:meta])* $name:ident, $portable:ident <$arithmetic:ident> ($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block) => {
         $(#[$doc])*
@@ -58,7 +58,7 @@ versions! {
 }
 
 versions! {
-    /// [`block::inertia_matrix`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
+    /// [`block::inertia_matrix`]: column c is `LANES` entries of `out` from `c * stride + at` on.
     inertia_matrix, inertia_matrix_portable<F>(
         frames: &[Frame], bodies: &[Body], q: &[Lane], work: &mut [JointBlock],
         composite: &mut CompositeBlock, out: &mut [f64], stride: usize, at: usize,
@@ -78,7 +78,7 @@ versions! {
 }
 
 versions! {
-    /// [`block::differential_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
+    /// [`block::differential_regressor`]: column c is `LANES` entries of `out` from `c * stride + at` on.
     differential_regressor, differential_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], qdd: &[Lane], axes: &mut [AxisBlock],
         out: &mut [f64], stride: usize, at: usize,
@@ -89,7 +89,7 @@ versions! {
 }
 
 versions! {
-    /// [`block::energy_regressor`]: column c goes to the [`LANES`](block::LANES) entries of `out` from `c * stride + at` on.
+    /// [`block::energy_regressor`]: column c is `LANES` entries of `out` from `c * stride + at` on.
     energy_regressor, energy_regressor_portable<F>(
         frames: &[Frame], gravity: [f64; 3], q: &[Lane], qd: &[Lane], out: &mut [f64], stride: usize, at: usize,
     ) {

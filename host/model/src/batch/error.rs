@@ -1,8 +1,8 @@
-//! Why a batch could not be computed.
+//! Errors of a batch.
 
 use rig_shared::multibody::MultibodyError;
 
-/// Why a batch could not be computed. Outputs are then partly written and mean nothing.
+/// Error of a batch. The outputs are then partly written and not usable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BatchError {
     /// The parameters do not fit the chain.
@@ -33,7 +33,7 @@ pub enum BatchError {
         /// Samples it has.
         found: usize,
     },
-    /// An output does not have the length that the samples ask for.
+    /// An output does not have the length that the samples need.
     #[error("The output has length {found}; {columns} columns of {samples} samples need {}.", columns * samples)]
     WrongOutput {
         /// Columns it must hold.

@@ -1,16 +1,15 @@
-//! Model mathematics over whole recordings: one call, many samples.
+//! Dynamics over whole recordings: one call, many samples.
 //!
 //! The unit of work is a recording. Signals come as one column of samples a joint (`&[Vec<f64>]`, `&[&[f64]]`,
-//! `[[f64; N]; n]`, …, all columns of the same length N); results go into flat slices of the caller, column after
-//! column, each of N samples: entry `c` of sample `k` is `out[c * N + k]`. Nothing is allocated a sample.
+//! `[[f64; N]; n]`, …), all columns of the same length N. Results go into flat slices of the caller, column after
+//! column, each of N samples: entry `c` of sample `k` is `out[c * N + k]`. No memory is allocated per sample.
 //!
-//! [`ModelBatch`] computes with the parameters of a robot, [`ChainBatch`] its regressors, which need the geometry
-//! alone. The differential regressor is large (14·n² columns, more than half of them zero) and has a store of its own,
-//! [`RegressorBlock`]. With room for the recording it holds all of it; where the regressor is only going to be filtered,
-//! accumulated or multiplied, [`ChainBatch::each_differential_block`] hands it over in pieces as long as the block, and
-//! those of [`BLOCK`] samples are then still in the cache.
+//! [`ModelBatch`] uses the parameters of a robot. [`ChainBatch`] computes regressors, which need only the geometry. The
+//! differential regressor is large (14·n² columns, more than half of them zero) and has its own store,
+//! [`RegressorBlock`]. A block can hold a whole recording. To filter, accumulate or multiply the regressor,
+//! [`ChainBatch::each_differential_block`] delivers it in pieces; pieces of [`BLOCK`] samples are still in the cache.
 //!
-//! Threads are the caller's business; [`over_threads`] cuts a recording into stretches.
+//! The caller starts the threads; [`over_threads`] cuts a recording into stretches.
 
 mod chain;
 mod dispatch;

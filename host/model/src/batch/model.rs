@@ -12,7 +12,7 @@ pub struct ModelBatch {
     frames: Vec<Frame>,
     gravity: [f64; 3],
     bodies: Vec<Body>,
-    /// The same without drives, friction and offsets.
+    /// The same bodies without drives, friction and offsets.
     links: Vec<Body>,
 }
 
@@ -21,7 +21,7 @@ impl ModelBatch {
     /// [`COLUMN_NAMES`](rig_shared::multibody::COLUMN_NAMES).
     ///
     /// # Errors
-    /// [`BatchError::Multibody`] where the number of rows is not that of the joints.
+    /// [`BatchError::Multibody`] if the number of rows differs from the number of joints.
     pub fn new(chain: &Chain<f64>, parameters: &[[f64; COLUMNS]]) -> Result<Self, BatchError> {
         let n = chain.joint_count();
         if parameters.len() != n {
@@ -48,16 +48,16 @@ impl ModelBatch {
         })
     }
 
-    /// Number of joints n.
+    /// Returns the number of joints n.
     pub fn joint_count(&self) -> usize {
         self.frames.len()
     }
 
-    /// Torques that move the chain by `q`, `qd`, `qdd`, drives, friction and offsets included:
+    /// Computes the torques of a motion `q`, `qd`, `qdd`, with drives, friction and offsets:
     /// [`inverse_dynamics`](rig_shared::multibody::inverse_dynamics) of every sample. `tau` holds n columns.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong.
+    /// [`BatchError`] if a length is wrong.
     pub fn inverse_dynamics<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -90,11 +90,11 @@ impl ModelBatch {
         Ok(())
     }
 
-    /// Torques that hold the links still against gravity, without drives, friction and offsets:
+    /// Computes the torques that hold the links against gravity, without drives, friction and offsets:
     /// [`gravity_vector`](rig_shared::multibody::gravity_vector) of every sample. `out` holds n columns.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong.
+    /// [`BatchError`] if a length is wrong.
     pub fn gravity<S: AsRef<[f64]>>(&self, q: &[S], out: &mut [f64]) -> Result<(), BatchError> {
         let n = self.joint_count();
         let count = samples(n, &[("q", q)])?;
@@ -119,12 +119,12 @@ impl ModelBatch {
         Ok(())
     }
 
-    /// Inertia matrices, drive inertias on the diagonal included:
-    /// [`inertia_matrix`](rig_shared::multibody::inertia_matrix) of every sample. They are symmetric, and `out` holds
-    /// the n(n + 1)/2 columns of the lower triangle, column [`lower(i, j)`](lower) the entry (i, j) with j ≤ i.
+    /// Computes the inertia matrices, with drive inertias on the diagonal:
+    /// [`inertia_matrix`](rig_shared::multibody::inertia_matrix) of every sample. They are symmetric: `out` holds the
+    /// n(n + 1)/2 columns of the lower triangle. Column [`lower(i, j)`](lower) is the entry (i, j) with j ≤ i.
     ///
     /// # Errors
-    /// [`BatchError`] where a length is wrong.
+    /// [`BatchError`] if a length is wrong.
     pub fn inertia_matrix<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -147,11 +147,11 @@ impl ModelBatch {
         Ok(())
     }
 
-    /// Accelerations under the torques `tau`: [`forward_dynamics`](rig_shared::multibody::forward_dynamics) of every
-    /// sample. `qdd` holds n columns.
+    /// Computes the accelerations under the torques `tau`:
+    /// [`forward_dynamics`](rig_shared::multibody::forward_dynamics) of every sample. `qdd` holds n columns.
     ///
     /// # Errors
-    /// [`BatchError::NotPositiveDefinite`] with the first sample where it happens; others where a length is wrong.
+    /// [`BatchError::NotPositiveDefinite`] with the first such sample; other errors if a length is wrong.
     pub fn forward_dynamics<S: AsRef<[f64]>>(
         &self,
         q: &[S],
@@ -184,7 +184,7 @@ impl ModelBatch {
                 &mut d,
             )
             .map_err(|e| BatchError::NotPositiveDefinite {
-                // What fills up a short stretch is its last sample, so it cannot fail first.
+                // The padding of a short stretch repeats its last sample, so it cannot fail first.
                 sample: range.start + e.lane,
                 joint: e.joint,
             })?;

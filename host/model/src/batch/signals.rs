@@ -1,4 +1,4 @@
-//! Signals as they come in, one column of samples a joint, and results as they go out.
+//! Input signals, one column of samples a joint, and output of results.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use rig_shared::multibody::block::{LANES, Lane};
 
 use super::BatchError;
 
-/// Checks that every signal has one column a joint, all of the same length, and gives that length.
+/// Checks that every signal has one column a joint, all of the same length, and returns that length.
 pub(super) fn samples<S: AsRef<[f64]>>(
     joints: usize,
     signals: &[(&'static str, &[S])],
@@ -49,7 +49,7 @@ pub(super) fn output(columns: usize, samples: usize, out: &[f64]) -> Result<(), 
     }
 }
 
-/// `range` cut into stretches of [`LANES`] samples, the last one perhaps shorter.
+/// Cuts `range` into stretches of [`LANES`] samples; the last one may be shorter.
 pub(super) fn stretches(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let end = range.end;
     range
@@ -57,7 +57,7 @@ pub(super) fn stretches(range: Range<usize>) -> impl Iterator<Item = Range<usize
         .map(move |start| start..end.min(start + LANES))
 }
 
-/// Samples `range` (at most [`LANES`]) of every column; a shorter stretch is filled up with its last sample.
+/// Loads samples `range` (at most [`LANES`]) of every column. A shorter stretch is padded with its last sample.
 pub(super) fn load<S: AsRef<[f64]>>(columns: &[S], range: &Range<usize>, lanes: &mut [Lane]) {
     for (lane, column) in lanes.iter_mut().zip(columns) {
         let part = &column.as_ref()[range.clone()];
@@ -82,8 +82,8 @@ pub(super) fn store<'a>(
     }
 }
 
-/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples, at `range`; where
-/// that is shorter, into columns of their own, from which it is copied.
+/// Lets `compute(columns, stride, at)` write [`LANES`] entries of every column of `samples` samples, at `range`. A
+/// shorter range is written to temporary columns and copied.
 pub(super) fn in_place(
     range: &Range<usize>,
     samples: usize,
@@ -98,7 +98,7 @@ pub(super) fn in_place(
     store(short.as_chunks().0.iter(), range, samples, out);
 }
 
-/// One lane a joint, all zero.
+/// Returns one lane a joint, all zero.
 pub(super) fn lanes(count: usize) -> Vec<Lane> {
     vec![Lane::ZERO; count]
 }

@@ -1,4 +1,4 @@
-//! The batch against the functions of one sample.
+//! Compares the batch with the functions of one sample.
 #![allow(clippy::unwrap_used)]
 
 use rand::{RngExt, SeedableRng};
@@ -18,7 +18,7 @@ struct Made {
     signals: [Vec<Vec<f64>>; 3],
 }
 
-/// A random chain with quarter twists and zero lengths among its joints, as robots have, and `samples` of motion.
+/// Makes a random chain with quarter twists and zero lengths, as in real robots, and `samples` of motion.
 fn made(n: usize, samples: usize, seed: u64) -> Made {
     let mut rng = Pcg64::seed_from_u64(seed * 31 + n as u64);
     let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
@@ -47,7 +47,7 @@ fn made(n: usize, samples: usize, seed: u64) -> Made {
     let gravity = [uniform(-9.0, 9.0), uniform(-9.0, 9.0), uniform(-9.0, 9.0)];
     let parameters = (0..n)
         .map(|_| {
-            // A box about a point, so a body that exists.
+            // A box about a point: a body that can exist.
             let m = uniform(0.5, 5.0);
             let c = [uniform(-0.3, 0.3), uniform(-0.3, 0.3), uniform(-0.3, 0.3)];
             let s = [uniform(0.01, 0.2), uniform(0.01, 0.2), uniform(0.01, 0.2)];
@@ -87,7 +87,7 @@ fn at(columns: &[Vec<f64>], k: usize) -> Vec<f64> {
     columns.iter().map(|c| c[k]).collect()
 }
 
-/// Entry by entry against one row of the expected, relative to the row's largest.
+/// Compares entry by entry with one row of expected values, relative to the row's largest.
 fn compare(what: &str, out: &[f64], samples: usize, k: usize, expected: &[f64], tolerance: f64) {
     let scale = expected.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
     for (c, value) in expected.iter().enumerate() {
@@ -190,7 +190,7 @@ fn blocks_cover_every_sample_once_and_say_which_columns_are_zero() {
     assert_eq!(next, count);
 }
 
-/// The same numbers whether a block holds all samples or a few, and nothing is left over of what it held before.
+/// A block gives the same numbers if it holds all samples or a few. Earlier contents have no influence.
 #[test]
 fn a_block_used_again_holds_the_new_samples_alone() {
     let (n, count) = (4, 2 * BLOCK + 5);
@@ -337,7 +337,7 @@ fn the_first_sample_whose_inertia_matrix_is_not_positive_definite_is_named() {
     ));
 }
 
-/// Entry by entry against the portable version's, relative to the largest.
+/// Compares entry by entry with the portable version, relative to the largest.
 fn alike(what: &str, chosen: &[f64], portable: &[f64], tolerance: f64) {
     let scale = portable.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
     assert_eq!(chosen.len(), portable.len());
@@ -353,7 +353,7 @@ fn flat(lanes: &[Lane]) -> Vec<f64> {
     lanes.iter().flat_map(|lane| lane.0).collect()
 }
 
-/// The version chosen for this machine may leave products unrounded; nothing else sets it apart from the portable one.
+/// The version for this machine may leave products unrounded. It has no other difference to the portable one.
 #[test]
 fn every_version_gives_the_same_results_but_for_rounding() {
     use super::dispatch::*;
@@ -405,7 +405,7 @@ fn every_version_gives_the_same_results_but_for_rounding() {
     }
 }
 
-/// Beyond the range of the vectorised sine the batch takes the slow way and stays right.
+/// Beyond the range of the vectorised sine the batch uses the slow path and stays correct.
 #[test]
 fn angles_of_many_turns_are_as_right_as_small_ones() {
     let mut made = made(6, 40, 5);

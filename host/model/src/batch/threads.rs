@@ -1,4 +1,4 @@
-//! Work on a recording shared among threads.
+//! Shares the work on a recording among threads.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,11 +6,11 @@ use std::thread;
 
 use super::BLOCK;
 
-/// Cuts `samples` into at most `threads` stretches of nearly equal length, runs `work` on each, as many at a time, and
-/// gives the results in the order of the stretches. Cuts lie on multiples of [`BLOCK`], so a result does not
-/// depend on the number of threads save through the caller's own way of joining the parts.
+/// Cuts `samples` into at most `threads` stretches of nearly equal length and runs `work` on all in parallel. Returns
+/// the results in the order of the stretches. Cuts lie on multiples of [`BLOCK`]. So a result depends on the number of
+/// threads only through the way in which the caller joins the parts.
 ///
-/// With one thread (or few samples) `work` runs in the calling thread. A panic in `work` goes on in the caller.
+/// With one thread (or few samples) `work` runs in the calling thread. A panic in `work` continues in the caller.
 pub fn over_threads<R: Send>(
     samples: usize,
     threads: usize,
@@ -23,9 +23,9 @@ pub fn over_threads<R: Send>(
     each_by(parts, parts, |part| work(range(part)))
 }
 
-/// Runs `work` on each of `items` pieces of unequal length, at most `threads` at a time, and gives the results in their order.
+/// Runs `work` on each of `items` pieces of unequal length, at most `threads` at a time. Returns the results in order.
 ///
-/// With one thread `work` runs in the calling thread. A panic in `work` goes on in the caller.
+/// With one thread `work` runs in the calling thread. A panic in `work` continues in the caller.
 pub fn each_by<R: Send>(items: usize, threads: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let mine = || {

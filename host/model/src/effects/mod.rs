@@ -1,10 +1,10 @@
-//! The effects of a description, placed on its joints: what they do to a motion and to a recording.
+//! The effects of a description, placed on its joints, and their action on a motion and a recording.
 //!
-//! The equations are in [`rig_shared::effects`]; here they get what they need of a robot: angles of the motors, the
-//! load that a gear transmits, the other joint's motion. A payload is no torque but a point mass on its link.
+//! [`rig_shared::effects`] has the equations. This module supplies their inputs from the robot: motor angles, gear load
+//! and the motion of the other joint. A payload is not a torque but a point mass on its link.
 //!
-//! Leaves out: what acts on the voltage; what acts between motor and link, which [`crate::simulate`] takes as a second
-//! mass and no recording can be freed of.
+//! Leaves out effects on the voltage, and effects between motor and link. [`crate::simulate`] models the latter with a
+//! second mass; a recording cannot be compensated for them.
 
 use std::f64::consts::PI;
 
@@ -20,10 +20,10 @@ use crate::robot::{Placed, Robot};
 #[derive(Clone, Debug)]
 pub struct Effects {
     placed: Vec<Placed>,
-    /// For sentences.
+    /// Titles for messages.
     titles: Vec<String>,
     transmission: Transmission<f64>,
-    /// Parameters of the links and drives that they stand beside, without payloads: the description's own, or a model's.
+    /// Parameters of links and drives, without payloads: from the description, or from a model.
     standard: Vec<[f64; COLUMNS]>,
     /// Payloads, one row a joint.
     loads: Vec<[f64; COLUMNS]>,
@@ -40,29 +40,29 @@ pub struct State<'a> {
     pub qdd: &'a [f64],
     /// Angles of the motors.
     pub motor: &'a [f64],
-    /// Torques as the currents say, N·m or N.
+    /// Torques from the motor currents, N·m or N.
     pub drive: &'a [f64],
-    /// s
+    /// Time, s.
     pub time: f64,
-    /// K
+    /// Temperature rise, K.
     pub warming: &'a [f64],
-    /// s
+    /// Sample period, s.
     pub period: f64,
 }
 
-/// Which of a joint's effects are worked out before which.
+/// Order in which a joint's effects are computed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
-    /// How far its contact is bent is what other friction goes by.
+    /// Contact deflection, which other friction depends on.
     Presliding,
-    /// What acts on the link is part of the load.
+    /// Effects on the link, which are part of the load.
     Others,
-    /// Goes by the load.
+    /// Friction that depends on the load.
     LoadFriction,
 }
 
 impl Turn {
-    /// All, in the order in which they act.
+    /// All, in the order of computation.
     pub const ALL: [Self; 3] = [Self::Presliding, Self::Others, Self::LoadFriction];
 
     /// Returns the turn in which an effect acts.
@@ -75,7 +75,7 @@ impl Turn {
     }
 }
 
-/// Friction of effects over the joint's own, 1.
+/// Returns the ratio of the friction of effects to the joint's own Coulomb friction, 1; zero without Coulomb friction.
 pub fn over_coulomb(friction: f64, coulomb: f64) -> f64 {
     if coulomb > 0.0 {
         friction / coulomb
@@ -84,13 +84,13 @@ pub fn over_coulomb(friction: f64, coulomb: f64) -> f64 {
     }
 }
 
-/// Whether the effect is a torque of the joint that its law gives along a motion.
+/// Returns true if the effect is a joint torque that its law gives along a motion.
 pub fn is_torque(kind: Kind) -> bool {
     kind.about().channel == Channel::Torque || kind == Kind::GravityTilt
 }
 
-/// Whether more than half a wave of the motor's angle passes from one sample to the next: what acts between two samples is then
-/// nearly nothing on average, and the samples make a slow wave of it that is not there.
+/// Returns true if the motor's angle passes more than half a wave between two samples. The true mean effect is then
+/// almost zero, but sampling turns it into a false slow wave (aliasing).
 pub fn outruns(kind: Kind, shapes: &[f64; SHAPES], motor_velocity: f64, period: f64) -> bool {
     let about = kind.about();
     let of_the_motor = matches!(
@@ -103,10 +103,10 @@ pub fn outruns(kind: Kind, shapes: &[f64; SHAPES], motor_velocity: f64, period: 
 }
 
 impl Effects {
-    /// Those of a description.
+    /// Returns the effects of a description.
     ///
     /// # Errors
-    /// [`TransmissionError`] on drives that make no transmission.
+    /// [`TransmissionError`] on drives that do not form a transmission.
     pub fn of(robot: &Robot) -> Result<Self, TransmissionError> {
         let placed = robot.placed_effects();
         let titles = robot
@@ -137,36 +137,36 @@ impl Effects {
         })
     }
 
-    /// The same beside other parameters than the description's, one row a joint.
+    /// Returns the same effects with parameters other than the description's, one row a joint.
     pub fn beside(mut self, parameters: &[[f64; COLUMNS]]) -> Self {
         self.standard = parameters.to_vec();
         self
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no effects.
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
     }
 
-    /// Columns of the dynamics that payloads add, one row a joint.
+    /// Returns the parameters that payloads add, one row a joint.
     #[must_use]
     pub fn loads(&self) -> &[[f64; COLUMNS]] {
         &self.loads
     }
 
-    /// Motor coordinates of the robot.
+    /// Returns the motor coordinates of the robot.
     #[must_use]
     pub fn transmission(&self) -> &Transmission<f64> {
         &self.transmission
     }
 
-    /// Columns of the description, one row a joint.
+    /// Returns the parameters of links and drives without payloads, one row a joint.
     #[must_use]
     pub fn standard(&self) -> &[[f64; COLUMNS]] {
         &self.standard
     }
 
-    /// All of them.
+    /// Returns all effects.
     pub fn placed(&self) -> &[Placed] {
         &self.placed
     }
@@ -180,23 +180,24 @@ impl Effects {
         }
     }
 
-    /// Angles of the motors where the joints stand at `q`.
+    /// Computes the motor angles at joint positions `q`.
     pub fn motor_angles(&self, q: &[f64], out: &mut [f64]) -> Result<(), TransmissionError> {
         self.transmission.motor_position(q, out)
     }
 
-    /// Dry and viscous friction of a joint at a velocity and in a direction, N·m.
+    /// Returns Coulomb and viscous friction of a joint for a velocity and a direction, N·m.
     pub fn friction(&self, joint: usize, velocity: f64, direction: f64) -> f64 {
         let row = &self.standard[joint];
         row[column::COULOMB] * direction + row[column::VISCOUS] * velocity
     }
 
-    /// Friction of effects over the joint's own, 1: by so much farther a contact is bent that all of it acts through.
+    /// Returns the friction of effects over the joint's own, 1. The contact deflects further by this share.
     pub fn over_coulomb(&self, joint: usize, friction: f64) -> f64 {
         over_coulomb(friction, self.friction(joint, 0.0, 1.0))
     }
 
-    /// What the law of effect `k` sees; load and direction are left to the caller, friction is that of the velocity's direction.
+    /// Returns the inputs of the law of effect `k`, without load and direction. Friction is in the velocity's
+    /// direction.
     pub fn instant(&self, k: usize, at: &State<'_>) -> Instant<f64> {
         let Placed { joint, other, .. } = self.placed[k];
         Instant {
@@ -215,7 +216,7 @@ impl Effects {
         }
     }
 
-    /// What the position sensors read beyond the truth, and how fast that changes.
+    /// Computes the errors of the position sensors, and their rates of change.
     pub fn position_errors(
         &self,
         q: &[f64],
@@ -250,8 +251,8 @@ impl Effects {
         Ok(())
     }
 
-    /// What the torque sensor of a joint reads, from what acts at instants `period` apart: later by its delay (a line
-    /// between two instants, the first value before the first) and with its offset.
+    /// Turns the true torque of a joint, at instants `period` apart, into its sensor reading. The reading is delayed
+    /// (linear interpolation; the first value holds before the first) and has an offset.
     pub fn read_effort(&self, joint: usize, torque: &mut Vec<f64>, period: f64) {
         let (delay, offset) = self.effort(joint);
         if delay != 0.0 {
@@ -264,8 +265,8 @@ impl Effects {
         }
     }
 
-    /// What acts on a joint whose torque sensor reads `reading`, at the same instants: [`Self::read_effort`] turned round; the
-    /// last value holds.
+    /// Returns the true torque of a joint for a sensor `reading`, at the same instants: the inverse of
+    /// [`Self::read_effort`]. The last value holds.
     pub fn applied_effort(&self, joint: usize, reading: &[f64], period: f64) -> Vec<f64> {
         let (delay, offset) = self.effort(joint);
         let mut torque = shifted(reading, delay / period);
@@ -275,7 +276,7 @@ impl Effects {
         torque
     }
 
-    /// Delay, s, and offset, N·m or N, of a joint's torque reading.
+    /// Returns delay, s, and offset, N·m or N, of a joint's torque reading.
     pub fn effort(&self, joint: usize) -> (f64, f64) {
         let sum = |kind| {
             let of = self.of_channel(Channel::Effort);
@@ -295,7 +296,7 @@ impl Effects {
         self.of_channel(channel).next().is_some()
     }
 
-    /// `title of joint name` of the effects that `which` picks, joined; none where it picks none.
+    /// Returns `title of joint name` of the effects that `which` selects, joined; `None` if it selects none.
     pub fn named(&self, which: impl Fn(Kind) -> bool) -> Option<String> {
         let names: Vec<&str> = self
             .placed
@@ -307,7 +308,7 @@ impl Effects {
         (!names.is_empty()).then(|| names.join(", "))
     }
 
-    /// Sentences on the effects that a simulated motion does not show.
+    /// Returns sentences on the effects that a simulated motion does not show.
     pub fn unsimulated(&self) -> Vec<String> {
         let voltage = self
             .named(|k| k.about().channel == Channel::Voltage)
@@ -326,7 +327,7 @@ impl Effects {
         voltage.into_iter().chain(warm).collect()
     }
 
-    /// Sentences on the effects that a recording was freed of, and on those that it was not.
+    /// Returns sentences on the effects compensated in a recording, and on those that were not.
     pub fn uncompensated(&self) -> [Option<String>; 2] {
         let stays = |k: Kind| matches!(k.about().channel, Channel::Voltage | Channel::Transmission);
         [
@@ -340,7 +341,7 @@ impl Effects {
     }
 }
 
-/// A series `rows` rows later (values from further on come forward), by lines between rows; the ends hold.
+/// Returns a series advanced by `rows` rows (later values come forward), by linear interpolation; the end values hold.
 pub fn shifted(series: &[f64], rows: f64) -> Vec<f64> {
     let last = series.len().saturating_sub(1) as f64;
     (0..series.len())

@@ -1,9 +1,9 @@
-//! Angles that are multiples of a right angle but for the digits that they are written with.
+//! Angles that are multiples of a right angle except for rounded digits.
 //!
-//! α = 1.5708 is not π/2, and axes that are 7e-6 rad off parallel have their common normal tens of kilometres away, and
-//! base parameters that no motion tells apart. So an angle between neighbouring axes within [`WRITTEN`] of a multiple of π/2 is
-//! taken as that multiple when a description is read, and the reader is told of it. Of a revolute joint theta is a mere
-//! offset of the position and stays as it is; of a prismatic one it is an angle between axes too.
+//! α = 1.5708 is not π/2. Axes that are 7e-6 rad off parallel have a common normal tens of kilometres away and base
+//! parameters that are not identifiable. So an angle between neighbouring axes within [`WRITTEN`] of a multiple of π/2
+//! is read as that multiple, and the reader gets a remark. Theta of a revolute joint is only an offset of the position
+//! and stays unchanged. Theta of a prismatic joint is also an angle between axes.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,26 +13,26 @@ use super::urdf::{Body, Chain};
 use super::{JointKind, Robot};
 use rig_output::format_significant;
 
-/// What four decimals leave of an angle at most, rad: 0.05 mm at the end of a metre, less than a calibration finds.
+/// Largest rounding error of an angle with four decimals, rad: 0.05 mm at 1 m, below the resolution of a calibration.
 pub(super) const WRITTEN: f64 = 5e-5;
 
-/// Angles (rad) and lengths (m) closer than this to a multiple of π/2 or to zero are rounding of the arithmetic, of which
-/// there is nothing to say.
+/// Angles (rad) and lengths (m) closer than this to a multiple of π/2 or to zero are rounding of the arithmetic. No
+/// remark is given.
 pub(super) const ROUNDING: f64 = 1e-10;
 
-/// The multiple of π/2 that `angle` stands for, where it stands for one.
+/// Returns the multiple of π/2 that `angle` means, if it means one.
 fn meant(angle: f64) -> Option<f64> {
     right_angle(angle, WRITTEN)
 }
 
-/// The multiple of π/2 that lies closer to `angle` than `tolerance`, rad.
+/// Returns the multiple of π/2 that lies closer to `angle` than `tolerance`, rad.
 pub(super) fn right_angle(angle: f64, tolerance: f64) -> Option<f64> {
     let exact = (angle / FRAC_PI_2).round() * FRAC_PI_2;
-    // Without the sign of a zero.
+    // Adding zero removes the sign of a zero.
     ((angle - exact).abs() < tolerance).then_some(exact + 0.0)
 }
 
-/// How far `angle` is from the multiple that it is taken as, as the end of a sentence.
+/// Returns the distance of an angle from its multiple, as the end of a sentence.
 fn taken(off: f64, exact: f64) -> String {
     let name = match (exact / FRAC_PI_2).round() as i64 {
         0 => "0".to_owned(),
@@ -45,17 +45,17 @@ fn taken(off: f64, exact: f64) -> String {
     format!("{off:.1e} rad off {name}, and is taken as {name}")
 }
 
-/// An angle of a description that is taken as another.
+/// An angle of a description that was replaced by a multiple of π/2.
 pub(super) struct Squared {
     /// Joint, from 0.
     pub joint: usize,
     /// Key of the angle.
     pub key: &'static str,
-    /// A sentence without its place.
+    /// The remark without its place.
     pub said: String,
 }
 
-/// Makes the angles of `robot` that stand for multiples of a right angle exactly that.
+/// Sets the angles of `robot` that mean multiples of a right angle to exact values.
 pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
     let mut all = Vec::new();
     for (number, joint) in robot.joints.iter_mut().enumerate() {
@@ -85,9 +85,9 @@ pub(super) fn square(robot: &mut Robot) -> Vec<Squared> {
     all
 }
 
-/// Places of the bodies of a URDF chain in the base link's frame at zero position, with neighbouring axes that are nearly
-/// parallel or perpendicular made so: a joint is turned about its own place, and all that hangs on it with it. With a
-/// sentence for each joint that was turned.
+/// Returns the poses of the bodies of a URDF chain in the base link's frame at zero position, and a sentence for each
+/// turned joint. Neighbouring axes that are nearly parallel or perpendicular become exactly so: a joint turns about its
+/// own origin and carries all bodies behind it.
 pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>) {
     let (mut poses, mut said) = (Vec::new(), Vec::new());
     let mut pose = Isometry3::identity();
@@ -112,7 +112,7 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
                 format_significant(angle, 8),
                 taken((angle - exact).abs(), exact)
             ));
-            // Along `before`, or across it.
+            // Direction along `before`, or across it.
             let square = match axis.dot(&before) {
                 cosine if exact == FRAC_PI_2 => axis - before * cosine,
                 cosine => before * cosine.signum(),
@@ -146,7 +146,7 @@ pub(super) fn squared_poses(chain: &Chain) -> (Vec<Isometry3<f64>>, Vec<String>)
     (poses, said)
 }
 
-/// The multiple of π/2 that theta of a prismatic joint stands for, as TOML takes it, with a sentence where it is another.
+/// Returns the multiple of π/2 that theta of a prismatic joint means, with a sentence if theta differs from it.
 pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64, Option<String>)> {
     let exact = meant(theta)?;
     let off = (theta - exact).abs();
@@ -161,8 +161,8 @@ pub(super) fn squared_theta(file: &str, body: &Body, theta: f64) -> Option<(f64,
     Some((exact, said))
 }
 
-/// Where the last joint of `axes` slides: its axis, and the last one before that stands at a fixed angle to what follows
-/// and is not parallel to it.
+/// If the last joint of `axes` is prismatic: returns its axis, and the last earlier axis that has a fixed angle to the
+/// following joint and is not parallel to it.
 fn slid(chain: &Chain, axes: &[Vector3<f64>]) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let (about, earlier) = axes.split_last()?;
     let slides = |joint: usize| chain.bodies[joint].kind == JointKind::Prismatic;
@@ -196,7 +196,7 @@ fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b))
 }
 
-/// `pose` turned about its own place.
+/// Returns `pose` turned about its own origin.
 fn turned(pose: &Isometry3<f64>, about: &Vector3<f64>, angle: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Unit::new_normalize(*about), angle);
     Isometry3::from_parts(

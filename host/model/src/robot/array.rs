@@ -1,8 +1,8 @@
-//! Lists of a fixed length in a description: neither shorter nor longer.
+//! Lists of a fixed length in a description; other lengths are refused.
 
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// Exactly `N` numbers. Serde's own arrays stop reading at the last one and never see what follows.
+/// Reads exactly `N` numbers. Serde's own arrays ignore numbers after the last one.
 pub(super) fn exact<'de, D: Deserializer<'de>, const N: usize>(
     from: D,
 ) -> Result<[f64; N], D::Error> {
@@ -12,7 +12,7 @@ pub(super) fn exact<'de, D: Deserializer<'de>, const N: usize>(
         .map_err(|_| D::Error::invalid_length(length, &format!("a list of {N} numbers").as_str()))
 }
 
-/// The same of a list that may be absent; `#[serde(default)]` goes with it.
+/// The same for a list that may be absent; used with `#[serde(default)]`.
 pub(super) fn exact_or_none<'de, D: Deserializer<'de>, const N: usize>(
     from: D,
 ) -> Result<Option<[f64; N]>, D::Error> {

@@ -1,25 +1,25 @@
-//! What was done to the recordings that the values of a description were identified from.
+//! Processing of the recordings from which the values of a description were identified.
 
 use serde::{Deserialize, Serialize};
 
 use super::check::{Fault, Step};
 use super::written::{float, line, list};
 
-/// Longest lead, s: a torque that acts so much later is of another motion.
+/// Largest torque lead, s. A torque that acts later than this belongs to another motion.
 pub const MOST_LEAD: f64 = 1.0;
 
-/// Band and rows in which the values of a description were found: what they are judged in unless asked otherwise, as an
-/// error relative to the torque depends on both.
+/// Band and rows in which the values of a description were identified. They are the default for judging the values,
+/// because an error relative to the torque depends on both.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IdentifiedBand {
     /// Cut-off of the zero-phase low-pass on the position, Hz.
     pub cutoff: f64,
-    /// Rows per second after the low-pass over torque and regressor.
+    /// Rows per second after the low-pass on torque and regressor.
     pub rate: f64,
     /// Per joint, speed below which rows do not count in that error, rad/s or m/s.
     pub min_speed: Vec<f64>,
-    /// How much later the torque recorded at an instant acts, s.
+    /// Torque lead: time from the recording of a torque to its action, s.
     #[serde(default)]
     pub torque_lead: f64,
 }

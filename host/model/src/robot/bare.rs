@@ -1,4 +1,4 @@
-//! Robots of which no more than the geometry is known.
+//! Robots with known geometry and nothing else.
 
 use super::dh::GRAVITY;
 use super::{Joint, JointKind, Origin, Robot};
@@ -24,7 +24,7 @@ impl Joint {
 }
 
 impl Robot {
-    /// Joints from the base outwards, z of the base upwards against gravity.
+    /// Returns a robot with joints from the base outwards; z of the base points up, against gravity.
     pub fn new(name: &str, joints: Vec<Joint>) -> Self {
         Self {
             name: name.to_owned(),

@@ -1,8 +1,8 @@
-//! Inertial values that no body has, said before they are used.
+//! Remarks on inertial values that no body can have.
 //!
-//! They are not refused: identified values are often fixed up to combinations only, and what a link cannot show in its
-//! motion is often left at zero. Judged is what the link's motion shows: of links that only slide the mass, of links that
-//! turn about one direction the moment of inertia about it, of all others the whole inertia.
+//! Such values are not refused: identified values are often known only in combinations, and values that no motion shows
+//! are often left at zero. Only values that the link's motion shows are judged: the mass of a link that only slides,
+//! the moment of inertia about the axis of a link that turns about one direction, and the whole inertia of all others.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,12 +11,12 @@ use super::urdf::SpatialInertia;
 use super::{JointKind, Original, Robot};
 use rig_output::format_significant;
 
-/// Axes closer to parallel than this turn a link about one direction, as the sine of the angle between them.
+/// Axes closer to parallel than this turn a link about one direction. Sine of the angle between them.
 const PARALLEL: f64 = 1e-6;
-/// Principal moments may break the triangle inequality by this share: what rounding to two or three digits does.
+/// Share by which principal moments may break the triangle inequality: the effect of rounding to two or three digits.
 const ROUNDED: f64 = 0.02;
 
-/// What of a link's inertia its motion shows.
+/// The part of a link's inertia that its motion shows.
 enum Shown {
     Mass,
     About(Vector3<f64>),
@@ -24,7 +24,7 @@ enum Shown {
 }
 
 impl Robot {
-    /// One sentence for each link whose inertial values no body has, by joint and, where it was read from a URDF file, by link.
+    /// Returns one sentence for each link (and its joint) whose inertial values no body can have.
     pub fn implausible_bodies(&self, urdf: Option<&Original>) -> Vec<String> {
         (0..self.joints.len())
             .filter_map(|k| {
@@ -42,8 +42,8 @@ impl Robot {
             .collect()
     }
 
-    /// Directions about which link `k` turns, all in frame k at zero position. Neighbouring axes keep their angle at
-    /// every position, so that axes that are parallel here are so everywhere or have one between them that is not.
+    /// Returns the directions about which link `k` turns, in frame k at zero position. Neighbouring axes keep their
+    /// angle at every position. So axes that are parallel here stay parallel, or an axis between them is not parallel.
     fn shown(&self, k: usize) -> Shown {
         let mut direction: Option<Vector3<f64>> = None;
         for joint in &self.joints[..=k] {
@@ -60,7 +60,7 @@ impl Robot {
     }
 }
 
-/// What is strange about a body, as the rest of a sentence about its link; none where nothing is.
+/// Returns the fault of a body as the rest of a sentence about its link; `None` if it has no fault.
 fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     let about_origin_is_zero = body.inertia == Matrix3::zeros();
     if body.mass <= 0.0 {
@@ -74,7 +74,7 @@ fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
     }
     let (_, inertia) = body.about_centre()?;
     let unit = |value: f64| format!("{} kg·m²", format_significant(value, 4));
-    // Against what rounding leaves of the difference between both inertias.
+    // Rounding of the difference between both inertias.
     let rounding = 1e-13 * body.inertia.amax();
     match shown {
         Shown::Mass => None,
@@ -116,19 +116,19 @@ fn strange(body: &SpatialInertia, shown: &Shown) -> Option<String> {
 
 /// Radius of gyration of a body whose inertia its motion does not show, m.
 const RADIUS: f64 = 0.05;
-/// Moments across the axis as a share of the one about it, where the motion shows that one alone. Above one half, so that the
-/// largest moment is below the sum of the others.
+/// Moments across the axis as a share of the moment about it, if the motion shows only that one. Above one half, so
+/// that the largest moment is below the sum of the others.
 const ACROSS: f64 = 0.6;
-/// Least principal moment as a share of the largest of a body that simulators take. MuJoCo refuses what is not positive.
+/// Least ratio of smallest to largest principal moment that simulators accept. MuJoCo demands positive moments.
 const POSITIVE: f64 = 1e-9;
 
 impl Robot {
-    /// The description with bodies that MuJoCo and Gazebo take, as far as no motion shows the difference, and what was done.
+    /// Returns the description with bodies that MuJoCo and Gazebo accept, without changing any motion, and the changes.
     ///
-    /// Both refuse a moving link without mass, or whose principal moments of inertia about its centre are not all positive with
-    /// the largest below the sum of the others. A description of what a motion shows need not be such a body: of a link that
-    /// turns about one direction only the moment about it counts, of one that only slides the mass. What does not count is
-    /// chosen here. Where all counts nothing is changed, and the sentence says what will be refused.
+    /// Both demand mass, and positive principal moments about the centre with the largest below the sum of the others.
+    /// An identified description need not satisfy this. For a link that turns about one direction only that moment
+    /// matters, and for a sliding link only the mass: the other values are chosen here. If all values matter nothing is
+    /// changed, and the sentence names the link that will be refused.
     pub(super) fn with_bodies(&self) -> (Self, Vec<String>) {
         let mut robot = self.clone();
         let mut remarks = Vec::new();
@@ -163,7 +163,7 @@ impl Robot {
     }
 }
 
-/// Whether simulators take it: mass, and moments that a body of some extent has.
+/// Returns true if simulators accept the body: it has mass, and moments that a body of some extent has.
 fn is_taken(body: &SpatialInertia) -> bool {
     let Some((_, inertia)) = body.about_centre().filter(|_| body.mass > 0.0) else {
         return false;
@@ -178,7 +178,7 @@ fn is_taken(body: &SpatialInertia) -> bool {
     }
 }
 
-/// A body of the same motion that simulators take; none where there is none. `first`: the joint stands on the base.
+/// Returns a body of the same motion that simulators accept, if one exists. `first`: the joint is on the base.
 fn body_like(body: &SpatialInertia, shown: &Shown, first: bool) -> Option<SpatialInertia> {
     let direction = match shown {
         Shown::All => return None,
@@ -187,8 +187,8 @@ fn body_like(body: &SpatialInertia, shown: &Shown, first: bool) -> Option<Spatia
     };
     let mut mass = body.mass;
     if let (true, Some(axis)) = (first, direction) {
-        // About a fixed axis the mass is free where first moment and moment of inertia are kept: the centre of mass moves towards
-        // the axis until half of the moment is the body's own.
+        // About a fixed axis the mass is free if first moment and moment of inertia are kept. The centre of mass moves
+        // towards the axis until half of the moment belongs to the body itself.
         let across = body.first_moment - axis * axis.dot(&body.first_moment);
         let moment = axis.dot(&(body.inertia * axis));
         let own = moment - across.norm_squared() / mass.max(f64::MIN_POSITIVE);

@@ -1,4 +1,4 @@
-//! Bodies that cannot be, and those that can.
+//! Possible and impossible bodies.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -62,7 +62,7 @@ fn what_no_body_has_is_named_by_link_and_joint() {
             "{words}: {said:?}"
         );
     }
-    // A thin plate by three digits, and a rod.
+    // A thin plate, rounded to three digits, and a rod.
     for possible in [[0.1, 0.2, 0.302], [0.1, 0.1, 0.0]] {
         assert_eq!(said(&inertia(possible)), [""; 0]);
     }
@@ -74,7 +74,7 @@ fn what_a_motion_does_not_show_may_stay_open() {
         let robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
         assert_eq!(robot.implausible_bodies(None), [""; 0], "{}", robot.name);
     }
-    // As published: the last link is a point.
+    // As published: the last link is a point mass.
     let tx40 = Robot::from_toml(TX40, Path::new("r.toml")).unwrap();
     let said = tx40.implausible_bodies(None);
     assert!(
@@ -82,7 +82,7 @@ fn what_a_motion_does_not_show_may_stay_open() {
         "{said:?}"
     );
     let mut robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("r.toml")).unwrap();
-    // Less than its own mass at its centre of mass has about the axis.
+    // Less than the moment of its own mass at its centre of mass about the axis.
     robot.joints[0].inertial.as_mut().unwrap().inertia[5] = 0.01;
     let said = robot.implausible_bodies(None);
     assert!(
@@ -141,8 +141,8 @@ fn placeholders_of_exporters_are_no_limits() {
     );
 }
 
-/// What is written for simulators is a body wherever the motion leaves that open, and where it does not the link is named. That
-/// it moves alike is a test of the writer.
+/// A written link is a possible body if the motion leaves that open; otherwise a remark names it. A test of the writer
+/// checks that the motion is the same.
 #[test]
 fn links_that_a_urdf_is_written_with_are_bodies_or_named() {
     for (text, refused) in [
@@ -155,7 +155,7 @@ fn links_that_a_urdf_is_written_with_are_bodies_or_named() {
     ] {
         let mut robot = Robot::from_toml(text, Path::new("r.toml")).unwrap();
         for joint in &mut robot.joints {
-            // As identified: of a slide the mass alone.
+            // As identified: only the mass of a slide.
             joint.inertial.get_or_insert(crate::robot::Inertial {
                 mass: 95.0,
                 first_moment: [0.0; 3],

@@ -1,7 +1,7 @@
-//! What a description must satisfy beyond its syntax.
+//! Checks of a description beyond its syntax.
 //!
-//! Physical consistency of the inertia (a density realises it) is not asked here: values that are
-//! identified from data are often only fixed up to combinations, and are read back as they are.
+//! Physical consistency of the inertia (a density realises it) is not required. Identified values are often known only
+//! in combinations and must be read back unchanged.
 
 use std::collections::HashSet;
 use std::f64::consts::TAU;
@@ -42,7 +42,7 @@ pub const EFFECT_NAMES: [&str; 22] = [
     "torque_offset",
 ];
 
-/// One step of the way to a value in the tree of a description.
+/// One step of the path to a value in the tree of a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// A key of a table.
@@ -62,7 +62,7 @@ pub(super) struct Fault {
     pub right: String,
 }
 
-/// The first fault of `robot`, if any.
+/// Returns the first fault of `robot`, if any.
 pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
     use Step::{At, Key};
     for (i, g) in robot.gravity.iter().enumerate() {
@@ -114,7 +114,7 @@ pub(super) fn check(robot: &Robot) -> Result<(), Fault> {
             f
         })?;
     }
-    // What was identified may be known in combinations only, and is read back as it is.
+    // Identified values may be known only in combinations and are read back unchanged.
     if robot.identified.is_none()
         && let Some((i, mut fault)) = oversized(&robot.joints)
     {
@@ -142,7 +142,7 @@ fn fault(way: &[Step], what: &str, found: &f64, right: &str) -> Fault {
     }
 }
 
-/// A number as a person writes it.
+/// Returns a number in the form that a person writes.
 pub fn written(value: f64) -> String {
     let small = value != 0.0 && value.abs() < 1.0 / LARGEST;
     if (sound(value) && !small) || !value.is_finite() {
@@ -152,21 +152,21 @@ pub fn written(value: f64) -> String {
     }
 }
 
-/// Largest number of a description, in the units that it is written in: beyond what any robot has, far within what products of
-/// such numbers can be computed with.
+/// Largest number of a description, in its written unit. It exceeds every robot's values, and products of such numbers
+/// do not overflow.
 pub(super) const LARGEST: f64 = 1e12;
 
-/// Whether `value` is a number that products can be computed with.
+/// Returns true if products of `value` do not overflow.
 pub fn sound(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 
-/// What a number must be.
+/// Requirement on a number.
 #[derive(Clone, Copy)]
 pub(super) enum Must {
     Finite,
     Positive,
-    /// Greater than 0, of whatever size: a limit that nothing reaches is none.
+    /// Greater than 0, of any size: a very large limit means no limit.
     Limit,
     NotNegative,
     NotZero,
@@ -207,7 +207,7 @@ fn check_joint(joint: &Joint) -> Result<(), Fault> {
         JointKind::Prismatic => ("m", "N"),
     };
     number(joint, &[Key("alpha")], "alpha", "rad", Finite, joint.alpha)?;
-    // The angle between two axes: what is beyond a turn was meant in another unit.
+    // The angle between two axes: a value beyond one turn has another unit.
     if joint.alpha.abs() > TAU {
         return Err(fault(
             &[Key("alpha")],

@@ -1,14 +1,14 @@
-//! What the drives of a description must satisfy, alone and together: that the motors move all joints, everywhere they may be.
+//! Checks of the drives, alone and together: the motors must move all joints at every allowed position.
 
 use rig_shared::transmission::TransmissionError;
 
 use super::check::{Fault, LARGEST, Must, Step, number, sound, written};
 use super::{Drive, Joint, Robot, Screw};
 
-/// A dead centre this close to the crank's range is within it, rad: the ratio there is hardly a hundredth of the best.
+/// Margin around the crank's range within which a dead centre is refused, rad. There the ratio is 1 % of its maximum.
 const MARGIN: f64 = 0.01;
 
-/// Positions at which the Jacobian is tried, besides the middle.
+/// Number of positions at which the Jacobian is tested, in addition to the middle position.
 const TRIED: usize = 200;
 
 fn way(k: usize, rest: &[Step]) -> Vec<Step> {
@@ -17,7 +17,7 @@ fn way(k: usize, rest: &[Step]) -> Vec<Step> {
     way
 }
 
-/// The first fault of the drives, if any.
+/// Returns the first fault of the drives, if any.
 pub(super) fn check_transmission(robot: &Robot) -> Result<(), Fault> {
     use Step::{Key, Name};
     for (k, joint) in robot.joints.iter().enumerate() {
@@ -96,7 +96,7 @@ fn finite(
     })
 }
 
-/// The crank turns with its own joint, has a range, and no dead centre within it.
+/// Checks that the crank turns with its own joint, has a range, and has no dead centre within the range.
 fn check_crank(robot: &Robot, k: usize, screw: &Screw) -> Result<(), Fault> {
     use Step::Key;
     let joint = &robot.joints[k].name;
@@ -131,7 +131,7 @@ fn check_crank(robot: &Robot, k: usize, screw: &Screw) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The motors together move all joints, at the middle of the range and at positions spread over it.
+/// Checks that the motors together move all joints, at the middle position and at positions spread over the range.
 fn check_jacobian(robot: &Robot) -> Result<(), Fault> {
     let n = robot.joints.len();
     let refuse = |error: TransmissionError, q: &[f64]| {
@@ -177,8 +177,8 @@ fn check_jacobian(robot: &Robot) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Position `draw` of an even sequence over the limits (Roberts 2018: powers of the generalised golden ratio), moved so
-/// that every crank stays within its range.
+/// Returns position `draw` of an even sequence over the limits (Roberts 2018: powers of the generalised golden ratio).
+/// Shifts it so that every crank stays within its range.
 fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
     let n = middle.len();
     let mut golden = 2.0f64;
@@ -218,7 +218,7 @@ fn spread(robot: &Robot, middle: &[f64], draw: usize) -> Vec<f64> {
     q
 }
 
-/// What a drive must satisfy on its own; [`check_transmission`] sees to what it does with the others.
+/// Checks a drive on its own. [`check_transmission`] checks the drives together.
 pub(super) fn check_drive(joint: &Joint, drive: &Drive) -> Result<(), Fault> {
     use Must::{Finite, NotNegative, NotZero, Positive};
     use Step::{At, Key};

@@ -1,12 +1,12 @@
-//! Limits that look like degrees, said before a motion is sized by them.
+//! Remarks on limits that look like degrees, before a motion is designed from them.
 
 use super::{JointKind, Robot};
 use rig_output::format_significant;
 
-/// Turns to either side of zero beyond which a limit is remarked on. Wrists of arms have up to two.
+/// Turns to either side of zero above which a limit gets a remark. Wrists of arms have up to two.
 const TURNS: f64 = 2.0;
-/// Acceleration that reaching the velocity limit within the range takes at least, beyond which it is remarked on, rad/s². Arms
-/// and servos are below 100 (UR5 2, Panda 2, SO-101 26, XL330 20); the same limits in degrees are above 400.
+/// Least acceleration to reach the velocity limit within the range, rad/s², above which a remark is given. Arms and
+/// servos are below 100 (UR5 2, Panda 2, SO-101 26, XL330 20); the same limits in degrees are above 400.
 const ABRUPT: f64 = 400.0;
 
 impl Robot {

@@ -11,25 +11,25 @@ use super::urdf::{Body, Chain};
 use super::{Drive, Joint, JointKind, Origin, Robot};
 use rig_output::format_significant;
 
-/// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the
-/// base link, the customary rounded value that robot descriptions and simulators are used with.
+/// Acceleration of gravity assumed for URDF, which does not state one: m/s², downwards along z of the base link. It is
+/// the rounded value that robot descriptions and simulators commonly use.
 pub(super) const GRAVITY: f64 = 9.81;
 
-/// Axes closer to parallel than this are parallel, rad: between this and the angles that [`squared_poses`] leaves there is
-/// nothing.
+/// Axes closer to parallel than this are parallel, rad. [`squared_poses`] leaves no angles between rounding and its own
+/// limit.
 const PARALLEL: f64 = 1e-6;
 
-/// A frame this many times further away than all links together reach stands where no mass is.
+/// Ratio of a frame's distance to the total length of all links above which a remark is given: no mass is there.
 const FAR: f64 = 30.0;
 
-/// The converted robot and where its frames lie, for whoever must relate it to the URDF's frames.
+/// The converted robot, and the poses that relate its frames to those of the URDF.
 pub(super) struct Converted {
     pub robot: Robot,
     /// Frame 0 in the base link's frame.
     pub base: Isometry3<f64>,
-    /// Each body's own frame (that of the link its joint moves) in frame i.
+    /// Pose of each body's own frame (the frame of the link that its joint moves) in frame i.
     pub links: Vec<Isometry3<f64>>,
-    /// Angles that are taken as others, one sentence each.
+    /// Angles that were replaced, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -50,8 +50,8 @@ struct Line {
     direction: Vector3<f64>,
 }
 
-/// Origin on `line` and direction x of the common normal to `next`. Where there is freedom, keeps
-/// `foot` as origin and `x` as direction as well as it can.
+/// Returns the origin on `line` and the direction x of the common normal to `next`. If these are not unique, keeps
+/// `foot` as origin and `x` as direction as far as possible.
 fn common_normal(
     line: Line,
     next: Line,
@@ -90,7 +90,7 @@ fn snap_length(length: f64) -> f64 {
     if length.abs() < ROUNDING { 0.0 } else { length }
 }
 
-/// Converts a URDF chain; never fails, as every chain of axes has such frames.
+/// Converts a URDF chain. Never fails: every chain of axes has such frames.
 pub(super) fn convert(chain: &Chain) -> Converted {
     let (poses, mut remarks) = squared_poses(chain);
     let reach: f64 = chain
@@ -111,8 +111,8 @@ pub(super) fn convert(chain: &Chain) -> Converted {
     let rotation = UnitQuaternion::from_basis_unchecked(&[x, y, Vector3::z()]);
     let base = Isometry3::from_parts(origin.into(), rotation);
 
-    // Each frame is placed relative to the one that the parameters so far really produce, so that
-    // neither the snapping above nor the file's rounding adds up along the chain.
+    // Each frame is placed relative to the frame that the parameters produce so far. So neither the snapping above nor
+    // the file's rounding accumulates along the chain.
     let mut frame = base;
     let mut joints = Vec::new();
     let mut links = Vec::new();
@@ -124,7 +124,7 @@ pub(super) fn convert(chain: &Chain) -> Converted {
         let a = snap_length((line.point - frame.translation.vector).dot(&x_before));
         let bent = frame * step(alpha, a, 0.0, 0.0);
         let z = bent.rotation * Vector3::z();
-        // Where the normal meets the axis: the natural origin if the next axis leaves the choice.
+        // Intersection of normal and axis: the default origin if the next axis does not fix it.
         let foot = bent.translation.vector;
         let (origin, x) = if i + 1 < chain.bodies.len() {
             common_normal(

@@ -1,5 +1,5 @@
-//! The converted robot against the URDF evaluated directly, by matrices of plain arrays and its own
-//! walk over the XML: every body's mass, first moment and inertia as seen from the base at random q.
+//! Compares the converted robot with the URDF evaluated directly, by plain matrices and a separate walk over the XML:
+//! mass, first moment and inertia of every body seen from the base at random q.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::HashMap;
@@ -77,7 +77,7 @@ struct Seen {
     inertia: [[f64; 3]; 3],
 }
 
-/// Direct evaluation: bodies by the name of the joint that moves them.
+/// Evaluates directly: bodies by the name of the joint that moves them.
 fn direct(text: &str, q: &HashMap<String, f64>) -> HashMap<String, Seen> {
     let document = Document::parse(text).unwrap();
     let root = document.root_element();
@@ -158,7 +158,7 @@ fn direct(text: &str, q: &HashMap<String, f64>) -> HashMap<String, Seen> {
     result
 }
 
-/// Largest difference between both evaluations over `draws` random configurations, relative to the scale.
+/// Returns the largest difference between both evaluations over `draws` random configurations, relative to the scale.
 fn worst(text: &str, seed: u64, draws: usize) -> (Robot, f64) {
     let chain = urdf::read(text, Path::new("test.urdf")).unwrap();
     let converted = convert(&chain);
@@ -192,7 +192,7 @@ fn worst(text: &str, seed: u64, draws: usize) -> (Robot, f64) {
     (robot, worst)
 }
 
-/// A chain with random axes: skew, parallel, meeting and coinciding ones; fixed links in between.
+/// A chain with random axes: skew, parallel, intersecting and coincident, with fixed links in between.
 pub(in crate::robot) fn random_urdf(rng: &mut Pcg64) -> String {
     let mut text = String::from("<robot name='r'><link name='l0'/>");
     let right = std::f64::consts::FRAC_PI_2;
@@ -243,7 +243,7 @@ pub(in crate::robot) fn random_urdf(rng: &mut Pcg64) -> String {
             rpy[1],
             rpy[2],
             n = i + 1,
-            // The next joint hangs on the fixed link, so that its pose enters the chain too.
+            // The next joint is attached to the fixed link, so that the link's pose is part of the chain.
             parent = if i == 0 {
                 "l0".to_owned()
             } else {
@@ -264,7 +264,7 @@ fn random_chains_keep_their_masses_in_place_at_every_position() {
         for joint in &robot.joints {
             kinds[usize::from(joint.kind == JointKind::Prismatic)] += 1;
         }
-        // Lengths to some tens of metres occur where skew axes meet far away; the bound is rounding there.
+        // Skew axes that meet far away give lengths up to some tens of metres; the bound is their rounding.
         assert!(worst < 1e-8, "chain {n} differs by {worst:e}:\n{text}");
     }
     assert!(kinds.iter().all(|&k| k > 100));
@@ -287,7 +287,7 @@ fn published_robots_keep_their_masses_in_place() {
         assert!(worst < 1e-9, "{file} differs by {worst:e}");
         let mut read_back =
             Robot::from_toml(&robot.to_toml().unwrap(), Path::new("x.toml")).unwrap();
-        // A TOML says neither that its values came from a URDF nor where that had its last link.
+        // TOML does not store the origin of the values or the last link of a URDF.
         (read_back.origin, read_back.last_link) = (robot.origin, robot.last_link);
         assert_eq!(read_back, robot);
         assert_eq!(Robot::load(&path).unwrap(), robot);

@@ -1,4 +1,4 @@
-//! The drives of a description as the functions Ψ = F(q) that the mathematics takes.
+//! The drives of a description as functions Ψ = F(q), for the equations.
 
 use rig_shared::multibody::{COLUMNS, column};
 use rig_shared::scalar::Real;
@@ -16,11 +16,11 @@ struct Numbers {
 }
 
 impl Robot {
-    /// Motor coordinates as a function of the joint coordinates: one motor a joint; a joint without a drive counts as
-    /// its own motor.
+    /// Returns the motor coordinates as a function of the joint coordinates, one motor a joint. A joint without a drive
+    /// counts as its own motor.
     ///
     /// # Errors
-    /// [`TransmissionError`]; none for a description that was loaded, which has been checked.
+    /// [`TransmissionError`]. It cannot occur for a loaded description, whose drives were checked.
     pub fn transmission(&self) -> Result<Transmission<f64>, TransmissionError> {
         self.transmission_of::<f64>()
     }
@@ -28,7 +28,7 @@ impl Robot {
     /// [`Self::transmission`] over any scalar: lanes, dual numbers.
     ///
     /// # Errors
-    /// As there.
+    /// The same as [`Self::transmission`].
     pub fn transmission_of<T: Real>(&self) -> Result<Transmission<T>, TransmissionError> {
         let numbers: Vec<Numbers> = (0..self.joints.len()).map(|k| self.numbers(k)).collect();
         let maps: Vec<DriveMap<'_>> = numbers
@@ -75,14 +75,14 @@ impl Robot {
         }
     }
 
-    /// What each joint adds to a crank's angle.
+    /// Returns the weight of each joint in the crank's angle.
     fn weights(&self, screw: &Screw) -> Vec<f64> {
         let weight = |name: &String| screw.angle.get(name).copied().unwrap_or(0.0);
         self.joints.iter().map(|j| weight(&j.name)).collect()
     }
 
-    /// Parameters of the motors that the joints' own do not state, one row a motor in the order of
-    /// [`rig_shared::transmission::MOTOR_COLUMN_NAMES`]; all zero for a drive on its own joint.
+    /// Returns the parameters of the motors that are not part of the joints' own, one row a motor in the order of
+    /// [`rig_shared::transmission::MOTOR_COLUMN_NAMES`]. All are zero for a drive that moves only its own joint.
     pub fn motor_parameters(&self) -> Vec<[f64; MOTOR_COLUMNS]> {
         let kinds = self.drive_kinds();
         self.joints
@@ -106,7 +106,7 @@ impl Robot {
             .collect()
     }
 
-    /// Kinds of the drives, base first, without building the transmission.
+    /// Returns the kinds of the drives, base first, without building the transmission.
     pub fn drive_kinds(&self) -> Vec<DriveKind> {
         self.joints
             .iter()
@@ -125,8 +125,8 @@ impl Robot {
             .collect()
     }
 
-    /// Adds what the drives put into the joints' own columns: a simple drive all it has, a coupled one what its rotor
-    /// and its viscous friction add to the diagonal of each joint.
+    /// Adds the drives to the joints' own columns. A simple drive adds all its parameters. A coupled drive adds the
+    /// contribution of its rotor and its viscous friction to the diagonal of each joint.
     pub(super) fn add_drives(&self, rows: &mut [[f64; COLUMNS]]) {
         for (k, kind) in self.drive_kinds().into_iter().enumerate() {
             let Some(drive) = &self.joints[k].drive else {
@@ -154,13 +154,13 @@ impl Robot {
         }
     }
 
-    /// The description with other values: the inverse of [`Self::standard_parameters`] and [`Self::motor_parameters`], one
-    /// row a joint and a motor. A rotor takes what its joint's `Ia` has left beside the motors coupled to it; friction
-    /// stands at the joints, save that of coupled motors and screws. A joint without a drive gets one of ratio 1 for its
-    /// drive inertia.
+    /// Returns the description with other values: the inverse of [`Self::standard_parameters`] and
+    /// [`Self::motor_parameters`], one row a joint and a motor. A rotor gets the joint's `Ia` minus the share of the
+    /// motors coupled to it. Friction is stored at the joints, except for coupled motors and screws. A joint without a
+    /// drive gets a drive of ratio 1 to hold its drive inertia.
     ///
-    /// The second result says which values no description can hold (friction or rotor inertia below zero) and were put to
-    /// zero.
+    /// The second result names the values that no description can hold (friction or rotor inertia below zero). They are
+    /// set to zero.
     #[must_use]
     pub fn with_parameters(
         &self,
@@ -181,7 +181,7 @@ impl Robot {
             }
         };
         let kinds = self.drive_kinds();
-        // What the coupled motors put on the diagonals.
+        // Contributions of the coupled motors to the diagonals.
         let mut shares = vec![[0.0; 2]; self.joints.len()];
         for (k, kind) in kinds.iter().enumerate() {
             let (Some(drive), Some(own)) = (&mut robot.joints[k].drive, motors.get(k)) else {
@@ -223,7 +223,7 @@ impl Robot {
             inertia.copy_from_slice(&row[column::INERTIA..column::DRIVE_INERTIA]);
             let rest = row[column::DRIVE_INERTIA] - shares[k][0];
             if joint.drive.is_none() && rest != 0.0 {
-                // A rotor's inertia made part of the link would be no body's.
+                // Rotor inertia added to the link would make a body that cannot exist.
                 joint.drive = Some(super::Drive {
                     gear_ratio: 1.0,
                     ..Default::default()
@@ -260,8 +260,8 @@ impl Robot {
         (robot, remarks)
     }
 
-    /// A position in the middle of the joints' limits with every crank within its range: where the way from motors to
-    /// joints begins. Zero for a joint without limits.
+    /// Returns the middle of the joints' limits, shifted so that every crank is within its range. It is the start
+    /// position for solving joints from motors. Zero for a joint without limits.
     pub fn middle_position(&self) -> Vec<f64> {
         let mut q: Vec<f64> = self
             .joints
@@ -287,7 +287,7 @@ impl Robot {
         q
     }
 
-    /// Angles that a crank can have within the limits of its joints; none where one of them has no limits.
+    /// Returns the range of a crank's angle within the limits of its joints; `None` if one of them has no limits.
     pub(super) fn crank_box(&self, screw: &Screw) -> Option<[f64; 2]> {
         let mut range = [screw.offset; 2];
         for (weight, joint) in self.weights(screw).into_iter().zip(&self.joints) {
@@ -304,7 +304,7 @@ impl Robot {
         Some(range)
     }
 
-    /// Whether motor `motor` moves joint `joint` (both from 0) at some position.
+    /// Returns true if motor `motor` moves joint `joint` (both from 0) at some position.
     pub fn moves(&self, motor: usize, joint: usize) -> bool {
         let (Some(own), Some(moved)) = (self.joints.get(motor), self.joints.get(joint)) else {
             return false;
@@ -321,8 +321,8 @@ impl Robot {
                 .is_some_and(|s| nonzero(s.angle.get(&moved.name)))
     }
 
-    /// Limits on combinations of joint positions beyond the joints' own: for every crank with a range its weights (one
-    /// a joint) and the lowest and highest value of Σ c_j·q_j.
+    /// Returns the limits on combinations of joint positions. For every crank with a range: its weights c (one a
+    /// joint), and the lowest and highest value of Σ c_j·q_j.
     pub fn combined_limits(&self) -> Vec<(Vec<f64>, [f64; 2])> {
         self.joints
             .iter()
@@ -334,7 +334,7 @@ impl Robot {
             .collect()
     }
 
-    /// Unit of a motor parameter (place `c` of motor `k`), ASCII.
+    /// Returns the unit of a motor parameter (place `c` of motor `k`), ASCII.
     pub fn motor_unit(&self, k: usize, c: usize) -> &'static str {
         let kind = self.drive_kinds().get(k).copied();
         let at_slide = kind != Some(DriveKind::Varying)
@@ -350,7 +350,7 @@ impl Robot {
     }
 }
 
-/// A difference that is only rounding of its parts is zero.
+/// Returns the difference, or zero if it is only rounding of `part`.
 fn without_rounding(difference: f64, part: f64) -> f64 {
     if difference.abs() < 1e-12 * part.abs() {
         0.0

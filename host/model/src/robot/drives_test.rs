@@ -1,4 +1,4 @@
-//! Descriptions of coupled drives: read, refused by name, written back, and the robots of the book.
+//! Descriptions of coupled drives: reading, refusal by name, writing, and the robots of the book.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -44,7 +44,7 @@ fn the_irp6_turns_its_motors_as_published() {
         assert_eq!(t.kind(k), Some(kind));
     }
     let right = std::f64::consts::FRAC_PI_2;
-    // Absolute angles, and the published functions of them in mm.
+    // Absolute angles, and their published functions in mm.
     for (p1, p2, p3, p4, p5) in [
         (0.0, -right, 0.0, 0.0, 0.0),
         (1.0, -2.0, 0.3, -0.8, 0.5),
@@ -76,7 +76,7 @@ fn drives_go_into_the_parameters_as_the_columns_want_them() {
     let robot = load(IRP6_TEMPLATE).unwrap();
     let (joints, motors) = (robot.standard_parameters(), robot.motor_parameters());
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{a} {b}");
-    // Motors 4 and 5 add to the diagonals of joints 2, 3 (both) and 4 (motor 5); those of the screws stand apart.
+    // Motors 4 and 5 add to the diagonals of joints 2, 3 (both) and 4 (motor 5); those of the screws are separate.
     near(joints[0][column::DRIVE_INERTIA], 158.0 * 158.0 * 2e-4);
     near(joints[1][column::DRIVE_INERTIA], 2.0 * 128.0 * 128.0 * 5e-5);
     near(joints[3][column::DRIVE_INERTIA], 128.0 * 128.0 * 5e-5);
@@ -208,7 +208,7 @@ fn wrong_drives_are_named_by_line_and_mend() {
 
 #[test]
 fn motors_that_turn_alike_are_refused_with_the_joint_at_fault() {
-    // Motor 5 as motor 6: 32·q5 + 32·q6 both.
+    // Motor 5 like motor 6: 32·q5 + 32·q6 for both.
     let text = TX40.replacen(
         "gear_ratio = 45.0                      # motor turns per joint turn\n\n[[joint]]\nname = \"joint_6\"",
         "gear_ratio = 32.0\ncouples = { joint_6 = 32.0 }\n\n[[joint]]\nname = \"joint_6\"",
@@ -232,7 +232,7 @@ fn a_description_takes_its_own_parameters_back() {
             row[column::OFFSET] = 0.1;
             row[column::COULOMB] += 0.5;
             row[column::VISCOUS] += 1.5;
-            // More than the other motors put there, or less.
+            // More than the contribution of the other motors, or less.
             let more = if t.has_joint_inertia(k) {
                 f64::max(0.7 - 0.3 * k as f64, -0.5 * row[column::DRIVE_INERTIA])
             } else {

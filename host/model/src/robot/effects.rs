@@ -15,11 +15,11 @@ use super::{JointKind, Robot};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "toml::Table", into = "toml::Table")]
 pub struct RobotEffect {
-    /// The joint that it acts on; may be absent where the robot has only one.
+    /// The joint that it acts on; may be absent if the robot has only one.
     pub joint: Option<String>,
-    /// The other joint, where the law has terms of another joint's motion.
+    /// The other joint, if the law depends on the motion of a second joint.
     pub other: Option<String>,
-    /// Which, with its parameters in the units of [`Kind::about`] (m for rad and N for N·m where the joint slides).
+    /// Kind and parameters in the units of [`Kind::about`] (m for rad and N for N·m if the joint is prismatic).
     pub effect: Effect<f64>,
 }
 
@@ -28,15 +28,15 @@ pub struct RobotEffect {
 pub struct Placed {
     /// The joint that it acts on.
     pub joint: usize,
-    /// The other joint, where the law has terms of one.
+    /// The other joint, if the law depends on the motion of a second joint.
     pub other: Option<usize>,
-    /// Which, with its parameters.
+    /// Kind and parameters.
     pub effect: Effect<f64>,
 }
 
-/// What is wrong with one table.
+/// The fault of one table.
 pub(super) struct Refusal {
-    /// The key at fault; none for the table as a whole.
+    /// The key at fault; `None` for the whole table.
     key: Option<String>,
     what: String,
     found: String,
@@ -44,7 +44,7 @@ pub(super) struct Refusal {
 }
 
 impl Refusal {
-    /// As the fault of effect `index` of a description.
+    /// Returns the refusal as the fault of effect `index` of a description.
     pub(super) fn at(self, index: usize) -> Fault {
         let mut way = vec![Step::Key("effect"), Step::At(index)];
         way.extend(self.key.map(Step::Name));
@@ -57,7 +57,7 @@ impl Refusal {
     }
 }
 
-/// Unit of a parameter on a joint of that kind, ASCII.
+/// Returns the unit of a parameter on a joint of that kind, ASCII.
 pub fn unit_of(parameter: &Parameter, kind: JointKind) -> String {
     match kind {
         JointKind::Revolute => parameter.unit.to_owned(),
@@ -70,7 +70,7 @@ pub fn unit_of(parameter: &Parameter, kind: JointKind) -> String {
     }
 }
 
-/// Name of an effect with its law, as `name (law)`.
+/// Returns the name of an effect with its law, as `name (law)`.
 pub fn title_of(kind: Kind) -> String {
     let about = kind.about();
     match about.law {
@@ -79,7 +79,7 @@ pub fn title_of(kind: Kind) -> String {
     }
 }
 
-/// Whether the law has terms of another joint's motion.
+/// Returns true if the law depends on the motion of a second joint.
 fn has_other(kind: Kind) -> bool {
     kind == Kind::InertiaCoupling
 }
@@ -88,7 +88,7 @@ fn parameters(kind: Kind) -> impl Iterator<Item = &'static Parameter> {
     kind.about().gains.iter().chain(kind.about().shapes)
 }
 
-/// Laws under a name, empty where it has one only.
+/// Returns the laws of a name; empty if it has only one.
 fn laws(name: &str) -> Vec<&'static str> {
     Kind::ALL
         .iter()
@@ -97,7 +97,7 @@ fn laws(name: &str) -> Vec<&'static str> {
         .collect()
 }
 
-/// A value that should have been a name, for a message.
+/// Returns a value that should have been a name, for a message.
 fn name_found(value: Option<&toml::Value>) -> String {
     match value {
         None => "missing".into(),
@@ -106,8 +106,8 @@ fn name_found(value: Option<&toml::Value>) -> String {
     }
 }
 
-/// Largest magnitudes of parameters by their unit: beyond what any machine has by orders of magnitude, so that a value is in
-/// another unit or mistyped. By judgement, but for a link's length.
+/// Largest magnitude of a parameter by its unit. It exceeds every real machine by orders of magnitude, so a larger
+/// value has another unit or is a typing error. By judgement, except for the length of a link.
 const LARGEST: [(&str, f64); 12] = [
     ("kg", 1.0e4),
     ("m", LARGEST_LINK),
@@ -122,18 +122,18 @@ const LARGEST: [(&str, f64); 12] = [
     ("N*m*s^2/rad^2", 1.0e6),
     ("N*m/rad", 1.0e9),
 ];
-/// Likewise of orders, per turn …
+/// Largest order, per turn. By judgement.
 const LARGEST_ORDER: f64 = 1.0e4;
-/// … and of shares.
+/// Largest share, 1. By judgement.
 const LARGEST_SHARE: f64 = 1.0;
 
-/// What a description may hold: within what physics allows, what machines have.
+/// Returns the range that a description may state: the physical bounds, narrowed to those of real machines.
 pub fn sane(parameter: &Parameter) -> [f64; 2] {
     let of_unit = LARGEST.iter().find(|(unit, _)| *unit == parameter.unit);
     let largest = match (of_unit, parameter.unit, parameter.name) {
         (Some((_, largest)), ..) => *largest,
         (None, "1", "order") => LARGEST_ORDER,
-        // A bound that physics states is the narrower one.
+        // A finite physical bound is narrower.
         (None, "1", _) if parameter.bounds[1].is_infinite() => LARGEST_SHARE,
         _ => f64::INFINITY,
     };
@@ -141,7 +141,7 @@ pub fn sane(parameter: &Parameter) -> [f64; 2] {
     [low.max(-largest), high.min(largest)]
 }
 
-/// The rest of a sentence on what a parameter must be.
+/// Returns the end of a sentence on the allowed range of a parameter.
 fn allowed(parameter: &Parameter) -> String {
     let number = |x: f64| {
         if x == f64::MIN_POSITIVE {
@@ -164,7 +164,7 @@ fn allowed(parameter: &Parameter) -> String {
 }
 
 impl RobotEffect {
-    /// Reads a table; its keys and values are checked, its joints are not.
+    /// Reads a table. Checks its keys and values, but not its joints.
     pub(super) fn from_table(table: &toml::Table) -> Result<Self, Refusal> {
         let refuse = |key: Option<&str>, what: &str, found: String, right: String| Refusal {
             key: key.map(str::to_owned),
@@ -252,14 +252,14 @@ impl RobotEffect {
         })
     }
 
-    /// Values by name, gains first.
+    /// Returns the values by name, gains first.
     pub fn values(&self) -> impl Iterator<Item = (&'static Parameter, f64)> {
         let about = self.effect.kind.about();
         let gains = about.gains.iter().zip(self.effect.gains);
         gains.chain(about.shapes.iter().zip(self.effect.shapes))
     }
 
-    /// As `name (law)`.
+    /// Returns the title, as `name (law)`.
     pub fn title(&self) -> String {
         title_of(self.effect.kind)
     }
@@ -295,7 +295,7 @@ impl From<RobotEffect> for toml::Table {
     }
 }
 
-/// The first fault of the effect tables themselves.
+/// Returns the first fault of the effect tables themselves.
 pub(super) fn check_tables(tables: &[toml::Value]) -> Result<(), Fault> {
     for (i, table) in tables.iter().enumerate() {
         if let Some(table) = table.as_table() {
@@ -305,7 +305,7 @@ pub(super) fn check_tables(tables: &[toml::Value]) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether the joints of all effects exist and can have them.
+/// Checks that the joints of all effects exist and can have these effects.
 pub(super) fn check_effects(robot: &Robot) -> Result<(), Fault> {
     let joints: Vec<&str> = robot.joints.iter().map(|j| j.name.as_str()).collect();
     let names = format!("this robot's joints are {}", joints.join(", "));
@@ -356,8 +356,8 @@ impl Robot {
         }
     }
 
-    /// The effects with their joints as indices. What names no joint of this robot is left out; a description that was
-    /// loaded has none such.
+    /// Returns the effects with their joints as indices. Leaves out effects whose joint this robot does not have; a
+    /// loaded description has no such effect.
     pub fn placed_effects(&self) -> Vec<Placed> {
         self.effects
             .iter()

@@ -10,7 +10,7 @@ fn with(effect: &str) -> Result<Robot, String> {
     Robot::from_toml(&text, Path::new("robot.toml")).map_err(|e| e.to_string())
 }
 
-/// Every parameter at the low end of its searched range.
+/// An effect with every parameter at the low end of its searched range.
 fn smallest(kind: Kind) -> RobotEffect {
     let about = kind.about();
     let of = |list: &[Parameter]| list.iter().map(|p| p.range[0]).collect::<Vec<f64>>();
@@ -227,7 +227,7 @@ fn what_could_not_be_read_back_is_not_written() {
     );
 }
 
-/// The table of the documentation, from the library.
+/// Returns the documentation's table, made from the library.
 fn table() -> String {
     let mut out = String::from(
         "| `kind` (`law`) | what | equation | parameters |\n| --- | --- | --- | --- |\n",
@@ -254,7 +254,7 @@ fn table() -> String {
     out
 }
 
-/// With `RIG_WRITE_DOCS` set the page is brought up to date instead.
+/// Updates the page instead if `RIG_WRITE_DOCS` is set.
 #[test]
 fn the_page_on_formats_has_every_effect_as_the_library_has_it() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");

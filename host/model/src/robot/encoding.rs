@@ -2,15 +2,15 @@
 
 use encoding_rs::{Encoding, UTF_8};
 
-/// What a file holds.
+/// Contents of a file.
 pub(super) struct Decoded {
-    /// Its text; a declaration of another encoding than UTF-8 says UTF-8 now.
+    /// Its text; a declaration of another encoding is replaced by UTF-8.
     pub text: String,
-    /// Name of the encoding where it was not UTF-8.
+    /// Name of the encoding if it was not UTF-8.
     pub from: Option<&'static str>,
 }
 
-/// Bytes that are no text, and where.
+/// Position of bytes that are not text.
 pub(super) struct NoText {
     /// Bytes before them.
     pub offset: usize,
@@ -18,8 +18,8 @@ pub(super) struct NoText {
     pub line: usize,
 }
 
-/// Reads bytes by their byte order mark; else as UTF-8, which other encodings hardly ever are by chance and which is often declared
-/// as something else; else by the encoding that an XML declaration states.
+/// Decodes bytes by their byte order mark, else as UTF-8, else by an XML declaration. UTF-8 comes first because other
+/// encodings rarely are valid UTF-8, and UTF-8 files are often declared wrongly.
 pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, NoText> {
     let marked = Encoding::for_bom(bytes).map(|(encoding, _)| encoding);
     if marked.is_none_or(|encoding| encoding == UTF_8) {
@@ -28,7 +28,7 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, NoText> {
             Err(wrong) => {
                 let label = stated(bytes).map(str::as_bytes);
                 let encoding = label.and_then(Encoding::for_label);
-                // UTF-16 that is declared without a mark has no ASCII letters to say so.
+                // UTF-16 without a byte order mark has no ASCII letters that could declare it.
                 let Some(encoding) = encoding.filter(|own| *own != UTF_8) else {
                     return Err(wrong);
                 };
@@ -54,7 +54,7 @@ fn of_utf_8(bytes: &[u8]) -> Result<String, NoText> {
 fn of_other(encoding: &'static Encoding, bytes: &[u8]) -> Result<Decoded, NoText> {
     let (text, _, wrong) = encoding.decode(bytes);
     if wrong || text.bytes().any(unprintable) {
-        // Where, in the text as far as it could be read.
+        // The place, in the text that could be read.
         let is_none = |c: char| c == '\u{fffd}' || u8::try_from(c).is_ok_and(unprintable);
         let end = text.find(is_none).unwrap_or(text.len());
         return Err(NoText {
@@ -76,7 +76,7 @@ fn unprintable(byte: u8) -> bool {
     byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r')
 }
 
-/// The encoding that an XML declaration of ASCII letters states.
+/// Returns the encoding that an XML declaration in ASCII states.
 fn stated(bytes: &[u8]) -> Option<&str> {
     let end = bytes.iter().position(|b| *b == b'>')?;
     stated_in(std::str::from_utf8(&bytes[..=end]).ok()?)
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(read.from, Some("UTF-16LE"));
     }
 
-    /// Files are saved as UTF-8 whatever they declared before.
+    /// Editors save files as UTF-8 and keep the old declaration.
     #[test]
     fn utf_8_is_read_as_such_whatever_is_declared() {
         for label in ["UTF-16", "ISO-8859-1", "Shift_JIS", "US-ASCII", "none"] {

@@ -1,4 +1,4 @@
-//! What can be wrong with a robot description.
+//! Faults of a robot description.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place of a byte offset in `text`.
+    /// Returns the place of a byte offset in `text`.
     pub fn of(text: &str, offset: usize) -> Self {
         let mut end = offset.min(text.len());
         while !text.is_char_boundary(end) {
@@ -42,7 +42,7 @@ pub enum RobotError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Message of the operating system.
         source: std::io::Error,
     },
     /// The path is a directory.
@@ -62,7 +62,7 @@ pub enum RobotError {
     NotText {
         /// The file.
         path: PathBuf,
-        /// Offset of the first byte that is not text, counted from 0.
+        /// Offset of the first byte that is not text, from 0.
         offset: usize,
         /// Line, from 1.
         line: usize,
@@ -80,7 +80,7 @@ pub enum RobotError {
         path: PathBuf,
         /// Where.
         place: Place,
-        /// One sentence: what is there and what would be right.
+        /// One sentence: the text found and the correction.
         message: String,
     },
     /// A value that parses but cannot be right.
@@ -94,7 +94,7 @@ pub enum RobotError {
         what: String,
         /// The value found.
         found: String,
-        /// What would be right.
+        /// The correction.
         right: String,
     },
     /// XML or URDF that does not describe a serial robot.
@@ -104,7 +104,7 @@ pub enum RobotError {
         path: PathBuf,
         /// Where.
         place: Place,
-        /// One sentence: what is there and what would be right.
+        /// One sentence: the text found and the correction.
         message: String,
     },
     /// A link that a joint moves has no inertial parameters.
@@ -124,7 +124,7 @@ pub enum RobotError {
     Write {
         /// The robot.
         robot: String,
-        /// What is wrong with which effect, and what would be right.
+        /// The effect, its fault, and the correction.
         message: String,
     },
     /// The description cannot be put into URDF.
@@ -132,7 +132,7 @@ pub enum RobotError {
     NotUrdf {
         /// The joint.
         joint: String,
-        /// What is missing, as the rest of a sentence about the joint.
+        /// The missing item, as the rest of a sentence about the joint.
         why: String,
     },
 }

@@ -1,8 +1,8 @@
-//! Inertia that no joint has: less than none for its own drive to accelerate.
+//! Checks for negative inertia of a drive, or negative inertia that a drive accelerates.
 //!
-//! Single elements of a link's inertia may be negative: identified values are known in combinations only, whose rest a description
-//! puts at zero. What the torque of a joint accelerates is such a combination itself, the diagonal of the inertia matrix, and it is
-//! positive for every way of splitting it.
+//! Single elements of a link's inertia may be negative: identified values are known only in combinations, and a
+//! description sets the other values to zero. The torque of a joint accelerates such a combination: the diagonal
+//! element of the inertia matrix. It is positive for every way of splitting the combination.
 
 use rig_shared::multibody::{COLUMNS, Chain, column, inertia_matrix};
 use rig_shared::transmission::DriveKind;
@@ -10,25 +10,25 @@ use rig_shared::transmission::DriveKind;
 use super::check::{Fault, Step, written};
 use super::{JointKind, Robot};
 
-/// Share of the largest addend up to which a difference is rounding.
+/// Share of the largest term below which a difference is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The first joint of `robot` whose drive has less inertia than none, or whose torque has less than none to accelerate, with the
-/// way to the value from its joint on.
+/// Returns the first joint of `robot` whose drive has negative inertia, or whose torque accelerates negative inertia,
+/// and the fault with the path from that joint.
 pub(super) fn negative_inertia(robot: &Robot) -> Option<(usize, Fault)> {
     let rows = robot.standard_parameters();
     let drive = (0..rows.len()).find_map(|k| Some((k, of_drive(robot, &rows, k)?)));
-    // A coupled drive adds to more joints than its own.
+    // A coupled drive adds to several joints.
     let simple = robot
         .drive_kinds()
         .iter()
         .all(|kind| *kind == DriveKind::Simple);
-    // What was identified may be a little less than none by its noise, and is read back as it is.
+    // Noise may make an identified value slightly negative; it is read back unchanged.
     let exact = simple && robot.identified.is_none();
     drive.or_else(|| exact.then(|| of_joints(robot, &rows)).flatten())
 }
 
-/// Drive inertia of joint `k`: that of its own gear with what the rotors of all drives add.
+/// Checks the drive inertia of joint `k`: its own gear plus the rotors of all drives.
 fn of_drive(robot: &Robot, rows: &[[f64; COLUMNS]], k: usize) -> Option<Fault> {
     let joint = &robot.joints[k];
     let own = joint.drive.as_ref()?;
@@ -42,7 +42,7 @@ fn of_drive(robot: &Robot, rows: &[[f64; COLUMNS]], k: usize) -> Option<Fault> {
     })
 }
 
-/// Diagonal of the inertia matrix where the joints are at zero and in the middle of their limits.
+/// Checks the diagonal of the inertia matrix with the joints at zero and in the middle of their limits.
 fn of_joints(robot: &Robot, rows: &[[f64; COLUMNS]]) -> Option<(usize, Fault)> {
     let n = robot.joints.len();
     let chain = Chain::new(&robot.geometry(), robot.gravity).ok()?;
@@ -52,7 +52,7 @@ fn of_joints(robot: &Robot, rows: &[[f64; COLUMNS]]) -> Option<(usize, Fault)> {
         .find_map(|q| {
             let mut mass = vec![0.0; n * n];
             inertia_matrix(&chain, rows, q, &mut mass).ok()?;
-            // From the tip: what a link lacks shows in all joints before it.
+            // From the tip: a missing inertia of a link shows in all joints before it.
             let found = (0..n)
                 .rev()
                 .find(|k| mass[k * n + k] < -ROUNDING * largest)?;

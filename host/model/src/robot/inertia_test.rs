@@ -7,7 +7,7 @@ fn read(text: &str) -> Result<Robot, RobotError> {
     Robot::from_toml(text, Path::new("robot.toml"))
 }
 
-/// The sentence that refuses a description, and the text of the line that it names.
+/// Returns the sentence that refuses a description, and the text of the line that it names.
 fn refused(text: &str) -> (String, String) {
     match read(text) {
         Err(error @ RobotError::Value { place, .. }) => {
@@ -51,7 +51,7 @@ fn a_link_with_less_inertia_about_its_axis_than_none_is_refused() {
         sentence.contains("-0.0049 kg·m²") && sentence.contains("Izz"),
         "{sentence}"
     );
-    // An element that no motion of the joint shows may be the rest of a combination.
+    // An element that no motion of the joint shows may be part of a combination.
     assert!(read(&XL330.replace("[0.0, 0.0, 0.0, 0.0049,", "[0.0, 0.0, 0.0, -0.09,")).is_ok());
 }
 

@@ -56,28 +56,28 @@ pub use voltage_controller::{AntiWindup, VoltageController};
 pub use workspace::Region;
 pub use worth::{CONTRADICTED, DESCRIBED, Origin, Quantity, STAND_IN, Worth, worth};
 
-/// Largest robot description that is read; the largest published URDF files are a hundredth of it.
+/// Largest robot description that is read. The largest published URDF files have a hundredth of this size.
 pub const MAX_BYTES: u64 = 16 << 20;
 
-/// What `rig init one-link` writes: the one-link rig, every line with its unit and meaning.
+/// Description that `rig init one-link` writes: the one-link rig. Every line has its unit and meaning.
 pub const ONE_LINK_TEMPLATE: &str = include_str!("../../../robots/one-link.toml");
 
-/// The EMPS axis (Janot, Gautier, Brunot 2019) without any prior inertial or friction value.
+/// The EMPS axis (Janot, Gautier, Brunot 2019) without prior inertial or friction values.
 pub const EMPS: &str = include_str!("../../../robots/emps.toml");
 
-/// The IRp-6 with its ball screws, absolute drives and coupled wrist; each figure with its source.
+/// The IRp-6 with its ball screws, absolute drives and coupled wrist. Each figure has its source.
 pub const IRP6_TEMPLATE: &str = include_str!("../../../robots/irp6.toml");
 
-/// A planar arm with two direct drives, as the EDDA was one; every figure is representative.
+/// A planar arm with two direct drives, like the EDDA. Every figure is representative.
 pub const EDDA_TEMPLATE: &str = include_str!("../../../robots/edda.toml");
 
-/// The Stäubli TX40 with its coupled wrist, as its published recording needs it.
+/// The Stäubli TX40 with its coupled wrist, for its published recording.
 pub const TX40: &str = include_str!("../../../robots/tx40.toml");
 
 /// The double pendulum of the DFKI whose public recordings the project reproduces.
 pub const DOUBLE_PENDULUM: &str = include_str!("../../../robots/double-pendulum.toml");
 
-/// The pendulum on a Dynamixel XL330 whose public recordings have a voltage and no current.
+/// The pendulum on a Dynamixel XL330. Its public recordings have a voltage and no current.
 pub const XL330: &str = include_str!("../../../robots/xl330.toml");
 
 /// A serial robot as a file describes it.
@@ -92,20 +92,20 @@ pub struct Robot {
     /// Joints from the base outwards.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
-    /// Where points of the links must stay.
+    /// Regions that points of the links must not leave.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub workspace: Vec<Region>,
     /// Effects beyond the standard model, as `diagnose` adds them.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<RobotEffect>,
-    /// Where the values come from an identification: the band that they were found in.
+    /// Band of the identification, if the values were identified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified: Option<IdentifiedBand>,
-    /// Where the values come from, which decides what they are worth ([`worth`]); no file says it.
+    /// Source of the values. It decides how far they are trusted ([`worth`]). Not stored in the file.
     #[serde(skip)]
     pub origin: Origin,
-    /// Frame of the last link as a URDF has it, in the frame of the last joint here; the same frame where no URDF was read. No file
-    /// says it.
+    /// Frame of the last URDF link in the frame of the last joint. Identity if no URDF was read. Not stored in the
+    /// file.
     #[serde(skip)]
     pub last_link: nalgebra::Isometry3<f64>,
 }
@@ -158,16 +158,16 @@ pub struct Joint {
     /// The drive; absent means an ideal torque source on the joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<Drive>,
-    /// The position controller, for simulation; absent means the recording's torque is applied.
+    /// The position controller, for simulation; absent means that the recorded torque is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controller: Option<Controller>,
-    /// The position controller of a joint that is known by its motor voltage, and the supply; absent where it is not known.
+    /// The position controller and supply of a joint whose motor voltage is known; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voltage_controller: Option<VoltageController>,
 }
 
 impl Joint {
-    /// Motor turns per joint turn, with sign; 1 without a drive and where a screw alone moves the joint.
+    /// Returns the motor turns per joint turn, with sign; 1 without a drive, or if only a screw moves the joint.
     pub fn gear_ratio(&self) -> f64 {
         let ratio = self.drive.as_ref().map(|drive| drive.gear_ratio);
         ratio.filter(|ratio| *ratio != 0.0).unwrap_or(1.0)
@@ -189,7 +189,7 @@ pub struct Inertial {
 }
 
 impl Inertial {
-    /// One kilogram at a point, m.
+    /// Returns one kilogram at a point, m.
     pub fn point([x, y, z]: [f64; 3]) -> Self {
         let [xx, yy, zz] = [y * y + z * z, x * x + z * z, x * x + y * y];
         Self {
@@ -199,7 +199,7 @@ impl Inertial {
         }
     }
 
-    /// Mass, first moment and inertia in the order of the standard parameters.
+    /// Returns mass, first moment and inertia in the order of the standard parameters.
     pub fn parameters(&self) -> [f64; 10] {
         let [x, y, z] = self.first_moment;
         let [xx, xy, xz, yy, yz, zz] = self.inertia;
@@ -211,11 +211,11 @@ impl Inertial {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointLimits {
-    /// Lowest and highest position, rad or m; −∞ and ∞ where a revolute joint turns endlessly.
+    /// Lowest and highest position, rad or m; −∞ and ∞ if a revolute joint turns without limit.
     #[serde(deserialize_with = "exact")]
     pub position: [f64; 2],
-    /// Lowest and highest position that motions are designed for where that is less than the joint can do (a URDF's
-    /// `safety_controller`), rad or m.
+    /// Lowest and highest position for designed motions, rad or m, if narrower than the joint's range (a URDF's
+    /// `safety_controller`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub soft_position: Option<[f64; 2]>,
     /// Highest speed, rad/s or m/s.
@@ -229,7 +229,7 @@ pub struct JointLimits {
 }
 
 impl JointLimits {
-    /// The range that motions are designed for.
+    /// Returns the range for designed motions.
     pub fn for_motions(&self) -> [f64; 2] {
         self.soft_position.unwrap_or(self.position)
     }
@@ -248,24 +248,24 @@ pub struct JointFriction {
     pub offset: f64,
 }
 
-/// Motor and gear. The motor's position is gear_ratio·q + Σ couples·q_j + what the screw gives + zero.
+/// Motor and gear. Motor position = gear_ratio·q + Σ couples·q_j + contribution of the screw + zero.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
-    /// Motor turns per joint turn (negative where the gear reverses); 0 (key absent) where a screw moves the joint.
+    /// Motor turns per joint turn (negative if the gear reverses); 0 (key absent) if a screw moves the joint.
     #[serde(default)]
     pub gear_ratio: f64,
     /// Motor turns per turn of other joints, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub couples: BTreeMap<String, f64>,
-    /// Motor position where all joints are at zero (beyond what a screw gives), rad
+    /// Motor position with all joints at zero (without the contribution of a screw), rad
     #[serde(default)]
     pub zero: f64,
     /// kg·m², on the motor side
     #[serde(default)]
     pub rotor_inertia: f64,
-    /// Inertia of gear and shaft seen at the joint beside the rotors', kg·m² (kg where prismatic); of a coupled drive less than
-    /// none where the rotors of others count as more at this joint than was found.
+    /// Inertia of gear and shaft seen at the joint, without the rotors, kg·m² (kg where prismatic). In a coupled drive
+    /// it may be negative: the rotors of other drives may add more to this joint than its identified total.
     #[serde(default)]
     pub joint_inertia: f64,
     /// Coulomb friction on the motor side, N·m
@@ -274,7 +274,7 @@ pub struct Drive {
     /// Viscous friction on the motor side, N·m·s/rad
     #[serde(default)]
     pub viscous: f64,
-    /// N·m/A, on the motor side; 0 (key absent) where unknown, so that motor currents cannot be used
+    /// N·m/A, on the motor side; 0 (key absent) if unknown: motor currents then cannot be used
     #[serde(default)]
     pub torque_constant: f64,
     /// Ω
@@ -286,10 +286,10 @@ pub struct Drive {
     /// Counts per motor turn after quadrature
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder_counts_per_rev: Option<f64>,
-    /// Value of the recording's `duty` column that stands for the whole supply; 1 where absent
+    /// Value of the recording's `duty` column that means full supply; 1 if absent
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duty_full_scale: Option<f64>,
-    /// 0 where brushed
+    /// Number of pole pairs; 0 if brushed
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pole_pairs: Option<u32>,
     /// A ball screw on a crank instead of a constant ratio.
@@ -315,7 +315,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// The commented description that `rig init <kind>` writes, if there is one of that kind.
+/// Returns the commented description that `rig init <kind>` writes, or `None` for an unknown kind.
 pub fn template(kind: &str) -> Option<&'static str> {
     match kind {
         "one-link" => Some(ONE_LINK_TEMPLATE),
@@ -330,12 +330,12 @@ pub fn template(kind: &str) -> Option<&'static str> {
 }
 
 impl Robot {
-    /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
+    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
         Ok(Description::load(path)?.robot)
     }
 
-    /// Reads TOML text; `path` only names the source in messages. What the user should know of it [`Description::load`] says.
+    /// Reads TOML text; `path` only names the source in messages. [`Description::load`] also returns the remarks.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self, RobotError> {
         Ok(text::read(text, path)?.0)
     }
@@ -351,12 +351,12 @@ impl Robot {
         Ok(robot)
     }
 
-    /// The description as TOML with units in comments; [`Robot::from_toml`] reads it back equal.
+    /// Returns the description as TOML with units in comments. [`Robot::from_toml`] reads back an equal description.
     pub fn to_toml(&self) -> Result<String, RobotError> {
         written::write(self)
     }
 
-    /// Index (from 0) of the joint called `name`.
+    /// Returns the index (from 0) of the joint called `name`.
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|j| j.name == name)
     }
@@ -367,17 +367,17 @@ impl Robot {
 pub struct Description {
     /// The robot.
     pub robot: Robot,
-    /// The file itself, where it is URDF.
+    /// The file itself, if it is URDF.
     pub urdf: Option<Original>,
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
 }
 
 impl Description {
-    /// Reads a description: TOML or URDF by the extension, by the first character where it is another.
+    /// Reads a description. The extension selects TOML or URDF; for other extensions the first character does.
     ///
     /// # Errors
-    /// [`RobotError`]: what is wrong with the file, by line.
+    /// [`RobotError`] with the fault of the file and its line.
     pub fn load(path: &Path) -> Result<Self, RobotError> {
         let (text, from) = read_text(path)?;
         let extension = path
@@ -420,8 +420,8 @@ impl Description {
     }
 }
 
-/// The whole file as text and the encoding that it had where that is not UTF-8, refusing what cannot be a description before
-/// reading it.
+/// Reads the whole file as text. Returns its encoding too if that is not UTF-8. Refuses a directory, and a file that is
+/// too large, empty or not text.
 fn read_text(path: &Path) -> Result<(String, Option<&'static str>), RobotError> {
     let failed = |source| RobotError::Read {
         path: path.into(),
@@ -431,7 +431,7 @@ fn read_text(path: &Path) -> Result<(String, Option<&'static str>), RobotError> 
         return Err(RobotError::Directory { path: path.into() });
     }
     let mut bytes = Vec::new();
-    // One byte more than allowed tells too large from just fitting, also where the length is unknown.
+    // One byte more than allowed: this detects an oversized file even if its length is unknown.
     let mut limited = File::open(path).map_err(failed)?.take(MAX_BYTES + 1);
     limited.read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MAX_BYTES {

@@ -1,11 +1,11 @@
-//! A description as the numbers that the mathematics takes.
+//! The numbers of a description, for the equations.
 
 use rig_shared::multibody::{COLUMNS, JointGeometry, JointKind as Kind, column};
 
 use super::{JointKind, Robot};
 
 impl Robot {
-    /// Geometry, joint by joint, for [`rig_shared::multibody::Chain::new`].
+    /// Returns the geometry, joint by joint, for [`rig_shared::multibody::Chain::new`].
     pub fn geometry(&self) -> Vec<JointGeometry<f64>> {
         let joint = |joint: &super::Joint| JointGeometry {
             kind: match joint.kind {
@@ -20,16 +20,16 @@ impl Robot {
         self.joints.iter().map(joint).collect()
     }
 
-    /// Torque limit of each joint, N·m or N, where one is stated.
+    /// Returns the torque limit of each joint, N·m or N, if one is stated.
     pub fn torque_limits(&self) -> Vec<Option<f64>> {
         (self.joints.iter())
             .map(|j| j.limits.as_ref().and_then(|l| l.torque))
             .collect()
     }
 
-    /// Standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 where the description is silent.
-    /// The drives' inertia and friction stand on the joint side; what coupled drives and screws add beside the joints'
-    /// diagonals is [`Self::motor_parameters`].
+    /// Returns the standard parameters, one row a joint in the order of `COLUMN_NAMES`; 0 for values that are not
+    /// stated. Inertia and friction of the drives are on the joint side. [`Self::motor_parameters`] returns the terms
+    /// of coupled drives and screws beyond the joints' diagonals.
     pub fn standard_parameters(&self) -> Vec<[f64; COLUMNS]> {
         let joint = |joint: &super::Joint| {
             let mut row = [0.0; COLUMNS];

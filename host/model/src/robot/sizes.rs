@@ -1,7 +1,7 @@
-//! Links larger than any that was built: values in another unit.
+//! Checks for links larger than any real one: their values have another unit.
 //!
-//! The bound, 100 m, is by judgement: no link of an arm is so long, nor has its mass so far from its centre. Lengths in
-//! millimetres and inertias in g·mm² are beyond it from links of 0.1 m and radii of gyration of 3 mm on.
+//! The bound, 100 m, is by judgement: no link of an arm has this length or this radius of gyration. Lengths in
+//! millimetres exceed it from links of 0.1 m on; inertias in g·mm² exceed it from radii of gyration of 3 mm on.
 
 use super::Joint;
 use super::angles::ROUNDING;
@@ -9,13 +9,13 @@ use super::check::{Fault, Step, written};
 use super::urdf::SpatialInertia;
 use rig_output::format_significant;
 
-/// No link is as long, nor its radius of gyration, m.
+/// Bound on the length and the radius of gyration of a link, m.
 pub(super) const LARGEST_LINK: f64 = 100.0;
-/// Between axes closer to parallel than this (but not parallel), as the sine of the angle, the common normal lies far away and
-/// `d` is no length of the robot.
+/// Sine of the angle between axes below which `d` is not a length of the robot, unless the axes are parallel: their
+/// common normal lies far away.
 const CROSSED: f64 = 0.1;
 
-/// What no link is large enough for, as the end of a sentence that names the value.
+/// Returns the end of a sentence on a length that exceeds the bound.
 pub(super) fn too_long(length: f64) -> String {
     format!(
         "no link of a robot is {LARGEST_LINK} m long; it must be in m, and were these mm, it would be {}",
@@ -23,8 +23,8 @@ pub(super) fn too_long(length: f64) -> String {
     )
 }
 
-/// What is wrong with moments of inertia of up to `largest` kg·m² about the centre of a mass of `mass` kg; none where
-/// their radius of gyration can be.
+/// Returns the fault of moments of inertia up to `largest` kg·m² about the centre of a mass of `mass` kg; `None` if the
+/// radius of gyration is possible.
 pub(super) fn too_wide(largest: f64, mass: f64) -> Option<String> {
     let radius = (largest / mass).sqrt();
     (mass > 0.0 && radius > LARGEST_LINK).then(|| {
@@ -39,10 +39,10 @@ pub(super) fn too_wide(largest: f64, mass: f64) -> Option<String> {
     })
 }
 
-/// The first length or inertia of `joints` that no link has, with the way to it from its joint on, and the joint.
+/// Returns the first joint with a length or inertia that no link has, and the fault with the path from that joint.
 ///
-/// Judged is what does not depend on where the frames of nearly parallel axes lie: the distance of neighbouring axes, that
-/// of the centre of mass from the axis, and the inertia about the centre of mass.
+/// Judges only quantities that do not depend on the frames of nearly parallel axes: the distance of neighbouring axes,
+/// the distance of the centre of mass from the axis, and the inertia about the centre of mass.
 pub(super) fn oversized(joints: &[Joint]) -> Option<(usize, Fault)> {
     (0..joints.len()).find_map(|k| Some((k, of_joint(joints, k)?)))
 }

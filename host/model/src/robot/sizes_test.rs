@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::robot::{EDDA_TEMPLATE, ONE_LINK_TEMPLATE, Robot, TX40};
 
-/// What is said of a URDF whose second link hangs at `xyz` and has this inertial, or none.
+/// Returns the message on a URDF whose second link is at `xyz` with this inertial, or no message.
 fn urdf(xyz: &str, inertial: &str) -> Result<Robot, String> {
     let text = format!(
         "<robot name='r'>\n<link name='base'/>\n\
@@ -61,7 +61,7 @@ fn a_urdf_in_another_unit_is_refused_by_line() {
     );
 }
 
-/// Of axes that a calibration found 10⁻⁴ rad off parallel the common normal is kilometres away.
+/// Axes that a calibration found 10⁻⁴ rad off parallel have a common normal kilometres away.
 #[test]
 fn axes_that_are_nearly_parallel_are_no_long_links() {
     let text = "<robot name='r'><link name='base'/>\

@@ -1,4 +1,4 @@
-//! What is read back, and what is said about wrong descriptions.
+//! Reading descriptions, and the messages on wrong ones.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::Path;
@@ -226,7 +226,7 @@ fn wrong_files_are_refused_without_reading_them_through() {
         Robot::load(&huge).unwrap_err(),
         RobotError::TooLarge { .. }
     ));
-    // An unknown ending: the content decides.
+    // An unknown extension: the content decides.
     let path = dir.path().join("robot.txt");
     std::fs::write(&path, format!("\u{feff}{ONE_LINK_TEMPLATE}")).unwrap();
     assert_eq!(Robot::load(&path).unwrap(), example());
@@ -254,7 +254,7 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> Strin
     )
 }
 
-/// A ratio stands wherever ROS 1, ROS 2 or Drake have it; 1 says nothing beside another, and two that differ are no ratio.
+/// ROS 1, ROS 2 and Drake state ratios. A value of 1 beside another is ignored; two different values are refused.
 #[test]
 fn gear_ratios_are_read_in_every_form() {
     let read = |transmission: &str| {
@@ -287,7 +287,7 @@ fn gear_ratios_are_read_in_every_form() {
         two.contains("r.urdf:9:19") && two.contains("60 at 8:"),
         "{two}"
     );
-    // What another file describes.
+    // A joint that another file describes.
     let other = ros_2("", &reduction(50.0)).replace("'one'", "'gripper'");
     assert_eq!(read(&other).unwrap(), None);
 }
@@ -337,7 +337,7 @@ fn urdf_drives_friction_and_limits_are_kept() {
     );
     let text = robot.to_toml().unwrap();
     let mut read_back = Robot::from_toml(&text, Path::new("x.toml")).unwrap();
-    // A TOML says neither that its values came from a URDF nor where that had its last link.
+    // TOML does not store the origin of the values or the last link of a URDF.
     assert_ne!(read_back.origin, robot.origin);
     (read_back.origin, read_back.last_link) = (robot.origin, robot.last_link);
     assert_eq!(read_back, robot);
@@ -423,7 +423,7 @@ fn what_is_no_serial_chain_is_refused_by_name() {
             assert!(said.contains(part), "{said}");
         }
     }
-    // A loop beside the base, and one that the base itself is part of.
+    // A loop beside the base, and one that includes the base.
     let beside = joint("one", "revolute", "a", "b", "") + &joint("two", "revolute", "b", "a", "");
     let through = one.clone()
         + &joint("two", "fixed", "a", "b", "")
@@ -480,7 +480,7 @@ fn what_xacro_has_not_expanded_is_refused_where_it_matters() {
         said.contains("`name` of <joint> is \"${side}_two\"") && said.contains("run xacro"),
         "{said}"
     );
-    // What xacro leaves behind, and what other programs expand.
+    // Macros that xacro leaves, and text that other programs expand.
     let mesh = "<visual><geometry><mesh filename='$(find arm)/a.stl'/></geometry></visual></link>";
     let left = declared(&whole).replacen("</link>", mesh, 1);
     assert!(left.contains("$(find"));
@@ -551,7 +551,7 @@ fn an_alpha_in_degrees_is_refused() {
     assert!(Robot::from_toml(&with("alpha", "alpha = 6.28"), Path::new("r.toml")).is_ok());
 }
 
-/// A full 3 x 3 matrix has its numbers in other places than the six of a symmetric one.
+/// A full 3 x 3 matrix orders its numbers differently from the six of a symmetric one.
 #[test]
 fn lists_with_surplus_numbers_are_refused() {
     for (right, wrong, length) in [

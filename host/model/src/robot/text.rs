@@ -1,4 +1,4 @@
-//! TOML read, with the place of what is wrong.
+//! Reads TOML and locates its faults.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::effects::check_tables;
 use super::error::{Place, RobotError};
 use super::{Drive, Robot};
 
-/// The robot, and what the user should know of the text, one sentence each.
+/// Returns the robot and the remarks on the text, one sentence each.
 pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), RobotError> {
     let refused = |f: Fault| RobotError::Value {
         path: path.into(),
@@ -20,7 +20,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
         found: f.found,
         right: f.right,
     };
-    // Before the whole: what the reader of the whole says of an effect has no line of its own.
+    // Effects are checked first: the reader of the whole file gives no line for an effect.
     if let Ok(tables) = toml::from_str::<toml::Table>(text)
         && let Some(toml::Value::Array(effects)) = tables.get("effect")
     {
@@ -36,7 +36,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
     for (i, joint) in robot.joints.iter().enumerate() {
         let drive = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
         let way = [&drive[..], &[Step::Key("torque_constant")]].concat();
-        // Absent means unknown; written out, zero can only be a slip.
+        // Absent means unknown. A written zero can only be a mistake.
         if joint
             .drive
             .as_ref()
@@ -65,7 +65,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<(Robot, Vec<String>), Robo
     Ok((robot, remarks))
 }
 
-/// Every drive has a ratio, unless a screw takes its place.
+/// Checks that every drive has a ratio or a screw.
 fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotError> {
     for (i, joint) in robot.joints.iter().enumerate() {
         let way = [Step::Key("joint"), Step::At(i), Step::Key("drive")];
@@ -83,7 +83,7 @@ fn missing_ratio(robot: &Robot, text: &str, path: &Path) -> Result<(), RobotErro
     Ok(())
 }
 
-/// What the TOML reader said, on one line, with the mend where it is ours to know.
+/// Returns the message of the TOML reader on one line, with a correction if one is known.
 fn sentence(error: &toml::de::Error) -> String {
     let said = error
         .message()
@@ -91,7 +91,7 @@ fn sentence(error: &toml::de::Error) -> String {
         .map(str::trim)
         .collect::<Vec<_>>()
         .join(", ");
-    // A bare word is taken for the beginning of `true` or `false`.
+    // The reader takes a bare word for the beginning of `true` or `false`.
     if said.starts_with("invalid boolean") || said.contains("must be quoted") {
         return "what stands here is no TOML value; write a number like 20 or 2e-5, text in quotation marks, true or false".into();
     }
@@ -109,7 +109,7 @@ fn sentence(error: &toml::de::Error) -> String {
     said.replace("expected f64", "expected a number") + mend
 }
 
-/// Byte offset of the deepest value that `way` reaches.
+/// Returns the byte offset of the deepest value that `way` reaches.
 fn offset(text: &str, way: &[Step]) -> usize {
     walk(text, way).0
 }

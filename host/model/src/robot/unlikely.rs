@@ -1,13 +1,13 @@
-//! Values of a description that no robot on the earth has: another unit, or a ratio upside down.
+//! Remarks on values that no robot on the earth has: they have another unit, or a ratio is inverted.
 
 use super::{Joint, JointKind, Robot};
 use rig_output::format_trimmed;
 
 /// Standard gravity, m/s².
 const EARTH: f64 = 9.81;
-/// Share by which gravity on the earth may differ from it: 0.3 % from pole to equator, and what a description rounds.
+/// Share by which gravity may differ from the standard: 0.3 % from pole to equator, and rounding in the description.
 const NEAR: f64 = 0.02;
-/// Units that gravity is written in, and how many of them are one m/s².
+/// Other units of gravity, each with its number per m/s².
 const UNITS: [(f64, &str); 5] = [
     (1.0 / EARTH, "g"),
     (100.0, "cm/s²"),
@@ -21,7 +21,7 @@ const HEAVIEST_ROTOR: f64 = 10.0;
 const LARGEST_CONSTANT: f64 = 50.0;
 
 impl Robot {
-    /// One sentence for each value that is no robot's.
+    /// Returns one sentence for each value that no robot has.
     pub fn unlikely_values(&self) -> Vec<String> {
         let gravity = self.unlikely_gravity();
         (gravity.into_iter())
@@ -32,7 +32,7 @@ impl Robot {
     fn unlikely_gravity(&self) -> Option<String> {
         let size = self.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let is = |value: f64| (size / value - 1.0).abs() < NEAR;
-        // Without gravity: a table without friction, a slide that lies, a robot in free fall.
+        // Zero gravity is allowed: a table without friction, a horizontal slide, a robot in free fall.
         if size == 0.0 || is(EARTH) {
             return None;
         }
@@ -55,7 +55,7 @@ fn unlikely_drive(joint: &Joint) -> Vec<String> {
     let name = &joint.name;
     let mut found = Vec::new();
     let ratio = drive.gear_ratio.abs();
-    // A ball screw has none.
+    // A ball screw has no ratio.
     if joint.kind == JointKind::Revolute && ratio > 0.0 && ratio < 1.0 {
         found.push(format!(
             "Joint \"{name}\": gear_ratio is {}, less than one motor turn per joint turn. Motor turns per joint turn are wanted: of a gear of {} to 1 give {}.",

@@ -5,22 +5,22 @@ use serde::{Deserialize, Serialize};
 use super::Joint;
 use super::check::{Fault, Must, Step, number};
 
-/// What the integral of the position error does while the output is at its limit.
+/// Behaviour of the integral of the position error while the output is at its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AntiWindup {
-    /// It grows as elsewhere.
+    /// It grows as it does below the limit.
     #[default]
     None,
-    /// It stands still while the error drives the output further beyond the limit (conditional integration).
+    /// It stops while the error drives the output further beyond the limit (conditional integration).
     Clamping,
 }
 
-/// PID controller with feed-forward of the reference whose output is a share of the supply voltage:
-/// share = proportional·e + integral·∫e − derivative·q̇ + velocity_feedforward·ṙ + acceleration_feedforward·r̈ + bias with
-/// e = r − q, within ± `limit`; voltage = share·(supply\[0\] + supply\[1\]·|share|).
+/// PID controller with feed-forward of the reference. Its output is a share of the supply voltage: share =
+/// proportional·e + integral·∫e − derivative·q̇ + velocity_feedforward·ṙ + acceleration_feedforward·r̈ + bias with e =
+/// r − q, within ± `limit`; voltage = share·(supply\[0\] + supply\[1\]·|share|).
 ///
-/// Gains per rad, or per m where the joint is prismatic.
+/// Gains are per rad, or per m for a prismatic joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VoltageController {
@@ -41,17 +41,17 @@ pub struct VoltageController {
     /// Constant share of the supply.
     #[serde(default)]
     pub bias: f64,
-    /// Largest share of the supply; absent where there is no limit.
+    /// Largest share of the supply; absent if there is no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
     /// What the integral does at the limit.
     #[serde(default)]
     pub anti_windup: AntiWindup,
-    /// Supply without load, V, and its change from there to a share of one, V.
+    /// Supply voltage without load, V, and its change up to a share of one, V.
     pub supply: [f64; 2],
 }
 
-/// What a [`VoltageController`] answers.
+/// Inputs of a [`VoltageController`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
     /// Reference less position, rad or m.
@@ -67,7 +67,7 @@ pub struct Demand {
 }
 
 impl VoltageController {
-    /// Share of the supply that the gains ask for, before the limit.
+    /// Returns the share of the supply before the limit.
     pub fn wish(&self, at: &Demand) -> f64 {
         self.proportional * at.error + self.integral * at.integral - self.derivative * at.velocity
             + self.velocity_feedforward * at.reference_velocity
@@ -75,24 +75,24 @@ impl VoltageController {
             + self.bias
     }
 
-    /// What the integral of the error grows by over `dt`, s, at a wish and an error.
+    /// Returns the growth of the integral of `error` over `dt`, s, for an unlimited share `wish`.
     pub fn integrated(&self, wish: f64, error: f64, dt: f64) -> f64 {
         let beyond = self.limit.is_some_and(|limit| wish.abs() > limit);
         let stands = beyond && self.anti_windup == AntiWindup::Clamping && wish * error > 0.0;
         if stands { 0.0 } else { error * dt }
     }
 
-    /// Voltage at a wish, V.
+    /// Returns the voltage for an unlimited share, V.
     pub fn voltage(&self, wish: f64) -> f64 {
         let limit = self.limit.unwrap_or(f64::INFINITY);
         let share = wish.clamp(-limit, limit);
         share * (self.supply[0] + self.supply[1] * share.abs())
     }
 
-    /// Supply while it gives a voltage, V: where share·(supply\[0\] + supply\[1\]·|share|) is that voltage.
+    /// Returns the supply at an output voltage, V: voltage = share·(supply\[0\] + supply\[1\]·|share|).
     pub fn supply_at(&self, voltage: f64) -> f64 {
         let [none, slope] = self.supply;
-        // The root of slope·share² + none·share = |voltage| that is |voltage| / none without a slope.
+        // The root of slope·share² + none·share = |voltage| that tends to |voltage| / none for a slope of zero.
         let root = (none * none + 4.0 * slope * voltage.abs()).max(0.0).sqrt();
         let share = 2.0 * voltage.abs() / (none + root);
         none + slope * share

@@ -1,4 +1,4 @@
-//! Where points of the links must stay.
+//! Regions that points of the links must not leave.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,12 +36,12 @@ pub struct Region {
         skip_serializing_if = "Option::is_none"
     )]
     pub normal: Option<[f64; 3]>,
-    /// How far along the normal the allowed side begins, from the base frame's origin, m.
+    /// Distance along the normal from the base frame's origin to the allowed side, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beyond: Option<f64>,
 }
 
-/// The first fault of the regions of `robot`, if any.
+/// Returns the first fault of the regions of `robot`, if any.
 pub(super) fn check_workspace(robot: &Robot) -> Result<(), Fault> {
     for (i, region) in robot.workspace.iter().enumerate() {
         let refused = |key: Option<&'static str>, what: &str, found: String, right: &str| {
@@ -69,7 +69,7 @@ pub(super) fn check_workspace(robot: &Robot) -> Result<(), Fault> {
         let lowest = region.min.unwrap_or([f64::NEG_INFINITY; 3]);
         let highest = region.max.unwrap_or([f64::INFINITY; 3]);
         for axis in 0..3 {
-            // Also false for numbers that are none.
+            // Also false for NaN.
             if !(lowest[axis] < highest[axis]) {
                 let key = if region.max.is_some() { "max" } else { "min" };
                 return refused(

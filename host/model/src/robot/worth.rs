@@ -1,12 +1,12 @@
-//! What the values of a description are worth before any data: one table, used by `identify` and `diagnose` alike.
+//! Trust in the values of a description before any data: one table, used by `identify` and `diagnose`.
 //!
-//! A TOML description is the user's own: its values, zeros among them, are stated on purpose. A URDF is an exchange file, written by
-//! exporters that fill `<dynamics>` with 0 or a token; its friction says at most in which decade the friction is.
+//! The values of a TOML description, zeros included, are stated by the user on purpose. A URDF is an exchange file:
+//! exporters fill `<dynamics>` with 0 or a placeholder, so its friction gives at most the order of magnitude.
 
-/// Where a description's values come from.
+/// Source of a description's values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Origin {
-    /// A TOML description, or one that a program made: values stated on purpose.
+    /// A TOML description, or one that a program made: all values are stated on purpose.
     #[default]
     Own,
     /// A URDF file.
@@ -18,7 +18,7 @@ pub enum Origin {
 pub enum Quantity {
     /// Mass, first moment and inertia of a link.
     Inertial,
-    /// The same of the block that stands in for a link of which nothing is stated.
+    /// The same for the block that replaces a link without stated values.
     StandInBody,
     /// Inertia of rotor and gear, seen at the joint.
     DriveInertia,
@@ -28,45 +28,46 @@ pub enum Quantity {
     Offset,
 }
 
-/// What a stated value is worth.
+/// Trust in a stated value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Worth {
-    /// Right to this share of its size (one standard deviation).
+    /// Right within this share of its size (one standard deviation).
     Share(f64),
-    /// Right to this factor either way (one standard deviation of the logarithm) where it is not 0. It is a first value where the
-    /// data say nothing, and no knowledge against what they say.
+    /// Right within this factor either way (one standard deviation of the logarithm) if it is not 0. Used only if the
+    /// data do not determine the value; it never overrides the data.
     Factor(f64),
-    /// Nothing: the value is not stated, whatever stands there.
+    /// No trust: the value counts as not stated.
     Unknown,
 }
 
-/// Inertial values of a description: right to a factor of about three, a share of 2. On the real arms (docs/arms.md) errors on the
-/// hold-out are the same to a few per cent for shares from 1 to 3; at 1 the Stäubli TX40's momentum model has 52 of 60 values within
-/// two published standard deviations, at 2 and 3 it has 55.
+/// Inertial values of a description: a share of 2, right within a factor of about three. On the real arms
+/// (docs/arms.md) errors on the hold-out agree within a few per cent for shares from 1 to 3. With 1 the Stäubli TX40's
+/// momentum model has 52 of 60 values within two published standard deviations, with 2 and 3 it has 55.
 pub const DESCRIBED: f64 = 2.0;
 /// A stand-in body: an aluminium block between two joints. 3: real links differ from it by a factor of a few.
 pub const STAND_IN: f64 = 3.0;
-/// Friction in a URDF, a factor. 10: of 1232 moving joints in the 69 URDF files of example-robot-data 6.0.0, 401 have no `<dynamics>` and
-/// 238 have two zeros; of 591 dampings above 0, 492 are one of 1, 0.5, 0.05, 0.1, 3, 0.001 and 0.003, whatever the joint (counted 2026).
+/// Friction in a URDF: a factor of 10. Of 1232 moving joints in the 69 URDF files of example-robot-data 6.0.0, 401 have
+/// no `<dynamics>` and 238 have two zeros. Of 591 dampings above 0, 492 are one of 1, 0.5, 0.05, 0.1, 3, 0.001 and
+/// 0.003, independent of the joint (counted 2026).
 const URDF_FRICTION: f64 = 10.0;
 
-/// Standard deviations between data and a stated value from which on the value is no knowledge any more. 5: six in ten million true
-/// values are that far off; the same as for an effect whose value differs from the description's.
+/// Standard deviations between data and a stated value above which the value is rejected. 5: six in ten million true
+/// values are that far off. The same limit applies to effects that differ from the description.
 pub const CONTRADICTED: f64 = 5.0;
 
-/// The table. Geometry, gear ratios and limits are not in it: they are taken as exact, and what contradicts them is a fault of
-/// description or recording (docs/diagnosis.md), but for placeholders, which count as not stated when the file is read.
+/// The table. Geometry, gear ratios and limits are not in it: they count as exact. A contradiction is a fault of
+/// description or recording (docs/diagnosis.md). Placeholders count as not stated when the file is read.
 pub fn worth(quantity: Quantity, origin: Origin, value: f64) -> Worth {
     match (quantity, origin) {
         (Quantity::Inertial, _) => Worth::Share(DESCRIBED),
         (Quantity::StandInBody, _) => Worth::Share(STAND_IN),
-        // What exporters write where nothing was entered.
+        // Exporters write this if the user entered nothing.
         (Quantity::Friction, Origin::Urdf) if value <= 0.0 => Worth::Unknown,
-        // URDF has no place for it.
+        // URDF has no element for it.
         (Quantity::DriveInertia, Origin::Urdf) => Worth::Unknown,
         (Quantity::DriveInertia | Quantity::Friction, Origin::Own) => Worth::Share(DESCRIBED),
         (Quantity::Friction, Origin::Urdf) => Worth::Factor(URDF_FRICTION),
-        // It is a matter of sensors and postures, and fitted wherever it can be.
+        // It depends on sensors and postures, and is fitted whenever possible.
         (Quantity::Offset, _) => Worth::Unknown,
     }
 }

@@ -1,4 +1,4 @@
-//! A description as TOML, each line with its unit.
+//! Writes a description as TOML, each line with its unit.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use super::effects::{check_effects, write_effect};
 use super::error::RobotError;
 use super::{AntiWindup, Drive, Joint, JointKind, Region, Robot, Screw, VoltageController};
 
-/// Shortest form that reads back to the same number, always with a point or an exponent.
+/// Returns the shortest form that reads back to the same number, always with a point or an exponent.
 pub(super) fn float(value: f64) -> String {
     format!("{value:?}")
 }
@@ -366,7 +366,7 @@ fn write_screw(out: &mut String, s: &Screw) {
     }
 }
 
-/// Inline table of numbers by name.
+/// Returns an inline table of numbers by name.
 fn table(values: &BTreeMap<String, f64>) -> String {
     let key = |name: &str| {
         let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
@@ -383,7 +383,7 @@ fn table(values: &BTreeMap<String, f64>) -> String {
     format!("{{ {} }}", items.join(", "))
 }
 
-/// A name as a basic TOML string on one line.
+/// Returns a name as a basic TOML string on one line.
 fn quoted_key(name: &str) -> String {
     let mut text = String::from("\"");
     for c in name.chars() {

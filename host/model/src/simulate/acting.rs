@@ -1,4 +1,4 @@
-//! The effects of a model within a step.
+//! The effects of a model within one step.
 
 use rig_shared::effects::{Direction, GAINS, Kind, Memory};
 use rig_shared::scalar::Real as _;
@@ -6,30 +6,30 @@ use rig_shared::scalar::Real as _;
 use super::{SimulateError, Since};
 use crate::effects::{Effects, State, Turn, is_torque};
 
-/// Friction may be beyond zero by this share of itself: rounding.
+/// Share of its size by which friction may have the wrong sign, as rounding.
 const SLACK: f64 = 1e-9;
 
-/// What the effects of a model remember, and what they do in the step at hand.
+/// Hidden states of a model's effects, and their torques in the present step.
 pub(super) struct Acting<'a> {
     effects: &'a Effects,
     memory: Vec<Memory<f64>>,
     motor: Vec<f64>,
     time: f64,
-    /// Where the link is a mass of its own: the place of its coordinate.
+    /// Index of the link's coordinate, if the link is a separate mass.
     link: Option<usize>,
-    /// Torques that do not turn with the direction, one a coordinate.
+    /// Torques that do not depend on the direction of motion, one a coordinate.
     pub torque: Vec<f64>,
-    /// What dry friction adds against motion backwards and forwards, one a joint.
+    /// Dry friction that effects add, for motion backwards and forwards, one a joint.
     dry: Vec<[f64; 2]>,
-    /// The part of that whose hidden state stands for the direction.
+    /// Part of `dry` from presliding, whose hidden state replaces the direction.
     remembered: Vec<[f64; 2]>,
-    /// How far the contact of each joint with presliding is bent.
+    /// Contact deflection of each joint with presliding.
     bent: Vec<Option<f64>>,
-    /// What other friction adds through such a contact, whatever the direction is, one a joint.
+    /// Other friction that acts through such a contact, independent of the direction, one a joint.
     through: Vec<f64>,
-    /// Friction of those over the joint's own, 1, one a joint: presliding sees that of the pass before.
+    /// That friction over the joint's own, 1, one a joint. Presliding uses the value of the pass before.
     beside: Vec<f64>,
-    /// What warming takes off viscous friction, one a joint.
+    /// Change of viscous friction by warming, one a joint.
     warmed: Vec<f64>,
 }
 
@@ -51,7 +51,7 @@ impl<'a> Acting<'a> {
         }
     }
 
-    /// Goes on from what has been.
+    /// Continues from a history.
     pub(super) fn go_on(&mut self, since: &Since) {
         self.time = since.time;
         for (own, before) in self.memory.iter_mut().zip(&since.memory) {
@@ -63,7 +63,7 @@ impl<'a> Acting<'a> {
         self.effects.is_empty()
     }
 
-    /// Inertia that another joint's acceleration makes felt: joint, other, kg·m².
+    /// Returns the inertia that couples a joint to another joint's acceleration: joint, other, kg·m².
     pub(super) fn couplings(&self) -> impl Iterator<Item = (usize, usize, f64)> + use<'a> {
         let of = |p: &&crate::robot::Placed| p.effect.kind == Kind::InertiaCoupling;
         self.effects
@@ -73,7 +73,7 @@ impl<'a> Acting<'a> {
             .filter_map(|p| Some((p.joint, p.other?, p.effect.gains[0])))
     }
 
-    /// What effect `k` sees at a state; the coupled acceleration counts with the inertia.
+    /// Returns the inputs of effect `k`. The coupled acceleration is zero: its inertia is in the mass matrix.
     fn instant(
         &self,
         k: usize,
@@ -106,8 +106,8 @@ impl<'a> Acting<'a> {
         instant
     }
 
-    /// Evaluates all torques in the middle of a step of `dt`: positions, mean velocities and accelerations of all
-    /// coordinates, torques of the drives, and what the links ask of the gears.
+    /// Computes all torques in the middle of a step of `dt`. `motion`: positions, mean velocities and accelerations of
+    /// all coordinates, torques of the drives. `links`: loads of the links on the gears.
     pub(super) fn evaluate(
         &mut self,
         motion: [&[f64]; 4],
@@ -177,7 +177,7 @@ impl<'a> Acting<'a> {
         Ok(())
     }
 
-    /// Refuses viscous friction of a joint of which warming has left less than none.
+    /// Refuses a joint whose viscous friction is negative after warming.
     fn refuse_driving(&self, joint: usize) -> Result<(), SimulateError> {
         let viscous = self.effects.friction(joint, 1.0, 0.0);
         let left = viscous + self.warmed[joint];
@@ -192,8 +192,8 @@ impl<'a> Acting<'a> {
         Ok(())
     }
 
-    /// Bounds of the friction of a joint whose Coulomb friction is `coulomb`, at a velocity: one value where all of it is remembered.
-    /// No more can be than there is: what effects ask for beyond that holds its share of what there is.
+    /// Returns the bounds of the friction of a joint with Coulomb friction `coulomb`, at a velocity. They are equal if
+    /// presliding holds all friction. Presliding cannot hold more: it then holds its share of the friction.
     pub(super) fn bounds(
         &self,
         joint: usize,
@@ -204,7 +204,7 @@ impl<'a> Acting<'a> {
         let bounds = [low - coulomb, high + coulomb];
         let [back, forth] = self.remembered[joint];
         let slack = SLACK * (coulomb + low.abs() + high.abs());
-        // Slid far enough, what is remembered is the direction: the rest must be friction on its own.
+        // After enough sliding the hidden state equals the direction. So the friction without it must dissipate too.
         let driving = |[low, high]: [f64; 2]| SimulateError::DrivingEffects {
             joint: joint + 1,
             velocity,
@@ -212,7 +212,7 @@ impl<'a> Acting<'a> {
             high,
         };
         let through = self.through[joint];
-        // What a bent contact holds goes against what has bent it.
+        // A deflected contact pushes against its deflection.
         let held = self.bent[joint].map_or(0.0, |bent| (coulomb * bent + through) * bent.sgn());
         if held.is_nan() || held < -slack {
             return Err(driving([-held, held]));
@@ -227,7 +227,7 @@ impl<'a> Acting<'a> {
         Err(driving(bounds))
     }
 
-    /// Hidden states and time at the end of the step.
+    /// Computes hidden states and time at the end of the step.
     pub(super) fn advance(&mut self, motion: [&[f64]; 4], dt: f64) {
         for k in 0..self.memory.len() {
             let instant = self.instant(k, motion, dt);
@@ -238,15 +238,15 @@ impl<'a> Acting<'a> {
     }
 }
 
-/// Friction that a hidden state holds by itself, between the `remembered` against motion backwards and forwards: at the end of
-/// its way all dry friction that there is in that direction, so that what the directions differ by stays a constant, as it is
-/// where less is remembered. `bounds` are those of all friction.
+/// Returns the friction that a hidden state holds if presliding is larger than the whole friction. At full deflection
+/// it is the whole dry friction of that direction. So the difference between the directions stays a constant, as it
+/// does for smaller presliding. `bounds` are the bounds of all friction.
 fn winding(bounds: [f64; 2], [back, forth]: [f64; 2]) -> f64 {
     let whole = back - forth;
     if whole <= 0.0 {
         return 0.5 * (bounds[0] + bounds[1]);
     }
-    // From −1 to 1.
+    // Deflection from −1 to 1.
     let way = (back + forth) / whole;
     let [backwards, forwards] = [bounds[0] - back, bounds[1] - forth];
     0.5 * (forwards + backwards + way * (forwards - backwards))

@@ -1,17 +1,17 @@
-//! A gear with play or elasticity: the motor as one mass, the link as the other.
+//! A gear with backlash or elasticity: the motor is one mass, the link the other.
 //!
-//! Sources: Spong 1987; Nordin and Gutman 2002. The drive's inertia and the position sensor are on the motor's side. So is the
-//! joint's friction, but for the share of its viscous and Coulomb parts that the effect puts on the link's; what effects add
-//! to friction stays on the motor.
+//! Sources: Spong 1987; Nordin and Gutman 2002. The drive's inertia, the position sensor and the joint's friction are
+//! on the motor's side. The effect moves a share of viscous and Coulomb friction to the link's side. Friction of other
+//! effects stays on the motor.
 
 use rig_shared::effects::{Kind, SHAPES, transmitted};
 use rig_shared::multibody::{bias_torque, column, inertia_matrix};
 
 use super::{Model, SimulateError};
 
-/// Steps are so short that neither the spring nor its damping turns by more than this within one, rad.
+/// Largest phase of spring and damping within one step, rad. It limits the step length.
 const ANGLE: f64 = 0.1;
-/// Passes on the twist at rest under gravity.
+/// Iterations for the twist at rest under gravity.
 const REST_PASSES: usize = 8;
 
 /// The gear, and the link behind it.
@@ -22,14 +22,14 @@ pub(super) struct Elastic {
     pub link_friction: f64,
     /// Inertia of the motor's side.
     pub rotor: f64,
-    /// rad/s that a step has to resolve.
+    /// Rate that a step has to resolve, rad/s.
     rate: f64,
-    /// Position and velocity of the link; none before the first step.
+    /// Position and velocity of the link; `None` before the first step.
     pub link: Option<[f64; 2]>,
 }
 
 impl Elastic {
-    /// The one that the model has, if any.
+    /// Returns the elastic gear of the model, if any.
     pub(super) fn of(model: &Model) -> Result<Option<Self>, SimulateError> {
         let of = |p: &crate::robot::Placed| {
             let (kind, shapes) = (p.effect.kind, &p.effect.shapes);
@@ -65,18 +65,18 @@ impl Elastic {
         }))
     }
 
-    /// Torque from motor to link at these positions and velocities of the two.
+    /// Returns the torque from motor to link for positions and velocities of both.
     pub(super) fn torque(&self, q: &[f64], v: &[f64]) -> f64 {
         let [gap, stiffness, damping] = self.law;
         transmitted(gap, stiffness, damping, q[0] - q[1], v[0] - v[1])
     }
 
-    /// Steps that a step of `dt` is cut into.
+    /// Returns the number of substeps of a step of `dt`.
     pub(super) fn steps(&self, dt: f64) -> usize {
         (dt * self.rate / ANGLE).ceil().max(1.0) as usize
     }
 
-    /// Where the link hangs at rest behind a motor at `q`.
+    /// Returns the position of the link at rest behind a motor at `q`.
     pub(super) fn at_rest(&self, model: &Model, q: f64) -> Result<f64, SimulateError> {
         let [gap, stiffness, _] = self.law;
         let (mut link, mut load) = (q, [0.0]);

@@ -19,10 +19,10 @@ use crate::robot::{Controller, Robot};
 
 pub use step::Stepper;
 
-/// Bandwidth of the controller that stands in where the description has none, Hz.
+/// Bandwidth of the stand-in controller if the description has none, Hz.
 pub const STAND_IN_BANDWIDTH: f64 = 5.0;
 
-/// Share of the largest inertia below which one is rounding.
+/// Share of the largest inertia below which an inertia is rounding.
 const NO_INERTIA: f64 = 1e-12;
 
 /// Why a motion could not be simulated.
@@ -46,7 +46,7 @@ pub enum SimulateError {
         /// From 1 at the base.
         joint: usize,
     },
-    /// A joint has nothing to move.
+    /// A joint has no inertia to move.
     #[error(
         "joint \"{joint}\" has no inertia to move, so it cannot be simulated: neither its link nor what follows has any about its axis, nor has its drive. Give the link mass and inertia, or the drive a rotor_inertia; `rig identify` writes a description that can."
     )]
@@ -54,7 +54,7 @@ pub enum SimulateError {
         /// The joint's name.
         joint: String,
     },
-    /// The motion left what numbers can hold.
+    /// The motion left the range of finite numbers.
     #[error(
         "the simulated motion of joint \"{joint}\" grew beyond all bounds after {time:.3} s: the controller's gains do not fit the model."
     )]
@@ -75,7 +75,7 @@ pub enum SimulateError {
         /// Least eigenvalue of the damping matrix.
         least: f64,
     },
-    /// Friction whose effects leave it driving.
+    /// Friction that would drive a joint because of effects.
     #[error(
         "the friction of joint {joint} with the description's effects would drive it at {velocity} (rad/s or m/s): it lies between {low} and {high} N·m (N), which must hold 0; give the joint more Coulomb friction, or the effects less."
     )]
@@ -84,12 +84,12 @@ pub enum SimulateError {
         joint: usize,
         /// rad/s or m/s
         velocity: f64,
-        /// Friction against motion backwards.
+        /// Friction for motion backwards.
         low: f64,
-        /// Friction against motion forwards.
+        /// Friction for motion forwards.
         high: f64,
     },
-    /// Viscous friction that has warmed away.
+    /// Viscous friction that warming made negative.
     #[error(
         "after {time:.3} s of motion joint {joint} has warmed so far that its viscous friction is {left} N·m·s/rad (N·s/m), and would drive it: the description gives it {viscous} cold; give viscous_warmup a smaller drop, or [joint.friction] viscous more."
     )]
@@ -100,10 +100,10 @@ pub enum SimulateError {
         time: f64,
         /// Viscous friction cold, N·m·s/rad or N·s/m.
         viscous: f64,
-        /// Viscous friction then, N·m·s/rad or N·s/m.
+        /// Viscous friction at that time, N·m·s/rad or N·s/m.
         left: f64,
     },
-    /// Play or elasticity where it is not simulated.
+    /// Backlash or elasticity where it cannot be simulated.
     #[error(
         "{effect} is simulated for a robot of one joint with a drive of its own only; leave it out, or describe the joint alone."
     )]
@@ -111,7 +111,7 @@ pub enum SimulateError {
         /// The effect and its joint.
         effect: String,
     },
-    /// Play or elasticity without a second mass.
+    /// Backlash or elasticity without a second mass.
     #[error(
         "{effect} needs a motor with inertia on the other side of the gear, and the description has none; give rotor_inertia in [joint.drive]."
     )]
@@ -119,10 +119,10 @@ pub enum SimulateError {
         /// The effect and its joint.
         effect: String,
     },
-    /// The drives cannot be used.
+    /// The drives are invalid.
     #[error(transparent)]
     Drives(#[from] TransmissionError),
-    /// Lengths or inertia.
+    /// Wrong lengths, or an inertia matrix that is not positive definite.
     #[error(transparent)]
     Multibody(#[from] MultibodyError),
 }
@@ -133,35 +133,35 @@ pub struct Model {
     pub chain: Chain<f64>,
     /// Parameters, joint by joint.
     pub parameters: Vec<[f64; COLUMNS]>,
-    /// Drives that move more than their own joint or do it at a changing ratio; none where there is no such drive.
+    /// Drives that move several joints or have a changing ratio; `None` if there is no such drive.
     pub motors: Option<Motors>,
-    /// Effects beyond all that; payloads are in the parameters.
+    /// Effects beyond these; payloads are already in the parameters.
     pub effects: Effects,
 }
 
-/// Coupled drives and what they add to the joints' own parameters.
+/// Coupled drives and their parameters beyond the joints' own.
 pub struct Motors {
-    /// Motor positions as functions of the joints'.
+    /// Motor positions as functions of the joint positions.
     pub transmission: Transmission<f64>,
     /// Parameters, motor by motor, in the order of `MOTOR_COLUMN_NAMES`.
     pub parameters: Vec<[f64; MOTOR_COLUMNS]>,
 }
 
 impl Model {
-    /// The model that a description states.
+    /// Builds the model of a description.
     ///
     /// # Errors
-    /// [`SimulateError::Chain`] on geometry that is no chain.
+    /// [`SimulateError::Chain`] on geometry that does not form a chain.
     pub fn from_robot(robot: &Robot) -> Result<Self, SimulateError> {
         let chain = Chain::new(&robot.geometry(), robot.gravity)?;
         let motors = Motors::from_robot(robot)?;
         Self::assembled(robot, chain, robot.standard_parameters(), motors)
     }
 
-    /// A model of these parameters with the effects of `robot`, whose payloads are added.
+    /// Builds a model from these parameters with the effects of `robot`. Its payloads are added.
     ///
     /// # Errors
-    /// [`SimulateError::Drives`] on drives that are none.
+    /// [`SimulateError::Drives`] on invalid drives.
     pub fn assembled(
         robot: &Robot,
         chain: Chain<f64>,
@@ -178,10 +178,10 @@ impl Model {
         })
     }
 
-    /// Inertia matrix at `q`, n × n row-major, drives and motors included.
+    /// Computes the inertia matrix at `q`, n × n row-major, with drives and motors.
     ///
     /// # Errors
-    /// [`SimulateError::Multibody`], [`SimulateError::Drives`]: lengths.
+    /// [`SimulateError::Multibody`], [`SimulateError::Drives`] on wrong lengths.
     pub fn inertia_matrix(&self, q: &[f64], out: &mut [f64]) -> Result<(), SimulateError> {
         inertia_matrix(&self.chain, &self.parameters, q, out)?;
         if let Some(motors) = &self.motors {
@@ -192,10 +192,9 @@ impl Model {
         Ok(())
     }
 
-    /// Torques of the joints (length n) that a motion needs, drives, motors and friction included.
-    ///
+    /// Computes the joint torques (length n) of a motion, with drives, motors and friction.
     /// # Errors
-    /// As [`Self::inertia_matrix`].
+    /// Same as [`Self::inertia_matrix`].
     pub fn inverse_dynamics(
         &self,
         q: &[f64],
@@ -220,10 +219,10 @@ impl Model {
 }
 
 impl Motors {
-    /// Those of a description; none where every drive moves its own joint at a constant ratio.
+    /// Returns the coupled drives of a description; `None` if every drive moves only its own joint at a constant ratio.
     ///
     /// # Errors
-    /// [`SimulateError::Drives`] on drives that are none.
+    /// [`SimulateError::Drives`] on invalid drives.
     pub fn from_robot(robot: &Robot) -> Result<Option<Self>, SimulateError> {
         let transmission = robot.transmission()?;
         Ok((!transmission.is_simple()).then(|| Self {
@@ -233,14 +232,14 @@ impl Motors {
     }
 }
 
-/// The controllers of a robot; a stand-in where the description has none, and for which joints that was so.
+/// Returns the controllers of a robot, and the joints that got a stand-in because the description has no controller.
 ///
-/// The stand-in is the cascade that places both poles of the joint's own inertia at
-/// [`STAND_IN_BANDWIDTH`], critically damped. What a motion needs beyond that, as friction, is for a feed-forward
-/// ([`Inputs::feed_forward`]): dry friction on a light link holds it against such a feedback.
+/// The stand-in is a cascade that places both poles of the joint's own inertia at [`STAND_IN_BANDWIDTH`], critically
+/// damped. It does not compensate friction: dry friction can hold a light link still. Use a feed-forward
+/// ([`Inputs::feed_forward`]) for that.
 ///
 /// # Errors
-/// [`SimulateError::NoInertia`] where there is nothing to design it for.
+/// [`SimulateError::NoInertia`] if a joint has no inertia to move.
 pub fn controllers(
     robot: &Robot,
     model: &Model,
@@ -273,8 +272,8 @@ pub fn controllers(
     Ok((list, stand_ins))
 }
 
-/// The joint, from the tip, that has next to nothing to move while the joints behind it are free: its pivot of the inertia
-/// matrix (n × n, row-major), which the elimination from the tip leaves (Featherstone 2008, sec. 7.3), is rounding.
+/// Returns the first joint, from the tip, with almost no inertia to move while the joints beyond it are free. Its pivot
+/// of the inertia matrix (n × n, row-major) in the elimination from the tip (Featherstone 2008, sec. 7.3) is rounding.
 fn massless(mass: &[f64], n: usize) -> Option<usize> {
     let largest = (0..n).map(|i| mass[i * n + i]).fold(0.0, f64::max);
     let mut left = mass.to_vec();
@@ -293,15 +292,15 @@ fn massless(mass: &[f64], n: usize) -> Option<usize> {
     None
 }
 
-/// What drives a simulation, sample by sample.
+/// Inputs of a simulation, sample by sample.
 pub struct Inputs<'a> {
     /// Sample period, s.
     pub period: f64,
     /// Reference positions: one slice a joint, one value a sample.
     pub reference: &'a [Vec<f64>],
-    /// Torques that the controllers add to their answers, within the torque limit, same shape; empty for none.
+    /// Torques that the controllers add to their output, within the torque limit, same shape; empty for none.
     pub feed_forward: &'a [Vec<f64>],
-    /// Torques added to the controllers' (disturbances), same shape; empty for none.
+    /// Torques added after the controllers (disturbances), same shape; empty for none.
     pub added: &'a [Vec<f64>],
     /// Initial positions.
     pub q: &'a [f64],
@@ -309,13 +308,13 @@ pub struct Inputs<'a> {
     pub v: &'a [f64],
     /// Steps within one sample.
     pub substeps: u32,
-    /// Whether the controllers run once a sample and hold their torque in between; else they answer at every step, to a
-    /// reference that goes straight from sample to sample, as a drive's own loop does that is faster than its recorder.
+    /// True if the controllers run once a sample and hold their torque. Otherwise they run at every step, with a
+    /// reference interpolated between samples, like a drive whose loop is faster than its recorder.
     pub held: bool,
 }
 
 impl Inputs<'_> {
-    /// Reference and feed-forward of joint `i` so far beyond sample `k`, in samples; after the last they stay.
+    /// Returns reference and feed-forward of joint `i` at `beyond` samples after sample `k`; the last values hold.
     fn asked(&self, i: usize, k: usize, beyond: f64) -> [f64; 2] {
         [self.reference, self.feed_forward].map(|series| {
             let values = series.get(i).and_then(|list| list.get(k..));
@@ -328,7 +327,7 @@ impl Inputs<'_> {
     }
 }
 
-/// Torque that a controller asks for, of position and velocity as read.
+/// Returns the torque that a controller asks for, from the measured position and velocity.
 fn wish(controller: &Controller, reference: f64, [q, v]: [f64; 2]) -> f64 {
     let speed = controller.position_gain * (reference - q);
     controller.torque_gain * controller.velocity_gain * (speed - v)
@@ -337,27 +336,27 @@ fn wish(controller: &Controller, reference: f64, [q, v]: [f64; 2]) -> f64 {
 /// A simulated motion: per joint one value a sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Positions as the sensors read them; at the motor, where it is a mass of its own.
+    /// Positions as the sensors read them; of the motor, if it is a separate mass.
     pub q: Vec<Vec<f64>>,
-    /// Velocities, likewise.
+    /// Velocities, from the same sensors.
     pub qd: Vec<Vec<f64>>,
-    /// Torques of the controllers (without `Inputs::added`), as the sensors read them; where they are not held, the mean of
-    /// those before and after the sample, which belongs to its instant.
+    /// Torques of the controllers (without `Inputs::added`), as the sensors read them. If they are not held, the mean
+    /// of the torques before and after the sample.
     pub tau: Vec<Vec<f64>>,
-    /// Samples at or after which, up to the next, a joint's torque limit cut the controller's wish.
+    /// Per joint, number of samples in whose period the torque limit cut the controller's output.
     pub saturated: Vec<usize>,
 }
 
-/// What has been before a simulation begins: nothing by default.
+/// History before a simulation begins; empty by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Since {
     /// Time for which the joints have been running, s.
     pub time: f64,
-    /// What each effect of the model remembers; empty where none does.
+    /// Hidden state of each effect of the model; empty if there is none.
     pub memory: Vec<Memory<f64>>,
 }
 
-/// Simulates the closed loop over all samples of the reference. `progress` is told how many are done.
+/// Simulates the closed loop over all samples of the reference. Calls `progress` with the number of finished samples.
 ///
 /// # Errors
 /// [`SimulateError`], with the joint at fault.
@@ -378,10 +377,10 @@ pub fn closed_loop(
     )
 }
 
-/// [`closed_loop`] of joints that have been running.
+/// Same as [`closed_loop`], for joints that have been running.
 ///
 /// # Errors
-/// As there.
+/// Same as [`closed_loop`].
 pub fn closed_loop_since(
     robot: &Robot,
     model: &Model,
@@ -407,7 +406,7 @@ pub fn closed_loop_since(
     let mut errors = vec![[0.0; 2]; n];
     let substeps = inputs.substeps.max(1);
     let dt = inputs.period / f64::from(substeps);
-    // Answers of the controllers within one sample, and steps to each.
+    // Controller updates within one sample, and steps for each update.
     let (answers, steps) = match inputs.held {
         true => (1, substeps),
         false => (substeps, 1),

@@ -2,7 +2,7 @@
 
 use super::SimulateError;
 
-/// Inverse of a symmetric positive definite matrix by Cholesky; the factor replaces the input.
+/// Inverts a symmetric positive definite matrix by Cholesky; the factor replaces the input.
 pub(super) fn invert(a: &mut [f64], inverse: &mut [f64], n: usize) -> Result<(), SimulateError> {
     for j in 0..n {
         let pivot = a[j * n + j] - (0..j).map(|k| a[j * n + k] * a[j * n + k]).sum::<f64>();
@@ -29,7 +29,7 @@ pub(super) fn invert(a: &mut [f64], inverse: &mut [f64], n: usize) -> Result<(),
     Ok(())
 }
 
-/// Inverse of a matrix whose symmetric part is positive definite, by elimination with pivoting; `a` is used up.
+/// Inverts a matrix whose symmetric part is positive definite, by elimination with pivoting. Overwrites `a`.
 pub(super) fn invert_any(
     a: &mut [f64],
     inverse: &mut [f64],

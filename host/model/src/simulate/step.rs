@@ -1,19 +1,19 @@
 //! One time step of a chain with dry friction that really sticks.
 //!
-//! Midpoint time-stepping after Moreau (1988; Jean 1999): positions advance by half a step, velocities by a
-//! whole one, positions by the other half. Coulomb friction is a set-valued torque: within a step it is
-//! whatever value in [−fc, fc] brings the joint to rest, or ±fc if that is not enough. Nothing is smoothed,
-//! so a joint below breakaway stands still exactly. Second order in the step while no joint starts or stops.
+//! Midpoint time-stepping after Moreau (1988; Jean 1999): positions advance by half a step, velocities by a whole step,
+//! positions by the other half. Coulomb friction is a set-valued torque. Within a step it takes the value in [−fc, fc]
+//! that brings the joint to rest, or ±fc if that is not enough. Nothing is smoothed, so a joint below breakaway stands
+//! still exactly. The method is second order in the step while no joint starts or stops.
 //!
-//! Motors of coupled drives count with their inertia A + Jᵀ·I_m·J, its change with the position, their viscous friction
-//! and a Coulomb friction along the motor's own motion, all of the middle of the step.
+//! Motors of coupled drives add their inertia A + Jᵀ·I_m·J, its change with the position, their viscous friction and
+//! Coulomb friction along the motor's motion. All are taken in the middle of the step.
 //!
-//! Effects beyond the standard model act as their laws say: what turns with the direction widens or shifts the bounds of
-//! the set-valued friction ([−fc + h(−1), fc + h(1)] at the speed of the step; friction that remembers a distance so
-//! takes its part of Coulomb friction over), the rest is a torque of the middle of the step, a coupled inertia part of the
-//! matrix. Play and elasticity make the motor a mass of its own, with steps short enough for the gear.
+//! Effects beyond the standard model follow their laws. Terms that depend on the direction widen or shift the bounds of
+//! the set-valued friction ([−fc + h(−1), fc + h(1)] at the speed of the step). Presliding replaces its part of Coulomb
+//! friction. Other terms are torques in the middle of the step. A coupled inertia is part of the matrix. With backlash
+//! or elasticity the motor is a separate mass, and the steps are short enough for the gear.
 //!
-//! Leaves out: end stops, temperatures, the electrical side.
+//! Leaves out end stops, temperatures and the electrical side.
 
 use rig_shared::multibody::{COLUMNS, bias_torque, column, inertia_matrix};
 use rig_shared::scalar::Real as _;
@@ -26,14 +26,14 @@ use super::{Model, SimulateError, Since};
 
 mod friction;
 
-/// Passes over velocity-dependent terms; the second makes the step second order.
+/// Passes over velocity-dependent terms. The second makes the step second order.
 const PASSES: usize = 2;
-/// Passes where effects depend on accelerations and hidden states: they contract, but not at once.
+/// Passes if effects depend on accelerations and hidden states. They converge, but not in one pass.
 const PASSES_WITH_EFFECTS: usize = 5;
-/// Steps a model; owns every buffer, so that a step allocates nothing.
+/// Steps a model. Owns every buffer, so that a step allocates nothing.
 pub struct Stepper<'a> {
     model: &'a Model,
-    /// The parameters without friction and offset, which the step treats itself.
+    /// The parameters without friction and offset, which the step computes itself.
     smooth: Vec<[f64; COLUMNS]>,
     mass: Vec<f64>,
     factor: Vec<f64>,
@@ -45,7 +45,7 @@ pub struct Stepper<'a> {
     next: Vec<f64>,
     /// Viscous friction, n × n.
     damping: Vec<f64>,
-    /// Directions along which Coulomb friction acts, one row each: the coordinates, then the motors of coupled drives.
+    /// Directions of Coulomb friction, one row each: the coordinates, then the motors of coupled drives.
     along: Vec<f64>,
     /// Coulomb friction along them.
     coulomb: Vec<f64>,
@@ -54,26 +54,26 @@ pub struct Stepper<'a> {
     acting: Acting<'a>,
     elastic: Option<Elastic>,
     acceleration: Vec<f64>,
-    /// What the links ask of the gears.
+    /// Loads of the links on the gears.
     loads: Vec<f64>,
     friction: Vec<f64>,
-    /// What a unit of each friction does to the velocities (n columns a row), and to the speeds along all directions.
+    /// Response of the velocities to a unit of each friction (n columns a row), and of the speeds along all directions.
     response: Vec<f64>,
     coupling: Vec<f64>,
-    /// Columns of the motors at rest acceleration.
+    /// Columns of the motors at zero acceleration.
     columns: Vec<f64>,
 }
 
 impl<'a> Stepper<'a> {
-    /// Lets effects go on from what has been.
+    /// Continues the effects from a history.
     pub fn go_on(&mut self, since: &Since) {
         self.acting.go_on(since);
     }
 
-    /// Prepares to step a model.
+    /// Prepares the steps of a model.
     ///
     /// # Errors
-    /// [`SimulateError::NegativeFriction`] where a joint's friction would feed energy in.
+    /// [`SimulateError::NegativeFriction`] if a joint's friction would feed energy in.
     pub fn new(model: &'a Model) -> Result<Self, SimulateError> {
         let joints = model.parameters.len();
         let elastic = Elastic::of(model)?;
@@ -129,7 +129,7 @@ impl<'a> Stepper<'a> {
         }
         let contacts = coulomb.len();
         let mut along = vec![0.0; contacts * n];
-        // An elastic gear has two masses and a friction for each.
+        // An elastic gear has two masses, each with its own friction.
         for i in 0..n {
             along[i * n + i] = 1.0;
         }
@@ -161,7 +161,7 @@ impl<'a> Stepper<'a> {
         Ok(stepper)
     }
 
-    /// What depends on the position alone: inertia, damping and the directions of friction in the middle of the step.
+    /// Computes the position-dependent terms in the middle of the step: inertia, damping and directions of friction.
     fn place(&mut self) -> Result<(), SimulateError> {
         let n = self.middle.len();
         self.damping.fill(0.0);
@@ -195,7 +195,7 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Torques at rest acceleration without friction, with the change of the motors' ratios.
+    /// Computes the torques at zero acceleration without friction, with the change of the motors' ratios.
     fn bias(&mut self) -> Result<(), SimulateError> {
         if let Some(elastic) = &self.elastic {
             let torque = elastic.torque(&self.middle, &self.mean_velocity);
@@ -239,7 +239,7 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Torques of the effects in the middle of a step, and the bounds that they leave friction.
+    /// Computes the torques of the effects in the middle of a step, and the resulting bounds of friction.
     fn effects(&mut self, torque: &[f64], dt: f64) -> Result<(), SimulateError> {
         if self.acting.is_empty() {
             return Ok(());
@@ -250,7 +250,7 @@ impl<'a> Stepper<'a> {
             let inertia: f64 = row.zip(&self.acceleration).map(|(m, a)| m * a).sum();
             let rotor = self.smooth[j][column::DRIVE_INERTIA] * self.acceleration[j];
             *load = match self.elastic {
-                // What the shaft transmits, without the friction on the link's side: a law adds what it takes to be carried.
+                // Torque of the shaft without friction on the link's side. A law adds the torque that it transmits.
                 Some(elastic) => {
                     let speed = self.mean_velocity[1];
                     let friction = self.model.effects.friction(j, speed, speed.sgn());
@@ -274,12 +274,11 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`. Where the gear has
-    /// play or elasticity, they are the motor's; the link follows from rest behind it.
+    /// Advances positions `q` and velocities `v` (length n) by `dt` under the joint torques `torque`. With backlash or
+    /// elasticity they belong to the motor; the link starts at rest behind it.
     ///
     /// # Errors
-    /// [`SimulateError::Multibody`] where the inertia matrix is not positive definite,
-    /// [`SimulateError::DrivingEffects`].
+    /// [`SimulateError::Multibody`] if the inertia matrix is not positive definite, [`SimulateError::DrivingEffects`].
     pub fn step(
         &mut self,
         q: &mut [f64],
@@ -306,7 +305,7 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Position and velocity of the link where it is a mass of its own and has begun to move.
+    /// Returns position and velocity of the link if it is a separate mass and has begun to move.
     pub fn link(&self) -> Option<[f64; 2]> {
         self.elastic.and_then(|e| e.link)
     }
@@ -323,7 +322,7 @@ impl<'a> Stepper<'a> {
             self.middle[i] = q[i] + 0.5 * dt * v[i];
         }
         self.place()?;
-        // Viscous friction acts on the mean velocity of the step: half of it belongs to the unknown.
+        // Viscous friction acts on the mean velocity of the step: half of it multiplies the unknown velocity.
         for (entry, (mass, damping)) in self
             .factor
             .iter_mut()

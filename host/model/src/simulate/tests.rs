@@ -46,7 +46,7 @@ fn energy(model: &Model, q: &[f64], v: &[f64]) -> f64 {
         + potential_energy(&model.chain, &model.parameters, q).unwrap()
 }
 
-/// Swings freely and gives the final state and the energy that friction took.
+/// Swings freely and returns the final state and the energy that friction dissipated.
 fn swing(robot: &Robot, dt: f64, seconds: f64) -> (Vec<f64>, Vec<f64>) {
     let model = Model::from_robot(robot).unwrap();
     let n = robot.joints.len();
@@ -83,7 +83,7 @@ fn a_frictionless_swing_converges_to_the_fine_solution() {
 
 #[test]
 fn coulomb_friction_takes_exactly_its_torque_times_the_way() {
-    // Far from its rest position the pendulum swings to one side only: the way is the change of angle.
+    // Far from its rest position the pendulum swings to one side only: the travel is the change of angle.
     let robot = pendulum(0.4, 0.0);
     let frictionless = Model::from_robot(&pendulum(0.0, 0.0)).unwrap();
     let (q, v) = swing(&robot, 1e-5, 0.25);
@@ -111,7 +111,7 @@ fn one_stuck_joint_carries_the_load_of_the_moving_one() {
     robot.joints[0].friction.as_mut().unwrap().coulomb = 50.0;
     let (q, v) = swing(&robot, 1e-4, 1.0);
     assert_eq!((q[0], v[0]), (0.3, 0.0));
-    // The second then swings as a simple pendulum about a fixed pivot: its energy is its own.
+    // The second link then swings as a simple pendulum about a fixed pivot: its energy is its own.
     assert!((q[1] - 0.3).abs() > 0.5);
     let model = Model::from_robot(&robot).unwrap();
     let start = energy(&model, &[0.3, 0.3], &[0.0, 0.0]);
@@ -152,8 +152,8 @@ fn the_stand_in_controller_tracks_a_slow_sine() {
         held: true,
     };
     let motion = closed_loop(&robot, &model, &controllers, &inputs, |_| ()).unwrap();
-    // What a cascade without feed-forward leaves: gravity and viscous friction over the stiffness J·ω², and the
-    // lag of the velocity over the position gain.
+    // Error of a cascade without feed-forward: gravity and viscous friction over the stiffness J·ω², and the lag of the
+    // velocity over the position gain.
     let omega = core::f64::consts::TAU * STAND_IN_BANDWIDTH;
     let last = 3999;
     let speed = motion.qd[0][last];
@@ -183,7 +183,7 @@ fn frictionless_irp6() -> Robot {
     robot
 }
 
-/// Energy of links and rotors, the rotors' from the motor speeds themselves.
+/// Energy of links and rotors. The rotors' part uses the motor speeds.
 fn energy_with_rotors(robot: &Robot, q: &[f64], v: &[f64]) -> f64 {
     let mut links = robot.clone();
     for joint in &mut links.joints {
@@ -204,10 +204,10 @@ fn energy_with_rotors(robot: &Robot, q: &[f64], v: &[f64]) -> f64 {
     energy(&links, q, v) + rotors
 }
 
-/// Joint speeds at which no motor of the IRp-6 stands still, nor reverses for some tenths of a second.
+/// Joint speeds at which no motor of the IRp-6 stands still or reverses for some tenths of a second.
 const THROWN: [f64; 5] = [0.8, 1.0, -2.2, 2.5, 2.0];
 
-/// A throw of the IRp-6 from the middle of its range: final state, and ∫ f(q, v) dt on the way.
+/// A throw of the IRp-6 from the middle of its range: final state, and ∫ f(q, v) dt along it.
 fn throw(
     robot: &Robot,
     dt: f64,
@@ -248,7 +248,7 @@ fn the_friction_of_the_motors_takes_its_power_at_the_motors() {
     }
     let start = energy_with_rotors(&robot, &robot.middle_position(), &THROWN);
     let transmission = robot.transmission().unwrap();
-    // The rate of loss is continuous where a motor reverses, so that the sum of steps holds there too.
+    // The rate of loss is continuous where a motor reverses, so the sum over steps is valid there too.
     let (mut fastest, mut slowest) = ([0.0_f64; 5], [f64::INFINITY; 5]);
     let (q, v, lost) = throw(&robot, 1e-4, 0.2, |q, v| {
         let mut psid = [0.0; 5];
@@ -272,7 +272,7 @@ fn the_friction_of_the_motors_takes_its_power_at_the_motors() {
 
 #[test]
 fn a_motor_that_sticks_holds_the_joints_it_moves() {
-    // Friction of the screws' motors beyond what gravity asks of them; the wrist's is at its joints.
+    // Friction of the screws' motors above the torque of gravity; the wrist's friction is at its joints.
     let mut robot = frictionless_irp6();
     for joint in &mut robot.joints {
         joint.drive.as_mut().unwrap().coulomb = 3.0;
@@ -313,13 +313,13 @@ fn coupled_friction_that_would_drive_is_refused() {
     let path = std::path::Path::new("tx40.toml");
     let robot = Robot::from_toml(crate::robot::TX40, path).unwrap();
     let mut model = Model::from_robot(&robot).unwrap();
-    // Cross damping of the wrist without the diagonal that it belongs to.
+    // Cross damping of the wrist without the diagonal terms that belong to it.
     model.motors.as_mut().unwrap().parameters[5][1] = 0.5;
     let error = Stepper::new(&model).err().unwrap().to_string();
     assert!(error.contains("-0.5"), "{error}");
 }
 
-/// The pendulum without gravity behind a shaft that twists, `share` of its friction on the link's side.
+/// The pendulum without gravity behind an elastic shaft, with `share` of its friction on the link's side.
 fn elastic_joint(share: f64) -> Robot {
     let mut text = pendulum(1.0, 0.2).to_toml().unwrap();
     text += &format!(
@@ -354,11 +354,11 @@ fn pushed(robot: &Robot, torque: f64, seconds: f64) -> [[f64; 2]; 2] {
 
 #[test]
 fn friction_behind_an_elastic_gear_holds_the_link_while_the_motor_winds_it_up() {
-    // All of it behind: nothing holds the motor, which comes to rest where the spring balances the torque.
+    // All friction on the link: nothing holds the motor, which stops where the spring balances the torque.
     let [motor, link] = pushed(&elastic_joint(1.0), 0.5, 3.0);
     assert_eq!(link, [0.0; 2]);
     assert!((motor[0] - 0.5 / 200.0).abs() < 1e-9, "{motor:?}");
-    // All of it before: nothing moves.
+    // All friction on the motor: nothing moves.
     assert_eq!(pushed(&elastic_joint(0.0), 0.5, 3.0), [[0.0; 2]; 2]);
     // Half: the motor breaks loose and winds until spring and its own friction hold it; the link never moves.
     let [motor, link] = pushed(&elastic_joint(0.5), 0.8, 3.0);
@@ -375,7 +375,7 @@ fn the_side_of_the_friction_changes_the_twist_but_not_the_steady_speed() {
         // 1.2 = 1.0 + 0.2·v.
         assert!((motor[1] - 1.0).abs() < 1e-6, "{share}: {motor:?}");
         assert!((link[1] - 1.0).abs() < 1e-6, "{share}: {link:?}");
-        // What passes the gear is the friction behind it.
+        // The gear transmits the friction behind it.
         let spring = 200.0 * (motor[0] - link[0]);
         assert!((spring - share * 1.2).abs() < 1e-6, "{share}: {spring}");
     }
@@ -420,7 +420,7 @@ fn a_link_without_inertia_is_named_whatever_the_controllers() {
     assert_eq!(named(&robot, &[0.3, 0.2]), Ok(()));
 }
 
-/// Whether a little more or a little less friction is remembered than there is: what the directions differ by is the same constant.
+/// If presliding is close to the whole friction, the difference between the directions is the same constant.
 #[test]
 fn friction_that_differs_by_direction_is_a_constant_however_much_is_remembered() {
     let end = |coulomb: f64| {

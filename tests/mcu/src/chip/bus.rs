@@ -1,4 +1,4 @@
-//! The processor's side: what a load, a store and a block of instructions come to.
+//! The processor's side: the effects of a load, a store and a block of instructions.
 
 use super::{BRIDGE, CONTROL_EXCEPTION, Chip, ChipError, Reading, TIMERS, code_of, timer_index};
 use crate::cost::{REFILL, WAIT_STATES};
@@ -67,7 +67,7 @@ impl Chip {
         })
     }
 
-    /// The cycle counter: it counts cycles asleep as well.
+    /// Returns the cycle counter. It also counts cycles asleep.
     fn cycles(&self) -> u32 {
         if self.cycle_counter.0 {
             (self.work.now / self.period).wrapping_sub(self.cycle_counter.1) as u32
@@ -131,7 +131,7 @@ impl Chip {
             }
             Peripheral::Flash => self.flash.write(now, offset, value)?,
             Peripheral::Gpio(n) => {
-                // What the pulls were until now counts until now.
+                // Counts up to now use the pulls up to now.
                 if n == 0 {
                     self.count_edges();
                 }
@@ -186,7 +186,7 @@ impl Chip {
         Ok(())
     }
 
-    /// Peripherals whose reset bit is set start anew.
+    /// Resets the peripherals whose reset bit is set.
     fn reset_held(&mut self) {
         for (k, number) in TIMERS.into_iter().enumerate() {
             if self.rcc.is_held(Peripheral::Tim(number)) {

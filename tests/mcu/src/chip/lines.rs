@@ -8,7 +8,7 @@ use crate::peripheral::{Refusal, told};
 use crate::time::Instant;
 
 impl Chip {
-    /// The interrupt lines as they stand.
+    /// Sets the present levels of the interrupt lines.
     pub(super) fn set_lines(&mut self) {
         let mut lines = [0_u32; 4];
         let mut raise = |number: u32, up: bool| {
@@ -93,7 +93,7 @@ impl Chip {
         Ok(())
     }
 
-    /// Requests of the serial port to the DMA.
+    /// Serves requests of the serial port to the DMA.
     pub(super) fn serve_dma(
         &mut self,
         at: Instant,
@@ -122,8 +122,8 @@ impl Chip {
         Ok(())
     }
 
-    /// A timer's pulse to the converter, whose clock must be on by then: a pulse that nobody can take is a mistake in the
-    /// order of the start.
+    /// Passes a timer's pulse to the converter, whose clock must be on: a pulse that is not received is a mistake in
+    /// the order of the start.
     pub(super) fn trigger_adc(
         &mut self,
         source: u32,
@@ -152,8 +152,8 @@ impl Chip {
             })
     }
 
-    /// The crystal may stop. Watched, it is replaced by the chip's own oscillator, which tells by the non-maskable interrupt;
-    /// not watched, the clock that comes from it stands.
+    /// Handles a crystal that stops. If watched, the chip's own oscillator replaces it and raises the non-maskable
+    /// interrupt. Otherwise the clock from it stops.
     pub(super) fn watch_crystal(&mut self) -> Result<(), Refusal> {
         match self.rcc.set_crystal(!self.board.faults.crystal_dead) {
             Crystal::Unchanged => Ok(()),

@@ -8,7 +8,7 @@ use crate::ripple::Ripple;
 use crate::time::{Instant, to_seconds};
 
 impl Chip {
-    /// What has changed outside acts at once, without waiting for anything else to happen.
+    /// Applies changes of the board at once, without waiting for an event.
     pub fn see_board(&mut self) {
         self.update_pins();
         if let Err(refusal) = self.update_bridge(self.work.now) {
@@ -16,14 +16,14 @@ impl Chip {
         }
     }
 
-    /// Pins that the board holds high: the receiving line idle, the fault line released.
+    /// Sets the pins that the board holds high: the receiving line idle, the fault line released.
     pub(super) fn set_pins(&mut self) {
         self.gpio[0].set_outside(3, true);
         let fault = self.board.fault_pin();
         self.gpio[1].set_outside(12, fault);
     }
 
-    /// Codes on PC1, PC0, PC2 as far as the pins are analogue.
+    /// Returns the codes on PC1, PC0, PC2, if these pins are analogue.
     pub(super) fn codes(&self) -> Codes {
         let [current, supply, temperature] = [(0, 1), (1, 0), (2, 2)].map(|(input, pin)| {
             (self.gpio[2].function(pin) == Function::Analogue).then(|| self.board.code(input))
@@ -38,7 +38,7 @@ impl Chip {
         }
     }
 
-    /// The pins that the board drives.
+    /// Updates the pins that the board drives.
     pub(super) fn update_pins(&mut self) {
         let high = self.board.fault_pin();
         if self.gpio[1].set_outside(12, high) && self.syscfg.port_of(12) == 1 {
@@ -51,11 +51,11 @@ impl Chip {
         let low = self.board.faults.logic_supply;
         let low = low.is_some_and(|supply| self.pwr.detects_low(supply));
         let break_down = low && self.syscfg.breaks_on_low_supply();
-        // The clock's failure acts whatever SYSCFG says.
+        // A clock failure acts independently of SYSCFG.
         self.tim[0].set_system_break(break_down || self.rcc.clock_failed());
     }
 
-    /// The current sense on PC1, at COMP3's second input, and on PB0, at COMP4's first, against DAC3.
+    /// Compares the current sense on PC1 (COMP3's second input) and PB0 (COMP4's first) with DAC3.
     pub(super) fn compare(&mut self) {
         let sense = self.board.sense();
         let wired = |port: usize, pin| {
@@ -69,7 +69,7 @@ impl Chip {
         self.tim[0].set_comparator(4, fourth);
     }
 
-    /// What PWM and enable pin make of the bridge. PA8 and PA9 by alternate function 6 (DS12288 table 13).
+    /// Sets the bridge from PWM and enable pin. PA8 and PA9 by alternate function 6 (DS12288 table 13).
     pub(super) fn update_bridge(&mut self, now: Instant) -> Result<(), Refusal> {
         let mut half = [0.0; 2];
         for (k, level) in half.iter_mut().enumerate() {
@@ -93,7 +93,7 @@ impl Chip {
         Ok(())
     }
 
-    /// The encoder's edges up to now, into the timers that count and time them: PA0 and PA1 by alternate function 1.
+    /// Passes the encoder's edges up to now to the timers that count and time them: PA0, PA1 by alternate function 1.
     pub(super) fn count_edges(&mut self) {
         let pulls = [0, 1].map(|pin| self.gpio[0].pulls_up(pin));
         let edges = self.board.edges(self.work.now, pulls);
@@ -118,7 +118,7 @@ impl Chip {
         }
     }
 
-    /// Bytes that the host puts on the serial line now. They reach the port only where PA3 is set up for it.
+    /// Sends bytes of the host to the serial line. They reach the port only if PA3 is set up for it.
     pub fn send(&mut self, bytes: &[u8]) {
         if self.gpio[0].function(3) == Function::Alternate(12) {
             self.lpuart.receive(self.work.now, bytes);
@@ -126,20 +126,20 @@ impl Chip {
         }
     }
 
-    /// Bytes that have gone out on PA2 since the last call.
+    /// Returns the bytes sent on PA2 since the last call.
     pub fn take_sent(&mut self) -> Vec<u8> {
         core::mem::take(&mut self.lpuart.sent)
     }
 }
 
-/// What is on the converter's pins: codes, and what the current's varies by within a pulse.
+/// Inputs of the converter's pins: codes, and the ripple of the current within a pulse.
 pub(super) struct Codes {
     reference: u16,
     current: Option<u16>,
     supply: Option<u16>,
     temperature: Option<u16>,
     ripple: Ripple,
-    /// Middle of a braking interval, while the pulses come.
+    /// Middle of a braking interval, if there are pulses.
     middle: Option<Instant>,
 }
 

@@ -26,7 +26,7 @@ impl<C: Cpu<Chip>> Emulation<C> {
         Ok(())
     }
 
-    /// Puts a fault down; an error where none was expected.
+    /// Records a fault; returns an error if none was expected.
     fn note_fault(&mut self, what: String) -> Result<(), EmulationError> {
         let pc = self.cpu.get(Register::Pc);
         self.faults.push((pc, what.clone()));

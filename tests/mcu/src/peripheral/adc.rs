@@ -1,5 +1,5 @@
-//! ADC1 (RM0440 section 21): switching on with its waits, calibration, the injected sequence by hardware trigger
-//! or software, single regular conversions, oversampling. ADC2's registers are there, its converter is not.
+//! ADC1 (RM0440 section 21): start with its waits, calibration, the injected sequence by hardware trigger or software,
+//! single regular conversions, oversampling. ADC2 has registers but no converter.
 //!
 //! Left out: DMA, analogue watchdogs, offsets and gain compensation, the context queue, dual mode.
 
@@ -79,11 +79,11 @@ const REGISTERS: &[Register] = &[
     Register(0xC0, "ADC_GCOMP", 0x1000, 0),
 ];
 
-/// One conversion under way.
+/// A conversion in progress.
 #[derive(Clone, Copy, Debug)]
 struct Conversion {
     ends: Instant,
-    /// Rank from 0 among the injected ones; none: a regular one.
+    /// Rank from 0 among the injected ones; `None` for a regular one.
     rank: Option<u32>,
     value: u32,
     last: bool,
@@ -97,7 +97,7 @@ pub struct Adc {
     regulator: Option<Instant>,
     calibrated: Instant,
     under_way: Vec<Conversion>,
-    /// Triggers that came while a sequence was still running.
+    /// Triggers during a running sequence.
     pub missed: u64,
 }
 
@@ -114,11 +114,11 @@ impl Default for Adc {
     }
 }
 
-/// What the board has on a channel's pin when a sample is held, as a 12-bit code; none where nothing is connected.
+/// Returns the 12-bit code of a channel's pin when a sample is held; `None` for an unconnected channel.
 pub type Codes<'a> = &'a dyn Fn(u32, Instant) -> Option<u16>;
 
 impl Adc {
-    /// Period of the converter's clock, from the AHB's and the asynchronous one.
+    /// Returns the period of the converter's clock, from the AHB clock and the asynchronous one.
     fn clock(&self, system: u64, kernel: Result<u64, Refusal>) -> Result<u64, Refusal> {
         const PRESCALERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
         let period = match self.common >> 16 & 3 {
@@ -139,7 +139,7 @@ impl Adc {
         Ok(period)
     }
 
-    /// Half cycles of the sampling time of a channel.
+    /// Returns the half cycles of the sampling time of a channel.
     fn sampling(&self, channel: u32) -> u64 {
         let code = self.bank.get(SMPR1 + 4 * (channel / 10)) >> (3 * (channel % 10)) & 7;
         [5, 13, 25, 49, 95, 185, 495, 1281]
@@ -148,7 +148,7 @@ impl Adc {
             .unwrap_or(5)
     }
 
-    /// End of a conversion that begins at `start`, and its result. A sample is held at the end of its sampling time.
+    /// Returns end and result of a conversion that begins at `start`. A sample is held at the end of its sampling time.
     fn conversion(
         &self,
         channel: u32,
@@ -182,7 +182,7 @@ impl Adc {
         Ok((start + ratio * single * clock / 2, result & 0xFFFF))
     }
 
-    /// Whether the hardware trigger `source` starts the injected sequence.
+    /// Returns true if the hardware trigger `source` starts the injected sequence.
     pub fn listens_to(&self, source: u32) -> bool {
         let jsqr = self.bank.get(JSQR);
         self.bank.get(CR) & JADSTART != 0 && jsqr >> 7 & 3 != 0 && jsqr >> 2 & 0x1F == source
@@ -191,7 +191,7 @@ impl Adc {
     /// Starts the injected sequence.
     ///
     /// # Errors
-    /// A channel with nothing on it, or a clock out of range.
+    /// An unconnected channel, or a clock out of range.
     pub fn start_injected(
         &mut self,
         now: Instant,
@@ -244,12 +244,12 @@ impl Adc {
         Ok(())
     }
 
-    /// When a conversion ends next.
+    /// Returns the next end of a conversion.
     pub fn due(&self) -> Instant {
         self.under_way.iter().map(|c| c.ends).min().unwrap_or(NEVER)
     }
 
-    /// Ends conversions that are due.
+    /// Ends the conversions that are due.
     pub fn advance(&mut self, now: Instant) {
         if self.due() > now {
             return;
@@ -286,7 +286,7 @@ impl Adc {
         self.bank.put(ISR, status);
     }
 
-    /// Whether an interrupt is requested.
+    /// Returns true if an interrupt is requested.
     pub fn requests(&self) -> bool {
         self.bank.get(ISR) & self.bank.get(IER) != 0
     }

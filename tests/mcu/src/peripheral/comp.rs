@@ -1,7 +1,7 @@
 //! Comparators (RM0440 section 24): enable, input selection, polarity, output; COMP3 and COMP4 are wired.
 //!
-//! Left out: hysteresis, blanking, the propagation delay (DS12288: 17 ns typical), the reference's divider, locking, the way
-//! out to pins and EXTI. Asking for divider, blanking or lock is refused.
+//! Left out: hysteresis, blanking, the propagation delay (DS12288: 17 ns typical), the reference's divider, locking,
+//! the outputs to pins and EXTI. Divider, blanking and lock are refused.
 
 use super::{Bank, Refusal, Register, told};
 
@@ -55,8 +55,8 @@ impl Comp {
         self.0.write(offset, value).map(|_| ())
     }
 
-    /// Output of comparator `number` (3 or 4), whose inputs are at these voltages, in any one unit: of its two positive inputs
-    /// and its DAC. Low while it is off; an input that is not connected is none.
+    /// Returns the output of comparator `number` (3 or 4) for the voltages of its two positive inputs and its DAC, in
+    /// any common unit. Low while it is off; an unconnected input is `None`.
     pub fn compare(&mut self, number: u32, plus: [Option<f64>; 2], dac: f64) -> bool {
         let offset = 4 * (number - 1);
         let control = self.0.get(offset);

@@ -1,6 +1,6 @@
 //! DAC3 (RM0440 section 22): two channels without trigger, to on-chip peripherals, without buffer.
 //!
-//! Left out: triggers, waves, DMA, sample and hold, calibration, settling. Asking for one of them is refused.
+//! Left out: triggers, waves, DMA, sample and hold, calibration, settling. Using one of them is refused.
 
 use super::{Bank, Refusal, Register, told};
 
@@ -60,7 +60,7 @@ impl Dac {
         Ok(())
     }
 
-    /// What a channel (0 or 1) gives, as a code of its reference.
+    /// Returns the output of a channel (0 or 1), as a code of its reference.
     pub fn output(&self, channel: u32) -> f64 {
         f64::from(self.0.get(DOR1 + 4 * channel))
     }

@@ -21,7 +21,7 @@ struct Channel {
     count: u32,
     peripheral: u32,
     memory: u32,
-    /// Items of a whole transfer, and how many are done.
+    /// Items of a whole transfer, and number of finished items.
     length: u32,
     done: u32,
     flags: u32,
@@ -36,7 +36,7 @@ pub struct Item {
     pub peripheral: u32,
     /// Bytes in memory.
     pub size: u32,
-    /// From memory to the peripheral.
+    /// True from memory to the peripheral.
     pub to_peripheral: bool,
 }
 
@@ -45,13 +45,13 @@ pub struct Item {
 pub struct Dma([Channel; 8]);
 
 impl Dma {
-    /// Whether a channel waits for requests, and in which direction it moves: true towards the peripheral.
+    /// Returns the direction (true towards the peripheral) if a channel waits for requests.
     pub fn armed(&self, channel: usize) -> Option<bool> {
         let channel = self.0.get(channel)?;
         (channel.control & EN != 0 && channel.count > 0).then_some(channel.control & DIR != 0)
     }
 
-    /// Serves one request of a channel: what is to be moved.
+    /// Serves one request of a channel and returns the item to move.
     ///
     /// # Errors
     /// Addresses outside RAM.
@@ -93,7 +93,7 @@ impl Dma {
         Ok(Some(item))
     }
 
-    /// Whether a channel requests an interrupt.
+    /// Returns true if a channel requests an interrupt.
     pub fn requests(&self, number: usize) -> bool {
         self.0
             .get(number)
@@ -168,7 +168,7 @@ impl Dma {
     }
 }
 
-/// Channel from 0, and register within it.
+/// Returns the channel from 0, and the register within it.
 fn place(offset: u32) -> Result<(usize, u32), Refusal> {
     let from = offset.checked_sub(8).ok_or(Refusal::NoRegister)?;
     let (number, register) = (from as usize / 20, from % 20);

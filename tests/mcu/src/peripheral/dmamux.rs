@@ -1,5 +1,5 @@
-//! DMA request multiplexer (RM0440 section 13.6): which request drives which channel. Synchronisation and
-//! request generators are not modelled.
+//! DMA request multiplexer (RM0440 section 13.6): assigns requests to channels. Synchronisation and request generators
+//! are not modelled.
 
 use super::{Refusal, told};
 
@@ -14,7 +14,7 @@ impl Dmamux {
     /// An access that is not modelled.
     pub fn read(&self, offset: u32) -> Result<u32, Refusal> {
         match offset {
-            // No synchronisation, hence no overrun of it.
+            // Without synchronisation there is no overrun of it.
             0x80 => Ok(0),
             _ => self
                 .0
@@ -32,7 +32,7 @@ impl Dmamux {
         if offset == 0x84 {
             return Ok(());
         }
-        // Events (EGE) go to the request generators, which nothing listens to; SOIE, NBREQ and SPOL say nothing
+        // Events (EGE) go to the request generators, which are not modelled; SOIE, NBREQ and SPOL have no effect
         // without synchronisation.
         if value & 0x0001_0000 != 0 {
             return told(format!(
@@ -47,7 +47,7 @@ impl Dmamux {
         Ok(())
     }
 
-    /// Channel that a request drives: controller 1 or 2, and channel from 0.
+    /// Returns the channel that a request drives: controller 1 or 2, and channel from 0.
     pub fn channel_of(&self, request: u32) -> Option<(u8, usize)> {
         let place = self.0.iter().position(|c| c & 0x7F == request)?;
         Some((1 + (place / 8) as u8, place % 8))

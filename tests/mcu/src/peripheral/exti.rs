@@ -1,5 +1,5 @@
-//! External interrupts (RM0440 section 16.5): the sixteen lines of the pins. The lines of other peripherals
-//! can be configured, but nothing drives them.
+//! External interrupts (RM0440 section 16.5): the sixteen lines of the pins. The lines of other peripherals can be
+//! configured, but no signal drives them.
 
 use super::{Bank, Refusal, Register};
 
@@ -44,7 +44,7 @@ impl Exti {
     /// An access that is not modelled.
     pub fn write(&mut self, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
-            // Pending bits are cleared by writing ones.
+            // Writing ones clears pending bits.
             0x14 => {
                 let pending = self.0.get(0x14) & !value;
                 self.0.put(0x14, pending);
@@ -61,7 +61,7 @@ impl Exti {
         }
     }
 
-    /// A pin that feeds `line` changes its level.
+    /// Handles a level change of a pin that feeds `line`.
     pub fn edge(&mut self, line: u32, rising: bool) {
         let enabled = self.0.get(if rising { 0x08 } else { 0x0C }) & 1 << line;
         if enabled != 0 {
@@ -70,7 +70,7 @@ impl Exti {
         }
     }
 
-    /// Lines that request an interrupt.
+    /// Returns the lines that request an interrupt.
     pub fn pending(&self) -> u32 {
         self.0.get(0x14) & self.0.get(0) & 0xFFFF
     }

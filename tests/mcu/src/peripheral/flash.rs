@@ -1,8 +1,8 @@
-//! Flash controller (RM0440 section 3.7): latency, unlocking, erasing pages and programming double words, with
-//! their times. Dual-bank, pages of 2 KiB. While a bank is busy, whoever fetches from it waits
-//! (section 3.3.2, read-while-write works across banks only).
+//! Flash controller (RM0440 section 3.7): latency, unlocking, erasing pages and programming double words, with their
+//! times. Dual-bank, pages of 2 KiB. A fetch from a busy bank waits (section 3.3.2, read-while-write works across banks
+//! only).
 //!
-//! Left out: fast programming, option bytes, protection; of ECC all but the flag of an error that a test names.
+//! Left out: fast programming, option bytes, protection; ECC except the flag of an error that a test sets.
 
 use super::{Bank, Refusal, Register, told};
 use crate::cpu::Memory;
@@ -21,7 +21,7 @@ const SR: u32 = 0x10;
 const CR: u32 = 0x14;
 const ECCR: u32 = 0x18;
 
-/// Cleared by writing it with one.
+/// Writing one clears it.
 const ECCD: u32 = 1 << 31;
 const EOP: u32 = 1;
 const PROGERR: u32 = 1 << 3;
@@ -81,32 +81,32 @@ impl Default for Flash {
 }
 
 impl Flash {
-    /// Wait states that are set.
+    /// Returns the set wait states.
     pub fn latency(&self) -> u32 {
         self.bank.get(ACR) & 0xF
     }
 
-    /// Whether the instruction cache is on.
+    /// Returns true if the instruction cache is on.
     pub fn caches(&self) -> bool {
         self.bank.get(ACR) & 0x200 != 0
     }
 
-    /// Whether the prefetch is on.
+    /// Returns true if the prefetch is on.
     pub fn prefetches(&self) -> bool {
         self.bank.get(ACR) & 0x100 != 0
     }
 
-    /// A word with two wrong bits has been read, in bank 1 or 2 (FLASH_ECCR: ECCD, BK_ECC).
+    /// Handles the reading of a word with two wrong bits in bank 1 or 2 (FLASH_ECCR: ECCD, BK_ECC).
     pub fn double_error(&mut self, bank: u8) {
         self.bank.put(ECCR, ECCD | u32::from(bank == 2) << 21);
     }
 
-    /// When the job under way ends.
+    /// Returns the end of the present operation.
     pub fn due(&self) -> Instant {
         self.job.map_or(NEVER, |(end, _)| end)
     }
 
-    /// Until when a fetch from `address` has to wait.
+    /// Returns the time until which a fetch from `address` has to wait.
     pub fn stalls(&self, address: u32) -> Option<Instant> {
         let (end, job) = self.job?;
         let (Job::Erase(at) | Job::Program(at, _)) = job;
@@ -114,17 +114,17 @@ impl Flash {
         same.then_some(end)
     }
 
-    /// Whether an interrupt is requested.
+    /// Returns true if an interrupt is requested.
     pub fn requests(&self) -> bool {
         let (status, control) = (self.bank.get(SR), self.bank.get(CR));
         status & EOP != 0 && control & EOPIE != 0 || status & 0xFA != 0 && control & ERRIE != 0
     }
 
-    /// Ends the job under way. Gives the first address and length of what has changed.
+    /// Ends the present operation. Returns the first address and length of the change.
     pub fn finish(&mut self, memory: &mut dyn Memory) -> Option<(u32, u32)> {
         let (_, job) = self.job.take()?;
         let status = self.bank.get(SR) & !BSY;
-        // EOP is set only where its interrupt is enabled (section 3.7.5).
+        // EOP is set only if its interrupt is enabled (section 3.7.5).
         let end = if self.bank.get(CR) & EOPIE != 0 {
             EOP
         } else {
@@ -152,10 +152,10 @@ impl Flash {
         self.bank.put(SR, status);
     }
 
-    /// A store into the memory itself.
+    /// Stores into the memory itself.
     ///
     /// # Errors
-    /// Something that is not modelled.
+    /// An operation that is not modelled.
     pub fn store(
         &mut self,
         now: Instant,
@@ -185,7 +185,7 @@ impl Flash {
                 {
                     *to = from;
                 }
-                // Only an erased double word can be programmed, or any be made all zeros (section 3.3.7).
+                // Only an erased double word can be programmed; any double word can be set to zero (section 3.3.7).
                 if before != [0xFF; 8] && bytes != [0; 8] {
                     self.fail(PROGERR);
                     return Ok(());

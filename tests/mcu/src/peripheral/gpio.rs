@@ -16,7 +16,7 @@ const REGISTERS: &[Register] = &[
     Register(0x28, "BRR", 0, 0x0000_FFFF),
 ];
 
-/// What a pin is set up for.
+/// Function of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
     /// Digital input.
@@ -33,12 +33,12 @@ pub enum Function {
 #[derive(Clone, Debug)]
 pub struct Gpio {
     bank: Bank,
-    /// Levels that the board puts on the pins.
+    /// Levels from the board on the pins.
     outside: u16,
 }
 
 impl Gpio {
-    /// Port `number` (0 for A) after reset.
+    /// Returns port `number` (0 for A) after reset.
     pub fn new(number: u8) -> Self {
         let mut bank = Bank::new(REGISTERS);
         match number {
@@ -57,7 +57,7 @@ impl Gpio {
         Self { bank, outside: 0 }
     }
 
-    /// Function of a pin.
+    /// Returns the function of a pin.
     pub fn function(&self, pin: u32) -> Function {
         match self.bank.get(0x00) >> (2 * pin) & 3 {
             0 => Function::Input,
@@ -70,24 +70,24 @@ impl Gpio {
         }
     }
 
-    /// Whether the pin is driven high as an output.
+    /// Returns true if the pin is driven high as an output.
     pub fn drives_high(&self, pin: u32) -> bool {
         self.function(pin) == Function::Output && self.bank.get(0x14) & 1 << pin != 0
     }
 
-    /// Sets the level that the board puts on a pin; true where it changed.
+    /// Sets the level from the board on a pin; returns true if it changed.
     pub fn set_outside(&mut self, pin: u32, high: bool) -> bool {
         let before = self.outside;
         self.outside = (before & !(1 << pin)) | u16::from(high) << pin;
         before != self.outside
     }
 
-    /// Level that the pin's own pull gives to a wire that nothing drives; low without one.
+    /// Returns the level that the pin's own pull gives to an undriven wire; low without a pull.
     pub fn pulls_up(&self, pin: u32) -> bool {
         self.bank.get(0x0C) >> (2 * pin) & 3 == 1
     }
 
-    /// Level that the board puts on a pin.
+    /// Returns the level from the board on a pin.
     pub fn outside(&self, pin: u32) -> bool {
         self.outside & 1 << pin != 0
     }

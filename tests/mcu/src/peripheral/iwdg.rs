@@ -1,4 +1,4 @@
-//! Independent watchdog (RM0440 section 43). Its clock is the LSI, taken at its nominal 32 kHz.
+//! Independent watchdog (RM0440 section 43). Its clock is the LSI, with its nominal 32 kHz.
 
 use super::{Refusal, told};
 use crate::time::{Instant, NEVER, UNITS_PER_SECOND};
@@ -11,7 +11,7 @@ pub struct Iwdg {
     prescaler: u32,
     reload: u32,
     unlocked: bool,
-    /// When it bites; never until started.
+    /// Time of its reset; never until started.
     bites: Instant,
     /// Longest time between two refreshes so far.
     longest: u64,
@@ -38,17 +38,17 @@ impl Iwdg {
         (u64::from(self.reload) + 1) * divider * LSI_PERIOD
     }
 
-    /// When the watchdog bites if it is not fed.
+    /// Returns the time at which the watchdog resets the chip if it is not fed.
     pub fn bites(&self) -> Instant {
         self.bites
     }
 
-    /// Longest time between two refreshes since it was started.
+    /// Returns the longest time between two refreshes since the start.
     pub fn longest(&self) -> u64 {
         self.longest
     }
 
-    /// A load. The registers' updates are done at once: the status flags read 0.
+    /// A load. Register updates are immediate: the status flags read 0.
     ///
     /// # Errors
     /// An access that is not modelled.

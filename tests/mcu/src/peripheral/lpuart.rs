@@ -1,5 +1,5 @@
-//! Low-power UART (RM0440 section 38): frames of eight bits, one or more stop bits taken as one, FIFO or not,
-//! DMA. Left out: parity, flow control, addressing, wake-up.
+//! Low-power UART (RM0440 section 38): frames of eight bits, stop bits always as one, with or without FIFO, DMA. Left
+//! out: parity, flow control, addressing, wake-up.
 
 use std::collections::VecDeque;
 
@@ -46,13 +46,13 @@ pub struct Lpuart {
     clock: u64,
     received: VecDeque<u8>,
     to_send: VecDeque<u8>,
-    /// Byte in the transmit shift register, and when it is out.
+    /// Byte in the transmit shift register, and the end of its transmission.
     shifting: Option<(Instant, u8)>,
     /// Bytes on the way from the host.
     incoming: VecDeque<u8>,
-    /// When the next of them has arrived.
+    /// Arrival of the next of them.
     arrives: Instant,
-    /// When the line has been idle for a frame.
+    /// Time at which the line has been idle for a frame.
     idle_at: Instant,
     /// Bytes sent and not yet collected.
     pub sent: Vec<u8>,
@@ -79,7 +79,7 @@ impl Default for Lpuart {
 }
 
 impl Lpuart {
-    /// A reset: what has gone out is still to be collected.
+    /// Resets the port. Sent bytes can still be collected.
     pub fn reset(&mut self) {
         let sent = core::mem::take(&mut self.sent);
         *self = Self {
@@ -93,7 +93,7 @@ impl Lpuart {
         self.clock = period;
     }
 
-    /// Time of a frame of ten bits: a bit lasts BRR/256 clock periods (section 38.4.7).
+    /// Returns the time of a frame of ten bits: a bit lasts BRR/256 clock periods (section 38.4.7).
     fn frame(&self) -> u64 {
         const DIVIDERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
         let divider = DIVIDERS
@@ -103,7 +103,7 @@ impl Lpuart {
         (10 * u64::from(self.bank.get(BRR)) * self.clock * divider / 256).max(1)
     }
 
-    /// Bits per second that are set; none where nothing is.
+    /// Returns the set bits per second; `None` if not set.
     pub fn baud(&self) -> Option<f64> {
         (self.bank.get(BRR) != 0)
             .then(|| 10.0 * crate::time::UNITS_PER_SECOND as f64 / self.frame() as f64)
@@ -117,7 +117,7 @@ impl Lpuart {
         }
     }
 
-    /// Bytes that the host puts on the line at `now`.
+    /// Takes bytes that the host sends at `now`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -128,13 +128,13 @@ impl Lpuart {
         self.incoming.extend(bytes);
     }
 
-    /// When something happens here next.
+    /// Returns the time of the next event.
     pub fn due(&self) -> Instant {
         let out = self.shifting.map_or(NEVER, |(at, _)| at);
         out.min(self.arrives).min(self.idle_at)
     }
 
-    /// Lets happen what is due at `now`.
+    /// Handles the events due at `now`.
     pub fn advance(&mut self, now: Instant) {
         if let Some((at, byte)) = self.shifting
             && at <= now
@@ -186,19 +186,19 @@ impl Lpuart {
         }
     }
 
-    /// Whether the transmitter asks the DMA for a byte.
+    /// Returns true if the transmitter asks the DMA for a byte.
     pub fn wants_byte(&self) -> bool {
         self.bank.get(CR3) & DMAT != 0
             && self.bank.get(CR1) & (UE | TE) == UE | TE
             && self.to_send.len() < self.depth()
     }
 
-    /// Whether the receiver has a byte for the DMA.
+    /// Returns true if the receiver has a byte for the DMA.
     pub fn has_byte(&self) -> bool {
         self.bank.get(CR3) & DMAR != 0 && !self.received.is_empty()
     }
 
-    /// Whether an interrupt is requested.
+    /// Returns true if an interrupt is requested.
     pub fn requests(&self) -> bool {
         let (control, status) = (self.bank.get(CR1), self.status());
         control & UE != 0

@@ -1,8 +1,8 @@
-//! The chip's peripherals, a file each, from the reference manual RM0440 rev 8 and, for the core's own, from
-//! the ARMv7-M Architecture Reference Manual (DDI 0403E).
+//! The chip's peripherals, one file each, from the reference manual RM0440 rev 8 and, for the core's own, from the
+//! ARMv7-M Architecture Reference Manual (DDI 0403E).
 //!
-//! Whatever is not modelled is refused by name: a register that is not listed, a bit that is reserved or whose
-//! effect is missing. A refusal ends the run; nothing is silently taken.
+//! Everything not modelled is refused by name: an unlisted register, a reserved bit, or a bit without a modelled
+//! effect. A refusal ends the run; nothing is accepted silently.
 
 pub mod adc;
 pub mod comp;
@@ -21,28 +21,28 @@ pub mod tim;
 
 use thiserror::Error;
 
-/// Why an access is refused.
+/// Reason why an access is refused.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Refusal {
     /// No such register in the model.
     #[error("there is no register there in the model")]
     NoRegister,
-    /// Bits that are reserved, or whose effect is not modelled.
+    /// Bits that are reserved or not modelled.
     #[error("bits {bits:#x} of {register} are reserved or not modelled (written {value:#010x})")]
     Bits {
         /// Name of the register.
         register: &'static str,
         /// The bits.
         bits: u32,
-        /// All that was written.
+        /// The whole written value.
         value: u32,
     },
-    /// Anything else, said in words.
+    /// Another reason, as text.
     #[error("{0}")]
     Told(String),
 }
 
-/// A refusal in words.
+/// Returns a refusal as text.
 pub fn told<T>(text: impl Into<String>) -> Result<T, Refusal> {
     Err(Refusal::Told(text.into()))
 }
@@ -51,7 +51,7 @@ pub fn told<T>(text: impl Into<String>) -> Result<T, Refusal> {
 #[derive(Clone, Copy, Debug)]
 pub struct Register(pub u16, pub &'static str, pub u32, pub u32);
 
-/// Registers that mostly hold what is written into them.
+/// Registers that mostly hold their written values.
 #[derive(Clone, Debug)]
 pub struct Bank {
     registers: &'static [Register],
@@ -82,7 +82,7 @@ impl Bank {
         (place != u8::MAX && offset.is_multiple_of(4)).then_some(usize::from(place))
     }
 
-    /// Value of a register; 0 where there is none.
+    /// Returns the value of a register; 0 if there is none.
     pub fn get(&self, offset: u32) -> u32 {
         self.place(offset)
             .and_then(|place| self.values.get(place))
@@ -90,7 +90,7 @@ impl Bank {
             .unwrap_or(0)
     }
 
-    /// Puts a value in, as hardware does.
+    /// Sets a value, as hardware does.
     pub fn put(&mut self, offset: u32, value: u32) {
         if let Some(slot) = self.place(offset).and_then(|p| self.values.get_mut(p)) {
             *slot = value;
@@ -108,8 +108,8 @@ impl Bank {
         }
     }
 
-    /// A store by software. Bits that software may not set keep what hardware put there; writing back a bit as
-    /// it was read is no error. Gives the value before.
+    /// Stores a value as software does. Bits that software may not set keep the value of the hardware; writing back a
+    /// bit as read is no error. Returns the value before.
     ///
     /// # Errors
     /// [`Refusal::NoRegister`], [`Refusal::Bits`].

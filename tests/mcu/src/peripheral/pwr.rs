@@ -44,14 +44,14 @@ impl Pwr {
         self.0.write(offset, value).map(|_| ())
     }
 
-    /// The voltage detector is on (CR2.PVDE) and finds `supply`, V, below its level (CR2.PLS, section 6.4.2).
+    /// Returns true if the voltage detector is on (CR2.PVDE) and `supply`, V, below its level (CR2.PLS, section 6.4.2).
     pub fn detects_low(&self, supply: f64) -> bool {
         let control = self.0.get(0x04);
         let level = LEVELS.get((control >> 1 & 7) as usize);
         control & 1 != 0 && level.is_some_and(|level| supply < *level)
     }
 
-    /// Highest system clock that the core's voltage allows, Hz (section 6.1.5): range 1 boost 170 MHz, range 1
+    /// Returns the highest system clock for the core's voltage, Hz (section 6.1.5): range 1 boost 170 MHz, range 1
     /// normal 150 MHz, range 2 26 MHz.
     pub fn fastest(&self) -> u64 {
         match (self.0.get(0) >> 9 & 3, self.0.get(0x80) & 0x100) {

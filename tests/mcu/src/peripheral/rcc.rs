@@ -1,7 +1,7 @@
 //! Reset and clock control (RM0440 section 7.4).
 //!
-//! Oscillators are ready as soon as they are on, save a crystal that is dead. Left out: MCO, clocks of peripherals
-//! without a model.
+//! Oscillators are ready as soon as they are on, except a dead crystal. Left out: MCO, clocks of peripherals without a
+//! model.
 
 use super::{Bank, Refusal, Register, told};
 use crate::map::Peripheral;
@@ -52,13 +52,13 @@ const REGISTERS: &[Register] = &[
     Register(0x80, "RCC_APB2SMENR", 0x0437_F801, 0x0437_F801),
     Register(0x88, "RCC_CCIPR", 0, 0xFFFF_FFFF),
     Register(0x90, "RCC_BDCR", 0, 0x0301_837D),
-    // LSION, RMVF; the reset flags are hardware's.
+    // LSION, RMVF; hardware sets the reset flags.
     Register(0x94, "RCC_CSR", 0x0C00_0000, 0x0080_0001),
     Register(0x98, "RCC_CRRCR", 0, 0x0000_0001),
     Register(0x9C, "RCC_CCIPR2", 0, 0x0030_0003),
 ];
 
-/// Why the chip was reset.
+/// Reason of a reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cause {
     /// Power came on.
@@ -72,14 +72,14 @@ pub enum Cause {
     Pin,
 }
 
-/// What a crystal's stopping comes to.
+/// Result of a crystal's stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crystal {
-    /// Nothing new.
+    /// No change.
     Unchanged,
-    /// The clock security system has put the chip's own oscillator in its place.
+    /// The clock security system has replaced it by the chip's own oscillator.
     Replaced,
-    /// The clock has gone with it.
+    /// The system clock has stopped too.
     Lost,
 }
 
@@ -97,10 +97,10 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// After a reset.
+    /// Returns the state after a reset.
     pub fn new(cause: Cause) -> Self {
         let mut bank = Bank::new(REGISTERS);
-        // BORRSTF with power on; the others pull the reset pin too.
+        // BORRSTF at power on; the other causes also pull the reset pin.
         let flags = match cause {
             Cause::PowerOn => 0x0C00_0000,
             Cause::Pin => 0x0400_0000,
@@ -114,8 +114,8 @@ impl Rcc {
         }
     }
 
-    /// Whether the crystal swings. Where the system clock comes from one that stops, directly or by the PLL, the clock
-    /// security system (CR.CSSON) goes over to HSI, switches HSE and PLL off and flags it (RM0440 section 7.2.10).
+    /// Starts or stops the crystal. If a stopped crystal feeds the system clock, directly or by the PLL, the clock
+    /// security system (CR.CSSON) changes to HSI, switches HSE and PLL off and sets its flag (RM0440 section 7.2.10).
     pub fn set_crystal(&mut self, swings: bool) -> Crystal {
         self.crystal = swings;
         let (control, config) = (self.bank.get(CR), self.bank.get(CFGR));
@@ -141,7 +141,7 @@ impl Rcc {
         Crystal::Replaced
     }
 
-    /// CIFR.CSSF: the security system has acted, and nobody has taken note.
+    /// Returns CIFR.CSSF: true if the security system has acted and the flag is not cleared.
     pub fn clock_failed(&self) -> bool {
         self.bank.get(CIFR) & CSSF != 0
     }
@@ -165,12 +165,12 @@ impl Rcc {
         })
     }
 
-    /// A store. True: clocks may have changed.
+    /// A store. Returns true if clocks may have changed.
     ///
     /// # Errors
     /// An access that is not modelled.
     pub fn write(&mut self, offset: u32, value: u32) -> Result<bool, Refusal> {
-        // What reads as ready may be written back.
+        // Ready bits may be written back as read.
         let value = match offset {
             CR => value & !0x0202_0400,
             CFGR => value & !0xC,
@@ -191,12 +191,12 @@ impl Rcc {
         Ok(matches!(offset, CR | CFGR | PLLCFGR | CCIPR))
     }
 
-    /// Offset of a reset register, bits newly set.
+    /// Returns true for the offset of a reset register.
     pub fn is_reset(offset: u32) -> bool {
         (AHB1RSTR..=APB2RSTR).contains(&offset)
     }
 
-    /// Frequency of the PLL's R output, Hz.
+    /// Returns the frequency of the PLL's R output, Hz.
     fn pll(&self) -> Result<u64, Refusal> {
         let config = self.bank.get(PLLCFGR);
         let input = match config & 3 {
@@ -218,7 +218,7 @@ impl Rcc {
         Ok(vco / r)
     }
 
-    /// System clock, Hz.
+    /// Returns the system clock, Hz.
     ///
     /// # Errors
     /// A source that is off, or a frequency that the time base does not divide.
@@ -250,13 +250,13 @@ impl Rcc {
         Ok(divided)
     }
 
-    /// Divider of an APB clock from the system clock.
+    /// Returns the divider of an APB clock from the system clock.
     fn apb_shift(&self, second: bool) -> u32 {
         let bits = self.bank.get(CFGR) >> (if second { 11 } else { 8 }) & 7;
         bits.saturating_sub(3)
     }
 
-    /// Time units of one period of a timer's kernel clock: the APB clock, doubled where that is divided.
+    /// Returns the time units of one period of a timer's kernel clock: the APB clock, doubled if that is divided.
     ///
     /// # Errors
     /// As [`Rcc::system_clock`].
@@ -266,7 +266,7 @@ impl Rcc {
         Ok((UNITS_PER_SECOND / self.system_clock()?) << shift)
     }
 
-    /// Time units of one period of the system clock.
+    /// Returns the time units of one period of the system clock.
     ///
     /// # Errors
     /// As [`Rcc::system_clock`].
@@ -274,7 +274,7 @@ impl Rcc {
         Ok(UNITS_PER_SECOND / self.system_clock()?)
     }
 
-    /// Time units of one period of LPUART1's kernel clock.
+    /// Returns the time units of one period of LPUART1's kernel clock.
     ///
     /// # Errors
     /// As [`Rcc::system_clock`].
@@ -288,7 +288,7 @@ impl Rcc {
         }
     }
 
-    /// Time units of one period of the asynchronous clock of ADC1 and ADC2.
+    /// Returns the time units of one period of the asynchronous clock of ADC1 and ADC2.
     ///
     /// # Errors
     /// As [`Rcc::system_clock`].
@@ -314,7 +314,7 @@ impl Rcc {
         }
     }
 
-    /// Whether a peripheral's clock is on.
+    /// Returns true if a peripheral's clock is on.
     pub fn is_clocked(&self, peripheral: Peripheral) -> bool {
         let (register, bit) = match peripheral {
             Peripheral::Tim(n @ 2..=7) => (APB1ENR1, u32::from(n) - 2),
@@ -341,7 +341,7 @@ impl Rcc {
         self.bank.get(register) & 1 << bit != 0
     }
 
-    /// Whether a peripheral is held in reset.
+    /// Returns true if a peripheral is held in reset.
     pub fn is_held(&self, peripheral: Peripheral) -> bool {
         let (register, bit) = match peripheral {
             Peripheral::Tim(n @ 2..=7) => (0x38, u32::from(n) - 2),

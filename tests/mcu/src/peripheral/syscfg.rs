@@ -1,4 +1,4 @@
-//! System configuration (RM0440 section 10.2): which port feeds which external interrupt, remap, RAM guards.
+//! System configuration (RM0440 section 10.2): port of each external interrupt, remap, RAM guards.
 
 use super::{Bank, Refusal, Register};
 
@@ -40,22 +40,22 @@ impl Syscfg {
         self.0.write(offset, value).map(|_| ())
     }
 
-    /// CFGR2.CLL: a lock-up of the processor acts on the timers' break inputs.
+    /// Returns CFGR2.CLL: true if a lock-up of the processor acts on the timers' break inputs.
     pub fn breaks_on_lockup(&self) -> bool {
         self.0.get(0x1C) & 1 != 0
     }
 
-    /// CFGR2.ECCL: a flash word beyond repair acts on the timers' break inputs.
+    /// Returns CFGR2.ECCL: true if an uncorrectable flash word acts on the timers' break inputs.
     pub fn breaks_on_flash_error(&self) -> bool {
         self.0.get(0x1C) & 8 != 0
     }
 
-    /// CFGR2.PVDL: the voltage detector acts on the timers' break inputs.
+    /// Returns CFGR2.PVDL: true if the voltage detector acts on the timers' break inputs.
     pub fn breaks_on_low_supply(&self) -> bool {
         self.0.get(0x1C) & 4 != 0
     }
 
-    /// Port (0 for A) that feeds external interrupt `line`.
+    /// Returns the port (0 for A) that feeds external interrupt `line`.
     pub fn port_of(&self, line: u32) -> u8 {
         let register = 0x08 + 4 * (line / 4);
         (self.0.get(register) >> (4 * (line % 4)) & 0xF) as u8

@@ -1,9 +1,9 @@
-//! Timers (RM0440 sections 28 to 31): up-counting and centre-aligned time base with repetition counter and
-//! preload, compare flags, PWM outputs, encoder mode with index, break input and system break, enable, update and encoder
-//! clock as triggers, start and capture on an internal trigger.
+//! Timers (RM0440 sections 28 to 31): up-counting and centre-aligned time base with repetition counter and preload,
+//! compare flags, PWM outputs, encoder mode with index, break input and system break. Enable, update and encoder clock
+//! can be triggers; an internal trigger can start and capture.
 //!
-//! Left out: slave modes other than encoder and trigger mode, capture from a pin, the resynchronisation of a trigger by some clock periods,
-//! dead time, DMA requests, dithering, complementary outputs. Asking for one of them is refused.
+//! Left out: slave modes other than encoder and trigger mode, capture from a pin, the resynchronisation delay of a
+//! trigger, dead time, DMA requests, dithering, complementary outputs. Using one of them is refused.
 
 mod access;
 mod breaks;
@@ -45,18 +45,18 @@ const IDXF: u32 = 1 << 20;
 const TERRF: u32 = 1 << 23;
 /// First over-capture flag.
 const CC1OF: u32 = 1 << 9;
-/// TIMx_CR2.MMS, whose fourth bit lies apart, at "encoder clock output" (RM0440 section 30.5.2).
+/// TIMx_CR2.MMS at "encoder clock output" (RM0440 section 30.5.2). Its fourth bit is separate.
 const MMS: u32 = 0x0200_0070;
 const MMS_ENCODER_CLOCK: u32 = 0x0200_0000;
 const MMS_ENABLE: u32 = 1 << 4;
 const MMS_UPDATE: u32 = 2 << 4;
-/// TIMx_SMCR.SMS, whose fourth bit lies apart, at "trigger mode": a trigger starts the counter.
+/// TIMx_SMCR.SMS at "trigger mode": a trigger starts the counter. Its fourth bit is separate.
 const SMS: u32 = 0x0001_0007;
 const SMS_TRIGGER: u32 = 6;
-/// TIMx_SMCR.TS, likewise in two parts.
+/// TIMx_SMCR.TS, also in two parts.
 const TS: u32 = 0x0030_0070;
-/// TS of the connections that are modelled: ITR0, which is TIM1's TRGO at TIM4, and ITR1, which is TIM2's at TIM5 (RM0440
-/// section 30.4.2, table of the internal trigger connections).
+/// TS of the modelled connections: ITR0 (TIM1's TRGO at TIM4) and ITR1 (TIM2's at TIM5) (RM0440 section 30.4.2, table
+/// of the internal trigger connections).
 const TS_ITR0: u32 = 0;
 const TS_ITR1: u32 = 0x10;
 const BKE: u32 = 1 << 12;
@@ -95,7 +95,7 @@ const REGISTERS: &[Register] = &[
     Register(0x64, "TIM_AF2", 0x0000_0001, 0x0000_0201),
 ];
 
-/// What has taken effect, as against what is preloaded.
+/// Values in effect, in contrast to preloaded ones.
 #[derive(Clone, Copy, Debug)]
 struct Active {
     prescaler: u32,
@@ -111,15 +111,15 @@ pub struct Tim {
     /// Period of the kernel clock.
     clock: u64,
     active: Active,
-    /// When the run up or down under way began.
+    /// Start of the present run up or down.
     base: Instant,
-    /// Compare matches up to here are flagged.
+    /// Compare matches up to this time are flagged.
     checked: Instant,
     down: bool,
     repetitions: u32,
-    /// Counter while it does not run by the clock.
+    /// Counter while the clock does not run it.
     held: u32,
-    /// Updates that went out as TRGO2 or TRGO and have not been taken.
+    /// Updates sent as TRGO2 or TRGO and not yet taken.
     pulses: [Option<Instant>; 2],
     indexed: bool,
     /// Levels at the break input: the pin, and comparators 1 to 4.
@@ -131,7 +131,7 @@ pub struct Tim {
 }
 
 impl Tim {
-    /// Timer `number` after reset, by a clock of this period.
+    /// Returns timer `number` after reset, with a clock of this period.
     pub fn new(number: u8, clock: u64) -> Self {
         let mut bank = Bank::new(REGISTERS);
         let reload = if matches!(number, 2 | 5) {
@@ -163,7 +163,7 @@ impl Tim {
         }
     }
 
-    /// Sets the period of the kernel clock; the count goes on from where it is.
+    /// Sets the period of the kernel clock; the count continues.
     pub fn set_clock(&mut self, now: Instant, period: u64) {
         if period != self.clock {
             let count = self.count(now);
@@ -188,7 +188,7 @@ impl Tim {
         self.clock * (u64::from(self.active.prescaler) + 1)
     }
 
-    /// Length of a run up or down, ticks.
+    /// Returns the length of a run up or down, ticks.
     fn run(&self) -> u64 {
         if self.is_centred() {
             u64::from(self.active.reload).max(1)
@@ -220,7 +220,7 @@ impl Tim {
         self.checked = now;
     }
 
-    /// Time of compare match of channel `k` in the run under way, if it has one there.
+    /// Returns the time of the compare match of channel `k` in the present run, if any.
     fn match_time(&self, k: usize) -> Option<Instant> {
         let compare = *self.active.compare.get(k)?;
         if compare > self.active.reload {
@@ -241,20 +241,20 @@ impl Tim {
         Some(self.base + u64::from(ticks) * self.tick())
     }
 
-    /// When something happens here next that anybody waits for.
+    /// Returns the next event here that has a receiver.
     pub fn due(&self) -> Instant {
         if !self.counts_by_clock() {
             return NEVER;
         }
         let run = self.run() * self.tick();
-        // Runs to come before the update: the repetition counter has to come down first.
+        // Runs before the update: the repetition counter has to count down first.
         let update = self.base + run * (u64::from(self.repetitions) + 1);
         let mut due = update;
         for k in 0..4 {
             if self.bank.get(DIER) & 2 << k != 0 && self.bank.get(SR) & 2 << k == 0 {
                 let next = match self.match_time(k) {
                     Some(time) if time > self.checked => time,
-                    // In a later run: look again when this one is over.
+                    // In a later run: checked again after this one.
                     _ => self.base + run,
                 };
                 due = due.min(next);
@@ -263,7 +263,7 @@ impl Tim {
         due
     }
 
-    /// Lets happen what is due up to `now`.
+    /// Handles the events due up to `now`.
     pub fn advance(&mut self, now: Instant) {
         while self.counts_by_clock() {
             let end = self.base + self.run() * self.tick();
@@ -317,7 +317,7 @@ impl Tim {
         self.send_update(at);
     }
 
-    /// An update goes out where it is selected as TRGO2 (CR2.MMS2 = 2) or TRGO (CR2.MMS = 2) when it comes.
+    /// Sends an update if it is selected as TRGO2 (CR2.MMS2 = 2) or TRGO (CR2.MMS = 2) when it comes.
     fn send_update(&mut self, at: Instant) {
         let control = self.bank.get(CR2);
         if control >> 20 & 0xF == 2 {
@@ -328,7 +328,7 @@ impl Tim {
         }
     }
 
-    /// Takes the preloaded values over.
+    /// Applies the preloaded values.
     fn load(&mut self) {
         self.active.prescaler = self.bank.get(PSC);
         self.active.reload = self.bank.get(ARR);
@@ -337,22 +337,22 @@ impl Tim {
         }
     }
 
-    /// The update since the last call that went out as TRGO2.
+    /// Returns the update sent as TRGO2 since the last call.
     pub fn take_trgo2(&mut self) -> Option<Instant> {
         self.pulses[0].take()
     }
 
-    /// The update since the last call that went out as TRGO.
+    /// Returns the update sent as TRGO since the last call.
     pub fn take_trgo(&mut self) -> Option<Instant> {
         self.pulses[1].take()
     }
 
-    /// Whether the counter's enable is on and goes out as TRGO.
+    /// Returns true if the counter's enable is on and is sent as TRGO.
     pub fn sends_enable(&self) -> bool {
         self.bank.get(CR2) & MMS == MMS_ENABLE && self.bank.get(CR1) & CEN != 0
     }
 
-    /// Internal trigger 0 rose: a counter in trigger mode starts (RM0440 section 30.4.19).
+    /// Handles a rise of internal trigger 0: a counter in trigger mode starts (RM0440 section 30.4.19).
     pub fn internal_trigger_0(&mut self, at: Instant) {
         let slave = self.bank.get(SMCR) & (SMS | TS) == SMS_TRIGGER | TS_ITR0;
         if slave && self.bank.get(CR1) & CEN == 0 {
@@ -362,7 +362,7 @@ impl Tim {
         }
     }
 
-    /// Interrupt lines: break, update, trigger, compare.
+    /// Returns the interrupt lines: break, update, trigger, compare.
     pub fn requests(&self) -> [bool; 4] {
         let pending = self.bank.get(SR) & self.bank.get(DIER);
         [

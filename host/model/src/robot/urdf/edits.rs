@@ -1,4 +1,4 @@
-//! Pieces of a URDF file that are written anew, in its own indentation.
+//! Edits of a URDF file, in its own indentation.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use super::reader::{Xml, child};
 use super::spatial::SpatialInertia;
 use super::write::{comment, inertial_element};
 
-/// A piece of the file and what stands there instead.
+/// A part of the file and its replacement.
 pub(super) struct Edit {
     pub(super) range: Range<usize>,
     pub(super) text: String,
@@ -19,7 +19,7 @@ pub(super) fn at(place: usize) -> Range<usize> {
     place..place
 }
 
-/// The element of that kind and name at the top of the file.
+/// Returns the top-level element of that kind and name.
 fn named<'a>(document: &'a Document<'a>, tag: &str, name: &str) -> Option<Xml<'a>> {
     document
         .root_element()
@@ -27,18 +27,18 @@ fn named<'a>(document: &'a Document<'a>, tag: &str, name: &str) -> Option<Xml<'a
         .find(|n| n.has_tag_name(tag) && n.attribute("name") == Some(name))
 }
 
-/// White space before `place` on its line; empty where something else stands there.
+/// Returns the white space before `place` on its line; empty if other text stands there.
 fn indent<'a>(document: &Document<'a>, place: usize) -> &'a str {
     let before = document.input_text().get(..place).unwrap_or_default();
     let line = &before[before.rfind('\n').map_or(0, |i| i + 1)..];
     if line.trim().is_empty() { line } else { "" }
 }
 
-/// Puts `inertia` into the link that the joint moves and takes it out of what is fixed to it. Gives the link's name, and
-/// the sentence on the others.
+/// Writes `inertia` into the link that the joint moves, and removes it from the links fixed to it. Returns the link's
+/// name and a sentence on the others.
 ///
 /// # Errors
-/// What stands in the way, as the rest of a sentence about the joint.
+/// The obstacle, as the rest of a sentence about the joint.
 pub(super) fn put_inertia<'b>(
     document: &Document<'_>,
     body: &'b Body,
@@ -88,7 +88,7 @@ pub(super) fn put_inertia<'b>(
     Ok((&body.link, merged))
 }
 
-/// `element` as the last child of `node`, whose line begins with `outer`.
+/// Inserts `element` as the last child of `node`, whose line begins with `outer`.
 fn inserted(document: &Document<'_>, node: Xml<'_>, outer: &str, element: &str) -> Edit {
     let range = node.range();
     let text = document.input_text().get(range.clone()).unwrap_or_default();
@@ -113,7 +113,7 @@ fn inserted(document: &Document<'_>, node: Xml<'_>, outer: &str, element: &str) 
     }
 }
 
-/// Puts viscous and Coulomb friction into the `<dynamics>` of a joint; false where the file has no such joint.
+/// Writes viscous and Coulomb friction into `<dynamics>` of a joint. Returns false if the file has no such joint.
 pub(super) fn put_friction(
     document: &Document<'_>,
     joint: &str,
@@ -136,7 +136,7 @@ pub(super) fn put_friction(
                 range: attribute.range_value(),
                 text,
             },
-            // After the name of the element.
+            // Position after the name of the element.
             None => Edit {
                 range: at(dynamics.range().start + "<dynamics".len()),
                 text: format!(" {key}=\"{text}\""),
@@ -146,9 +146,9 @@ pub(super) fn put_friction(
     true
 }
 
-/// The text with all edits made, which do not overlap.
+/// Returns the text with all edits. They must not overlap.
 pub(super) fn spliced(text: &str, mut edits: Vec<Edit>) -> String {
-    // Stable: what is put in at one place keeps its order.
+    // A stable sort: insertions at one place keep their order.
     edits.sort_by_key(|edit| edit.range.start);
     let mut out =
         String::with_capacity(text.len() + edits.iter().map(|e| e.text.len()).sum::<usize>());

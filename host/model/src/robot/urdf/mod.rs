@@ -1,7 +1,6 @@
-//! URDF in and out.
+//! Reads and writes URDF.
 //!
-//! Leaves out: visuals, collision shapes, safety controllers and calibration, none of which enters the
-//! dynamics.
+//! Leaves out visuals, collision shapes and calibration: they do not enter the dynamics.
 
 mod edits;
 mod original;
@@ -37,21 +36,21 @@ pub(in crate::robot) struct Body {
     pub place: Place,
     /// The link that the joint moves.
     pub link: String,
-    /// Links of this body that have an `<inertial>`: the one that the joint moves, and what is fixed to it.
+    /// Links of this body with an `<inertial>`: the link that the joint moves, and links fixed to it.
     pub heavy: Vec<String>,
     pub kind: JointKind,
-    /// Frame of this joint (= of its child link) in the frame of the previous body at q = 0.
+    /// Frame of this joint (its child link) in the frame of the previous body at q = 0.
     pub origin: Isometry3<f64>,
     /// Unit vector of the axis in the joint's frame.
     pub axis: Vector3<f64>,
-    /// In the joint's frame, with everything that is fixed to the link.
+    /// Inertia in the joint's frame, including everything fixed to the link.
     pub inertia: SpatialInertia,
     pub limits: Option<JointLimits>,
     pub friction: Option<JointFriction>,
     pub reduction: Option<f64>,
 }
 
-/// The movable bodies from the base outwards; gravity is along −z of the base link.
+/// The movable bodies from the base outwards; gravity points along −z of the base link.
 #[derive(Debug)]
 pub(in crate::robot) struct Chain {
     pub name: String,
@@ -60,7 +59,7 @@ pub(in crate::robot) struct Chain {
     /// The base link.
     pub base: String,
     pub bodies: Vec<Body>,
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -75,7 +74,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<Chain, RobotError> {
     .chain()
 }
 
-/// Refuses a chain whose links, as `joints` describe them, no robot has.
+/// Refuses a chain whose links, as `joints` describe them, are larger than any real link.
 pub(super) fn check_sizes(chain: &Chain, robot: &Robot, path: &Path) -> Result<(), RobotError> {
     match oversized(&robot.joints).or_else(|| negative_inertia(robot)) {
         None => Ok(()),

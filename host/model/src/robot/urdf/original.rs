@@ -1,8 +1,8 @@
-//! A URDF file as its author wrote it, with other values in place of its own.
+//! A URDF file as its author wrote it, with replaced values.
 //!
-//! What is not a value of the dynamics stays byte for byte: names, frames, meshes, comments, order. Values are turned
-//! into the file's own link frames. A body of several links that are fixed to each other has one inertia, which nothing
-//! divides: it stands in the link that the joint moves, and the others lose theirs.
+//! Everything except the values of the dynamics stays byte for byte: names, frames, meshes, comments, order. Values are
+//! converted to the file's own link frames. Links that are fixed to each other form one body with one inertia that
+//! cannot be divided. It is written into the link that the joint moves, and removed from the others.
 
 use std::path::Path;
 
@@ -19,12 +19,12 @@ use crate::robot::dh::convert;
 use crate::robot::error::RobotError;
 use crate::robot::{Inertial, Joint, Robot};
 
-/// Values that agree to this share of the largest of their kind are the same: what changing frames makes of them.
+/// Values that agree within this share of the largest of their kind are equal: the rounding of a change of frames.
 const ROUNDING: f64 = 1e-12;
-/// Frames are those of the file where their parameters agree to this, rad and m.
+/// Frames are those of the file if their parameters agree within this, rad and m.
 const SAME_FRAME: f64 = 1e-9;
 
-/// A URDF file, and the description that was read from it.
+/// A URDF file, and the description read from it.
 #[derive(Debug)]
 pub struct Original {
     text: String,
@@ -55,27 +55,27 @@ impl Original {
         })
     }
 
-    /// The description.
+    /// Returns the description.
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
 
-    /// What the user should know of the file, one sentence each.
+    /// Returns the remarks on the file, one sentence each.
     pub fn remarks(&self) -> &[String] {
         &self.chain.remarks
     }
 
-    /// The link that joint `joint` (from 0) moves.
+    /// Returns the link that joint `joint` (from 0) moves.
     pub fn link(&self, joint: usize) -> Option<&str> {
         self.chain.bodies.get(joint).map(|body| body.link.as_str())
     }
 
-    /// The file with the inertia and friction of `robot` wherever these differ from its own, and what it has no place for.
+    /// Returns the file with those inertias and frictions of `robot` that differ, and remarks on what URDF cannot hold.
     ///
-    /// Gravity of another direction than the file's puts a level link above the base link.
+    /// If gravity has another direction than in the file, a level link is inserted above the base link.
     ///
     /// # Errors
-    /// [`RobotError::NotUrdf`] where a joint of `robot` is not the file's, or its values cannot be written.
+    /// [`RobotError::NotUrdf`] if a joint of `robot` is not in the file, or its values cannot be written.
     pub fn with_values(&self, robot: &Robot) -> Result<Urdf, RobotError> {
         self.same_chain(robot)?;
         let document = parsed(&self.text, Path::new(&self.chain.name))?;
@@ -163,7 +163,7 @@ impl Original {
         })
     }
 
-    /// Refuses a description of other joints or frames.
+    /// Refuses a description with other joints or frames.
     fn same_chain(&self, robot: &Robot) -> Result<(), RobotError> {
         let numbers = |j: &Joint| [j.alpha, j.a, j.theta, j.d];
         let strange = |joint: &Joint, why: String| RobotError::NotUrdf {
@@ -198,7 +198,7 @@ impl Original {
         Ok(())
     }
 
-    /// Puts a level link above the base link where gravity is not along −z of it.
+    /// Inserts a level link above the base link if gravity is not along its −z.
     fn level(
         &self,
         document: &Document<'_>,
@@ -241,7 +241,7 @@ impl Original {
             escaped(base),
             rpy(&rotation)
         );
-        // After the last element; the chain has joints, so there is one.
+        // Position after the last element; the chain has joints, so there is one.
         if let Some(last) = root.children().rfind(Xml::is_element) {
             edits.push(Edit {
                 range: at(last.range().end),
@@ -251,7 +251,7 @@ impl Original {
     }
 }
 
-/// Whether both are the same but for rounding.
+/// Returns true if both are equal except for rounding.
 fn same(a: &Inertial, b: &Inertial) -> bool {
     let alike = |a: &[f64], b: &[f64]| {
         let size = a.iter().chain(b).fold(0.0f64, |m, v| m.max(v.abs()));

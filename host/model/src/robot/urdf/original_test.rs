@@ -1,4 +1,4 @@
-//! Values put into files of all kinds: the rest stays, and the dynamics in the author's own frames are those put in.
+//! Values written into many kinds of files: the rest stays, and the author's frames get the new dynamics.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::robot::urdf::SpatialInertia;
 use crate::robot::urdf::write::tests::body;
 use crate::robot::{Inertial, JointFriction, Robot, RobotEffect};
 
-/// Everything that the author's file has for the eye and nothing for the dynamics.
+/// A file with everything that concerns the display and not the dynamics.
 const SKEW: &str = r#"<?xml version="1.0" encoding="utf-8"?>
 <!-- drawn by hand -->
 <robot name="skew" xmlns:xacro="http://ros.org/wiki/xacro">
@@ -85,7 +85,7 @@ fn torques(robot: &Robot, gravity: [f64; 3], q: &[f64], qd: &[f64], qdd: &[f64])
     tau
 }
 
-/// The file that is written has the dynamics of `robot`, body by body in the author's base frame and as torques.
+/// Checks that the written file has the dynamics of `robot`: body by body in the author's base frame, and as torques.
 fn same_dynamics(original: &Original, robot: &Robot, rng: &mut Pcg64) {
     let text = original.with_values(robot).unwrap().text;
     let chain = crate::robot::urdf::read(&text, Path::new("r.urdf")).unwrap();
@@ -107,7 +107,7 @@ fn same_dynamics(original: &Original, robot: &Robot, rng: &mut Pcg64) {
         if tilted {
             continue;
         }
-        // Links of the written file where its own frames put them, against the description's in its frames.
+        // Links of the written file in its own frames, compared with the description in its frames.
         let mut pose = Isometry3::identity();
         let mut frame = original.base;
         for ((body, joint), own) in chain.bodies.iter().zip(&robot.joints).zip(&q) {
@@ -131,7 +131,7 @@ fn same_dynamics(original: &Original, robot: &Robot, rng: &mut Pcg64) {
     }
 }
 
-/// The text without `<inertial>`, `<dynamics>` and comments, white space between elements taken together.
+/// Returns the text without `<inertial>`, `<dynamics>` and comments, with white space between elements merged.
 fn frame_of(text: &str) -> String {
     let mut rest = text.to_owned();
     for (from, to) in [
@@ -192,7 +192,7 @@ fn what_was_not_identified_stays_to_the_byte() {
     let original = Original::read(SKEW.into(), Path::new("skew.urdf")).unwrap();
     let same = original.with_values(original.robot()).unwrap();
     assert_eq!(same.text, SKEW);
-    // Through TOML and back too, which is where identified values come from.
+    // Also through TOML and back, because identified values come from TOML.
     let toml = original.robot().to_toml().unwrap();
     let mut robot = Robot::from_toml(&toml, Path::new("r.toml")).unwrap();
     assert_eq!(original.with_values(&robot).unwrap().text, SKEW);
@@ -209,7 +209,7 @@ fn what_was_not_identified_stays_to_the_byte() {
     let rest =
         written.text[begin..].replace(" damping=\"0.75\" friction=\"0.5\"", " friction=\"0.50\"");
     assert_eq!(rest, SKEW[SKEW.find("<robot").unwrap()..]);
-    // Line ends are the author's.
+    // The author's line ends are kept.
     let dos = SKEW.replace('\n', "\r\n");
     let original = Original::read(dos, Path::new("skew.urdf")).unwrap();
     robot = changed(original.robot(), &mut Pcg64::seed_from_u64(1));

@@ -1,4 +1,4 @@
-//! Elements and numbers of a URDF file, each refused by its line where it is wrong.
+//! Elements and numbers of a URDF file. Each fault is reported with its line.
 
 use std::cell::RefCell;
 use std::f64::consts::TAU;
@@ -15,20 +15,20 @@ use crate::robot::error::{Place, RobotError};
 pub(super) struct Reader<'a> {
     pub path: &'a Path,
     pub document: &'a Document<'a>,
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub remarks: RefCell<Vec<String>>,
 }
 
-/// What is to be done about a macro.
+/// Correction for a macro.
 const EXPAND: &str = "which is an unexpanded macro; run xacro over the file first";
 
-/// Elements whose contents enter no dynamics and may hold text of other programs.
+/// Elements whose contents do not enter the dynamics and may hold text of other programs.
 const FOREIGN: [&str; 5] = ["visual", "collision", "gazebo", "sensor", "ros2_control"];
 
 /// An element.
 pub(super) type Xml<'a> = Node<'a, 'a>;
 
-/// The document, or where it is not well formed.
+/// Returns the document, or the place where it is not well formed.
 pub(super) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, RobotError> {
     Document::parse(text).map_err(|e| RobotError::Urdf {
         path: path.into(),
@@ -52,7 +52,7 @@ pub(super) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, Rob
     })
 }
 
-/// The XML reader appends " at line:column", which the message already begins with.
+/// Removes the " at line:column" that the XML reader appends; the message already begins with the place.
 fn without_position(message: &str) -> &str {
     match message.rsplit_once(" at ") {
         Some((head, tail)) if tail.chars().all(|c| c.is_ascii_digit() || c == ':') => head,
@@ -69,7 +69,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Refuses what xacro should have replaced: its elements anywhere, its expressions where they enter the dynamics.
+    /// Refuses xacro that was not expanded: its elements anywhere, its expressions if they enter the dynamics.
     pub(super) fn expanded(&self) -> Result<(), RobotError> {
         let root = self.document.root_element();
         for node in root.descendants().filter(Xml::is_element) {
@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
         text: &str,
     ) -> Result<f64, RobotError> {
         match text.trim().parse::<f64>() {
-            // A limit that nothing reaches is none.
+            // A very large limit means no limit.
             Ok(v) if sound(v) || v.is_finite() && node.tag_name().name() == "limit" => Ok(v),
             Ok(v) if v.is_finite() => Err(self.error(
                 node,
@@ -177,14 +177,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// `<origin xyz rpy>` of `node`; fixed-axis roll, pitch, yaw as URDF defines it.
+    /// Reads `<origin xyz rpy>` of `node`; fixed-axis roll, pitch, yaw as URDF defines it.
     pub(super) fn origin(&self, node: Xml<'a>) -> Result<Isometry3<f64>, RobotError> {
         let Some(origin) = child(node, "origin") else {
             return Ok(Isometry3::identity());
         };
         let xyz = self.vector(origin, "xyz")?.unwrap_or_else(Vector3::zeros);
         let rpy = self.vector(origin, "rpy")?.unwrap_or_else(Vector3::zeros);
-        // As alpha in TOML: no one writes so many turns, and 2π rounded up is one.
+        // As alpha in TOML: a larger angle has another unit. 2π that was rounded up is allowed.
         if rpy.amax() > TAU + WRITTEN {
             let [r, p, y] = rpy.map(f64::to_radians).into();
             return Err(self.error(
@@ -205,7 +205,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The first child element called `tag`.
+/// Returns the first child element called `tag`.
 pub(super) fn child<'a>(node: Xml<'a>, tag: &str) -> Option<Xml<'a>> {
     node.children().find(|n| n.has_tag_name(tag))
 }

@@ -1,4 +1,4 @@
-//! What URDF has no place for.
+//! Remarks on values that URDF cannot hold.
 
 use rig_shared::effects::Parameter;
 use rig_shared::multibody::{COLUMNS, column};
@@ -9,7 +9,7 @@ use crate::robot::{JointKind, Robot, RobotEffect};
 use rig_output::format_significant;
 
 impl Robot {
-    /// Says what the file does not hold.
+    /// Adds remarks on values that the file does not hold.
     pub(super) fn left_out(&self, parameters: &[[f64; COLUMNS]], remarks: &mut Vec<String>) {
         let list = |place: usize, unit: fn(JointKind) -> &'static str| {
             let entries: Vec<String> = self
@@ -56,7 +56,7 @@ impl Robot {
         }
     }
 
-    /// An effect with its parameters.
+    /// Returns an effect with its parameters, as text.
     fn told(&self, effect: &RobotEffect) -> String {
         let about = effect.effect.kind.about();
         let joint = match &effect.joint {

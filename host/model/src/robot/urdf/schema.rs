@@ -1,6 +1,6 @@
-//! Which elements and attributes a URDF has: what stands twice or is misspelt is refused by line.
+//! Elements and attributes of URDF. Duplicates and misspelt names are refused with their line.
 //!
-//! Elements of other programs (Gazebo, Drake, ros2_control) may stand anywhere and are not looked into.
+//! Elements of other programs (Gazebo, Drake, ros2_control) may stand anywhere and are not checked.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use super::reader::{Reader, Xml};
 use crate::robot::error::{Place, RobotError};
 use rig_output::listed;
 
-/// An element that is read: its name, its children that may stand once, those that may stand more often, and its attributes.
+/// An element that is read: its name, its children that may occur once or several times, and its attributes.
 struct Element {
     name: &'static str,
     once: &'static [&'static str],
@@ -73,14 +73,14 @@ const fn element(
     }
 }
 
-/// Attributes that are not read, by the name of their element: where the first stands, their names, and the number of elements.
+/// Unread attributes by the name of their element: place of the first, their names, and the number of elements.
 type Unread<'a> = BTreeMap<&'static str, (Place, BTreeSet<&'a str>, usize)>;
 
 impl<'a> Reader<'a> {
-    /// Refuses elements that stand twice, and elements and attributes that are misspelt; remarks on attributes that are not read.
+    /// Refuses duplicate elements, and misspelt elements and attributes. Adds remarks on attributes that are not read.
     ///
     /// # Errors
-    /// The first of them, by line.
+    /// The first of these faults, with its line.
     pub(super) fn as_described(&self) -> Result<(), RobotError> {
         let root = self.document.root_element();
         let mut unread = Unread::new();
@@ -89,7 +89,7 @@ impl<'a> Reader<'a> {
             for node in root.children().filter(|node| node.has_tag_name(tag)) {
                 self.element(node, &mut unread)?;
                 for own in node.children().filter(Xml::is_element) {
-                    // What they hold is drawn, and enters no dynamics.
+                    // Their contents are for display and do not enter the dynamics.
                     if own.has_tag_name("visual") || own.has_tag_name("collision") {
                         continue;
                     }
@@ -116,13 +116,13 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// One element against its description; one that is not described is not looked into.
+    /// Checks one element against its definition. Elements without a definition are not checked.
     fn element(&self, node: Xml<'a>, unread: &mut Unread<'a>) -> Result<(), RobotError> {
         let name = node.tag_name().name();
         let Some(known) = ELEMENTS.iter().find(|element| element.name == name) else {
             return Ok(());
         };
-        // Names with another prefix than the robot's own are of other programs.
+        // Names with another prefix than the robot's own belong to other programs.
         let own = self.document.root_element().tag_name().namespace();
         let is_own = |node: &Xml<'a>| node.tag_name().namespace() == own;
         if !is_own(&node) {
@@ -140,7 +140,7 @@ impl<'a> Reader<'a> {
                     self.called(node),
                     self.place(*first)
                 );
-                // Most fixed joints carry what no dynamics asks for, such as the stand of the base.
+                // Most fixed joints have attributes that the dynamics do not need, such as the stand of the base.
                 if node.attribute("type") != Some("fixed") {
                     return Err(self.error(*child, format!("{text}; give one")));
                 }
@@ -194,7 +194,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// "joint `elbow`", or "<inertial>" where it has no name.
+    /// Returns the element as "joint `elbow`", or as "<inertial>" if it has no name.
     fn called(&self, node: Xml<'a>) -> String {
         let tag = node.tag_name().name();
         match node.attribute("name") {
@@ -204,8 +204,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The name that one with up to two slips stands for: letters left out, doubled, exchanged for others, or in another case. Of names
-/// of up to four letters one slip.
+/// Returns the known name within two typing errors of `written`: missing, added or exchanged letters, or another case.
+/// Names of up to four letters allow one error.
 fn nearest<'n>(
     written: &str,
     names: impl Iterator<Item = &'n &'static str>,
@@ -218,7 +218,7 @@ fn nearest<'n>(
         .map(|(_, name)| name)
 }
 
-/// Letters that have to be put in, taken out or exchanged to make `a` of `b` (Levenshtein 1966).
+/// Returns the number of letters to insert, delete or exchange to turn `a` into `b` (Levenshtein 1966).
 fn slips(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -353,14 +353,14 @@ mod tests {
             &LIMIT.replace("limit", "limits"),
             "is <limit> meant?",
         );
-        // So are they where the file has a namespace of its own.
+        // The same applies to a file with its own namespace.
         let text = format!(
             "<robot name='r' xmlns='http://www.ros.org'><link name='base'/><link name='arm'>{INERTIAL}</link><joint name='turn' type='revolute'><parent link='base'/><child link='arm'/>{}</joint></robot>",
             LIMIT.replace("upper", "uper")
         );
         let said = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap_err();
         assert!(said.to_string().contains("is `upper` meant?"), "{said}");
-        // Elements of other programs stay.
+        // Elements of other programs are accepted.
         let more = "<hardwareInterface/><gazebo/><sensor name='s'/>";
         assert!(read(&format!("{INERTIAL}{more}"), &format!("{LIMIT}{more}")).is_ok());
     }

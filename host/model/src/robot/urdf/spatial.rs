@@ -21,7 +21,7 @@ impl SpatialInertia {
         }
     }
 
-    /// From mass, centre of mass and inertia about the centre of mass (Steiner).
+    /// Builds the body from mass, centre of mass and inertia about the centre of mass (Steiner).
     pub(in crate::robot) fn from_centre(
         mass: f64,
         centre: Vector3<f64>,
@@ -34,9 +34,9 @@ impl SpatialInertia {
         }
     }
 
-    /// The same body seen from another frame; `pose` is this frame in that one.
+    /// Returns the same body in another frame; `pose` is this frame in that one.
     ///
-    /// With c → R·c + p: Σm·S(Rc+p)ᵀS(Rc+p) expands into the four terms below, and no division by the mass is needed.
+    /// With c → R·c + p: Σm·S(Rc+p)ᵀS(Rc+p) expands into the four terms below. No division by the mass is needed.
     pub(in crate::robot) fn seen_from(&self, pose: &Isometry3<f64>) -> Self {
         let (r, p) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
         let h = r * self.first_moment;
@@ -60,7 +60,7 @@ impl SpatialInertia {
         }
     }
 
-    /// Of a description's values, in the frame of its joint.
+    /// Builds the body from a description's values, in the frame of its joint.
     pub(in crate::robot) fn of(inertial: &Inertial) -> Self {
         let [xx, xy, xz, yy, yz, zz] = inertial.inertia;
         Self {
@@ -70,7 +70,7 @@ impl SpatialInertia {
         }
     }
 
-    /// As a description states it.
+    /// Returns the values in the form of a description.
     pub(in crate::robot) fn inertial(&self) -> Inertial {
         let (h, i) = (self.first_moment, self.inertia);
         Inertial {
@@ -80,7 +80,7 @@ impl SpatialInertia {
         }
     }
 
-    /// Centre of mass, and inertia about it; none for a first moment without a mass.
+    /// Returns the centre of mass and the inertia about it; `None` for a first moment without a mass.
     pub(in crate::robot) fn about_centre(&self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         if self.mass <= 0.0 {
             return (self.first_moment == Vector3::zeros())
@@ -91,7 +91,7 @@ impl SpatialInertia {
     }
 }
 
-/// Inertia of a unit mass at a point, about the origin.
+/// Returns the inertia of a unit mass at a point, about the origin.
 fn steiner(point: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() * point.norm_squared() - point * point.transpose()
 }

@@ -1,4 +1,4 @@
-//! The tree of links as a chain of bodies, each moved by one joint.
+//! Converts the tree of links to a chain of bodies, each moved by one joint.
 
 use std::collections::HashMap;
 
@@ -11,16 +11,16 @@ use super::{Body, Chain};
 use crate::robot::JointKind;
 use crate::robot::error::{Place, RobotError};
 
-/// A movable joint with the pose of its parent link in the body that it leaves.
+/// A movable joint with the pose of its parent link in the frame of the body before it.
 type Outgoing<'a> = (Xml<'a>, Isometry3<f64>);
 
-/// What a link hangs on.
+/// The joint and the parent of a link.
 struct Above<'a> {
     joint: &'a str,
     parent: &'a str,
 }
 
-/// Names of the joints of the closed loop that the way from `link` towards the base ends in; none where it ends at a base.
+/// Returns the joints of the closed loop above `link` on the path to the base; `None` if the path ends at a base.
 fn loop_above(link: &str, above: &HashMap<&str, Above>) -> Option<String> {
     let mut way: Vec<&Above> = Vec::new();
     let mut link = link;
@@ -36,13 +36,13 @@ fn loop_above(link: &str, above: &HashMap<&str, Above>) -> Option<String> {
     None
 }
 
-/// A link with all that is fixed to it.
+/// A link with all links fixed to it.
 struct Rigid<'a> {
-    /// In the frame of the link; none where no part has one.
+    /// In the frame of the link; `None` if no part has an inertia.
     inertia: Option<SpatialInertia>,
-    /// Links that have one.
+    /// Links that have an inertia.
     heavy: Vec<String>,
-    /// The one movable joint that leaves it.
+    /// The only movable joint after it.
     outgoing: Option<Outgoing<'a>>,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Joins `link` with all that is fixed to it.
+    /// Joins `link` with all links fixed to it.
     fn rigid_body(
         &self,
         link: &'a str,
@@ -229,7 +229,7 @@ impl<'a> Reader<'a> {
             return Err(self.error(mimic, format!("joint `{name}` mimics another joint, but only independent joints can be read; make it fixed or remove <mimic>")));
         }
         let axis = match child(node, "axis") {
-            // The default that URDF defines.
+            // The default of the URDF definition.
             None => Vector3::x(),
             Some(axis_node) => {
                 let axis = self.vector(axis_node, "xyz")?.unwrap_or_else(Vector3::x);

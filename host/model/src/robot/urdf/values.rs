@@ -11,7 +11,7 @@ use crate::robot::sizes::too_wide;
 use crate::robot::{JointFriction, JointLimits};
 use rig_output::format_significant;
 
-/// Round effort limits from here on are taken for placeholders, N·m or N.
+/// Round effort limits from this value on count as placeholders, N·m or N.
 const UNKNOWN_EFFORT: f64 = 1e4;
 
 impl<'a> Reader<'a> {
@@ -105,7 +105,7 @@ impl<'a> Reader<'a> {
         }
         let effort = stated.unwrap_or(0.0);
         if velocity == 0.0 && effort == 0.0 && position[0] == position[1] {
-            // What exporters of CAD programs write where nothing was entered.
+            // CAD exporters write this if the user entered nothing.
             remark(format!(
                 "<limit> of joint `{name}` is zero throughout, a placeholder; its limits count as not known."
             ));
@@ -135,8 +135,8 @@ impl<'a> Reader<'a> {
         }))
     }
 
-    /// The range within which the robot's own controller keeps the joint: `<safety_controller soft_lower_limit
-    /// soft_upper_limit>`. A side that is not stated, or lies beyond the limit, is the limit.
+    /// Returns the range in which the robot's own controller keeps the joint: `<safety_controller soft_lower_limit
+    /// soft_upper_limit>`. A side that is absent, or beyond the limit, becomes the limit.
     fn soft_limits(
         &self,
         joint: Xml<'a>,
@@ -156,7 +156,7 @@ impl<'a> Reader<'a> {
             return Ok(None);
         }
         if soft[0] >= soft[1] {
-            // The element's own defaults, both 0, say nothing.
+            // Covers the element's defaults, both 0, which mean nothing.
             let place = format!("{}:{}", self.path.display(), self.place(node));
             self.remarks.borrow_mut().push(format!(
                 "{place}: <safety_controller> of joint `{name}` leaves no range within {low} to {high}; its soft limits are not used."
@@ -185,13 +185,13 @@ impl<'a> Reader<'a> {
         }))
     }
 
-    /// Gear ratio by joint name; 1 is the customary placeholder for "none" and says nothing.
+    /// Returns the gear ratio by joint name. 1 is the usual placeholder for "none" and is ignored.
     pub(super) fn reductions(
         &self,
         known: &[(&'a str, Xml<'a>)],
     ) -> Result<HashMap<&'a str, f64>, RobotError> {
         let mut found: HashMap<&str, (f64, Xml<'a>)> = HashMap::new();
-        // Of ROS 1 and Drake beside the joints, of ROS 2 within <ros2_control>.
+        // ROS 1 and Drake place them beside the joints, ROS 2 within <ros2_control>.
         for transmission in self
             .document
             .root_element()
@@ -205,7 +205,7 @@ impl<'a> Reader<'a> {
             let of_ros_2 = (transmission.ancestors()).any(|n| n.has_tag_name("ros2_control"));
             for joint in &joints {
                 let name = self.attribute(*joint, "name")?;
-                // Controllers of ROS 2 may move what another file describes.
+                // Controllers of ROS 2 may move joints of another file.
                 if !of_ros_2 && known.iter().all(|(other, _)| *other != name) {
                     return Err(self.error(*joint, format!("this <transmission> names joint `{name}`, which the file does not describe; correct the name or remove the transmission")));
                 }
@@ -235,7 +235,7 @@ impl<'a> Reader<'a> {
                         }
                     }
                     [_] => {}
-                    // Of ROS 2's controllers, which may couple joints that move by themselves here.
+                    // Controllers of ROS 2 may couple joints that are independent in this file.
                     _ if of_ros_2 => {
                         let place = format!("{}:{}", self.path.display(), self.place(transmission));
                         self.remarks.borrow_mut().push(format!(
@@ -255,8 +255,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The reductions that a transmission states: where each stands, what it is called there, and its text. ROS 1 has
-/// `<mechanicalReduction>`, ROS 2 `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
+/// Returns the reductions of a transmission: element, name and text. ROS 1 has `<mechanicalReduction>`, ROS 2
+/// `<mechanical_reduction>`, Drake `<drake:gear_ratio value>`.
 fn reductions<'a>(transmission: Xml<'a>) -> impl Iterator<Item = (Xml<'a>, String, &'a str)> {
     let is_name = |name: &str| ["mechanicalReduction", "mechanical_reduction"].contains(&name);
     (transmission.descendants().filter(Xml::is_element)).filter_map(move |node| {
@@ -275,8 +275,8 @@ fn reductions<'a>(transmission: Xml<'a>) -> impl Iterator<Item = (Xml<'a>, Strin
     })
 }
 
-/// Whether an effort limit stands for "none": 0, powers of ten and rows of nines from `least` (N·m or N) on, and whatever
-/// is a million or more.
+/// Returns true if an effort limit means "none": 0, a million or more, and from `least` (N·m or N) on powers of ten and
+/// rows of nines.
 pub fn is_placeholder(effort: f64, least: f64) -> bool {
     let power = |x: f64| (x.log10() - x.log10().round()).abs() < 1e-12;
     let round = power(effort) || (effort.fract() == 0.0 && power(effort + 1.0));

@@ -1,8 +1,8 @@
-//! A description as URDF.
+//! Writes a description as URDF.
 //!
 //! Link frames are the description's own (modified Denavit–Hartenberg), so that every joint turns about z of its frame
-//! and keeps its zero and sense. What URDF has no place for is said: rotor inertia, constant torques, couplings between
-//! drives, effects, and gravity of another size than its readers assume.
+//! and keeps its zero and sense. Remarks name the values that URDF cannot hold: rotor inertia, constant torques,
+//! couplings between drives, effects, and a size of gravity that differs from the one its readers assume.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -16,24 +16,24 @@ use crate::robot::dh::{GRAVITY, step};
 use crate::robot::error::RobotError;
 use crate::robot::{Joint, JointKind, Robot};
 
-/// Written where the description has no limit: URDF demands one.
+/// Limit written if the description has none: URDF demands one.
 const NO_LIMIT: f64 = 1e6;
 
-/// A description as URDF, and what that leaves out.
+/// A description as URDF, with remarks on values that it cannot hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Urdf {
     /// The file.
     pub text: String,
-    /// Sentences.
+    /// Remarks, one sentence each.
     pub remarks: Vec<String>,
 }
 
 impl Robot {
-    /// The description as URDF text; [`Robot::from_urdf`] reads back a chain with the same dynamics. Inertia that no motion
-    /// of the robot shows is chosen where the link would be no body.
+    /// Returns the description as URDF text. [`Robot::from_urdf`] reads back a chain with the same dynamics. Inertia
+    /// that no motion of the robot shows is chosen so that each link is a possible body.
     ///
     /// # Errors
-    /// [`RobotError::NotUrdf`] where a link has no inertial parameters, or a first moment without a mass.
+    /// [`RobotError::NotUrdf`] if a link has no inertial parameters, or a first moment without a mass.
     pub fn to_urdf(&self) -> Result<Urdf, RobotError> {
         let (bodies, mut remarks) = self.with_bodies();
         let mut taken: HashSet<String> = HashSet::new();
@@ -97,7 +97,7 @@ impl Robot {
         Ok(Urdf { text, remarks })
     }
 
-    /// A name for the joint between world and base that no joint of the robot has.
+    /// Returns a name for the joint between world and base that no joint of the robot has.
     fn fixed_name(&self) -> String {
         let mut name = "world_to_base".to_owned();
         while self.joint_index(&name).is_some() {
@@ -122,7 +122,7 @@ impl Robot {
     }
 }
 
-/// The frame of this gravity in a world where gravity points along −z; none where it does already.
+/// Returns the frame of this gravity in a world with gravity along −z; `None` if gravity already is along −z.
 pub(super) fn levelled(gravity: Vector3<f64>, remarks: &mut Vec<String>) -> Option<Rotation3<f64>> {
     let size = gravity.norm();
     if (size - GRAVITY).abs() > 1e-9 {
@@ -135,17 +135,17 @@ pub(super) fn levelled(gravity: Vector3<f64>, remarks: &mut Vec<String>) -> Opti
         return None;
     }
     let turn = UnitQuaternion::rotation_between(&down, &-Vector3::z_axis())
-        // Upside down: any half turn about a level axis.
+        // Upside down: any half turn about a level axis is correct.
         .unwrap_or_else(|| {
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
         });
     Some(turn.to_rotation_matrix())
 }
 
-/// `<inertial>` of a body about its centre of mass, in lines that begin with `indent`.
+/// Returns `<inertial>` of a body about its centre of mass, in lines that begin with `indent`.
 ///
 /// # Errors
-/// What stands in the way, as the rest of a sentence about the joint.
+/// The obstacle, as the rest of a sentence about the joint.
 pub(super) fn inertial_element(body: &SpatialInertia, indent: &str) -> Result<String, String> {
     let (centre, i) = body.about_centre().ok_or(
         "has a first moment but no mass, so it has no centre of mass, which URDF is written about",
@@ -247,12 +247,12 @@ fn write_joint(
     out.push_str("  </joint>\n");
 }
 
-/// Fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
+/// Returns fixed-axis roll, pitch and yaw of a rotation Rz(yaw)·Ry(pitch)·Rx(roll).
 pub(super) fn rpy(rotation: &Rotation3<f64>) -> String {
     let r = rotation.matrix();
     let level = r.m32.hypot(r.m33);
     let pitch = (-r.m31).atan2(level);
-    // Pitch straight up or down: roll and yaw turn about the same axis, and roll is left at zero.
+    // Pitch of ±90°: roll and yaw turn about the same axis, and roll is set to zero.
     let (roll, yaw) = if level < 1e-12 {
         (0.0, (-r.m12).atan2(r.m22))
     } else {
@@ -266,7 +266,7 @@ fn three(v: &Vector3<f64>) -> String {
     format!("{:?} {:?} {:?}", v.x + 0.0, v.y + 0.0, v.z + 0.0)
 }
 
-/// An XML comment; two dashes would end it.
+/// Returns an XML comment. Two dashes would end it, so they are replaced.
 pub(super) fn comment(text: &str) -> String {
     let mut text = text.to_owned();
     while text.contains("--") {
@@ -275,7 +275,7 @@ pub(super) fn comment(text: &str) -> String {
     format!("<!-- {text} -->")
 }
 
-/// Text for an XML attribute.
+/// Returns text for an XML attribute.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

@@ -96,7 +96,7 @@ fn torques(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
     let chain = Chain::new(&robot.geometry(), robot.gravity).unwrap();
     let mut parameters = robot.standard_parameters();
     for row in &mut parameters {
-        // URDF holds neither.
+        // URDF can hold neither.
         row[column::DRIVE_INERTIA] = 0.0;
         row[column::OFFSET] = 0.0;
     }
@@ -108,7 +108,7 @@ fn torques(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
 fn same_dynamics(robot: &Robot, rng: &mut Pcg64) {
     let text = robot.to_urdf().unwrap().text;
     let mut back = Robot::from_urdf(&text, Path::new("r.urdf")).unwrap();
-    // URDF states a direction of gravity and no size; the file's comment gives it.
+    // URDF states the direction of gravity but not its size; the size is in a comment of the file.
     let size = |g: [f64; 3]| g.iter().map(|x| x * x).sum::<f64>().sqrt();
     let times = size(robot.gravity) / size(back.gravity);
     back.gravity = back.gravity.map(|x| x * times);

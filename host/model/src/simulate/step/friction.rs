@@ -6,14 +6,14 @@ use rig_shared::transmission::{DriveKind, motor_column};
 use super::Stepper;
 use crate::simulate::SimulateError;
 
-/// Bound on the sweeps over the joints for the friction torques; they converge geometrically.
+/// Bound on the sweeps over the joints for the friction torques. They converge geometrically.
 const SWEEPS: usize = 200;
-/// Joints that a stuck motor holds are at rest below this speed, rad/s or m/s: rounding of the friction torques.
+/// Speed below which joints held by a stuck motor are at rest, rad/s or m/s: rounding of the friction torques.
 const AT_REST: f64 = 1e-11;
 
 impl Stepper<'_> {
-    /// Coupled drives take energy out in every motion. (Those of changing ratio do by their signs; the others' damping is
-    /// the same everywhere.)
+    /// Refuses coupled drives that feed energy into some motion. Drives of changing ratio need only correct signs; the
+    /// damping of the others is the same everywhere.
     pub(super) fn refuse_driving_friction(&self) -> Result<(), SimulateError> {
         let Some(motors) = &self.model.motors else {
             return Ok(());
@@ -35,14 +35,14 @@ impl Stepper<'_> {
             .add_motor_viscosity(&constant, &origin, damping.as_mut_slice())?;
         let scale = damping.amax();
         let least = damping.symmetric_eigenvalues().min();
-        // Rounding of the entries; a drive without friction of its own has a damping of exactly zero.
+        // Rounding of the entries. A drive without friction has a damping of exactly zero.
         if least < -1e-9 * scale {
             return Err(SimulateError::DrivingFriction { least });
         }
         Ok(())
     }
 
-    /// What a unit of each friction torque does: its own direction through the inverse, and what the others see of it.
+    /// Computes the response to a unit of each friction torque: on the coordinates, and on the other directions.
     pub(super) fn respond(&mut self) {
         let n = self.free.len();
         let contacts = self.limits.len();
@@ -62,7 +62,7 @@ impl Stepper<'_> {
         }
     }
 
-    /// Projected Gauss–Seidel on the friction torques: afterwards `next` holds the velocities.
+    /// Solves the friction torques by projected Gauss–Seidel. Then `next` holds the velocities.
     pub(super) fn solve_friction(&mut self, dt: f64) {
         let n = self.free.len();
         let contacts = self.limits.len();
@@ -72,7 +72,7 @@ impl Stepper<'_> {
                 let [low, high] = self.limits[c];
                 let limit = high.max(-low);
                 let own = self.coupling[c * contacts + c];
-                // A motor that moves its own joint only has no direction here: its friction is the joint's.
+                // A motor that moves only its own joint has no direction here: its friction is the joint's.
                 if limit == 0.0 || own <= 0.0 {
                     self.friction[c] = 0.0;
                     continue;
@@ -86,7 +86,7 @@ impl Stepper<'_> {
                 self.friction[c] = wanted.clamp(low, high);
                 change = change.max((self.friction[c] - before).abs() / limit);
             }
-            // A single joint is exact after one sweep; the comparison ends it after the second.
+            // One joint is exact after one sweep; the comparison stops after the second.
             if change < 1e-12 {
                 break;
             }
@@ -97,7 +97,7 @@ impl Stepper<'_> {
                 .sum();
             self.next[i] = self.free[i] - dt * coupled;
         }
-        // What is stuck is at rest exactly, not to rounding: drift over minutes would otherwise add up.
+        // Stuck coordinates are set exactly to rest. Otherwise rounding would add up to a drift over minutes.
         for c in 0..contacts {
             let [low, high] = self.limits[c];
             if self.friction[c] <= low || self.friction[c] >= high {
@@ -105,7 +105,7 @@ impl Stepper<'_> {
             }
             let along = &self.along[c * n..(c + 1) * n];
             let touched = |i: usize| along[i] != 0.0;
-            // The first directions are the coordinates themselves.
+            // The first directions are the coordinates.
             if c < n {
                 self.next[c] = 0.0;
             } else if (0..n).all(|i| !touched(i) || self.next[i].abs() < AT_REST) {

@@ -74,7 +74,7 @@ impl Adc {
         Ok(())
     }
 
-    /// The control register: bits that are set by software and cleared by hardware.
+    /// Writes the control register: software sets its bits and hardware clears them.
     pub(super) fn control(
         &mut self,
         now: Instant,
@@ -85,7 +85,7 @@ impl Adc {
     ) -> Result<(), Refusal> {
         let before = self.bank.get(CR);
         let new = value & !before;
-        // Start and enable bits are cleared by their stops only.
+        // Only their stop bits clear start and enable bits.
         let mut control = value | (before & (ADEN | ADSTART | JADSTART | ADCAL));
         if new & ADVREGEN != 0 {
             if value & DEEPPWD != 0 {

@@ -56,7 +56,7 @@ fn oversampling_holds_each_sample_at_the_end_of_its_sampling_time() {
     for (offset, value) in [(SMPR1, 3 << 18), (CFGR2, 2 | 1 << 2), (JSQR, 6 << 9)] {
         write(&mut adc, 0, offset, value).unwrap();
     }
-    // The sum of the half cycles at which they are held.
+    // Sum of the half cycles at which the samples are held.
     let held = |_, at: Instant| Some((at / 48) as u16);
     adc.start_injected(0, 24, Ok(24), &held).unwrap();
     adc.advance(10_000_000);

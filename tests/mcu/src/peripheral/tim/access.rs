@@ -17,7 +17,7 @@ impl Tim {
             0x34..=0x40 => {
                 let k = (offset - CCR1) / 4;
                 if self.selection(k as usize).is_some_and(|s| s != 0) {
-                    // Reading what was captured clears its flag (RM0440 section 30.5.5, CC1IF).
+                    // Reading a captured value clears its flag (RM0440 section 30.5.5, CC1IF).
                     let status = self.bank.get(SR) & !(2 << k);
                     self.bank.put(SR, status);
                 }
@@ -39,7 +39,7 @@ impl Tim {
     pub fn write(&mut self, now: Instant, offset: u32, value: u32) -> Result<(), Refusal> {
         match offset {
             SR => {
-                // Cleared by zeros, save the bits that cannot be set, and breaks that still act.
+                // Writing zeros clears flags, except bits that cannot be set and breaks that still act.
                 let acting =
                     (u32::from(self.break_active) * BIF) | (u32::from(self.system_break) * SBIF);
                 let status = self.bank.get(SR) & (value | acting);
@@ -70,7 +70,7 @@ impl Tim {
                         self.down = false;
                     }
                     self.rebase(now, count);
-                    // A match at the very value that the count starts from counts.
+                    // A match at the start value of the count counts.
                     self.checked = now.saturating_sub(1);
                 }
             }

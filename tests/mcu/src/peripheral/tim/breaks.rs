@@ -1,15 +1,15 @@
-//! What takes the outputs: break input and system break (RM0440 section 28.3.17).
+//! Sources that disable the outputs: break input and system break (RM0440 section 28.3.17).
 
 use super::{AF1, BDTR, BIF, BKE, BKP, MOE, SBIF, SR, Tim};
 
 impl Tim {
-    /// Level of the break input's pin.
+    /// Sets the level of the break input's pin.
     pub fn set_break_pin(&mut self, high: bool) {
         self.break_levels[0] = high;
         self.see_breaks();
     }
 
-    /// Output of comparator `number`, 1 to 4.
+    /// Sets the output of comparator `number`, 1 to 4.
     pub fn set_comparator(&mut self, number: usize, high: bool) {
         if let Some(level) = self.break_levels.get_mut(number) {
             *level = high;
@@ -41,8 +41,8 @@ impl Tim {
         self.bank.put(BDTR, bdtr);
     }
 
-    /// Level of the system break: what goes wrong inside the chip (RM0440 section 28.3.17). It passes no filter, and flags
-    /// itself apart from the break input.
+    /// Sets the level of the system break: faults inside the chip (RM0440 section 28.3.17). It passes no filter, and
+    /// has a flag separate from the break input.
     pub fn set_system_break(&mut self, active: bool) {
         self.system_break = active && self.bank.get(BDTR) & BKE != 0;
         if self.system_break {
@@ -51,13 +51,13 @@ impl Tim {
         }
     }
 
-    /// Whether the main output can't be switched on: a break acts, or the system break's flag has not been cleared ("this
-    /// flag must be reset to re-start PWM operation", section 28.6.5).
+    /// Returns true if the main output cannot be switched on: a break acts, or the system break's flag is not cleared
+    /// ("this flag must be reset to re-start PWM operation", section 28.6.5).
     pub(super) fn is_broken(&self) -> bool {
         self.break_active || self.system_break || self.bank.get(SR) & SBIF != 0
     }
 
-    /// Whether the main output is enabled.
+    /// Returns true if the main output is enabled.
     pub fn main_output(&self) -> bool {
         self.bank.get(BDTR) & MOE != 0
     }

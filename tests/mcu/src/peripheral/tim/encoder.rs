@@ -1,4 +1,4 @@
-//! Counting by an encoder's edges and index, and capturing when they came (RM0440 sections 30.4.20 and 30.4.7).
+//! Counts an encoder's edges and index, and captures their times (RM0440 sections 30.4.20 and 30.4.7).
 
 use super::{
     CC1OF, CCER, CCMR1, CCMR2, CCR1, CEN, CR1, CR2, ECR, IDXF, MMS, MMS_ENCODER_CLOCK, SMCR, SR,
@@ -12,7 +12,7 @@ impl Tim {
         matches!(smcr & 7, 1..=3) && smcr & 1 << 16 == 0
     }
 
-    /// Counts by the encoder's edges.
+    /// Counts the encoder's edges.
     pub fn quadrature(&mut self, counts: i64) {
         if self.is_encoder() && self.bank.get(CR1) & CEN != 0 {
             let span = i64::from(self.active.reload) + 1;
@@ -20,24 +20,24 @@ impl Tim {
         }
     }
 
-    /// Whether the clock of the encoder's counter goes out as TRGO.
+    /// Returns true if the clock of the encoder's counter is sent as TRGO.
     pub fn sends_encoder_clock(&self) -> bool {
         let on = self.is_encoder() && self.bank.get(CR1) & CEN != 0;
         on && self.bank.get(CR2) & MMS == MMS_ENCODER_CLOCK
     }
 
-    /// Both channels have changed at once (TIM2_SR.TERRF).
+    /// Handles a change of both channels at once (TIM2_SR.TERRF).
     pub fn transition_error(&mut self) {
         if self.is_encoder() {
             self.flag(TERRF);
         }
     }
 
-    /// The encoder's index has passed `since` counts ago: it set the counter to 0 counting up, to its top counting
+    /// Handles the encoder's index, passed `since` counts ago: it set the counter to 0 counting up, to its top counting
     /// down.
     pub fn index(&mut self, upwards: bool, since: u32) {
         let control = self.bank.get(ECR);
-        // It stands while A and B are low; gated to another state (IPOS) it never comes.
+        // It is active while A and B are low; gated to another state (IPOS) it never comes.
         let gated = control >> 6 & 3 != 0;
         if !self.is_encoder() || control & 1 == 0 || gated || control & 0x20 != 0 && self.indexed {
             return;
@@ -51,8 +51,8 @@ impl Tim {
         self.flag(IDXF);
     }
 
-    /// Internal trigger 1 had an edge at `at`: channels on TRC capture the count (RM0440 section 30.4.7, "Input capture
-    /// mode").
+    /// Handles an edge of internal trigger 1 at `at`: channels on TRC capture the count (RM0440 section 30.4.7, "Input
+    /// capture mode").
     pub fn internal_trigger_1(&mut self, at: Instant) {
         if self.bank.get(SMCR) & TS != TS_ITR1 {
             return;
@@ -68,7 +68,7 @@ impl Tim {
         }
     }
 
-    /// The count at an instant that may lie before the run under way.
+    /// Returns the count at an instant that may be before the present run.
     pub(super) fn count_before(&self, at: Instant) -> u32 {
         if self.counts_by_clock() && at < self.base && !self.is_centred() {
             let ticks = (self.base - at).div_ceil(self.tick());
@@ -77,13 +77,13 @@ impl Tim {
         self.count(at)
     }
 
-    /// How channel `k` is selected (CCxS), if it is enabled.
+    /// Returns the selection of channel `k` (CCxS), if it is enabled.
     pub(super) fn selection(&self, k: usize) -> Option<u32> {
         let modes = self.bank.get(if k < 2 { CCMR1 } else { CCMR2 }) >> (8 * (k % 2));
         (self.bank.get(CCER) >> (4 * k) & 1 != 0).then_some(modes & 3)
     }
 
-    /// What is asked of the captures and not there.
+    /// Returns a requested capture feature that is not modelled.
     pub(super) fn unmodelled_capture(&self) -> Option<String> {
         (0..4).find_map(|k| {
             let name = format!("TIM{} channel {}", self.number, k + 1);

@@ -1,11 +1,11 @@
-//! What the outputs do: PWM.
+//! PWM outputs.
 
 use super::{BDTR, CCER, CCMR1, CCMR2, CEN, CR1, MOE, Tim};
 use crate::peripheral::{Refusal, told};
 use crate::time::Instant;
 
 impl Tim {
-    /// Share of the time for which output `channel` (0 for CH1) is high; none while it is not driven.
+    /// Returns the share of the time for which output `channel` (0 for CH1) is high; `None` while it is not driven.
     ///
     /// # Errors
     /// An output mode that is not PWM.
@@ -24,7 +24,7 @@ impl Tim {
         };
         let compare = self.active.compare.get(channel).copied().unwrap_or(0);
         let share = if self.bank.get(CR1) & CEN == 0 {
-            // A counter that stands holds its output at the level of its count.
+            // A stopped counter holds its output at the level of its count.
             f64::from(u8::from(self.held < compare))
         } else {
             (f64::from(compare) / top.max(1) as f64).min(1.0)
@@ -32,7 +32,7 @@ impl Tim {
         let active = match mode {
             6 => share,
             7 => 1.0 - share,
-            // Forced inactive and active; frozen outputs stay where reset left them.
+            // Forced inactive and active; frozen outputs keep their state after reset.
             0 | 4 => 0.0,
             5 => 1.0,
             other => {
@@ -50,7 +50,7 @@ impl Tim {
         }))
     }
 
-    /// When the counter of a centre-aligned timer is at 0 next, from `now`; none while it stands.
+    /// Returns the next time from `now` at which a centre-aligned counter is at 0; `None` while it is stopped.
     pub fn underflow(&self, now: Instant) -> Option<Instant> {
         if !self.counts_by_clock() || !self.is_centred() {
             return None;

@@ -124,7 +124,7 @@ fn comparators_break_by_their_own_polarity_and_only_where_they_are_let_through()
     tim.set_comparator(3, true);
     assert!(tim.main_output(), "not let through");
     tim.set_comparator(3, false);
-    // BKCMP3E, inverted: high acts. BKCMP4E as it is: low acts.
+    // BKCMP3E, inverted: high acts. BKCMP4E not inverted: low acts.
     tim.set_comparator(4, true);
     tim.write(0, AF1, 1 | 1 << 3 | 1 << 12 | 1 << 4).unwrap();
     tim.set_comparator(3, true);
@@ -186,7 +186,7 @@ fn encoder_clock_captures_the_count_of_another_timer() {
     tim.internal_trigger_1(1000 + 101 * CLOCK);
     assert_eq!(tim.read(0, SR).unwrap(), 2 | CC1OF);
     assert_eq!(tim.read(0, CCR1).unwrap(), 101);
-    // An edge shortly before the counter wrapped, told afterwards.
+    // An edge shortly before the counter wrapped, handled afterwards.
     let wrap = 1000 + (1_u64 << 32) * CLOCK;
     tim.advance(wrap + 5 * CLOCK);
     tim.internal_trigger_1(wrap - 3 * CLOCK);
