@@ -115,7 +115,7 @@ fn what_the_drives_cannot_turn_is_named_by_line_and_column() {
     for (k, [_, _, psi, tau_motor]) in motion.iter().enumerate() {
         let mut psi = *psi;
         if k == 20 {
-            // Longer than crank and anchor reach.
+            // Longer than the reach of crank and anchor.
             psi[1] += 400.0;
         }
         row(&mut text, k, &[psi, *tau_motor]);
