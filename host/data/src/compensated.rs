@@ -1,4 +1,4 @@
-//! A recording with the torques and position errors of described effects.
+//! A recording corrected for the effects of a description.
 
 use rig_shared::effects::{Kind, Memory};
 use rig_shared::multibody::{Chain, column, inverse_dynamics};

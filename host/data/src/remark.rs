@@ -21,7 +21,7 @@ pub enum Remark {
         before + 1
     )]
     Preamble {
-        /// Number of lines before the header.
+        /// Last line before the header.
         before: u64,
     },
     /// The header follows a comment sign.

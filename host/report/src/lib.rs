@@ -77,9 +77,9 @@ pub enum ReportError {
         "The figure \"{figure}\" is to be {height} px high; heights from 120 to 2000 px are possible."
     )]
     Height {
-        /// The requested height.
+        /// Title of the figure.
         figure: String,
-        /// What was asked for.
+        /// The requested height, px.
         height: u32,
     },
     /// No finite point in any series.
