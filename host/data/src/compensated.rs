@@ -153,8 +153,8 @@ struct Scratch {
     behind: Vec<f64>,
     /// Relative contact deflection in presliding, otherwise the direction of motion.
     slid: Vec<f64>,
-    /// Friction of the effects that act through the contact, relative to the joint's own. Presliding uses the previous
-    /// row.
+    /// Friction of the effects that act through the contact over the joint's own friction, 1. Presliding uses the
+    /// previous row.
     beside: Vec<f64>,
 }
 

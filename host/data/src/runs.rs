@@ -144,7 +144,7 @@ const LOOKED_FOR: (usize, usize) = (8, 3);
 /// Allowed relative deviation of the ratio of two sample rates from a whole number. Rates are medians of intervals.
 const RATE_OFF: f64 = 0.01;
 
-/// Finds two recordings that share samples of position and torque, or of which one holds every n-th sample of the
+/// Finds two recordings that share samples of position and torque, or where one holds every n-th sample of the
 /// other. Returns their indices in `runs`.
 pub fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     (0..runs.len()).find_map(|b| {

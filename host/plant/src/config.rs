@@ -66,7 +66,7 @@ pub struct Bridge {
 pub struct Mechanism {
     /// Motor turns per joint turn.
     pub ratio: f64,
-    /// What the joint carries.
+    /// Bodies that the joint carries.
     pub bodies: Vec<Body>,
     /// Gravity in the base frame, m/s².
     pub gravity: [f64; 3],

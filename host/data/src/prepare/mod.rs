@@ -100,7 +100,7 @@ pub enum PrepareError {
         label: String,
         /// Number of the first joint, from 1.
         joint: usize,
-        /// Where it stands.
+        /// Its position.
         position: f64,
     },
     /// The recordings have different rates.
