@@ -1,31 +1,32 @@
-//! Rows that were stamped when they arrived, several at a time: a USB latency timer, a network that collects packets.
+//! Rows stamped on arrival, several at a time: a USB latency timer, a network that collects packets.
 //!
-//! No row is missing. The stamps of a burst are close together, and a long interval follows, as long as the burst's rows took.
+//! No row is missing. The stamps of a burst are close together. A long interval follows that lasts as long as the rows
+//! of the burst took.
 
-/// Long intervals are this many times as long as the short ones, at least.
+/// Minimum ratio of the long intervals to the short ones.
 const APART: f64 = 5.0;
-/// Share of the bursts whose number of rows is the median one or differs by one.
+/// Minimum share of the bursts with the median number of rows, or one more or less.
 const ALIKE: f64 = 0.9;
-/// Share of the long intervals that differ from their median by less than half of it.
+/// Minimum share of the long intervals that differ from their median by less than half of it.
 const STEADY: f64 = 0.9;
-/// Fewest bursts that are judged.
+/// Minimum number of bursts.
 const FEWEST: usize = 8;
 
-/// Rows that arrive together.
+/// A group of rows that arrive together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bursts {
-    /// Rows of a burst.
+    /// Number of rows in a burst.
     pub rows: usize,
-    /// Rows a second in the mean.
+    /// Mean number of rows per second.
     pub rate: f64,
 }
 
-/// The bursts in which rows with these stamps came; none where they came one by one.
+/// Returns the bursts in which rows with these stamps arrived; `None` if they arrived one by one.
 pub(super) fn bursts(times: &[f64]) -> Option<Bursts> {
     let intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let (first, last) = (times.first()?, times.last()?);
     let mean = (last - first) / intervals.len().max(1) as f64;
-    // A burst's rows have less than their mean share of the time, its end has more.
+    // Intervals within a burst are shorter than the mean, the one at its end is longer.
     let (short, long): (Vec<f64>, Vec<f64>) = intervals.iter().partition(|step| **step < mean);
     let (short, typical) = (median(short)?, median(long.clone())?);
     let steady = long
@@ -43,7 +44,7 @@ pub(super) fn bursts(times: &[f64]) -> Option<Bursts> {
         .collect();
     let rows = median(sizes.clone())?;
     let alike = sizes.iter().filter(|size| (*size - rows).abs() <= 1.0);
-    // Where rows are lost the others keep their time.
+    // If rows were lost, the other rows keep their time.
     let waits = typical > rows * short;
     (waits
         && sizes.len() >= FEWEST

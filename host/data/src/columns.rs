@@ -1,4 +1,4 @@
-//! What each column of a recording means for a given robot.
+//! Meaning of each column of a recording for a given robot.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -9,37 +9,37 @@ use super::place::Place;
 use super::source::Header;
 use rig_model::robot::Robot;
 
-/// Whether every joint must come with its torque.
+/// Whether every joint needs a torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EffortNeed {
     /// `tau<k>` or `i<k>` must be there for every joint.
     #[default]
     Required,
-    /// It may be missing: the motion alone is wanted, or torque comes from the voltage.
+    /// It may be missing: only the motion is used, or the torque is computed from the voltage.
     Optional,
 }
 
-/// Where a value goes.
+/// Destination of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Role {
     Time,
     Position(usize),
-    /// Times this factor.
+    /// Joint and factor.
     Effort(usize, f64),
-    /// Of the motor.
+    /// Joint; position of its motor.
     MotorPosition(usize),
-    /// Of the motor, times this factor.
+    /// Joint and factor; torque of its motor.
     MotorEffort(usize, f64),
     Velocity(usize),
     Acceleration(usize),
     Reference(usize),
     Voltage(usize),
-    /// Times the value of that column.
+    /// Joint, column of the supply voltage, and factor.
     Duty(usize, usize, f64),
     Temperature(usize),
-    /// On the link's side of the transmission.
+    /// Joint; position on the link side of the transmission.
     LinkPosition(usize),
-    /// No meaning to the model.
+    /// No meaning for the model.
     None,
 }
 
@@ -47,24 +47,24 @@ pub(super) enum Role {
 #[derive(Clone, Debug)]
 pub(super) struct FileColumn {
     pub name: String,
-    /// What messages call it: the name in the file.
+    /// Name in messages: the name in the file.
     pub label: String,
     pub role: Role,
-    /// Place in [`super::Block::extra`], if it is kept by name.
+    /// Index in [`super::Block::extra`], if it is kept by name.
     pub extra: Option<usize>,
-    /// Whether every value must be a finite number.
+    /// True if every value must be a finite number.
     pub strict: bool,
 }
 
-/// Magnitude that no value of a column in SI units has, whatever unit it was mistaken for: 10⁶ rad, N·m, A or V, a million
-/// times too large in a smaller unit.
+/// Magnitude above which no value in SI units is a measurement, even with a wrong unit: 10⁶ rad, N·m, A or V, times a
+/// million for a smaller unit.
 const NO_MEASUREMENT: f64 = 1e12;
 
-/// The same for time: nanoseconds since 1970, which are told as such, are 1.8·10¹⁸.
+/// The same for time: nanoseconds since 1970, which have a message of their own, are 1.8·10¹⁸.
 const NO_TIME: f64 = 1e21;
 
 impl FileColumn {
-    /// Largest magnitude that is taken for a measurement.
+    /// Returns the largest magnitude that counts as a measurement.
     pub(super) fn largest(&self) -> f64 {
         match self.role {
             Role::Time => NO_TIME,
@@ -72,7 +72,7 @@ impl FileColumn {
         }
     }
 
-    /// What the column measures.
+    /// Returns the quantity that the column measures.
     fn quantity(&self) -> &'static str {
         match (self.role, split(&self.name)) {
             (Role::Time, _) => "time",
@@ -90,7 +90,7 @@ impl FileColumn {
         }
     }
 
-    /// That this value is beyond [`FileColumn::largest`].
+    /// Returns the error for a value beyond [`FileColumn::largest`].
     pub(super) fn out_of_range(&self, path: &Path, place: Place, value: f64) -> DataError {
         DataError::OutOfRange {
             path: path.into(),
@@ -102,28 +102,28 @@ impl FileColumn {
     }
 }
 
-/// All columns of the file in their order.
+/// All columns of the file in order.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
     pub columns: Vec<FileColumn>,
     pub time: usize,
     pub joints: usize,
     pub extras: usize,
-    /// What is turned from the motors to the joints; none where nothing is.
+    /// Conversion from motors to joints, if needed.
     pub motors: Option<MotorSide>,
-    /// Per joint, the motors whose columns make its position or torque where it is turned from the motors.
+    /// Per joint, the motors whose columns determine its position or torque, if it is converted.
     pub movers: Vec<Vec<usize>>,
     pub warnings: Vec<Warning>,
 }
 
-/// Columns that mean something beside the joints' own: wrist sensor and supply.
+/// Columns with a meaning that belong to no joint: wrist sensor and supply.
 const NUMERIC_EXTRAS: [&str; 7] = ["fx", "fy", "fz", "mx", "my", "mz", "supply"];
 
 const QUANTITIES: [&str; 12] = [
     "taum", "tau", "ref", "temp", "duty", "qdd", "qd", "qm", "ql", "q", "i", "u",
 ];
 
-/// `tau12` → ("tau", 12); a number has no leading zero except `0` itself.
+/// Splits `tau12` into ("tau", 12); a number has no leading zero except `0` itself.
 fn split(name: &str) -> Option<(&'static str, usize)> {
     QUANTITIES.iter().find_map(|quantity| {
         let digits = name.strip_prefix(quantity)?;
@@ -187,7 +187,7 @@ pub(super) fn layout(
             )));
         }
     }
-    // One joint needs no number on its duty cycle.
+    // The duty cycle of a single joint needs no number.
     let bare = joints == 1 && !names.iter().any(|name| name == "duty1");
     let split =
         |name: &str| split(name).or_else(|| (bare && name == "duty").then_some(("duty", 1)));
@@ -229,7 +229,7 @@ pub(super) fn layout(
                     "qm" => (Role::None, true),
                     "taum" | "i" => match efforts.role(name, joint) {
                         Some(role) => (role, false),
-                        // With the torque itself there, the motor's says nothing more to the model.
+                        // The joint torque is recorded, so the model does not need that of the motor.
                         None => (Role::None, true),
                     },
                     "qd" => (Role::Velocity(joint), false),
@@ -286,7 +286,7 @@ pub(super) fn layout(
     })
 }
 
-/// Share of the supply per unit of a joint's duty column.
+/// Returns the share of the supply voltage per unit of a joint's duty column.
 fn duty_scale(robot: &Robot, joint: usize) -> f64 {
     let drive = robot.joints.get(joint).and_then(|j| j.drive.as_ref());
     drive
@@ -294,7 +294,7 @@ fn duty_scale(robot: &Robot, joint: usize) -> f64 {
         .map_or(1.0, |full| 1.0 / full)
 }
 
-/// Whether the positions are the motors'.
+/// Returns true if the positions are those of the motors.
 fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<bool, String> {
     let missing = |quantity: &str| -> Vec<usize> {
         (1..=joints)
@@ -318,7 +318,7 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
         };
     };
     let name = &robot.joints[first - 1].name;
-    // Some joints are recorded, as beside a gripper.
+    // Some joints are recorded and others not, for example those of a gripper.
     let unmoved = if joint.len() < joints {
         format!("where joint `{name}` never moves, make it type=\"fixed\" in the URDF; ")
     } else {
@@ -337,13 +337,13 @@ fn motor_positions(names: &[String], robot: &Robot, joints: usize) -> Result<boo
     })
 }
 
-/// Where the torques come from.
+/// Sources of the torques.
 struct Efforts {
-    /// Per joint: the file's factor for `i<k>` where the drive is its own, as before.
+    /// Per joint: column and factor, if the joint has its own drive.
     own: Vec<Option<(String, f64)>>,
-    /// Per joint: from motor torques through the Jacobian.
+    /// Per joint: true if its torque comes from motor torques through the Jacobian.
     turned: Vec<bool>,
-    /// Per motor: column and factor to a motor torque, if it is needed.
+    /// Per motor: column and factor to its torque, if needed.
     motor: Vec<Option<(String, f64)>>,
 }
 
@@ -359,7 +359,7 @@ impl Efforts {
     }
 }
 
-/// Finds a source for the torque of every joint: its own, or all motors that move it.
+/// Finds a source for the torque of every joint: its own column, or all motors that move it.
 fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts, String> {
     let n = robot.joints.len();
     let has = |name: String| names.contains(&name).then_some(name);
@@ -368,7 +368,7 @@ fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts,
         turned: vec![false; n],
         motor: vec![None; n],
     };
-    // Torque of motor m from its column, with the factor that makes it N·m.
+    // Column and factor (to N·m) for the torque of motor m.
     let source = |m: usize| -> Result<Option<(String, f64)>, String> {
         if let Some(name) = has(format!("taum{}", m + 1)) {
             return match &robot.joints[m].drive {
@@ -448,7 +448,8 @@ fn efforts(names: &[String], robot: &Robot, need: EffortNeed) -> Result<Efforts,
             }
         }
     }
-    // A motor whose torque is turned to several joints is read as a motor's; its own joint then follows by the Jacobian.
+    // If a motor's torque acts on several joints, its column is a motor torque; its own joint then follows by the
+    // Jacobian.
     for m in 0..n {
         if found.motor[m].is_some() && found.own[m].take().is_some() {
             found.turned[m] = true;

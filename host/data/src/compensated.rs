@@ -1,4 +1,4 @@
-//! A recording freed of the effects that a description states.
+//! A recording corrected for the effects of a description.
 
 use rig_shared::effects::{Kind, Memory};
 use rig_shared::multibody::{Chain, column, inverse_dynamics};
@@ -11,15 +11,15 @@ use crate::prepare::{
 use crate::{Block, JointColumns};
 use rig_model::effects::{Effects, State, Turn, is_torque, outruns, shifted};
 
-/// Rows that are worked on together.
+/// Rows that are processed together.
 const CORE: usize = 1 << 16;
 
-/// A recording whose positions are what the sensors should have read, and whose torques have beside them
-/// ([`JointColumns::effects`]) what of each is the effects'. Other columns stay.
+/// A recording with corrected positions and with the torque of the described effects in [`JointColumns::effects`].
+/// Other columns are unchanged.
 ///
-/// The effects see the motion behind the position filter of the treatment and the torque behind the same filter; hidden
-/// states run on from row to row of a stretch and start at 0. The load that a gear transmits is the torque less the
-/// drive's inertia, the friction of the description and all other effects on the motor's side.
+/// The effects act on motion and torque behind the position filter of the treatment. Hidden states continue from row to
+/// row of a stretch and start at 0. The load that a gear transmits is the torque minus the drive inertia, the described
+/// friction and all other effects on the motor side.
 pub struct Compensated<'a> {
     inner: &'a dyn Recording,
     effects: &'a Effects,
@@ -32,10 +32,10 @@ pub struct Compensated<'a> {
 }
 
 impl<'a> Compensated<'a> {
-    /// Frees `inner`; of payloads only where `loads` says so.
+    /// Compensates `inner`; payloads only if `loads` is true.
     ///
     /// # Errors
-    /// [`PrepareError::Cutoff`] where the treatment has no position filter.
+    /// [`PrepareError::Cutoff`] if the treatment has no position filter.
     pub fn new(
         inner: &'a dyn Recording,
         effects: &'a Effects,
@@ -67,23 +67,23 @@ fn stopped(e: impl std::fmt::Display) -> PrepareError {
     PrepareError::Stopped(e.to_string())
 }
 
-/// What runs on from piece to piece.
+/// State that continues from piece to piece.
 struct Running {
     memory: Vec<Memory<f64>>,
     segment: usize,
-    /// Of the last row worked on, s.
+    /// Time of the last processed row, s.
     last_time: f64,
     first_time: f64,
     first_temperature: Vec<Option<f64>>,
     scratch: Scratch,
 }
 
-/// One joint over a piece, as the effects see it.
+/// Motion and torque of one joint over a piece, as input of the effects.
 struct Seen {
     q: Vec<f64>,
     qd: Vec<f64>,
     qdd: Vec<f64>,
-    /// Torque with the sensor's errors taken off, as recorded and filtered.
+    /// Torque without the sensor's errors: as recorded, and filtered.
     raw: Vec<f64>,
     torque: Vec<f64>,
 }
@@ -145,15 +145,16 @@ impl Recording for Compensated<'_> {
     }
 }
 
-/// What is worked out for a row, joint by joint, N·m or N.
+/// Intermediate values of a row, per joint, N·m or N.
 struct Scratch {
-    /// What effects ask for.
+    /// Torque of the effects.
     sum: Vec<f64>,
-    /// What is left for the gear to transmit.
+    /// Remaining torque that the gear transmits.
     behind: Vec<f64>,
-    /// How far the contact is bent where there is presliding, elsewhere the direction.
+    /// Relative contact deflection in presliding, otherwise the direction of motion.
     slid: Vec<f64>,
-    /// Friction of effects that act through it over the joint's own, 1: presliding sees that of the row before.
+    /// Friction of the effects that act through the contact over the joint's own friction, 1. Presliding uses the
+    /// previous row.
     beside: Vec<f64>,
 }
 
@@ -169,7 +170,7 @@ impl Scratch {
     }
 }
 
-/// Temperature of each joint at a row.
+/// Returns the temperature of each joint at a row.
 fn temperatures(piece: &Piece, row: usize) -> Vec<Option<f64>> {
     let joints = piece.rows.joints.iter();
     joints
@@ -178,7 +179,7 @@ fn temperatures(piece: &Piece, row: usize) -> Vec<Option<f64>> {
 }
 
 impl Compensated<'_> {
-    /// Corrects the positions of a piece and says what of its torques is the effects'.
+    /// Corrects the positions of a piece and computes the torque of the effects.
     fn work(&self, piece: &mut Piece, running: &mut Running) -> Result<(), PrepareError> {
         self.correct_positions(piece)?;
         let seen = piece
@@ -251,7 +252,7 @@ impl Compensated<'_> {
         Ok(())
     }
 
-    /// Torques of all joints along a motion; the hidden states go on.
+    /// Computes the effect torques of all joints along a motion; hidden states continue.
     fn torques(
         &self,
         at: &State<'_>,
@@ -308,8 +309,8 @@ impl Compensated<'_> {
             }
         }
         for (j, behind) in behind.iter().enumerate() {
-            // What is left is load + c·|carried|·direction, where carried is load + link_friction·friction. Of several such
-            // effects, which carry in one sense but about zero, the shares are weighed.
+            // The rest is load + c·|carried|·direction, with carried = load + link_friction·friction. If there are
+            // several such effects, their shares are weighted; they carry in the same direction except near zero.
             let of = placed.iter().map(|p| (p.joint, &p.effect));
             let [coefficient, weighed] = of
                 .filter(|(joint, effect)| *joint == j && effect.kind == Kind::LoadFriction)
@@ -333,7 +334,7 @@ impl Compensated<'_> {
         let mut errors = vec![[0.0; 2]; joints];
         let mut guess = vec![0.0; joints];
         for r in 0..piece.rows.len() {
-            // The error is a function of the true position: twice is enough for errors far below its period.
+            // The error is a function of the true position. Two iterations suffice for errors far below its period.
             let read: Vec<f64> = piece.rows.joints.iter().map(|j| j.q[r]).collect();
             guess.copy_from_slice(&read);
             for _ in 0..2 {

@@ -1,4 +1,4 @@
-//! CSV line by line, without an allocation per line.
+//! CSV reader that works line by line without an allocation per line.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -14,24 +14,24 @@ use super::place::Place;
 use super::remark::Remark;
 use super::source::Header;
 
-/// Longest line that is read: hundreds of joints fit, a file without line ends does not.
+/// Maximum length of a line, bytes: hundreds of joints fit; a file without line ends does not.
 const LONGEST_LINE: usize = 1 << 20;
 
-/// Magnitude of numbers that need no further check, whatever their column.
+/// Magnitude below which a number of any column needs no further check.
 const LARGEST_QUICK: f64 = 1e9;
 
-/// Bytes read at once; measured, larger ones are no faster.
+/// Bytes read at once; larger buffers measured no faster.
 const BUFFER: usize = 1 << 17;
 
 /// Lines of a text file.
 pub(super) struct TextLines {
     path: PathBuf,
     reader: BufReader<File>,
-    /// The line read last, without its end.
+    /// The last line, without its end.
     line: Vec<u8>,
     number: u64,
     bytes: u64,
-    /// Byte that ends a line: a line feed, or a carriage return where the file has those alone.
+    /// Byte that ends a line: a line feed, or a carriage return if the file has only those.
     end: u8,
 }
 
@@ -79,7 +79,7 @@ impl Lines for TextLines {
             self.line.pop();
         } else if read == LONGEST_LINE {
             let (path, line) = (self.path.clone(), self.number);
-            // A file of zeros is better called what it is.
+            // A file of zero bytes is reported as not text.
             return Err(if self.line.contains(&0) {
                 DataError::NotText { path, line }
             } else {
@@ -109,15 +109,15 @@ impl Lines for TextLines {
 pub(super) struct CsvRows {
     lines: TextLines,
     separator: Separator,
-    /// Decimal point or comma, once a number had one.
+    /// Decimal point or comma, after the first number that has one.
     mark: Option<u8>,
     remarks: Vec<Remark>,
-    /// Whether the line read last is a row that was not given: the header stood in a comment before it.
+    /// True if the last line is a row that was not returned yet: the header was in a comment before it.
     waiting: bool,
     quoted: QuotedRow,
 }
 
-/// A row with quoted fields: their text one after the other, and where each ends.
+/// A row with quoted fields: the joined text, and the end of each field.
 struct QuotedRow {
     reader: Reader,
     text: Vec<u8>,
@@ -125,7 +125,7 @@ struct QuotedRow {
 }
 
 impl CsvRows {
-    /// Finds the header and what separates the columns.
+    /// Finds the header and the column separator.
     pub(super) fn open(path: &Path) -> Result<(Self, Header), DataError> {
         let mut lines = TextLines::open(path)?;
         let found = find_header(&mut lines)?;
@@ -154,12 +154,12 @@ impl CsvRows {
         self.lines.bytes
     }
 
-    /// What was assumed so far.
+    /// Returns the assumptions so far.
     pub(super) fn remarks(&self) -> &[Remark] {
         &self.remarks
     }
 
-    /// Reads the next row into `values`, one per column; gives its line, or none at the end.
+    /// Reads the next row into `values`, one per column; returns its line, or `None` at the end.
     ///
     /// Text in a column that need not be a number becomes NaN.
     pub(super) fn next_row(
@@ -174,7 +174,7 @@ impl CsvRows {
             return self.only_empty_lines_left(layout).map(|()| None);
         }
         let row = self.lines.number;
-        // Put back below: the fields are read out of it while what is known of the file changes.
+        // Put back below: the fields are read from it while the state of the file changes.
         let line = std::mem::take(&mut self.lines.line);
         let found = match self.separator {
             Separator::Blank => self.blank_fields(layout, values, &line).map(Some),
@@ -191,7 +191,7 @@ impl CsvRows {
         Ok(Some(row))
     }
 
-    /// Reads the fields of a line; gives how many there are, none where there are quotation marks among them.
+    /// Reads the fields of a line; returns their number, or `None` if there are quotation marks.
     fn plain_fields(
         &mut self,
         layout: &Layout,
@@ -216,7 +216,7 @@ impl CsvRows {
                     }
                     let end = rest.iter().position(|b| *b == separator);
                     let end = end.unwrap_or(rest.len());
-                    // The whole line is one field: it is separated by something else.
+                    // The whole line is one field, so the separator is another one.
                     if end == line.len() && layout.columns.len() > 1 {
                         return Ok(Some(1));
                     }
@@ -233,7 +233,7 @@ impl CsvRows {
         Ok(Some(found))
     }
 
-    /// Keeps a plain number.
+    /// Stores a plain number.
     #[inline]
     fn keep(
         &mut self,
@@ -251,7 +251,7 @@ impl CsvRows {
         }
     }
 
-    /// As [`CsvRows::plain_fields`] for columns between any number of blanks and tabs.
+    /// Reads a line like [`CsvRows::plain_fields`], with columns separated by blanks and tabs.
     fn blank_fields(
         &mut self,
         layout: &Layout,
@@ -267,8 +267,8 @@ impl CsvRows {
         Ok(found)
     }
 
-    /// As [`CsvRows::plain_fields`] for the line read last, which has quotation marks, and for those behind it that a
-    /// quoted field reaches into.
+    /// Reads the last line like [`CsvRows::plain_fields`]. It has quotation marks, and a quoted field may continue in
+    /// the lines after it.
     fn quoted_fields(&mut self, layout: &Layout, values: &mut [f64]) -> Result<usize, DataError> {
         let first = self.lines.number;
         let open = |rows: &Self| DataError::OpenQuote {
@@ -315,7 +315,7 @@ impl CsvRows {
         read
     }
 
-    /// Reads one field of any form.
+    /// Reads one field in any notation.
     fn field(
         &mut self,
         values: &mut [f64],
@@ -363,7 +363,7 @@ impl CsvRows {
         Ok(())
     }
 
-    /// Empty lines may end a file, not interrupt it.
+    /// Checks that only empty lines follow: they may end a file but not interrupt it.
     fn only_empty_lines_left(&mut self, layout: &Layout) -> Result<(), DataError> {
         let line = self.lines.number;
         while self.lines.next_line()? {

@@ -1,4 +1,4 @@
-//! The header of a CSV file and what separates its columns.
+//! Header and column separator of a CSV file.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::error::DataError;
 use super::number::number;
 use super::remark::Remark;
 
-/// What stands between two columns.
+/// Separator between two columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
     Comma,
@@ -37,7 +37,7 @@ impl Separator {
         }
     }
 
-    /// The names in a header line.
+    /// Splits a header line into names.
     fn split(self, text: &str) -> Vec<String> {
         let unquoted = |name: &str| {
             let name = name.trim();
@@ -66,15 +66,15 @@ impl Separator {
         names
     }
 
-    /// The separator of this header line and the names in it: that by which there is a column `t`, or else by which there
-    /// are most columns.
+    /// Returns the separator of this header line and its names. The separator that yields a column `t` is taken,
+    /// otherwise the one that yields most columns.
     fn of(text: &str) -> (Self, Vec<String>) {
         let all = [Self::Comma, Self::Semicolon, Self::Tab, Self::Blank];
         let mut tried = all.map(|s| (s, s.split(text)));
         let has_time = |names: &[String]| names.len() > 1 && names.iter().any(|n| n == "t");
         let best = (0..tried.len()).find(|k| has_time(&tried[*k].1));
         let best = best.unwrap_or_else(|| {
-            // The last of those that are equal: the first of them here.
+            // `max_by_key` returns the last of equal values, so the order is reversed to take the first.
             let count = |k: &usize| tried[*k].1.len();
             (0..3).rev().max_by_key(count).unwrap_or(0)
         });
@@ -83,37 +83,37 @@ impl Separator {
     }
 }
 
-/// Lines of a file one by one.
+/// A file that is read line by line.
 pub(super) trait Lines {
-    /// Reads the next line; false at the end of the file.
+    /// Reads the next line; returns false at the end of the file.
     fn next_line(&mut self) -> Result<bool, DataError>;
-    /// The line read last, without its end.
+    /// Returns the last line, without its end.
     fn line(&self) -> &[u8];
-    /// Its number, from 1.
+    /// Returns its number, from 1.
     fn number(&self) -> u64;
-    /// The file.
+    /// Returns the path of the file.
     fn path(&self) -> &Path;
 }
 
-/// A header that was found.
+/// The header of a file.
 pub(super) struct FoundHeader {
     pub names: Vec<String>,
     pub separator: Separator,
     /// Its line.
     pub line: u64,
-    /// Whether the line read last is a row: the header was a comment.
+    /// True if the last line is a row, because the header was a comment.
     pub has_row: bool,
     pub remarks: Vec<Remark>,
 }
 
-/// A line behind the sign of a comment.
+/// A comment line.
 struct Comment {
     sign: char,
     line: u64,
     text: String,
 }
 
-/// Reads up to the header: empty lines, comments and the separator line of spreadsheet programs may stand before it.
+/// Reads up to the header; empty lines, comments and the separator line of spreadsheet programs may precede it.
 pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataError> {
     let mut comment: Option<Comment> = None;
     while lines.next_line()? {
@@ -151,14 +151,14 @@ pub(super) fn find_header(lines: &mut impl Lines) -> Result<FoundHeader, DataErr
     })
 }
 
-/// The header is this line, or the comment before it where this line is a row that fits it.
+/// Returns this line as the header, or the comment before it if this line is a row that fits it.
 fn header(text: &str, line: u64, comment: Option<Comment>) -> FoundHeader {
     let (separator, names) = Separator::of(text);
     let mut remarks = Vec::new();
     if let Some(comment) = comment {
         let (by, named) = Separator::of(&comment.text);
         let row = by.split(text);
-        // A comma may be the decimal comma of a row, not of names.
+        // In a row a comma may be a decimal comma, in names it is not.
         let is_number = |field: &String| {
             let mark = if field.contains(',') { b',' } else { b'.' };
             number(field.as_bytes(), mark).is_finite()

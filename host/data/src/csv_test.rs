@@ -10,7 +10,7 @@ fn rig() -> Robot {
     Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap()
 }
 
-/// What is read of a file, and the remarks; else the error.
+/// Returns the blocks of a file and the remarks; otherwise the error.
 fn read(text: impl AsRef<[u8]>) -> Result<(Vec<Block>, Vec<String>), String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv");
@@ -42,7 +42,7 @@ fn quotes_are_those_of_csv() {
         2,
         &[],
     );
-    // Only some fields, blanks inside, and a separator, a doubled quotation mark and a line end in a text.
+    // Only some fields are quoted; a text contains a separator, a doubled quotation mark and a line end.
     holds(
         "t,\"q1\",tau1\n0,\" 0.5 \",-12.5\n0.001,0.25,\"3\"\n",
         2,
@@ -63,7 +63,7 @@ fn quotes_are_those_of_csv() {
         said.contains("a.csv:3:") && said.contains("not closed"),
         "{said}"
     );
-    // The line of an error behind a text of two lines.
+    // The line of an error after a text of two lines.
     let said = read("note,t,q1,tau1\n\"a\nb\",0,0,0\n\"c\",1,\"x\",0\n").unwrap_err();
     assert!(
         said.contains("a.csv:4:") && said.contains("`q1` holds \"x\""),
@@ -106,7 +106,7 @@ fn separators_and_decimal_commas_are_read_where_they_are_unambiguous() {
         &["line 2: a comma in a quoted number is a decimal comma"],
     );
     for (text, place, words) in [
-        // A comma that separates and is a decimal comma too.
+        // A comma that is both separator and decimal comma.
         (
             "t,q1,tau1\n0,0,0,5,1,2\n",
             "a.csv:2:",
@@ -117,7 +117,7 @@ fn separators_and_decimal_commas_are_read_where_they_are_unambiguous() {
             "a.csv:3:",
             "separate the columns by `;`",
         ),
-        // Both marks in one file, and in one number.
+        // Both decimal marks in one file, and in one number.
         (
             "t;q1;tau1\n0.0;0;0\n0,1;0;0\n",
             "a.csv:3:",
@@ -241,7 +241,7 @@ fn what_no_measurement_has_is_named_in_few_digits() {
         );
         assert!(said.len() < 200, "{said}");
     }
-    // Nanoseconds since 1970 are told as what they are, and small numbers are numbers.
+    // Nanoseconds since 1970 have their own message; very small numbers are accepted.
     assert!(read("t,q1,tau1\n1700000000000000000,1e-321,0\n1700000000001000000,0,1e9\n").is_ok());
     let said = read("t,q1,tau1\n1700000000.25,0,0\n1700000000.1234567,0,0\n").unwrap_err();
     assert!(

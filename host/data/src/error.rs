@@ -1,4 +1,4 @@
-//! What can be wrong with a recording.
+//! Errors and warnings about a recording.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub enum DataError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The path is a directory.
@@ -31,13 +31,13 @@ pub enum DataError {
         /// The path.
         path: PathBuf,
     },
-    /// No byte, or nothing but empty lines.
+    /// No bytes, or only empty lines.
     #[error("{} is empty, but a recording has a header line such as `t,q1,tau1` and one row per sample", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// A header and nothing else.
+    /// A header without rows.
     #[error("{} has a header but no rows; a recording has one row per sample below the header", path.display())]
     NoRows {
         /// The file.
@@ -48,9 +48,9 @@ pub enum DataError {
     Bursts {
         /// The file.
         path: PathBuf,
-        /// Rows of a burst.
+        /// Number of rows in a burst.
         rows: usize,
-        /// Rows a second in the mean.
+        /// Mean number of rows per second.
         rate: String,
     },
     /// A file of another program.
@@ -58,10 +58,10 @@ pub enum DataError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is, and what to do with it.
+        /// The format, and how to convert it.
         format: ForeignFormat,
     },
-    /// Bytes that are no text.
+    /// Bytes that are not text.
     #[error("{}:{line}: this line is not text (it holds bytes that are not printable UTF-8), but a recording is CSV text or an MCAP file; save text as UTF-8", path.display())]
     NotText {
         /// The file.
@@ -77,14 +77,14 @@ pub enum DataError {
         /// Line.
         line: u64,
     },
-    /// The header does not name what is needed.
+    /// The header lacks a required column.
     #[error("{}: {message}", place.map_or_else(|| path.display().to_string(), |p| p.in_file(path)))]
     Header {
         /// The file.
         path: PathBuf,
-        /// Line of the header; none where the file has no lines.
+        /// Line of the header; `None` if the file has no lines.
         place: Option<Place>,
-        /// One sentence: what is there and what would be right.
+        /// One sentence: what was found and what is correct.
         message: String,
     },
     /// A row with too few or too many fields.
@@ -101,7 +101,7 @@ pub enum DataError {
         /// The first column without a field, or the first field without a column.
         hint: String,
     },
-    /// A quotation mark that nothing closes.
+    /// A quotation mark that is not closed.
     #[error("{}:{line}: a quotation mark in this line is not closed; close it or take it out", path.display())]
     OpenQuote {
         /// The file.
@@ -118,12 +118,12 @@ pub enum DataError {
         line: u64,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text of the number.
         found: String,
-        /// Whether this number has the comma.
+        /// True if this number has the comma.
         is_comma: bool,
     },
-    /// A number that no measurement has.
+    /// A number too large for a measurement.
     #[error("{}: column `{column}` holds {}, but {} is no {quantity}; look for a damaged or misread value", place.in_file(path), format_short(*value), format_short(*value))]
     OutOfRange {
         /// The file.
@@ -132,12 +132,12 @@ pub enum DataError {
         place: Place,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// The value.
         value: f64,
-        /// What the column measures.
+        /// Quantity that the column measures.
         quantity: &'static str,
     },
-    /// A field that is no finite number.
+    /// A field that is not a finite number.
     #[error("{}: column `{column}` holds {found}, but it must be a finite number, in SI units and with a decimal point", place.in_file(path))]
     NotANumber {
         /// The file.
@@ -146,7 +146,7 @@ pub enum DataError {
         place: Place,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text of the field.
         found: String,
     },
     /// Time that does not grow.
@@ -160,17 +160,17 @@ pub enum DataError {
         previous: f64,
         /// Time of this row, s.
         now: f64,
-        /// What may be the cause, with a semicolon before it; empty where nothing is known.
+        /// Possible cause, after a semicolon; empty if none is known.
         hint: &'static str,
     },
-    /// Motor positions that no joint positions give.
+    /// Motor positions that belong to no joint positions.
     #[error("{}: the motor positions (columns `qm<k>`) of this row belong to no joint position: {message} The description's drives (ratios, screw, zero) or the recording's signs or units are wrong.", place.in_file(path))]
     Motors {
         /// The file.
         path: PathBuf,
         /// Line or message.
         place: Place,
-        /// What cannot be turned to the joints, one sentence.
+        /// Reason why the conversion fails, one sentence.
         message: String,
     },
     /// An MCAP file that is damaged or holds something else.
@@ -178,7 +178,7 @@ pub enum DataError {
     Mcap {
         /// The file.
         path: PathBuf,
-        /// One sentence: what is there and what would be right.
+        /// One sentence: what was found and what is correct.
         message: String,
     },
     /// The recording cannot be written.
@@ -186,28 +186,28 @@ pub enum DataError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system or the encoder said.
+        /// Error of the operating system or the encoder.
         source: std::io::Error,
     },
-    /// The file's ending does not say which format.
+    /// The file extension names no known format.
     #[error("cannot tell the format of {} from its name; end it in .csv or .mcap", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// Columns or a row that do not fit the recording to be written.
+    /// Columns or a row that do not fit the recording being written.
     #[error("cannot write row {row} of {}: {message}", path.display())]
     BadRow {
         /// The file.
         path: PathBuf,
         /// Row, counted from 1.
         row: u64,
-        /// What is there and what would be right.
+        /// What was found and what is correct.
         message: String,
     },
 }
 
-/// What time does instead of growing.
+/// Describes how time fails to grow.
 fn not_growing(previous: f64, now: f64) -> String {
     let (from, to) = (format_time(previous), format_time(now));
     if now == previous {
@@ -219,10 +219,10 @@ fn not_growing(previous: f64, now: f64) -> String {
     }
 }
 
-/// Something about a recording that its reader should know and that does not stop the work.
+/// A remark about a recording that does not stop the work.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Samples are missing; a new block begins.
+    /// Samples are missing; a new block starts.
     Gap {
         /// The first row after the gap.
         place: Place,
@@ -231,45 +231,45 @@ pub enum Warning {
         /// Time missing beyond one sample period, s.
         lost: f64,
     },
-    /// An interval of a regular recording is too short or too long for its neighbours to be filtered together; a
-    /// new block begins.
+    /// An interval of a regular recording is too short or too long to filter its neighbours together; a new block
+    /// starts.
     Uneven {
-        /// The row after it.
+        /// The row after the interval.
         place: Place,
         /// The interval, s.
         step: f64,
-        /// The usual one, s.
+        /// The usual interval, s.
         period: f64,
     },
-    /// One time stamp lies off the even grid, the rows before and after on it; the row is taken as evenly sampled.
+    /// One time stamp is off the even grid between rows on it; the row counts as evenly sampled.
     Misplaced {
         /// The row.
         place: Place,
-        /// How much later than the grid it is stamped, s.
+        /// Time by which the stamp is later than the grid, s.
         off: f64,
     },
-    /// A column without meaning to the model holds something that is no number; it is NaN in
+    /// A column without a meaning for the model holds a value that is not a number; it is NaN in
     /// [`super::Block::extra`].
     ExtraNotANumber {
-        /// First row where that is so.
+        /// First row with such a value.
         place: Place,
         /// The column.
         column: String,
     },
-    /// `duty<k>` is there but no `supply`, so that there is no voltage.
+    /// `duty<k>` without `supply`, so there is no voltage.
     DutyWithoutSupply {
         /// The column.
         column: String,
     },
-    /// How the file was read where it could be read in more than one way.
+    /// How an ambiguous file was read.
     Reading {
-        /// What was assumed or passed over.
+        /// The assumption or omission.
         remark: Remark,
     },
 }
 
 impl Warning {
-    /// Place of its kind, the gravest first, and how bad it is among that.
+    /// Returns the rank of its kind (the most serious first) and its severity within that kind.
     pub fn rank(&self) -> (usize, f64) {
         match self {
             Self::Gap { lost, .. } => (0, *lost),

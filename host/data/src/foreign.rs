@@ -1,9 +1,9 @@
-//! Files of other programs, known by their first bytes.
+//! Files of other programs, detected from their first bytes.
 
-/// Bytes from the start of a file by which it is known.
+/// Number of bytes used for the detection.
 pub(super) const HEAD: usize = 4096;
 
-/// A format that is not read.
+/// A format that is not supported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ForeignFormat {
     /// `#ROSBAG`.
@@ -16,7 +16,7 @@ pub enum ForeignFormat {
         "an SQLite database, as rosbag2 writes; convert it to MCAP (`ros2 bag convert` with storage_id mcap, or `mcap convert in.db3 out.mcap`) and give the .mcap file"
     )]
     Sqlite,
-    /// gzip, xz, bzip2, zstd or lz4 around a whole file.
+    /// A whole file compressed with gzip, xz, bzip2, zstd or lz4.
     #[error("a file compressed by {0}; decompress it and give the .csv or .mcap file inside")]
     Compressed(&'static str),
     /// Office workbook.
@@ -76,7 +76,7 @@ pub enum ForeignFormat {
 }
 
 impl ForeignFormat {
-    /// What a file that begins with these bytes is, if it is known and not a recording.
+    /// Returns the format of a file with these first bytes, if it is a known format other than a recording.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let is = |magic: &[u8]| head.starts_with(magic);
         let holds = |part: &[u8]| head.windows(part.len()).any(|w| w == part);
@@ -128,7 +128,7 @@ impl ForeignFormat {
                     Some(b'"' | b'{' | b'[' | b'}' | b']' | b'-' | b'0'..=b'9')
                 )
         };
-        // Text without a byte order mark in which every other byte is zero.
+        // Text without a byte order mark in which every second byte is zero.
         let wide = |at: usize| {
             let pairs = head.get(..16).map(|h| h.chunks_exact(2));
             pairs

@@ -1,19 +1,20 @@
-//! A column that keeps each value for several rows: a slow topic that was written into a fast recording.
+//! A column that keeps each value for several rows: a slow topic in a fast recording.
 //!
-//! The signal then is a staircase. Its derivative is zero but for single rows, and its values are late by half a stair on average.
+//! The signal is then a staircase. Its derivative is zero except in single rows, and it is late by half a stair on
+//! average.
 //!
-//! A value that repeats is no evidence by itself: a slow joint stays on one count of its encoder, and a torque on one of its
-//! converter. Evidence is a value that repeats between two changes that are each larger than two steps of the sensor.
+//! A repeated value alone is no evidence: a slow joint stays on one encoder count, a torque on one converter count.
+//! Evidence is a repeated value between two changes that are each larger than two sensor steps.
 //!
-//! Leaves out: a column whose rate is above two thirds of the recording's, where most values stand for one row.
+//! Not detected: a rate above two thirds of the recording's rate, where most values fill one row.
 
-/// Changes on both sides of a repeated value are larger than this many steps of the sensor (its smallest change).
+/// Minimum size of the changes on both sides of a repeated value, in sensor steps (the smallest change of the column).
 const CLEAR_CHANGE: f64 = 2.5;
-/// Fewest values between clear changes that are judged.
+/// Minimum number of values between clear changes.
 const FEWEST: usize = 20;
 
-/// Median number of rows for which `values` keep one value between two clear changes; none where that is one row, or where
-/// there are too few clear changes to tell.
+/// Returns the median number of rows in which `values` keep one value between two clear changes. Returns `None` if that
+/// is one row, or if there are too few clear changes.
 pub(super) fn held(values: &[f64]) -> Option<usize> {
     let changes: Vec<(usize, f64)> = (values.windows(2).enumerate())
         .map(|(row, pair)| (row, (pair[1] - pair[0]).abs()))
@@ -84,9 +85,9 @@ mod tests {
 
     #[test]
     fn coarse_encoders_rests_and_coarse_converters_are_no_stairs() {
-        // A count of 5 mrad at 1 kHz: one value stands for many rows, and each change is one count.
+        // An encoder count of 5 mrad at 1 kHz: one value fills many rows, and each change is one count.
         assert_eq!(held(&motion(12_000, 5e-3)), None);
-        // Steps and rests of a staircase motion, noise of three counts.
+        // Steps and dwells of a staircase motion, with noise of three counts.
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
         let rests: Vec<f64> = (0..12_000)
             .map(|k| {
@@ -95,7 +96,7 @@ mod tests {
             })
             .collect();
         assert_eq!(held(&rests), None);
-        // A torque in steps of the converter, noise of two of them.
+        // A torque in converter counts, with noise of two counts.
         let torque: Vec<f64> = (0..12_000)
             .map(|k| {
                 let t = f64::from(k) * 1e-3;

@@ -1,27 +1,27 @@
-//! `sensor_msgs/JointState` of ROS as rows: names are matched with the robot's joints.
+//! Converts ROS `sensor_msgs/JointState` to rows; names are matched with the robot's joints.
 
 use super::remark::Remark;
 use super::ros_layout::Field;
 use super::ros_message::{Encoding, JointSample};
 
-/// What is wrong with a message.
+/// Reason why a message is refused.
 #[derive(Debug)]
 pub(super) enum Refusal {
-    /// The message holds none of the robot's joints: these, quoted.
+    /// The message contains only other joints: their names, quoted.
     Foreign(String),
     /// One clause that follows "message 3 on /joint_states".
     Message(String),
 }
 
-/// Rows out of joint states.
+/// Converter from joint states to rows.
 #[derive(Debug, Default)]
 pub(super) struct JointStates {
     /// Names of the robot's joints.
     joints: Vec<String>,
     sample: JointSample,
-    /// What stands before the robot's names in the messages.
+    /// Text in front of the robot's names in the messages.
     prefix: String,
-    /// Names of the message before, as in [`JointSample`], and where the robot's joints stand among them.
+    /// Names of the previous message, as in [`JointSample`], and the positions of the robot's joints among them.
     known: (Vec<u8>, Vec<usize>),
     places: Vec<usize>,
     has_velocity: bool,
@@ -32,7 +32,7 @@ pub(super) struct JointStates {
     has_first: bool,
 }
 
-/// Signs that part a prefix from a name.
+/// Characters that separate a prefix from a name.
 const PARTING: [char; 5] = ['/', '_', '.', ':', '-'];
 
 impl JointStates {
@@ -43,7 +43,7 @@ impl JointStates {
         }
     }
 
-    /// Reads a message; the first one decides which columns there are.
+    /// Reads a message; the first one determines the columns.
     pub(super) fn read(
         &mut self,
         message: &[u8],
@@ -84,7 +84,7 @@ impl JointStates {
         Ok(())
     }
 
-    /// Takes from the first message what all have.
+    /// Stores the properties that all messages share with the first one.
     fn begin(&mut self, log_time: u64) {
         let sample = &self.sample;
         self.has_first = true;
@@ -95,7 +95,7 @@ impl JointStates {
             && self.places.iter().all(|k| !sample.velocity[*k].is_nan());
     }
 
-    /// Whether the messages have torques.
+    /// Returns true if the messages have torques.
     pub(super) fn has_effort(&self) -> bool {
         self.has_effort
     }
@@ -110,7 +110,7 @@ impl JointStates {
         }
     }
 
-    /// Columns and what messages call them.
+    /// Returns the columns and their names in messages.
     pub(super) fn columns(&self) -> (Vec<String>, Vec<String>) {
         let (mut names, mut labels) = (vec!["t".to_owned()], vec!["t".to_owned()]);
         for (prefix, quantity, there) in self.quantities() {
@@ -133,10 +133,10 @@ impl JointStates {
         ]
     }
 
-    /// The message read last as a row of [`JointStates::columns`].
+    /// Writes the last message as a row of [`JointStates::columns`].
     pub(super) fn row(&self, log_time: u64, values: &mut [f64]) {
         let (seconds, nanoseconds) = self.time(log_time);
-        // The difference of whole numbers is exact; seconds since 1970 in a double would be 0.2 µs apart.
+        // The difference of whole numbers is exact; doubles resolve seconds since 1970 only to 0.2 µs.
         let since = (
             seconds.wrapping_sub(self.origin.0),
             nanoseconds - self.origin.1,
@@ -158,7 +158,7 @@ impl JointStates {
         }
     }
 
-    /// What the first message makes worth saying.
+    /// Returns the remarks about the first message.
     pub(super) fn remarks(&self, topic: &str) -> Vec<Remark> {
         let mut remarks = Vec::new();
         if topic != "/joint_states" {
@@ -248,8 +248,8 @@ impl JointStates {
     }
 }
 
-/// What stands before all of the robot's joints in the names of a message: nothing, where any joint is there by its own
-/// name or none is there at all.
+/// Returns the text in front of all joint names of the robot in a message. Empty if a joint appears under its own name,
+/// or if no prefix fits.
 ///
 /// # Errors
 /// More than one prefix, quoted.
@@ -279,7 +279,7 @@ fn prefix(names: &[&[u8]], joints: &[String]) -> Result<String, String> {
     }
 }
 
-/// Names in quotation marks, at most twelve.
+/// Returns at most twelve names in quotation marks.
 fn quoted(names: &[&[u8]]) -> String {
     const MOST: usize = 12;
     let list: Vec<String> = names

@@ -2,17 +2,17 @@
 
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, Visitor};
 
-/// Keys of the first message, by which all are read.
+/// Keys of the first message; all messages are read by them.
 #[derive(Debug, Default)]
 pub(super) struct JsonSamples {
     names: Vec<String>,
 }
 
 impl JsonSamples {
-    /// Takes the keys of the first message.
+    /// Reads the keys of the first message.
     ///
     /// # Errors
-    /// What is wrong with it, one clause.
+    /// Its fault, one clause.
     pub(super) fn new(message: &[u8]) -> Result<Self, String> {
         Ok(Self {
             names: keys(message)?,
@@ -23,15 +23,15 @@ impl JsonSamples {
         &self.names
     }
 
-    /// Reads a message into `values`, one per key of the first; what is no number becomes NaN.
+    /// Reads a message into `values`, one per key of the first; a value that is not a number becomes NaN.
     ///
     /// # Errors
-    /// How it differs from the first message, one clause.
+    /// The difference to the first message, one clause.
     pub(super) fn read(&self, message: &[u8], values: &mut [f64]) -> Result<(), String> {
         if self.fill(message, values) {
             return Ok(());
         }
-        // Once more as JSON has it, where a writer put NaN and Infinity in.
+        // Second attempt without NaN and Infinity, which are not JSON.
         let plain = without_nan(message);
         if plain.is_some_and(|m| self.fill(&m, values)) {
             return Ok(());
@@ -39,7 +39,7 @@ impl JsonSamples {
         Err(self.difference(&keys(message)?))
     }
 
-    /// Fills `values`; false where the message cannot be read so.
+    /// Fills `values`; returns false if the message cannot be read.
     fn fill(&self, message: &[u8], values: &mut [f64]) -> bool {
         values.fill(f64::NAN);
         let mut found = 0;
@@ -53,7 +53,7 @@ impl JsonSamples {
         read.is_ok() && found == self.names.len()
     }
 
-    /// How these keys differ from those of the first message.
+    /// Describes how these keys differ from those of the first message.
     fn difference(&self, keys: &[String]) -> String {
         let quoted = |names: Vec<&String>| {
             let shown = names
@@ -91,7 +91,7 @@ impl JsonSamples {
     }
 }
 
-/// What a message has under a key, as it is written there.
+/// Returns the value of a key as written in the message.
 pub(super) fn written(message: &[u8], name: &str) -> String {
     let plain = without_nan(message);
     let value = serde_json::from_slice(plain.as_deref().unwrap_or(message));
@@ -112,10 +112,10 @@ pub(super) fn written(message: &[u8], name: &str) -> String {
     }
 }
 
-/// Words that are no JSON but that writers use for numbers that are none, the longest first.
+/// Words for values that are not numbers; not JSON, but some writers use them. The longest comes first.
 const NOT_NUMBERS: [&str; 3] = ["-Infinity", "Infinity", "NaN"];
 
-/// Which of [`NOT_NUMBERS`] stands behind a key.
+/// Returns the word of [`NOT_NUMBERS`] that follows a key.
 fn bare_word(message: &[u8], name: &str) -> Option<&'static str> {
     let text = std::str::from_utf8(message).ok()?;
     let key = serde_json::Value::from(name).to_string();
@@ -124,7 +124,7 @@ fn bare_word(message: &[u8], name: &str) -> Option<&'static str> {
     NOT_NUMBERS.into_iter().find(|word| value.starts_with(word))
 }
 
-/// The message with `null` in place of NaN and Infinity outside strings; none where there is none of them.
+/// Returns the message with `null` for NaN and Infinity outside strings; `None` if it contains none.
 fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
     let mut plain = Vec::with_capacity(message.len());
     let (mut quoted, mut changed) = (false, false);
@@ -139,7 +139,7 @@ fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
             changed = true;
             continue;
         }
-        // A character behind a backslash ends no string.
+        // A character after a backslash does not end a string.
         let count = if quoted && byte == b'\\' { 2 } else { 1 };
         quoted ^= byte == b'"';
         let (taken, behind) = rest.split_at(count.min(rest.len()));
@@ -149,7 +149,7 @@ fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
     changed.then_some(plain)
 }
 
-/// The keys of a message in their order.
+/// Returns the keys of a message in order.
 fn keys(message: &[u8]) -> Result<Vec<String>, String> {
     let plain = without_nan(message);
     let mut parser = serde_json::Deserializer::from_slice(plain.as_deref().unwrap_or(message));
@@ -160,7 +160,7 @@ fn keys(message: &[u8]) -> Result<Vec<String>, String> {
     read.map_err(|e| format!("is no JSON object of numbers ({e})"))
 }
 
-/// The keys of an object in their order.
+/// Visitor for the keys of an object in order.
 struct Names;
 
 impl<'de> Visitor<'de> for Names {
@@ -179,7 +179,7 @@ impl<'de> Visitor<'de> for Names {
     }
 }
 
-/// Fills `values` by name; keys nearly always come in the order of the first message.
+/// Visitor that fills `values` by name; keys nearly always have the order of the first message.
 struct Fields<'a> {
     names: &'a [String],
     values: &'a mut [f64],
@@ -215,7 +215,7 @@ impl<'de> Visitor<'de> for Fields<'_> {
     }
 }
 
-/// Index of a key among the names.
+/// Visitor for the index of a key among the names.
 struct Key<'a> {
     names: &'a [String],
     next: usize,
@@ -244,7 +244,7 @@ impl Visitor<'_> for Key<'_> {
     }
 }
 
-/// A number; anything else (JSON has no NaN: null, text) counts as NaN, and the column decides.
+/// A number; other values (null, text) count as NaN, and the column decides whether NaN is allowed.
 #[derive(serde::Deserialize)]
 #[serde(from = "Maybe")]
 struct Number(f64);

@@ -1,32 +1,31 @@
-//! A position that jumps from one row to the next: a lost count, an angle that begins again after a turn, two recordings
-//! put together.
+//! Position jumps from one row to the next: a lost count, an angle that wraps after a turn, two joined recordings.
 
-/// Rows whose middle speed says how fast the joint moves there.
+/// Number of row intervals whose median speed is the local speed of the joint.
 const SPAN: usize = 8;
-/// A jump is this many times as large as the fastest other motion from row to row.
+/// Minimum ratio of a jump to the largest other motion from row to row …
 const FASTER: f64 = 3.0;
-/// And this many times as large as the changes that noise and acceleration make, and as the smallest change there is.
+/// … and to the changes by noise and acceleration (99th percentile), and to the smallest change.
 const LARGER: f64 = 20.0;
 
 /// The largest jump of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Jump {
-    /// Row before it.
+    /// Row before the jump.
     pub row: usize,
-    /// Change of position less that of the motion around it.
+    /// Change of position minus that of the motion around it.
     pub by: f64,
-    /// How many jumps there are.
+    /// Number of jumps.
     pub count: usize,
-    /// Largest change from row to row apart from them.
+    /// Largest change from row to row without the jumps.
     pub fastest: f64,
 }
 
-/// Whether a column jumps anywhere.
+/// Returns true if a column has a jump.
 pub fn jumps(t: &[f64], q: &[f64]) -> bool {
     jump(t, q).is_some()
 }
 
-/// The largest jump of `q` over `t`; none where there is none, or where the rows are too few to know how the joint moves.
+/// Returns the largest jump of `q` over `t`, if any. Returns `None` if there are too few rows to know the motion.
 pub(super) fn jump(t: &[f64], q: &[f64]) -> Option<Jump> {
     let steps: Vec<[f64; 2]> = (t.windows(2).zip(q.windows(2)))
         .map(|(t, q)| [t[1] - t[0], q[1] - q[0]])
@@ -91,14 +90,14 @@ mod tests {
                 assert!((found.by + 0.3).abs() < 0.02, "{found:?}");
             }
         }
-        // At rest but for the last count of the encoder.
+        // At rest, except for the last count of the encoder.
         let (t, mut q) = motion(1e-3, 1e-4);
         q.fill(0.7);
         for k in (0..q.len()).step_by(701) {
             q[k] += 1e-4;
         }
         assert_eq!(jump(&t, &q), None);
-        // Rest, then motion at once.
+        // Rest, then a sudden start.
         let q: Vec<f64> = t.iter().map(|t| (t - 3.9).max(0.0)).collect();
         assert_eq!(jump(&t, &q), None);
     }

@@ -1,8 +1,8 @@
-//! Recordings: columns with units, checked line by line, read in blocks so that memory does not grow.
+//! Recordings: columns with units, checked line by line and read in blocks of constant memory.
 //!
-//! [`Source`] reads CSV and MCAP alike, as many passes as asked; [`RecordingWriter`] writes both;
-//! [`plausibility`] notices wrong units before they become wrong parameters. [`prepare`] filters, derives and decimates
-//! them, [`runs`] holds them in memory at their full rate, and [`Compensated`] subtracts what a description knows already.
+//! [`Source`] reads CSV and MCAP repeatedly; [`RecordingWriter`] writes both. [`plausibility`] detects wrong units
+//! before they lead to wrong parameters. [`prepare`] filters, differentiates and decimates recordings. [`runs`] holds
+//! them in memory at the full rate, and [`Compensated`] subtracts the torques that a description already explains.
 //!
 //! ```
 //! use rig_data::Source;
@@ -69,25 +69,25 @@ pub use writer::{Column, CsvWriter, McapWriter, RecordingWriter};
 
 use rig_model::simulate::Motion;
 
-/// Rows at the beginning of a recording by which its columns are judged: a wrong unit or sense shows at once, and all along.
+/// Number of rows at the start by which the columns are checked: a wrong unit or direction shows from the start.
 pub const JUDGED_ROWS: usize = 100_000;
 
-/// Where the effort (torque or force) of a joint comes from.
+/// Source of the effort (torque or force) of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EffortKind {
     /// Joint-side torque or force, column `tau<k>`.
     Torque,
-    /// Motor current, column `i<k>`, through the drives' torque constants and ratios.
+    /// Motor current, column `i<k>`, converted with the drives' torque constants and ratios.
     Current,
 }
 
-/// The columns of one joint over a stretch of rows, all of the same length, SI, joint-side.
+/// Columns of one joint over a stretch of rows: equal length, SI units, joint side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointColumns {
     /// Position, rad or m (from `q<k>`, or from `qm<k>` of the motors through the drives).
     pub q: Vec<f64>,
-    /// Joint torque or force, N·m or N (from `tau<k>`, or from `taum<k>` or `i<k>` of the motors through the drives); empty where
-    /// the recording has neither and was opened with [`EffortNeed::Optional`].
+    /// Joint torque or force, N·m or N (from `tau<k>`, or from `taum<k>` or `i<k>` of the motors through the drives).
+    /// Empty if the recording has neither and was opened with [`EffortNeed::Optional`].
     pub tau: Vec<f64>,
     /// Measured velocity, if recorded.
     pub qd: Option<Vec<f64>>,
@@ -99,9 +99,9 @@ pub struct JointColumns {
     pub voltage: Option<Vec<f64>>,
     /// Temperature, if recorded, °C.
     pub temperature: Option<Vec<f64>>,
-    /// What an encoder on the link's side of the transmission reads, if recorded (`ql<k>`), rad or m; its zero is free.
+    /// Reading of an encoder on the link side of the transmission, if recorded (`ql<k>`), rad or m; any zero.
     pub link: Option<Vec<f64>>,
-    /// What of the torque is the description's effects', N·m or N; in no file, from [`crate::Compensated`].
+    /// Torque of the described effects, N·m or N; not from a file but from [`crate::Compensated`].
     pub effects: Option<Vec<f64>>,
 }
 
@@ -112,16 +112,16 @@ pub struct Block {
     pub t: Vec<f64>,
     /// One entry per joint of the robot.
     pub joints: Vec<JointColumns>,
-    /// Columns that have no meaning to the model, kept by name (for instance `pulses`).
+    /// Columns without a meaning for the model, kept by name (for instance `pulses`).
     pub extra: Vec<(String, Vec<f64>)>,
-    /// Line of the file (1-based; in MCAP the message's number) that the first row came from.
+    /// Line of the first row in the file (1-based; in MCAP the number of the message).
     pub first_line: u64,
-    /// Whether this block follows the previous one without a gap in time.
+    /// True if this block follows the previous one without a gap in time.
     pub continues: bool,
 }
 
 impl Block {
-    /// A simulated motion as a recording would hold it: t, and per joint q, tau and, where given, ref.
+    /// Builds the block of a simulated motion: t, and per joint q, tau and, if given, ref.
     pub fn of_motion(motion: Motion, period: f64, reference: &[Vec<f64>]) -> Self {
         let rows = motion.q.first().map_or(0, Vec::len);
         let joints = motion.q.into_iter().zip(motion.tau).enumerate();
@@ -140,11 +140,11 @@ impl Block {
         }
     }
 
-    /// Rows.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.t.len()
     }
-    /// Whether there is no row.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }

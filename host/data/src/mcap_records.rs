@@ -1,4 +1,4 @@
-//! Records of an MCAP file one after the other, those of its chunks among them.
+//! Records of an MCAP file in order, including those in its chunks.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -10,41 +10,41 @@ use crc32fast::Hasher;
 
 use super::error::DataError;
 
-/// First bytes of every MCAP file, and its last ones.
+/// First and last bytes of every MCAP file.
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 
-/// Longest record or decompressed chunk that is read, bytes: a damaged length must not ask for all memory. Recorders
+/// Maximum length of a record or decompressed chunk, bytes: a damaged length must not request all memory. Recorders
 /// write chunks of 1 to 4 MiB.
 const LONGEST_RECORD: u64 = 256 << 20;
 
 /// Operation code and length of a record.
 const RECORD_HEADER: usize = 9;
 
-/// Where a file breaks off.
+/// Place where a file ends too early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Break {
-    /// Byte behind the last whole record.
+    /// Byte after the last complete record.
     pub at: u64,
-    /// What is lost.
+    /// Description of the loss.
     pub lost: &'static str,
 }
 
-/// Reads record by record; memory holds one record or one chunk.
+/// Reader of single records; memory holds one record or one chunk.
 pub(super) struct Records {
     path: PathBuf,
     file: BufReader<File>,
     /// Length of the file.
     length: u64,
-    /// Whether the file ends as a whole one does.
+    /// True if the file has a proper end.
     has_end: bool,
     /// Bytes read so far.
     at: u64,
     /// Body of the last record outside a chunk.
     body: Vec<u8>,
-    /// Decompressed records of the chunk under way.
+    /// Decompressed records of the current chunk.
     chunk: Vec<u8>,
     chunk_next: usize,
-    /// Byte at which that chunk begins.
+    /// Byte at which this chunk starts.
     chunk_start: u64,
     /// Check sum of the data section, then of the summary section.
     sum: Hasher,
@@ -53,14 +53,14 @@ pub(super) struct Records {
     broken: Option<Break>,
 }
 
-/// Where the body of a record lies.
+/// Location of a record's body.
 enum Body {
     File,
     Chunk(Range<usize>),
 }
 
 impl Records {
-    /// Opens a file that begins with [`MAGIC`].
+    /// Opens a file that starts with [`MAGIC`].
     pub(super) fn open(path: &Path) -> Result<Self, DataError> {
         let failed = |source| DataError::Read {
             path: path.into(),
@@ -98,17 +98,17 @@ impl Records {
         Ok(records)
     }
 
-    /// Bytes read so far.
+    /// Returns the number of bytes read so far.
     pub(super) fn bytes_read(&self) -> u64 {
         self.at
     }
 
-    /// Where the file breaks off, once its records were read.
+    /// Returns the place where the file ends too early, after its records were read.
     pub(super) fn broken(&self) -> Option<Break> {
         self.broken
     }
 
-    /// The next record: its operation code and body; none at the end of the file or where it breaks off.
+    /// Returns the next record, as operation code and body; `None` at the end, or where the file ends too early.
     pub(super) fn next_record(&mut self) -> Result<Option<(u8, &[u8])>, DataError> {
         Ok(match self.advance()? {
             None => None,
@@ -126,7 +126,7 @@ impl Records {
         }
     }
 
-    /// Puts at most so many bytes of the file into `self.body`; fewer at its end.
+    /// Reads at most `count` bytes of the file into `self.body`; fewer at its end.
     fn fill(&mut self, count: u64) -> Result<(), DataError> {
         self.body.clear();
         let read = (&mut self.file).take(count).read_to_end(&mut self.body);
@@ -141,7 +141,7 @@ impl Records {
         }
     }
 
-    /// Passes over bytes of the file that are not wanted, but for their check sum.
+    /// Skips bytes of the file, but adds them to the check sum.
     fn pass_over(&mut self, mut count: u64) -> Result<(), DataError> {
         while count > 0 {
             let bytes = self.file.fill_buf().map_err(|source| DataError::Read {
@@ -177,7 +177,7 @@ impl Records {
             };
             let header: [u8; RECORD_HEADER] = std::array::from_fn(|k| self.body[k]);
             let fits = length <= self.length.saturating_sub(self.at);
-            // Zeros stand where a file system lost the last blocks.
+            // A file system that lost the last blocks fills them with zeros.
             if code == 0 || (!fits && (self.has_end || code != op::CHUNK)) {
                 return self.break_off(start).map(|()| None);
             }
@@ -202,7 +202,7 @@ impl Records {
         }
     }
 
-    /// The file has no record here: it breaks off or, where its end is there, is damaged.
+    /// Handles a missing record: the file ends too early or, if it has a proper end, is damaged.
     fn break_off(&mut self, at: u64) -> Result<(), DataError> {
         if self.has_end {
             return Err(self.damaged(at, "no record begins"));
@@ -256,7 +256,7 @@ impl Records {
         Ok(())
     }
 
-    /// Reads and decompresses a chunk; what there is of it, where the file breaks off inside.
+    /// Reads and decompresses a chunk, or its first part if the file ends inside it.
     fn open_chunk(&mut self, start: u64, length: u64, cut: bool) -> Result<(), DataError> {
         if length > LONGEST_RECORD && !cut {
             return Err(self.too_long(start));
@@ -344,7 +344,7 @@ impl Records {
                 self.chunk_next = range.end;
                 Ok(Some((code, Body::Chunk(range))))
             }
-            // The file breaks off inside this chunk.
+            // The file ends inside this chunk.
             None if self.broken.is_some() => {
                 self.chunk_next = self.chunk.len();
                 Ok(None)
@@ -368,19 +368,20 @@ fn record_header(bytes: &[u8]) -> Option<(u8, u64)> {
     Some((*bytes.first()?, u64_at(bytes, 1)?))
 }
 
-/// What stands before the records of a chunk.
+/// Header of a chunk.
 struct ChunkHeader {
     /// Decompressed length, bytes.
     size: u64,
-    /// Check sum of the decompressed records; 0 where there is none.
+    /// Check sum of the decompressed records; 0 if there is none.
     sum: u32,
     compression: String,
-    /// Where the records lie in the chunk's body.
+    /// Position of the records in the chunk's body.
     records: Range<usize>,
 }
 
 impl ChunkHeader {
-    /// Start and end time, decompressed size, check sum, compression, compressed size; none where the body is too short.
+    /// Reads start and end time, decompressed size, check sum, compression and compressed size; `None` for a short
+    /// body.
     fn parse(body: &[u8]) -> Option<Self> {
         let name = u32_at(body, 28)? as usize;
         let behind = 32usize.checked_add(name)?;
@@ -395,14 +396,14 @@ impl ChunkHeader {
     }
 }
 
-/// Decompresses frames until `size` bytes are there; false where the frames are damaged or break off, with what there was
-/// before in `out`.
+/// Decompresses frames until `size` bytes are in `out`. Returns false if the frames are damaged or incomplete; `out`
+/// then holds the bytes before the error.
 fn zstd(mut frames: &[u8], size: u64, out: &mut Vec<u8>) -> bool {
     while !frames.is_empty() && (out.len() as u64) < size {
         let Ok(mut decoder) = ruzstd::decoding::StreamingDecoder::new(&mut frames) else {
             return false;
         };
-        // One byte more than there should be, so that a longer chunk is noticed.
+        // One byte more than expected, so that a longer chunk is detected.
         let room = size + 1 - out.len() as u64;
         if (&mut decoder).take(room).read_to_end(out).is_err() {
             return false;
@@ -411,7 +412,7 @@ fn zstd(mut frames: &[u8], size: u64, out: &mut Vec<u8>) -> bool {
     true
 }
 
-/// As [`zstd`].
+/// Does the same as [`zstd`] for lz4.
 fn lz4(frames: &[u8], size: u64, out: &mut Vec<u8>) -> bool {
     let decoder = lz4_flex::frame::FrameDecoder::new(frames);
     decoder.take(size + 1).read_to_end(out).is_ok()

@@ -1,4 +1,4 @@
-//! MCAP: one JSON message per sample on `/joint/state`, or ROS's joint states.
+//! MCAP reader: one JSON message per sample on `/joint/state`, or joint states of ROS.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,18 +20,18 @@ use rig_output::format_short;
 /// Topic of the joint samples.
 pub(super) const TOPIC: &str = "/joint/state";
 
-/// Names of ROS's joint state in both versions.
+/// Names of the ROS joint state in both versions.
 const JOINT_STATE: [&str; 2] = ["sensor_msgs/msg/JointState", "sensor_msgs/JointState"];
 
-/// What the messages of a channel are.
+/// Content of a channel's messages.
 enum Content {
     /// One JSON object per sample.
     Json,
-    /// ROS's joint states.
+    /// Joint states of ROS.
     JointStates(Vec<Field>, Encoding),
-    /// Joint samples that cannot be read: one clause.
+    /// Joint samples that cannot be read: the reason, one clause.
     Unreadable(String),
-    /// Something else.
+    /// Other content.
     Other,
 }
 
@@ -48,13 +48,13 @@ struct Schema {
 
 struct Topic {
     name: String,
-    /// Name of its schema.
+    /// Name of the schema.
     of: String,
-    /// Messages so far.
+    /// Number of messages so far.
     messages: u64,
 }
 
-/// How the samples are read.
+/// Reader of the samples.
 enum Samples {
     Json(JsonSamples),
     JointStates(Box<JointStates>),
@@ -69,23 +69,23 @@ pub(super) struct McapRows {
     topics: Vec<Topic>,
     /// Names of the robot's joints.
     joints: Vec<String>,
-    /// Topic of the recording, once a message of it came, and how it is read.
+    /// Topic of the recording and its reader, after its first message.
     chosen: Option<(usize, Samples)>,
     message: Vec<u8>,
     /// Number of the message on its topic.
     number: u64,
     log_time: u64,
-    /// Whether a message was logged before the one that precedes it in the file.
+    /// True if a message was logged before its predecessor in the file.
     is_unsorted: bool,
-    /// Rows given, and the time of the last one, s.
+    /// Number of rows returned, and time of the last one, s.
     given: (u64, f64),
     remarks: Vec<Remark>,
-    /// Whether the first message is read but not given.
+    /// True if the first message was read but not returned yet.
     waiting: bool,
 }
 
 impl McapRows {
-    /// Opens the file and takes the columns from the first message.
+    /// Opens the file and determines the columns from the first message.
     pub(super) fn open(path: &Path, joints: &[String]) -> Result<(Self, Header), DataError> {
         let mut rows = Self {
             path: path.into(),
@@ -133,7 +133,7 @@ impl McapRows {
         self.records.bytes_read()
     }
 
-    /// What was assumed and passed over so far; complete once the last row was read.
+    /// Returns the assumptions and omissions so far; complete after the last row.
     pub(super) fn remarks(&self) -> Vec<Remark> {
         let mut remarks = self.remarks.clone();
         if let Some(broken) = self.records.broken() {
@@ -147,7 +147,7 @@ impl McapRows {
         remarks
     }
 
-    /// What may be the cause of time that does not grow, with a semicolon before it; empty where nothing is known.
+    /// Returns the likely cause of time that does not grow, after a semicolon; empty if none is known.
     pub(super) fn order_hint(&self) -> &'static str {
         if self.is_unsorted {
             "; the messages of the file are not in the order of their log time (`mcap sort in.mcap -o out.mcap` sorts them)"
@@ -165,7 +165,7 @@ impl McapRows {
         }
     }
 
-    /// What to say of a file without a sample.
+    /// Returns the error for a file without a sample.
     fn nothing_there(&self) -> DataError {
         let passed_over = self.remarks.iter().find_map(|remark| match remark {
             Remark::OtherMessages {
@@ -204,7 +204,8 @@ impl McapRows {
         ))
     }
 
-    /// Puts the next message of the recording's topic into `self.message` and reads its joints; false at the end.
+    /// Reads the next message of the recording's topic into `self.message` and parses its joints; returns false at the
+    /// end.
     fn next_message(&mut self) -> Result<bool, DataError> {
         loop {
             let (code, body) = match self.records.next_record()? {
@@ -265,7 +266,7 @@ impl McapRows {
         }
     }
 
-    /// Judges the message in `self.message`; false where it is passed over.
+    /// Checks the message in `self.message`; returns false if it is skipped.
     fn accept(&mut self, channel: u16, log_time: u64) -> Result<bool, DataError> {
         let Some(Channel { topic, content }) = self.channels.get(&channel) else {
             return Ok(false);
@@ -300,7 +301,7 @@ impl McapRows {
                 Some(_) => {}
             },
             Content::JointStates(fields, encoding) => {
-                // Beside samples of the project's own, ROS's topics are of other things.
+                // If the file has samples in the project's own format, topics of ROS are not the recording.
                 if let Some((_, Samples::Json(_))) = &self.chosen {
                     return Ok(false);
                 }
@@ -343,7 +344,7 @@ impl McapRows {
         }
     }
 
-    /// Two topics that could both be the recording.
+    /// Returns the error for two topics that may both be the recording.
     fn two_topics(&self, other: usize) -> DataError {
         let chosen = self.chosen.as_ref().map_or(other, |(topic, _)| *topic);
         let (a, b) = (&self.topics[chosen].name, &self.topics[other].name);
@@ -352,7 +353,7 @@ impl McapRows {
         ))
     }
 
-    /// Reads the next message into `values`, one per column; gives its number, or none at the end.
+    /// Reads the next message into `values`, one per column; returns its number, or `None` at the end.
     pub(super) fn next_row(
         &mut self,
         layout: &Layout,
@@ -398,7 +399,7 @@ impl McapRows {
     }
 }
 
-/// What the messages of a channel are.
+/// Determines the content of a channel's messages.
 fn content(topic: &str, encoding: &str, schema: Option<&Schema>) -> Content {
     let is_joint_state = schema.is_some_and(|s| JOINT_STATE.contains(&s.name.as_str()));
     let ros = match encoding {
@@ -409,7 +410,7 @@ fn content(topic: &str, encoding: &str, schema: Option<&Schema>) -> Content {
     match (schema, ros) {
         _ if topic == TOPIC && encoding == "json" => Content::Json,
         (Some(schema), Some(ros)) if is_joint_state => {
-            // Other languages of definitions describe the same standard message.
+            // Other definition languages describe the same standard message.
             let is_msg = matches!(schema.encoding.as_str(), "ros2msg" | "ros1msg");
             let text = if is_msg { schema.text.as_str() } else { "" };
             match joint_state(text, ros == Encoding::Ros1) {

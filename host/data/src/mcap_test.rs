@@ -101,7 +101,7 @@ fn json(first: u64, count: u64) -> Vec<u8> {
 
 fn read_with(bytes: &[u8], robot: &Robot) -> Result<(Vec<Block>, Vec<String>), String> {
     let folder = tempfile::tempdir().unwrap();
-    // Files are told by what they hold.
+    // Files are detected by their content.
     let path = folder.path().join("a.bag");
     std::fs::write(&path, bytes).unwrap();
     let source = Source::open(&path, robot).map_err(|e| e.to_string())?;
@@ -113,7 +113,7 @@ fn read(bytes: &[u8]) -> Result<(Vec<Block>, Vec<String>), String> {
     read_with(bytes, &robot(&["link"]))
 }
 
-/// Asserts that a file is refused in one line that holds these words.
+/// Asserts that a file is refused with a one-line message that contains these words.
 fn refused(result: Result<(Vec<Block>, Vec<String>), String>, words: &[&str]) {
     let said = match result {
         Err(said) => said,
@@ -178,7 +178,7 @@ fn a_file_that_breaks_off_is_read_up_to_there() {
         ];
         let bytes = start(&records.concat());
         let one = start(&records[0]).len();
-        // At the end of a chunk, in the head of one, in its middle, behind the last, and with zeros behind it.
+        // Cut at the end of a chunk, in the header of one, in its middle, after the last one, and followed by zeros.
         let cuts = [
             (bytes[..one].to_vec(), 1000..=1000),
             (bytes[..one + 20].to_vec(), 1000..=1000),
@@ -200,18 +200,18 @@ fn a_file_that_breaks_off_is_read_up_to_there() {
             );
         }
     }
-    // An uncompressed chunk gives nearly all that was written of it.
+    // Nearly all data of an uncompressed chunk can be read.
     let records = chunk("", &[json_channel(), json(0, 1000)].concat());
     let bytes = start(&records);
     let (blocks, _) = read(&bytes[..bytes.len() - 100]).unwrap();
     assert!(blocks[0].len() >= 995);
-    // Messages outside chunks too; only the index is missing where the data has its end.
+    // Messages outside chunks too; if only the index is missing, the data are complete.
     let plain = [json_channel(), json(0, 50)].concat();
     let bytes = start(&plain);
     assert_eq!(read(&bytes[..bytes.len() - 5]).unwrap().0[0].len(), 49);
     let data_end = [bytes.clone(), record(15, &[0; 4])].concat();
     assert!(read(&data_end).unwrap().1[0].contains("only the index"));
-    // Nothing was written yet; and a hole in a file that has its end is damage.
+    // An empty file, and a hole in a file with a proper end, are damage.
     refused(
         read(&start(&json_channel())),
         &["breaks off at byte", "first sample"],
@@ -271,7 +271,7 @@ fn a_message_unlike_the_first_is_named() {
         read(&whole(&[json_channel(), first].concat())),
         &["message 1: column `t` holds NaN"],
     );
-    // Logged out of order: how to sort the file is said.
+    // If messages are out of order, the message says how to sort the file.
     let records = [json_channel(), json(10, 10), json(0, 10)].concat();
     refused(read(&whole(&records)), &["message 11", "mcap sort"]);
 }
@@ -390,7 +390,7 @@ fn joint_states_of_ros_2_are_read_by_the_names_of_the_joints() {
     for is_big in [false, true] {
         let make = |k: u64| {
             let x = k as f64;
-            // The order of the joints changes; one of them is not the robot's.
+            // The order of the joints changes, and one of them does not belong to the robot.
             if k.is_multiple_of(2) {
                 let (q, qd, tau) = ([9.0, x, -x], [9.0, 1.0, 2.0], [9.0, 0.5, -0.25]);
                 state(
@@ -468,7 +468,7 @@ fn definitions_are_read_and_not_presumed() {
     assert_eq!(blocks[0].joints[0].q, [0.0, 1.0, 2.0, 3.0, 4.0]);
     assert_eq!(blocks[0].joints[1].tau, [-0.25; 5]);
     assert_eq!(blocks[0].joints[0].qd, None);
-    // A definition without those of the types it uses, one in another language, and ones that cannot be read.
+    // A definition without those of its types, one in another language, and ones that cannot be read.
     let usual = |definition: &str, encoding: &str| {
         let one = |k| {
             message(
@@ -552,7 +552,7 @@ fn joints_are_matched_or_refused_by_name() {
             state(false, ns(k), &names, [&[1.0, 2.0], &[], &[3.0, 4.0]])
         }))
     };
-    // A prefix that all have.
+    // A prefix that all names have.
     for names in [
         ["ur5/elbow", "ur5/shoulder"],
         ["left_elbow", "left_shoulder"],
@@ -590,7 +590,7 @@ fn joints_are_matched_or_refused_by_name() {
         read_with(&file(["elbow", "elbow"]), &robot(&["elbow"])),
         &["\"elbow\" twice"],
     );
-    // Nor is a name that only ends alike a joint's.
+    // A name that only ends like a joint is not the joint.
     refused(
         read_with(&file(["myelbow", "myshoulder"]), &robot(&ARM)),
         &["no message has the joints"],
@@ -599,7 +599,7 @@ fn joints_are_matched_or_refused_by_name() {
 
 #[test]
 fn publishers_that_share_a_topic_are_told_apart() {
-    // A gripper's messages are none of the robot's.
+    // Messages of a gripper contain no joint of the robot.
     let mixed = |k: u64| {
         if k.is_multiple_of(2) {
             state(false, ns(k), &ARM, [&[1.0, 2.0], &[], &[3.0, 4.0]])
@@ -612,7 +612,7 @@ fn publishers_that_share_a_topic_are_told_apart() {
     assert_eq!(blocks[0].len(), 5);
     let told = |s: &String| s.contains("the first is message 2 on /joint_states, with \"finger\"");
     assert!(said.iter().any(told), "{said:?}");
-    // Parts of the robot in turn are refused.
+    // Messages that alternate between parts of the robot are refused.
     let parts = |k: u64| match k {
         0 => mixed(0),
         k => state(false, ns(k), &ARM[..1], [&[1.0], &[], &[3.0]]),
@@ -621,7 +621,7 @@ fn publishers_that_share_a_topic_are_told_apart() {
         read_with(&whole(&arm_file("/joint_states", parts)), &robot(&ARM)),
         &["message 2", "no joint \"elbow\"", "several publishers"],
     );
-    // Two topics with the robot's joints: which one is the recording nobody can tell.
+    // Two topics contain the robot's joints: it is unknown which one is the recording.
     let one = |channel: u16, k: u64| message(channel, ns(k), &mixed(0));
     let records = [
         ros_channel(1, "/joint_states"),
@@ -633,7 +633,7 @@ fn publishers_that_share_a_topic_are_told_apart() {
         read_with(&whole(&records.concat()), &robot(&ARM)),
         &["/joint_states and /joint_commands both", "mcap filter"],
     );
-    // Another name of the topic is told; so is a topic that holds other joints.
+    // An unusual topic name is reported, and so is a topic with other joints.
     let finger = state(false, ns(0), &["finger"], [&[9.0], &[], &[9.0]]);
     let records = [
         ros_channel(2, "/gripper/joint_states"),
@@ -708,7 +708,7 @@ fn arrays_that_are_missing_or_no_numbers_are_named() {
         read_with(&broken, &arm),
         &["message 5: column `effort of joint \"elbow\"` holds NaN"],
     );
-    // Interfaces that a driver has not are NaN from the first message on.
+    // Interfaces that a driver does not have are NaN from the first message on.
     let never = file(&|_| [two.clone(), nan.clone(), two.clone()]);
     let (blocks, said) = read_with(&never, &arm).unwrap();
     assert_eq!(blocks[0].joints[0].qd, None);
@@ -722,7 +722,7 @@ fn arrays_that_are_missing_or_no_numbers_are_named() {
         read_with(&huge, &arm),
         &["`position of joint \"shoulder\"`", "1·10²²⁴ is no position"],
     );
-    // Without stamps the recorder's time counts.
+    // Without stamps, the recorder's time is used.
     let unstamped = whole(&arm_file("/joint_states", |_| {
         state(false, 0, &ARM, [&two, &[], &two])
     }));

@@ -1,20 +1,20 @@
-//! Motor positions and torques of a recording, turned to the joints through the robot's drives.
+//! Conversion of recorded motor positions and torques to the joints, through the robot's drives.
 
 use rig_shared::transmission::{Transmission, TransmissionError};
 
 use rig_model::robot::Robot;
 
-/// Which quantities of a recording are the motors', and the drives that turn them to the joints.
+/// Motor-side quantities of a recording, and the drives that convert them to the joints.
 #[derive(Clone, Debug)]
 pub(super) struct MotorSide {
     transmission: Transmission<f64>,
-    /// Where the joints begin to be sought.
+    /// Start of the search for joint positions.
     start: Vec<f64>,
-    /// Whether the positions are the motors' (`qm<k>` for every joint).
+    /// True if the positions are those of the motors (`qm<k>` for every joint).
     pub positions: bool,
-    /// Per joint, whether its torque comes from motor torques (`taum<k>`, `i<k>`).
+    /// Per joint, true if its torque comes from motor torques (`taum<k>`, `i<k>`).
     pub torques: Vec<bool>,
-    /// Where the Jacobian is the same everywhere: it and its inverse, row-major, and the motors' zeros.
+    /// If the Jacobian is constant: it and its inverse, row-major, and the motors' zeros.
     constant: Option<Constant>,
 }
 
@@ -27,7 +27,7 @@ struct Constant {
 
 impl MotorSide {
     /// # Errors
-    /// Drives that are singular; none for a description that was loaded.
+    /// Singular drives; never for a description that was loaded.
     pub(super) fn new(
         robot: &Robot,
         positions: bool,
@@ -49,7 +49,7 @@ impl MotorSide {
         })
     }
 
-    /// A pass over the recording, which begins at the middle of the joints' range.
+    /// Starts a pass over the recording at the middle of the joints' range.
     pub(super) fn pass(&self) -> MotorPass {
         let n = self.start.len();
         MotorPass {
@@ -86,25 +86,25 @@ impl Constant {
     }
 }
 
-/// The motors' values of a row and what they make at the joints.
+/// Motor values of a row, and the resulting joint values.
 #[derive(Clone, Debug)]
 pub(super) struct MotorPass {
     /// Motor positions of the row, rad.
     pub psi: Vec<f64>,
     /// Motor torques of the row, N·m.
     pub tau_motor: Vec<f64>,
-    /// Joint positions: of the row before on entry, where the way back needs a start; set by the caller where the
-    /// recording has them itself.
+    /// Joint positions. On entry those of the previous row, as start of the search; set by the caller if the recording
+    /// contains them.
     pub q: Vec<f64>,
-    /// Joint torques; those that come from motors are right.
+    /// Joint torques; valid for those that come from motors.
     pub tau: Vec<f64>,
 }
 
 impl MotorPass {
-    /// Turns the row to the joints.
+    /// Converts the row to the joints.
     ///
     /// # Errors
-    /// A motor position that no joint position gives.
+    /// A motor position that belongs to no joint position.
     pub(super) fn turn(&mut self, side: &MotorSide) -> Result<(), TransmissionError> {
         let n = self.q.len();
         if side.positions {

@@ -18,7 +18,7 @@ fn file(dir: &tempfile::TempDir, text: &str) -> PathBuf {
     path
 }
 
-/// An IRp-6 that swings through its range, joint positions and torques, and what its motors do then.
+/// Motion of an IRp-6 through its range: positions and torques of joints and motors.
 fn irp6_motion(robot: &Robot, rows: usize) -> Vec<[[f64; 5]; 4]> {
     let t = robot.transmission().unwrap();
     let right = std::f64::consts::FRAC_PI_2;
@@ -115,7 +115,7 @@ fn what_the_drives_cannot_turn_is_named_by_line_and_column() {
     for (k, [_, _, psi, tau_motor]) in motion.iter().enumerate() {
         let mut psi = *psi;
         if k == 20 {
-            // Longer than crank and anchor reach.
+            // Longer than the reach of crank and anchor.
             psi[1] += 400.0;
         }
         row(&mut text, k, &[psi, *tau_motor]);

@@ -1,4 +1,4 @@
-//! Numbers as recordings have them.
+//! Numbers in the notation of recordings.
 
 /// Powers of ten that are exact in double precision.
 const POWERS: [f64; 23] = [
@@ -6,11 +6,11 @@ const POWERS: [f64; 23] = [
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 
-/// A plain decimal number at the start of `text`, and the bytes up to its end: nearly every field of a recording.
+/// Reads a plain decimal number at the start of `text`: nearly every field of a recording is one. Returns the number,
+/// its end in bytes, and whether it contains `mark`, the decimal point or comma.
 ///
-/// With digits that make an exact integer below 2⁵³ and at most 22 of them behind the point, the quotient of two
-/// exact numbers is the double nearest to the text (Clinger 1990), to the bit what the standard library gives. None
-/// for everything else, which is then left to that. Third: whether `mark`, the decimal point or comma, is in it.
+/// The digits must form an exact integer below 2⁵³. With at most 22 of them after the point, the quotient of two exact
+/// numbers is the nearest double (Clinger 1990), as from the standard library. Other numbers give `None`.
 #[inline]
 pub(super) fn decimal(text: &[u8], mark: u8) -> (Option<f64>, usize, bool) {
     let negative = text.first() == Some(&b'-');
@@ -21,7 +21,7 @@ pub(super) fn decimal(text: &[u8], mark: u8) -> (Option<f64>, usize, bool) {
     for byte in &text[start..] {
         let digit = byte.wrapping_sub(b'0');
         if digit < 10 {
-            // At most 18 digits are read below, so that this cannot overflow there.
+            // At most 18 digits are used below, so overflow here has no effect.
             mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
         } else if *byte == mark && point.is_none() {
             point = Some(end);
@@ -43,8 +43,8 @@ pub(super) fn decimal(text: &[u8], mark: u8) -> (Option<f64>, usize, bool) {
     )
 }
 
-/// The number in a field with this decimal mark, as programs write it: also `+1.5e3`, `1.5D-01` as of Fortran; NaN where
-/// there is none.
+/// Reads the number in a field with this decimal mark, also `+1.5e3` and `1.5D-01` (Fortran). Returns NaN if there is
+/// no number.
 pub(super) fn number(field: &[u8], mark: u8) -> f64 {
     let parse = |bytes: &[u8]| std::str::from_utf8(bytes).ok().and_then(|s| s.parse().ok());
     let field = field.trim_ascii();
@@ -52,7 +52,7 @@ pub(super) fn number(field: &[u8], mark: u8) -> f64 {
     if mark == b'.' && !field.iter().any(odd) {
         return parse(field).unwrap_or(f64::NAN);
     }
-    // No number is so long: text is not copied.
+    // No number is this long, so no text is copied.
     if field.len() > 64 || field.iter().any(|b| *b == b'.' && mark != b'.') {
         return f64::NAN;
     }

@@ -1,6 +1,6 @@
-//! What joints did in their session before a stretch of a recording: what has warmed up is warm.
+//! Thermal history: motion of the joints in their session before a stretch of a recording.
 //!
-//! Heat is slow beside a motion, so that its mean over a tenth of a second is enough of it.
+//! Heat changes slowly compared with the motion, so means over 0.1 s are sufficient.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use rig_shared::effects::{Effect, Instant, Kind, Memory};
 
 use super::runs::Run;
 
-/// Longest pause within a session, s: a gear keeps its warmth for some minutes.
+/// Longest pause within a session, s: a gear stays warm for some minutes.
 const ONE_SESSION: f64 = 60.0;
 
-/// Time over which motion is taken together, s: a hundredth of the shortest time constant that is looked for.
+/// Averaging time of the motion, s: a hundredth of the shortest time constant of the search.
 const SPAN: f64 = 0.1;
 
-/// Stretches that a session began with, the first first, each with the pause after it, s.
+/// Earlier stretches of the session in order of time, each with the pause after it, s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Past(Vec<(Arc<Spell>, f64)>);
 
-/// What happened in a stretch: mean speed and mean square of the velocity over each span, joint by joint.
+/// Motion in a stretch: mean speed and mean square velocity over each span, per joint.
 #[derive(Debug, PartialEq)]
 struct Spell {
-    /// Of a span, s.
+    /// Length of a span, s.
     period: f64,
     joints: Vec<Vec<[f64; 2]>>,
 }
@@ -45,7 +45,8 @@ impl Spell {
 }
 
 impl Past {
-    /// What an effect remembers after it, with a joint's viscous and Coulomb friction: of all effects only heat outlasts a pause.
+    /// Returns the state of an effect after this history, for a joint with the given viscous and Coulomb friction. Only
+    /// thermal effects keep a state over a pause.
     pub fn remembered(
         &self,
         effect: &Effect<f64>,
@@ -58,7 +59,7 @@ impl Past {
         }
         for (spell, pause) in &self.0 {
             for [speed, square] in &spell.joints[joint] {
-                // The friction whose work at this velocity is what was done over the span.
+                // Friction that does, at this velocity, the same work as in the span.
                 let velocity = square.sqrt();
                 let work = coulomb * speed + viscous * square;
                 let friction = if velocity > 0.0 { work / velocity } else { 0.0 };
@@ -76,7 +77,7 @@ impl Past {
     }
 }
 
-/// A stretch that another may go on from.
+/// A stretch that another stretch may continue.
 struct Known {
     recording: Option<usize>,
     began: f64,
@@ -97,8 +98,9 @@ impl Known {
     }
 }
 
-/// Lets recordings go on from those of `runs` and `before` that they were made after, by one clock and within
-/// 60 s, and stretches from those before them. Clocks that begin anew with each recording say nothing of that.
+/// Links each stretch of `runs` to the earlier stretches of its session, in `runs` or `before`. A recording continues
+/// an earlier one if its clock continues after a pause of at most 60 s. Clocks that restart with each recording link
+/// none.
 pub fn in_sessions(runs: &mut [Run], before: &[Run]) {
     let mut known: Vec<Known> = before.iter().map(|run| Known::of(run, None)).collect();
     let start = |run: &Run| run.t.first().copied().unwrap_or(run.began);
@@ -111,7 +113,7 @@ pub fn in_sessions(runs: &mut [Run], before: &[Run]) {
             .filter(|k| k.began < first && (k.end..=k.end + ONE_SESSION).contains(&first))
             .map(|k| k.began)
             .fold(first, f64::min);
-        // Of two that end as late that of the same recording, where a repeat has the same clock.
+        // If two end at the same time, the one of the same recording is taken: a repetition may have the same clock.
         let latest = (known.iter())
             .filter(|k| k.began == run.began && k.end < own)
             .filter(|k| k.began < first || k.recording == Some(run.recording))

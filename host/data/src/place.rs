@@ -1,4 +1,4 @@
-//! Where in a recording something was found.
+//! Place of a finding in a recording.
 
 use std::fmt;
 use std::path::Path;
@@ -13,7 +13,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// The place with its file before it: `a.csv:3` or `a.mcap, message 3`.
+    /// Returns the place with its file in front: `a.csv:3` or `a.mcap, message 3`.
     pub fn in_file(self, path: &Path) -> String {
         match self {
             Self::Line(line) => format!("{}:{line}", path.display()),

@@ -1,8 +1,7 @@
-//! Wrong units, noticed before they become wrong parameters.
+//! Detects wrong units before they lead to wrong parameters.
 //!
-//! Every rule leaves at least a factor of ten between what honest recordings do and what raises it;
-//! factors of unit mistakes are 57 (degrees) and 1000 (milli). Without limits in the robot's description
-//! only what the columns say about each other is checked.
+//! Each rule keeps a wide margin to correct recordings; unit mistakes have factors of 57 (degrees) and 1000 (milli).
+//! Without limits in the robot's description, the columns are only compared with each other.
 
 use super::held::held;
 use super::jump::jump;
@@ -13,7 +12,7 @@ use super::{Block, JointColumns};
 use rig_model::robot::{Joint, JointKind, Robot, is_placeholder};
 use rig_output::{format_significant, format_time, format_trimmed, listed};
 
-/// A column that cannot be in the unit of the contract.
+/// A column that cannot have the required unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Implausible {
     /// Position of a revolute joint in degrees.
@@ -29,7 +28,7 @@ pub enum Implausible {
         highest: f64,
         /// Farthest position limit, rad.
         limit: f64,
-        /// What else it may be, with a comma before it; empty where it is nothing else.
+        /// Another possible cause, after a comma; empty if there is no other.
         or: String,
     },
     /// Position far outside the limits.
@@ -49,10 +48,10 @@ pub enum Implausible {
         upper: f64,
         /// rad or m.
         unit: &'static str,
-        /// What else it may be, with a comma before it; empty where it is nothing else.
+        /// Another possible cause, after a comma; empty if there is no other.
         or: String,
     },
-    /// Faster than ten times the limit.
+    /// Speed above ten times the limit.
     #[error(
         "q{joint} moves at up to {speed:.4} {unit}/s, more than ten times its limit of {limit} {unit}/s; check the units of q{joint} and t and the limit"
     )]
@@ -66,7 +65,7 @@ pub enum Implausible {
         /// rad or m.
         unit: &'static str,
     },
-    /// A position that jumps.
+    /// A position with jumps.
     #[error(
         "q{joint} jumps by {by:.4} {unit} from one row to the next at t = {} s{more}, while its fastest motion is {fastest:.2e} {unit} a row; {mend}",
         format_time(*at)
@@ -78,16 +77,16 @@ pub enum Implausible {
         at: f64,
         /// Largest jump.
         by: f64,
-        /// How many more there are, with words; empty where there is one.
+        /// Number of further jumps in words; empty if there is only one.
         more: String,
-        /// Largest change from row to row apart from jumps.
+        /// Largest change from row to row without the jumps.
         fastest: f64,
-        /// What would be right.
+        /// Advice for a correction.
         mend: &'static str,
         /// rad or m.
         unit: &'static str,
     },
-    /// Single rows of effort that no other comes near.
+    /// Single rows of effort far above all others.
     #[error(
         "tau{joint} is {value:.4} {unit} in the row at t = {} s{more}, while it is hardly ever more than {usual:.4} {unit} elsewhere; a row like that is no torque: look for a loose contact or a lost bit, and take the row out",
         format_time(*at)
@@ -95,39 +94,39 @@ pub enum Implausible {
     Spike {
         /// Joint, 1-based.
         joint: usize,
-        /// Time of the largest, s.
+        /// Time of the largest spike, s.
         at: f64,
-        /// What stands there.
+        /// Value in this row.
         value: f64,
-        /// How many more there are, with words; empty where there is one.
+        /// Number of further spikes in words; empty if there is only one.
         more: String,
-        /// Largest magnitude elsewhere, but for one row in a thousand.
+        /// 99.9th percentile of the magnitude.
         usual: f64,
         /// N·m or N.
         unit: &'static str,
     },
-    /// Measured velocity and change of position do not belong together.
+    /// Measured velocity that does not fit the change of position.
     #[error(
         "qd{joint} and q{joint} do not belong together: q changes by {ratio:.4} times the integral of qd; give both in {unit} and {unit}/s and t in s"
     )]
     VelocityScale {
         /// Joint, 1-based.
         joint: usize,
-        /// Change of position over integral of velocity; 1 would be right.
+        /// Change of position over integral of velocity; 1 is correct.
         ratio: f64,
         /// rad or m.
         unit: &'static str,
     },
-    /// Reference and position do not belong together.
+    /// Reference that does not fit the position.
     #[error(
         "ref{joint} does not belong to q{joint}: it moves {ratio:.4} times as far{hint}, while both should be in {unit} and counted in the same sense"
     )]
     ReferenceScale {
         /// Joint, 1-based.
         joint: usize,
-        /// Change of the reference over that of the position; 1 would be right.
+        /// Change of the reference over that of the position; 1 is correct.
         ratio: f64,
-        /// What a factor like that is called, with a comma before it; empty where it has no name.
+        /// Usual cause of such a factor, after a comma; empty if there is none.
         hint: &'static str,
         /// rad or m.
         unit: &'static str,
@@ -139,7 +138,7 @@ pub enum Implausible {
     HeldPosition {
         /// Joints, 1-based.
         joints: Vec<usize>,
-        /// Rows for which a value stays.
+        /// Number of rows with the same value.
         rows: usize,
         /// Rate of the values, Hz.
         slow: String,
@@ -153,7 +152,7 @@ pub enum Implausible {
     HeldEffort {
         /// Joints, 1-based.
         joints: Vec<usize>,
-        /// Rows for which a value stays.
+        /// Number of rows with the same value.
         rows: usize,
         /// Rate of the values, Hz.
         slow: String,
@@ -173,7 +172,7 @@ pub enum Implausible {
         joint: usize,
         /// Share of the rows, %.
         share: String,
-        /// What was lost.
+        /// How the sign was lost.
         how: String,
     },
     /// A measured velocity or acceleration that is zero throughout.
@@ -186,7 +185,7 @@ pub enum Implausible {
         /// Joint, 1-based.
         joint: usize,
     },
-    /// Rows of a measured velocity that the position does not have.
+    /// Spikes of a measured velocity that the position does not show.
     #[error(
         "qd{joint} is {value} {unit}/s in the row at t = {} s{more}, where q{joint} changes by {speed} {unit}/s; such rows are no velocity: look for a wrapped counter or a lost sample, or leave qd{joint} out",
         format_time(*at)
@@ -194,13 +193,13 @@ pub enum Implausible {
     RateSpike {
         /// Joint, 1-based.
         joint: usize,
-        /// Time of the largest, s.
+        /// Time of the largest spike, s.
         at: f64,
-        /// What stands there.
+        /// Value in this row.
         value: String,
-        /// What the position does there.
+        /// Velocity of the position in this row.
         speed: String,
-        /// How many more there are, with words; empty where there is one.
+        /// Number of further spikes in words; empty if there is only one.
         more: String,
         /// rad or m.
         unit: &'static str,
@@ -219,7 +218,7 @@ pub enum Implausible {
         /// N·m or N.
         unit: &'static str,
     },
-    /// Effort far below what moves the joint.
+    /// Effort too low to move the joint.
     #[error(
         "tau{joint} looks too small by a factor of about 1000, as k{unit} would be (at most {highest:.3e} while the joint moves; its {of} is {expected} {unit}); give it in {unit}, at the joint, or correct the {of} in the description"
     )]
@@ -228,14 +227,14 @@ pub enum Implausible {
         joint: usize,
         /// Largest magnitude.
         highest: f64,
-        /// What it is compared with.
+        /// Name of the value that it is compared with.
         of: &'static str,
-        /// That value.
+        /// This value.
         expected: f64,
         /// N·m or N.
         unit: &'static str,
     },
-    /// No effort at all.
+    /// Effort that is zero throughout.
     #[error(
         "tau{joint} is 0 in every row while the joint moves; check that the column is the torque and was recorded"
     )]
@@ -252,7 +251,7 @@ pub enum Implausible {
 }
 
 impl Implausible {
-    /// The column at fault, with its factor where it has one.
+    /// Name of the faulty column, with the factor if there is one.
     pub fn column(&self) -> String {
         match self {
             Self::Degrees { joint, .. }
@@ -278,12 +277,12 @@ impl Implausible {
 }
 
 impl Implausible {
-    /// Whether the column may be right all the same, so that it is said and not refused.
+    /// Returns true if the column may still be correct, so that it is reported but not refused.
     pub fn is_doubt(&self) -> bool {
         matches!(self, Self::HeldEffort { .. })
     }
 
-    /// Whether nothing can be said of the motion or the torque before it is mended.
+    /// Returns true if motion or torque cannot be analysed before a correction.
     pub fn spoils(&self) -> bool {
         matches!(
             self,
@@ -295,13 +294,13 @@ impl Implausible {
     }
 }
 
-/// Columns of these joints: `q1, q2 and q3`.
+/// Lists the columns of these joints: `q1, q2 and q3`.
 fn columns_of(column: &str, joints: &[usize]) -> String {
     let all: Vec<String> = joints.iter().map(|k| format!("{column}{k}")).collect();
     listed(&all)
 }
 
-/// The same with their verb.
+/// Lists the columns with their verb.
 fn changes(column: &str, joints: &[usize]) -> String {
     let verb = if joints.len() == 1 {
         "changes"
@@ -320,7 +319,7 @@ fn nth(rows: usize) -> String {
     }
 }
 
-/// Everything in `block` that cannot be in SI units for `robot`; empty where all is well.
+/// Returns all columns in `block` that cannot be in SI units for `robot`; empty if there are none.
 pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     let mut found = Vec::new();
     let mut steps: Vec<f64> = block
@@ -330,7 +329,7 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
         .map(|(a, b)| b - a)
         .collect();
     steps.sort_by(f64::total_cmp);
-    // Motion sampled at 5 Hz or less cannot be identified anyway; 0.2 ms as milliseconds is this much.
+    // Motion sampled at 5 Hz or less cannot be identified; 0.2 is also a step of 0.2 ms in milliseconds.
     if let Some(&step) = steps.get(steps.len() / 2)
         && step >= 0.2
     {
@@ -343,7 +342,7 @@ pub fn plausibility(block: &Block, robot: &Robot) -> Vec<Implausible> {
     found
 }
 
-/// Positions and efforts that keep each value for several rows, joints of one rate together.
+/// Finds positions and efforts that keep each value for several rows; joints with the same rate are grouped.
 fn repeated(block: &Block) -> Vec<Implausible> {
     let together = |of: fn(&JointColumns) -> &[f64]| {
         let mut found: Vec<(usize, Vec<usize>)> = Vec::new();
@@ -381,8 +380,7 @@ fn repeated(block: &Block) -> Vec<Implausible> {
     positions.chain(efforts).collect()
 }
 
-/// The unit of time that steps of this size look like, where they are too long for seconds: rows come at between 5 and
-/// 5000 Hz.
+/// Returns the likely time unit for steps too long for seconds, if rows come at between 5 and 5000 Hz.
 pub fn unit_of_steps(step: f64) -> &'static str {
     match step {
         ..200.0 => "milliseconds",
@@ -391,7 +389,7 @@ pub fn unit_of_steps(step: f64) -> &'static str {
     }
 }
 
-/// That a fault is there more than once, in words.
+/// Returns the number of further places in words.
 fn more(count: usize) -> String {
     match count {
         1 => String::new(),
@@ -399,7 +397,7 @@ fn more(count: usize) -> String {
     }
 }
 
-/// Lowest and highest value.
+/// Returns the lowest and highest value.
 pub(super) fn range(values: &[f64]) -> (f64, f64) {
     values
         .iter()
@@ -481,7 +479,7 @@ fn check_joint(
         .as_ref()
         .and_then(|qd| velocity_scale(t, &columns.q, qd))
     {
-        // Degrees or rpm against rad are at least 6 apart, milli 1000.
+        // Factors of degrees or rpm to rad are at least 6, of milli 1000.
         if !(0.2..5.0).contains(&ratio.abs()) {
             found.push(Implausible::VelocityScale {
                 joint: k,
@@ -493,7 +491,7 @@ fn check_joint(
     check_effort(k, t, columns, joint, effort_unit, highest - lowest, found);
 }
 
-/// Rows a second.
+/// Returns the number of rows per second.
 fn rate(t: &[f64]) -> f64 {
     let (Some(first), Some(last)) = (t.first(), t.last()) else {
         return 0.0;
@@ -514,7 +512,7 @@ fn lost_sign(column: &'static str, joint: usize, lost: Unsigned) -> Implausible 
     }
 }
 
-/// That a position beyond its limits by this factor may be the motor's, with a comma before it.
+/// Returns a remark, after a comma, that a position beyond its limits by this factor may be a motor position.
 fn motor_angle(joint: &Joint, beyond: f64) -> String {
     let Some(ratio) = joint.drive.as_ref().map(|drive| drive.gear_ratio.abs()) else {
         return String::new();
@@ -536,12 +534,12 @@ fn motor_angle(joint: &Joint, beyond: f64) -> String {
     }
 }
 
-/// What is wrong with measured velocities and accelerations, which concerns who uses them.
+/// Returns the faults of measured velocities and accelerations; they concern only users of these columns.
 pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
     let mut found = Vec::new();
     for (k, (columns, joint)) in (1..).zip(block.joints.iter().zip(&robot.joints)) {
         let (lowest, highest) = range(&columns.q);
-        // 0.05 rad or 5 cm: less may be the noise of a joint that stands.
+        // Below 0.05 rad or 5 cm the motion may be the noise of a joint at rest.
         if highest - lowest < 0.05 || columns.q.is_empty() {
             continue;
         }
@@ -569,7 +567,7 @@ pub fn strange_rates(block: &Block, robot: &Robot) -> Vec<Implausible> {
     found
 }
 
-/// Highest mean speed over ten samples: a single step of a coarse encoder is no speed.
+/// Returns the highest mean speed over ten samples, so that a single step of a coarse encoder is not a speed.
 fn highest_speed(t: &[f64], q: &[f64]) -> Option<f64> {
     const SPAN: usize = 10;
     let rows = t.iter().zip(q);
@@ -579,8 +577,8 @@ fn highest_speed(t: &[f64], q: &[f64]) -> Option<f64> {
         .reduce(f64::max)
 }
 
-/// Least-squares factor between changes of q and the integral of qd over windows of twenty samples, if
-/// both go together.
+/// Returns the least-squares factor between changes of q and the integral of qd over windows of twenty samples, if the
+/// two are correlated.
 pub fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     const SPAN: usize = 20;
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -595,7 +593,7 @@ pub fn velocity_scale(t: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
         xy += x * y;
         yy += y * y;
     }
-    // Only where the two are clearly the same motion: correlation above 0.8.
+    // Only for a correlation above 0.8.
     (xx > 0.0 && yy > 0.0 && xy.abs() > 0.8 * (xx * yy).sqrt()).then(|| xy / xx)
 }
 
@@ -636,7 +634,7 @@ fn check_effort(
         });
         return;
     }
-    // 0.05 rad or 5 cm of travel: a joint that hardly moves may well need next to nothing.
+    // Below 0.05 rad or 5 cm of travel a joint may need almost no torque.
     if columns.tau.is_empty() || travel < 0.05 {
         return;
     }
@@ -644,7 +642,7 @@ fn check_effort(
         found.push(Implausible::NoEffort { joint: k });
         return;
     }
-    // A joint cannot move against its friction with a hundredth of it, whatever else acts.
+    // A joint cannot move with less than a hundredth of its Coulomb friction.
     let coulomb = joint
         .friction
         .as_ref()
@@ -652,8 +650,8 @@ fn check_effort(
         .filter(|c| *c > 0.0);
     let too_small = match (coulomb, limit) {
         (Some(c), _) if highest < 0.01 * c => Some(("Coulomb friction", c)),
-        // A limit that stands for "none" says nothing of what moves the joint, and where the link is described, that says more than
-        // any limit: a wrist in a table of equal limits may well need a thousandth of its own.
+        // A placeholder limit says nothing about the torque. If the link is described, its mass says more than any
+        // limit: a wrist may need only a thousandth of a limit that is equal for all joints.
         (None, Some(l))
             if joint.inertial.is_none() && highest < 5e-4 * l && !is_placeholder(l, 1e3) =>
         {

@@ -1,8 +1,8 @@
-//! What the columns of a joint measure, and what the file calls them.
+//! Quantities of a joint's columns, and their names in the file.
 
 use super::columns::{Layout, Role};
 
-/// What a column of a joint measures, as in [`super::JointColumns`].
+/// Quantity of a joint's column, as in [`super::JointColumns`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Position, rad or m.
@@ -19,11 +19,11 @@ pub enum Quantity {
     Voltage,
     /// Temperature, °C.
     Temperature,
-    /// Position on the link's side of the transmission, rad or m.
+    /// Position on the link side of the transmission, rad or m.
     LinkPosition,
 }
 
-/// Those that messages name.
+/// Quantities that messages name.
 const NAMED: [Quantity; 8] = [
     Quantity::Position,
     Quantity::Effort,
@@ -35,7 +35,7 @@ const NAMED: [Quantity; 8] = [
     Quantity::LinkPosition,
 ];
 
-/// `text` with the words in `names` (before, after) exchanged, but for what stands between quotation marks.
+/// Replaces words in `text` by `names` (before, after), except between quotation marks.
 fn renamed(text: &str, names: &[[String; 2]]) -> String {
     let mut out = String::with_capacity(text.len());
     let mut word = String::new();
@@ -59,8 +59,8 @@ fn renamed(text: &str, names: &[[String; 2]]) -> String {
 }
 
 impl super::Source {
-    /// A message about this recording with the file's own names of the columns: in place of the contract's, or beside them where
-    /// the values are not the column's own (`tau1 (from i1)`).
+    /// Returns a message with the file's own column names instead of the standard ones. Both names appear if the values
+    /// are converted from the column (`tau1 (from i1)`).
     pub fn in_its_names(&self, text: &str) -> String {
         let joints = 0..self.joint_count();
         let names: Vec<[String; 2]> = joints
@@ -82,7 +82,7 @@ impl super::Source {
 }
 
 impl Quantity {
-    /// Name of the column as in the contract, without the joint's number.
+    /// Returns the standard name of the column, without the joint's number.
     pub fn prefix(self) -> &'static str {
         match self {
             Self::Position => "q",
@@ -96,7 +96,7 @@ impl Quantity {
         }
     }
 
-    /// Whether a column of this role is the joint's own (or its motor's) column of this quantity.
+    /// Returns true if this role is the quantity's own column of the joint or its motor.
     fn is_of(self, role: Role, joint: usize) -> bool {
         let (quantity, k) = match role {
             Role::Position(k) | Role::MotorPosition(k) => (Self::Position, k),
@@ -114,7 +114,7 @@ impl Quantity {
 }
 
 impl Layout {
-    /// Returns true if a joint's values are made of columns of its motors.
+    /// Returns true if a joint's values are computed from columns of its motors.
     fn is_of_motors(&self, joint: usize, quantity: Quantity) -> bool {
         self.motors.as_ref().is_some_and(|m| match quantity {
             Quantity::Position => m.positions,
@@ -123,7 +123,7 @@ impl Layout {
         })
     }
 
-    /// Returns true if a joint's values went through a drive: its ratio or its torque constant.
+    /// Returns true if a joint's values are converted by a drive: by its ratio or its torque constant.
     fn is_turned(&self, joint: usize, quantity: Quantity) -> bool {
         let scaled = |role| matches!(role, Role::Effort(k, factor) if k == joint && factor != 1.0);
         self.is_of_motors(joint, quantity)

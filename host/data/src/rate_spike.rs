@@ -1,27 +1,27 @@
-//! Rows of a measured velocity that the position does not have: a counter that wraps, a lost sample in the drive.
+//! Spikes of a measured velocity that the position does not show: a counter overflow, a lost sample in the drive.
 
-/// Rows on either side over which the position's own velocity is taken.
+/// Rows on either side for the difference quotient of the position.
 const BESIDE: usize = 2;
-/// A spike is this many times what the two velocities differ by in all but one row in a hundred …
+/// A spike is this multiple of the 99th percentile of the difference between the two velocities …
 const STANDS_OUT: f64 = 50.0;
-/// … and at least this share of the fastest motion.
+/// … and at least this share of the highest speed.
 const FAST: f64 = 0.5;
 
 /// The row in which velocity and position differ most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RateSpike {
-    /// Its row.
+    /// Row of the spike.
     pub row: usize,
-    /// Measured velocity there.
+    /// Measured velocity in this row.
     pub value: f64,
-    /// Velocity of the position there.
+    /// Velocity from the position in this row.
     pub speed: f64,
-    /// How many there are.
+    /// Number of spikes.
     pub count: usize,
 }
 
-/// The largest spike of `qd` against `q`; none where there is none. A velocity that is late or filtered differs everywhere, and
-/// so does one in another unit: neither has spikes.
+/// Returns the largest spike of `qd` compared with `q`, if any. A velocity that is late, filtered or in another unit
+/// differs everywhere, so it has no spikes.
 pub(super) fn rate_spike(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateSpike> {
     let speed = |k: usize| (q[k + BESIDE] - q[k - BESIDE]) / (t[k + BESIDE] - t[k - BESIDE]);
     let rows = BESIDE..q.len().min(qd.len()).checked_sub(BESIDE)?;
@@ -31,7 +31,7 @@ pub(super) fn rate_spike(t: &[f64], q: &[f64], qd: &[f64]) -> Option<RateSpike> 
     let common = *sorted
         .select_nth_unstable_by(last - last / 100, f64::total_cmp)
         .1;
-    // A coarse encoder's own velocity comes in steps of a count a row.
+    // The velocity of a coarse encoder has steps of one count per row.
     let steps = q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let count = steps.filter(|by| *by > 0.0).fold(f64::INFINITY, f64::min);
     let step = count / (t[t.len() - 1] - t[0]) * (t.len() - 1) as f64;

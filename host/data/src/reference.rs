@@ -1,7 +1,7 @@
-//! References that cannot be those of their positions: noticed before a model is blamed for a motion that nobody asked for.
+//! References that cannot belong to their positions. They are detected before a model is blamed for a wrong motion.
 //!
-//! A joint follows its reference: both are in one unit, counted in one sense from one zero, by one clock. What departs from that
-//! by more than a control loop can is a fault of the column.
+//! A joint follows its reference: both have the same unit, direction, zero and clock. A larger deviation than a control
+//! loop can cause is a fault of the column.
 
 use core::f64::consts::TAU;
 
@@ -10,41 +10,40 @@ use super::{Block, JointColumns};
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_output::format_significant;
 
-/// Travel of a joint from which it counts as moving, rad or m.
+/// Travel above which a joint counts as moving, rad or m.
 const MOVES: f64 = 0.05;
-/// Correlation of a reference with the position of another joint, or with its own at another time, from which both are one
-/// motion.
+/// Correlation above which a reference and a position are the same motion. The position may be that of another joint,
+/// or the joint's own at another time.
 const SAME_MOTION: f64 = 0.95;
-/// Distance between a reference and a position that never changes from which both have different zeros, rad or m. A zero that is
-/// set by hand is off by 0.02 rad; one of another convention is off by a quarter of a turn and the like.
+/// Constant distance between reference and position above which they have different zeros, rad or m. A zero set by hand
+/// is wrong by 0.02 rad; one of another convention by a quarter of a turn or similar.
 const OTHER_ZERO: f64 = 0.1;
-/// Times by which such a distance must exceed what it varies by. The droop of a loop under gravity varies by as much as it is,
-/// where the joint moves farther than the droop.
+/// Minimum ratio of this distance to its standard deviation. The droop of a loop under gravity varies by its own size
+/// if the joint moves farther than the droop.
 const CONSTANT: f64 = 10.0;
-/// Time by which a position may follow its reference, s: a loop of 0.3 Hz does. Slower ones move no joint that is identified.
+/// Largest delay of a position behind its reference, s: that of a 0.3 Hz loop. No identified joint has a slower loop.
 const SLOWEST_LOOP: f64 = 0.5;
-/// Time by which a position may be ahead of its reference, s: what averaging and a period of the loop can shift both against
-/// each other.
+/// Largest lead of a position before its reference, s: averaging and a period of the loop can cause it.
 const AHEAD: f64 = 0.05;
-/// Longest shift that is looked for, s, and its share of the recording.
+/// Longest time shift of the search, s, and as a share of the recording.
 const LONGEST: [f64; 2] = [20.0, 0.25];
-/// Rows that are compared at each shift.
+/// Maximum number of rows compared at each shift.
 const MOST: usize = 4000;
-/// Shifted, the reference must leave at most this share of what it leaves of the position as recorded.
+/// Maximum ratio of the unexplained variance with the shift to that as recorded.
 const LESS: f64 = 0.35;
-/// Of shifts that do nearly as well as the best the shortest counts, as of a periodic motion.
+/// Factor of the least unexplained variance within which the shortest shift is taken. A periodic motion has several.
 const AS_WELL: f64 = 1.3;
 
-/// Share of a variance that is left by rounding alone.
+/// Share of a variance that rounding leaves.
 const ROUNDING: f64 = 1e-9;
 
-/// A reference that cannot be that of its joint's position.
+/// A reference that cannot belong to its joint's position.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StrangeReference {
-    /// Another unit or sense.
+    /// Another unit or direction.
     #[error(transparent)]
     Scale(#[from] Implausible),
-    /// One value.
+    /// A constant value.
     #[error(
         "ref{joint} is {} {unit} in every row while q{joint} moves by {} {unit}: the column is not the reference of this motion; record the reference, or leave the column out",
         format_significant(*value, 4), format_significant(*travel, 3)
@@ -59,7 +58,7 @@ pub enum StrangeReference {
         /// rad or m.
         unit: &'static str,
     },
-    /// Begins again after a turn.
+    /// Wraps after a turn.
     #[error(
         "ref{joint} jumps by a turn ({} {unit}) at t = {} s{more} while q{joint} goes on: give the reference counted on beyond a turn, as q{joint} is",
         format_significant(*by, 4), format_significant(*at, 6)
@@ -71,7 +70,7 @@ pub enum StrangeReference {
         at: f64,
         /// That jump.
         by: f64,
-        /// How many more there are, with words; empty where there is one.
+        /// Number of further jumps in words; empty if there is only one.
         more: String,
         /// rad or degrees.
         unit: &'static str,
@@ -88,7 +87,7 @@ pub enum StrangeReference {
         by: f64,
         /// above or below.
         side: &'static str,
-        /// That it is a whole number of turns, with a comma; empty where it is none.
+        /// Remark for a whole number of turns, after a comma; otherwise empty.
         turns: String,
         /// Range of the position.
         travel: f64,
@@ -103,16 +102,16 @@ pub enum StrangeReference {
     Clock {
         /// Joint, 1-based.
         joint: usize,
-        /// By how much the reference is later than the position, s.
+        /// Time by which the reference is later than the position, s.
         by: f64,
         /// behind or ahead of.
         side: &'static str,
-        /// Correlation with the reference moved.
+        /// Correlation with the shifted reference.
         moved: f64,
         /// Correlation as recorded.
         recorded: f64,
     },
-    /// Another joint's.
+    /// The reference of another joint.
     #[error(
         "ref{joint} goes with q{other} (correlation {}) and not with q{joint} ({}): the columns are in another order than the joints of the description",
         format_significant(*there, 3), format_significant(*here, 3)
@@ -120,9 +119,9 @@ pub enum StrangeReference {
     OtherJoint {
         /// Joint, 1-based.
         joint: usize,
-        /// Joint whose position it goes with, 1-based.
+        /// Joint whose position it follows, 1-based.
         other: usize,
-        /// Correlation with that.
+        /// Correlation with the other joint's position.
         there: f64,
         /// Correlation with its own position.
         here: f64,
@@ -143,7 +142,7 @@ impl StrangeReference {
         }
     }
 
-    /// The column at fault, with its factor where it has one.
+    /// Name of the faulty column, with the factor if there is one.
     pub fn column(&self) -> String {
         match self {
             Self::Scale(found) => found.column(),
@@ -152,8 +151,8 @@ impl StrangeReference {
     }
 }
 
-/// References that cannot be those of their positions; what uses no references is right without them. One a joint at most: the
-/// others follow from the first.
+/// Returns references that cannot belong to their positions, at most one fault per joint: others follow from the first.
+/// Methods that use no references are not affected.
 pub fn strange_references(block: &Block, robot: &Robot) -> Vec<StrangeReference> {
     (0..block.joints.len().min(robot.joints.len()))
         .filter_map(|j| {
@@ -194,7 +193,7 @@ fn constant(
     })
 }
 
-/// Jumps of a turn, in rad or degrees, of the reference alone.
+/// Finds jumps by a turn, in rad or degrees, that occur only in the reference.
 fn wrapped(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeReference> {
     [(TAU, "rad"), (360.0, "degrees")]
         .into_iter()
@@ -203,7 +202,7 @@ fn wrapped(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeR
                 (reference.windows(2).zip(q.windows(2)))
                     .enumerate()
                     .filter(|(_, (r, q))| {
-                        // Within one row nothing moves by a tenth of a turn.
+                        // No joint moves by a tenth of a turn within one row.
                         let [r, q] = [r[1] - r[0], q[1] - q[0]];
                         (r.abs() / turn - 1.0).abs() < 0.1 && q.abs() < 0.1 * TAU
                     });
@@ -222,7 +221,7 @@ fn wrapped(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeR
         })
 }
 
-/// A reference from another zero: whole turns, farther from the position than that ever moves, or always as far from it.
+/// Finds a reference with another zero: whole turns, a distance larger than any motion, or a constant distance.
 fn offset(
     j: usize,
     q: &[f64],
@@ -235,7 +234,7 @@ fn offset(
     let by = *apart.get(apart.len() / 2)?;
     let moved = travel(q);
     let turns = (by / TAU).round();
-    // The error of the loop is far below a tenth of a turn where it is known to a whole one.
+    // The loop error is far below a tenth of a turn, so whole turns are recognised.
     let whole = turning && turns != 0.0 && (by / TAU - turns).abs() < 0.1;
     let never_there = moved > MOVES && by.abs() > moved.max(travel(reference));
     let varies = apart.iter().map(|a| (a - by).powi(2)).sum::<f64>() / apart.len() as f64;
@@ -254,7 +253,7 @@ fn offset(
     })
 }
 
-/// Whether a reference and a position are one motion at one time.
+/// Returns true if a reference and a position are the same motion at the same time.
 fn same(q: &[f64], reference: &[f64]) -> bool {
     reference_scale(q, reference).is_some_and(|scale| scale > 0.0)
 }
@@ -278,13 +277,13 @@ fn other_joint(j: usize, joints: &[JointColumns], reference: &[f64]) -> Option<S
         })
 }
 
-/// Correlation of two columns; no number where one of them stands still.
+/// Returns the correlation of two columns; NaN if one of them is constant.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let [xx, xy, yy] = about_means(a, b);
     xy / (xx * yy).sqrt()
 }
 
-/// Squares of the first column, products of both and squares of the second, about their means.
+/// Returns the sums xx, xy and yy of the two columns about their means.
 fn about_means(a: &[f64], b: &[f64]) -> [f64; 3] {
     let count = a.len().min(b.len()).max(1) as f64;
     let (ma, mb) = (a.iter().sum::<f64>() / count, b.iter().sum::<f64>() / count);
@@ -298,11 +297,11 @@ fn about_means(a: &[f64], b: &[f64]) -> [f64; 3] {
     [xx, xy, yy]
 }
 
-/// A reference that is not in the unit or sense of its position.
+/// Finds a reference that has another unit or direction than its position.
 fn reference_unit(k: usize, columns: &JointColumns, joint: &Joint) -> Option<Implausible> {
     let ratio = reference_scale(&columns.q, columns.reference.as_ref()?)?;
     let (unit, _) = joint.kind.units();
-    // What does not follow its reference by a tenth is a fault of the loop; units are 57 and 1000.
+    // A factor between 0.1 and 10 is a loop error; unit mistakes have 57 and 1000.
     let hint = match (ratio, unit) {
         (0.1..10.0, _) => return None,
         (50.0..65.0, "rad") => ", as degrees would",
@@ -319,22 +318,22 @@ fn reference_unit(k: usize, columns: &JointColumns, joint: &Joint) -> Option<Imp
     })
 }
 
-/// Spread of the reference over that of the position, below zero where they run against each other; none where they are
-/// not the same motion.
+/// Returns the spread of the reference over that of the position, negative for opposite directions. Returns `None` if
+/// they are not the same motion.
 pub fn reference_scale(q: &[f64], reference: &[f64]) -> Option<f64> {
-    // The variance of one value is rounding, and so is what goes with it.
+    // The variance of a constant column is rounding error.
     let stands = |column: &[f64]| column.windows(2).all(|pair| pair[0] == pair[1]);
     if stands(q) || stands(reference) {
         return None;
     }
     let [xx, xy, yy] = about_means(q, reference);
     let alike = xy / (xx * yy).sqrt();
-    // A position that lags far behind its reference is still like it (KUKA LWR4+: 0.77); one that runs against it has to be
-    // its very mirror image.
+    // A position far behind its reference is still correlated (KUKA LWR4+: 0.77). Opposite directions need a
+    // correlation below −0.9.
     (alike.is_finite() && !(-0.9..=0.6).contains(&alike)).then(|| (yy / xx).sqrt() * alike.signum())
 }
 
-/// A reference that is the position at another time than a loop can make it.
+/// Finds a reference that is shifted in time by more than a loop can cause.
 fn clock(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeReference> {
     if travel(q) < MOVES || travel(reference) < MOVES {
         return None;
@@ -353,7 +352,7 @@ fn clock(j: usize, t: &[f64], q: &[f64], reference: &[f64]) -> Option<StrangeRef
     if reach == 0 || reach >= q.len() {
         return None;
     }
-    // Reference rows later than position rows by each lag.
+    // Correlation with the reference later than the position by each lag.
     let at = |lag: i64| {
         let shift = lag.unsigned_abs() as usize;
         let kept = q.len().saturating_sub(shift);
@@ -407,7 +406,7 @@ mod tests {
         robot
     }
 
-    /// Excitation of joint `j` behind its reference by `lag` s, in motion between 0 and the end.
+    /// Excitation of each joint, behind its reference by `lag` s; the motion starts and ends at rest.
     fn made(joints: usize, lag: f64) -> Block {
         let t: Vec<f64> = (0..20_000).map(|k| f64::from(k) * 1e-3).collect();
         let motion = |j: usize, t: f64| {
@@ -452,7 +451,7 @@ mod tests {
                 assert_eq!(said(&made(joints, lag)), [""; 0], "{lag}");
             }
         }
-        // A loop with droop, noise, a joint that holds while it sags, a swing at a constant reference that is not far.
+        // A loop with droop, noise, a joint that sags while holding, a small swing at a constant reference.
         let mut block = made(2, 0.1);
         for (k, q) in block.joints[0].q.iter_mut().enumerate() {
             *q = 0.8 * *q - 0.2 + 0.01 * (k as f64).sin();

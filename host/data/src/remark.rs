@@ -1,15 +1,15 @@
-//! How a file was read where it could be read in more than one way.
+//! How an ambiguous file was read.
 
-/// What was assumed or passed over while a recording was read; one sentence each.
+/// An assumption or omission during reading; one sentence each.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Remark {
-    /// A CSV file whose columns are not separated by commas.
+    /// A CSV file with a separator other than the comma.
     #[error("columns are separated by {separator}; a comma in a number is a decimal comma")]
     Separator {
         /// Name of the separator.
         separator: &'static str,
     },
-    /// Quoted numbers with a decimal comma in a file that commas separate.
+    /// Quoted numbers with a decimal comma in a comma-separated file.
     #[error("line {line}: a comma in a quoted number is a decimal comma")]
     QuotedDecimalComma {
         /// First line with one.
@@ -21,10 +21,10 @@ pub enum Remark {
         before + 1
     )]
     Preamble {
-        /// Line before the header.
+        /// Last line before the header.
         before: u64,
     },
-    /// The header stands behind the sign of a comment.
+    /// The header follows a comment sign.
     #[error("line {line} begins with `{sign}` and names the columns: it is read as the header")]
     CommentedHeader {
         /// Its line.
@@ -32,22 +32,22 @@ pub enum Remark {
         /// `#` or `%`.
         sign: char,
     },
-    /// An MCAP file without its end.
+    /// An MCAP file whose end is missing.
     #[error(
         "the file breaks off at byte {at}, as after a power loss or a recorder that was killed: {messages} messages are read, the last at t = {until} s; {lost}",
         until = rig_output::format_time(*until)
     )]
     CutOff {
-        /// Byte behind the last whole record.
+        /// Byte after the last complete record.
         at: u64,
         /// Messages that were read.
         messages: u64,
-        /// Time of the last one, s.
+        /// Time of the last message, s.
         until: f64,
-        /// What is lost.
+        /// Description of the loss.
         lost: &'static str,
     },
-    /// A ROS topic by another name than usual.
+    /// A ROS topic with an unusual name.
     #[error("the joint states are read from topic {topic}")]
     Topic {
         /// The topic.
@@ -72,16 +72,16 @@ pub enum Remark {
     Prefix {
         /// The topic.
         topic: String,
-        /// What stands before the robot's names.
+        /// Text in front of the robot's names.
         prefix: String,
     },
-    /// Joints that the robot has not.
+    /// Joints that the robot does not have.
     #[error("joints that the robot has not are passed over: {joints}")]
     OtherJoints {
         /// Their names, quoted.
         joints: String,
     },
-    /// Messages that hold no joint of the robot.
+    /// Messages without any joint of the robot.
     #[error(
         "messages that hold no joint of the robot are passed over; the first is message {number} on {topic}, with {joints}"
     )]
@@ -104,7 +104,7 @@ pub enum Remark {
 }
 
 impl Remark {
-    /// Number of its kind, from 0.
+    /// Returns the number of its kind, from 0.
     pub(super) fn kind(&self) -> usize {
         match self {
             Self::CutOff { .. } => 0,

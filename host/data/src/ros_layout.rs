@@ -1,11 +1,11 @@
-//! Layout of a ROS message, from the definition that the recorder stored with it.
+//! Layout of a ROS message, from the definition stored by the recorder.
 
 use std::collections::BTreeMap;
 
-/// Definitions nested deeper than this are refused: they cannot be those of a message.
+/// Maximum nesting of definitions: deeper ones do not belong to a message.
 const DEEPEST: usize = 16;
 
-/// `sensor_msgs/JointState` and what it consists of, for recorders that do not store it.
+/// `sensor_msgs/JointState` and its parts, for recorders that do not store them.
 const KNOWN: [(&str, &str); 3] = [
     (
         "sensor_msgs/JointState",
@@ -21,7 +21,7 @@ const KNOWN: [(&str, &str); 3] = [
 /// `std_msgs/Header` of ROS 1.
 const ROS1_HEADER: &str = "uint32 seq\ntime stamp\nstring frame_id";
 
-/// A number in a message.
+/// A number type in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     Unsigned(u8),
@@ -30,7 +30,7 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// Length, bytes.
+    /// Returns the length in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Unsigned(n) | Self::Signed(n) | Self::Float(n) => usize::from(n),
@@ -38,7 +38,7 @@ impl Number {
     }
 }
 
-/// What a field is.
+/// Type of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
     Number(Number),
@@ -46,16 +46,16 @@ pub(super) enum Kind {
     Nested(Vec<Field>),
 }
 
-/// How many there are of a field.
+/// Number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Count {
     One,
     Fixed(usize),
-    /// The message says.
+    /// The message contains the number.
     Counted,
 }
 
-/// What a field means to a joint state.
+/// Meaning of a field in a joint state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     None,
@@ -75,10 +75,10 @@ pub(super) struct Field {
     pub part: Part,
 }
 
-/// The fields of a joint state by its definition: ROS's `.msg` text with the definitions it needs behind it.
+/// Returns the fields of a joint state from its definition: a ROS `.msg` text followed by the definitions it uses.
 ///
 /// # Errors
-/// What cannot be read, one clause.
+/// The part that cannot be read, one clause.
 pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>, String> {
     let mut definitions: BTreeMap<String, String> = KNOWN
         .iter()
@@ -111,7 +111,7 @@ pub(super) fn joint_state(definition: &str, is_ros1: bool) -> Result<Vec<Field>,
     Ok(fields)
 }
 
-/// Keeps a definition that says something.
+/// Stores a definition that is not empty.
 fn store(definitions: &mut BTreeMap<String, String>, name: &str, text: &mut String) {
     if !text.trim().is_empty() {
         definitions.insert(name.to_owned(), std::mem::take(text));
@@ -161,7 +161,7 @@ fn fields(
     Ok(fields)
 }
 
-/// Type and name that a line declares; none for a comment, a constant and an empty line.
+/// Returns type and name declared by a line; `None` for a comment, a constant or an empty line.
 fn declaration(line: &str) -> Option<(&str, &str)> {
     let line = line.split('#').next()?.trim();
     let (ty, rest) = line.split_once(char::is_whitespace)?;
@@ -171,7 +171,7 @@ fn declaration(line: &str) -> Option<(&str, &str)> {
     (!behind.trim_start().starts_with('=')).then_some((ty, name))
 }
 
-/// `float64[<=3]` is `float64` and how many there are.
+/// Splits `float64[<=3]` into `float64` and the number of elements.
 fn array(ty: &str) -> Option<(&str, Count)> {
     let (base, count) = match ty.split_once('[') {
         None => (ty, Count::One),
@@ -181,7 +181,7 @@ fn array(ty: &str) -> Option<(&str, Count)> {
             count => (base, Count::Fixed(count.parse().ok()?)),
         },
     };
-    // A text of bounded length is stored as any other.
+    // A text of bounded length is stored like any other.
     Some((base.split("<=").next()?, count))
 }
 
@@ -205,7 +205,7 @@ fn primitive(base: &str) -> Option<Kind> {
     Some(Kind::Number(number))
 }
 
-/// A time of ROS 1: two whole numbers with these meanings.
+/// A ROS 1 time: two whole numbers with these meanings.
 fn seconds(whole: Part, nanoseconds: Part) -> Kind {
     let field = |part| Field {
         kind: Kind::Number(Number::Unsigned(4)),
@@ -215,7 +215,7 @@ fn seconds(whole: Part, nanoseconds: Part) -> Kind {
     Kind::Nested(vec![field(whole), field(nanoseconds)])
 }
 
-/// The name under which a nested type is defined, as used inside `within`.
+/// Returns the name under which a nested type, used inside `within`, is defined.
 fn qualified(definitions: &BTreeMap<String, String>, base: &str, within: &str) -> String {
     let base = base.replace("/msg/", "/");
     if base.contains('/') {

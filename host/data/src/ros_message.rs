@@ -1,11 +1,11 @@
-//! One joint state out of the bytes of a ROS message.
+//! Reads one joint state from the bytes of a ROS message.
 
 use super::ros_layout::{Count, Field, Kind, Number, Part};
 
-/// How a message is laid out in bytes.
+/// Binary encoding of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
-    /// ROS 2: CDR, whose first four bytes say which.
+    /// ROS 2: CDR, whose first four bytes name the variant.
     Cdr,
     /// ROS 1: little-endian without gaps.
     Ros1,
@@ -17,7 +17,7 @@ pub(super) struct JointSample {
     /// Header stamp, whole seconds and nanoseconds.
     pub seconds: i64,
     pub nanoseconds: i64,
-    /// The names one after the other, and where each ends.
+    /// The joined names, and the end of each.
     pub names: Vec<u8>,
     pub ends: Vec<usize>,
     pub position: Vec<f64>,
@@ -29,7 +29,7 @@ impl JointSample {
     /// Reads a message.
     ///
     /// # Errors
-    /// Why it cannot be read, one clause.
+    /// The reason why it cannot be read, one clause.
     pub(super) fn read(
         &mut self,
         message: &[u8],
@@ -47,7 +47,7 @@ impl JointSample {
             .ok_or_else(|| "ends in the middle of a field".to_owned())
     }
 
-    /// The names in their order.
+    /// Returns the names in order.
     pub(super) fn names(&self) -> impl Iterator<Item = &[u8]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts
@@ -55,7 +55,7 @@ impl JointSample {
             .map(|(start, end)| self.names.get(start..*end).unwrap_or_default())
     }
 
-    /// None where the message is too short.
+    /// Reads the fields; returns `None` if the message is too short.
     fn walk(&mut self, cursor: &mut Cursor, fields: &[Field]) -> Option<()> {
         for field in fields {
             let count = match field.count {
@@ -63,7 +63,7 @@ impl JointSample {
                 Count::Fixed(count) => count,
                 Count::Counted => cursor.count()?,
             };
-            // Nothing takes less than a byte: a damaged count must not go on for ever.
+            // Every element takes at least one byte; a damaged count must not loop forever.
             if count > cursor.left() {
                 return None;
             }
@@ -107,7 +107,7 @@ impl JointSample {
     }
 }
 
-/// A place in a message.
+/// A position in a message.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -193,7 +193,7 @@ impl<'a> Cursor<'a> {
     fn text(&mut self) -> Option<&'a [u8]> {
         let count = self.count()?;
         let text = self.take(count)?;
-        // CDR counts the zero at the end.
+        // CDR counts the terminating zero.
         Some(match (self.encoding, text.split_last()) {
             (Encoding::Cdr, Some((0, text))) => text,
             _ => text,

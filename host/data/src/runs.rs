@@ -1,4 +1,4 @@
-//! Recordings as the diagnosis works on them: whole stretches in memory, filtered and differentiated.
+//! Recordings in the form the diagnosis uses: whole stretches in memory, filtered and differentiated.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,9 +10,10 @@ use crate::Block;
 use crate::prepare::PrepareError;
 use crate::prepare::{LowPass, Recording, central_difference, second_difference};
 
-/// Variance of a torque's reading by its third differences over that by its second ones from which it counts as white: of white noise
-/// they are equal, and a filter makes it less. Noise that rises with the frequency, as a controller answers that of a position, counts as
-/// white, too, and then what is said to lie in the rows' band is more than does.
+/// Ratio of the noise variance from third differences to that from second differences above which noise counts as
+/// white. White noise has a ratio of 1; a low-pass filter lowers it. Noise that rises with frequency also counts as
+/// white, for example a controller's response to position noise. The noise in the band of the rows is then
+/// overestimated.
 const STILL_WHITE: f64 = 0.96;
 
 /// One joint over a stretch, at the recording's own rate.
@@ -20,11 +21,11 @@ const STILL_WHITE: f64 = 0.96;
 pub struct JointRun {
     /// Position as recorded, rad or m.
     pub q_raw: Vec<f64>,
-    /// Torque, joint-side, N·m or N, less [`Self::taken_off`]; empty where there is none.
+    /// Joint-side torque, N·m or N, without [`Self::taken_off`]; empty if no torque was recorded.
     pub tau: Vec<f64>,
-    /// What of the recorded torque is that of effects that the recording was freed of, where there are any.
+    /// Torque of the effects that were subtracted from the recorded torque, if any.
     pub taken_off: Option<Vec<f64>>,
-    /// Of a torque that was moved in time, which smooths it: what the recorded one differed by from sample to sample.
+    /// Differences of the recorded torque, if the torque was shifted in time (the shift smooths it).
     pub differences: Option<Differences>,
     /// Filtered position.
     pub q: Vec<f64>,
@@ -32,7 +33,7 @@ pub struct JointRun {
     pub qd: Vec<f64>,
     /// Acceleration, rad/s² or m/s².
     pub qdd: Vec<f64>,
-    /// Velocity as recorded, where it is; nothing is computed from it.
+    /// Velocity as recorded, if it was; no other column is computed from it.
     pub measured_velocity: Option<Vec<f64>>,
     /// Reference position, where recorded.
     pub reference: Option<Vec<f64>>,
@@ -40,27 +41,26 @@ pub struct JointRun {
     pub voltage: Option<Vec<f64>>,
     /// Temperature, where recorded, °C.
     pub temperature: Option<Vec<f64>>,
-    /// What an encoder on the link's side of the transmission reads, where recorded, rad or m, its zero where the joint's own
-    /// has it.
+    /// Reading of the encoder on the link side of the transmission, if recorded, rad or m. Its zero is that of the
+    /// joint's own encoder.
     pub link_raw: Option<Vec<f64>>,
-    /// The link's position: the filtered one less what is read across the transmission in its band; with velocity and
-    /// acceleration.
+    /// Link position, velocity and acceleration. The position is `q` minus the filtered difference of the two encoders.
     pub link: Option<[Vec<f64>; 3]>,
 }
 
-/// Sums of the squares of a signal's second and third differences, over so many places.
+/// Sums of the squared second and third differences of a signal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Differences {
-    /// Second differences, squared.
+    /// Sum of the squared second differences.
     pub second: f64,
-    /// Third differences, squared.
+    /// Sum of the squared third differences.
     pub third: f64,
-    /// Places.
+    /// Number of differences in each sum.
     pub count: usize,
 }
 
 impl Differences {
-    /// Those of a signal.
+    /// Computes the sums for a signal.
     pub fn of(signal: &[f64]) -> Self {
         let mut sums = Self::default();
         for w in signal.windows(4) {
@@ -71,14 +71,14 @@ impl Differences {
         sums
     }
 
-    /// [`Self::variance`] of a reading that nothing has filtered; none of another.
+    /// Returns [`Self::variance`] if the noise is white, that is, if no filter has acted on the reading.
     pub fn white(&self) -> Option<f64> {
         let before = self.second / 6.0 / self.count.max(1) as f64;
         (self.variance() > STILL_WHITE * before && self.count > 0).then(|| self.variance())
     }
 
-    /// Variance of what a sample's reading has by itself, of the signal's unit squared: a smooth signal leaves nothing in third
-    /// differences, white noise 20 times its variance. 0 of none.
+    /// Returns the noise variance of a single sample, in the signal's unit squared; 0 without differences. Third
+    /// differences of a smooth signal vanish; those of white noise have 20 times its variance.
     pub fn variance(&self) -> f64 {
         self.third / 20.0 / self.count.max(1) as f64
     }
@@ -89,28 +89,28 @@ impl Differences {
 pub struct Run {
     /// Name of the recording.
     pub label: String,
-    /// Which of the recordings given, from 0.
+    /// Index of the recording among those given, from 0.
     pub recording: usize,
     /// Hz
     pub rate: f64,
-    /// When the joints began to run, on the clock of `t`, s: the recording's first row, or that of the one it goes on from.
+    /// Start of the session on the clock of `t`, s: first row of this recording or of the one that it continues.
     pub began: f64,
-    /// What they did from there on until this stretch.
+    /// Motion of the joints from the start of the session to this stretch.
     pub past: Past,
     /// s
     pub t: Vec<f64>,
-    /// Joint by joint.
+    /// One entry per joint.
     pub joints: Vec<JointRun>,
-    /// Samples at which the rig says that its drive was off: the motor's voltage is not the inverter's there.
+    /// Samples with the drive off: the motor voltage is then not the inverter's.
     pub coasting: Vec<Range<usize>>,
-    /// Samples that are left out, because something happened in them that is not of the rig.
+    /// Samples to leave out, because they contain an event that does not come from the rig.
     pub left_out: Vec<Range<usize>>,
-    /// Whether everything that could pull on the joints from outside had been taken off.
+    /// True if all external loads on the joints had been removed.
     pub unburdened: bool,
 }
 
 impl JointRun {
-    /// Torque as recorded, whatever it was freed of.
+    /// Returns the torque as recorded, with the effects in [`Self::taken_off`] added again.
     pub fn recorded(&self) -> Cow<'_, [f64]> {
         match &self.taken_off {
             None => Cow::Borrowed(&self.tau),
@@ -118,35 +118,34 @@ impl JointRun {
         }
     }
 
-    /// What the torque as recorded differs by from sample to sample.
+    /// Returns the differences of the torque as recorded.
     pub fn differences(&self) -> Differences {
         (self.differences).unwrap_or_else(|| Differences::of(&self.recorded()))
     }
 }
 
 impl Run {
-    /// Samples.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
 }
 
-/// Rows that no two recordings share by chance, of which so many differ from the one before.
+/// Rows compared at one place, and minimum number of changes between them. Two recordings do not share these by chance.
 const SHARED: (usize, usize) = (64, 16);
-/// Places of a recording that are looked for in another, and how many of them are found of a piece that both hold: two may begin
-/// alike without any noise.
+/// Number of places of a recording that are searched in another, and how many must be found. One match is not enough:
+/// two recordings without noise may start with identical rows.
 const LOOKED_FOR: (usize, usize) = (8, 3);
-/// Share by which the rates of a recording and of its every so manieth sample may be off a whole ratio: rates are medians of
-/// intervals.
+/// Allowed relative deviation of the ratio of two sample rates from a whole number. Rates are medians of intervals.
 const RATE_OFF: f64 = 0.01;
 
-/// Two recordings that hold the same samples of position and effort, or every so manieth of a piece of them, by their places among
-/// those given.
+/// Finds two recordings that share samples of position and torque, or where one holds every n-th sample of the
+/// other. Returns their indices in `runs`.
 pub fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     (0..runs.len()).find_map(|b| {
         let first = (0..b).find(|&a| holds_of(runs[a], runs[b]) || holds_of(runs[b], runs[a]))?;
@@ -154,7 +153,7 @@ pub fn copies(runs: &[&Run]) -> Option<(usize, usize)> {
     })
 }
 
-/// Whether a recording holds a piece of another, sample by sample or of more samples than the other was left with.
+/// Returns true if `whole` contains pieces of `other`, sample by sample or at a rate n times as high.
 fn holds_of(whole: &Run, other: &Run) -> bool {
     let (rows, steps) = SHARED;
     let (places, enough) = LOOKED_FOR;
@@ -188,16 +187,17 @@ fn holds_of(whole: &Run, other: &Run) -> bool {
     (0..places).filter(found).count() >= enough
 }
 
-/// Steps of an encoder's count that a step of its reading may be off a whole number of them, as print rounds it.
+/// Allowed deviation of a position step from a whole number of counts, in counts; allows for rounding in text files.
 const OFF_A_COUNT: f64 = 0.25;
-/// Most counts in the least step of a reading: a joint that never turns back goes on by some from sample to sample.
+/// Largest number of counts assumed in the smallest step: a joint that never reverses may move several counts per
+/// sample.
 const MOST_COUNTS: u32 = 8;
-/// Share of the steps of a reading that are whole counts where it has any: of a reading without counts half of them are, of a motion
-/// at a few constant speeds those that are multiples of the slowest.
+/// Share of the steps that must be whole counts. Without an encoder count, half of the steps pass by chance. For a
+/// motion at a few constant speeds, the multiples of the slowest pass.
 const COUNTED: f64 = 0.95;
 
-/// The least step between two positions of a joint as recorded, rad or m: of an encoder a count. 0 of a joint that never moves, and of a
-/// reading whose steps are no whole number of the least, such as one without counts of a joint that never turns back.
+/// Returns the resolution of a joint's recorded position, rad or m: one encoder count. Returns 0 for a joint that never
+/// moves, and if the steps are not multiples of one count (a continuous reading of a joint that never reverses).
 pub fn resolution(runs: &[Run], joint: usize) -> f64 {
     let steps = || {
         let raw = runs
@@ -207,7 +207,7 @@ pub fn resolution(runs: &[Run], joint: usize) -> f64 {
             .filter(|step| *step > 0.0)
     };
     let least = steps().fold(f64::INFINITY, f64::min);
-    // What print has rounded off the least is not in the mean of those like it.
+    // The mean of all steps close to the smallest one averages out the rounding in a text file.
     let alike = || steps().filter(|step| *step < 1.2 * least);
     let mean = alike().sum::<f64>() / alike().count().max(1) as f64;
     let all = steps().count() as f64;
@@ -222,7 +222,7 @@ pub fn resolution(runs: &[Run], joint: usize) -> f64 {
         .map_or(0.0, |n| least / f64::from(n))
 }
 
-/// How far a joint goes, in the RMS, within `time` (s) from a reversal on, rad or m.
+/// Returns the RMS distance that a joint moves in the first `time` (s) after a reversal, rad or m.
 pub fn blurred(runs: &[Run], joint: usize, time: f64) -> f64 {
     let (mut squares, mut count) = (0.0, 0_u32);
     for own in runs.iter().map(|run| &run.joints[joint]) {
@@ -236,19 +236,19 @@ pub fn blurred(runs: &[Run], joint: usize, time: f64) -> f64 {
     0.5 * (squares / f64::from(count.max(1))).sqrt() * time * time
 }
 
-/// Band of what is read across a transmission, Hz: twist and play are slow beside the steps of two encoders, whose second
-/// derivative would be most of the torque that is computed from them.
+/// Band of the difference between motor-side and link-side encoder, Hz. Twist and backlash are slow compared with the
+/// encoder counts. At a higher cut-off, the second derivative of the counts would dominate the computed torque.
 const ACROSS_BAND: f64 = 25.0;
 
-/// What the difference of a joint's two encoders passes beside the filter of the positions.
+/// Returns the filter of the difference between a joint's two encoders, applied in addition to the position filter.
 pub fn across_band(rate: f64) -> Option<LowPass> {
     LowPass::butterworth(4, f64::min(ACROSS_BAND, 0.2 * rate), rate)
 }
 
-/// Reads `recording` stretch by stretch; positions are filtered by `position` (zero phase) and differentiated.
+/// Reads `recording` stretch by stretch, filters the positions with `position` (zero phase) and differentiates them.
 ///
 /// # Errors
-/// What reading gives.
+/// Errors of the reader.
 pub fn runs_of(
     recording: &dyn Recording,
     number: usize,
@@ -264,10 +264,10 @@ pub fn runs_of(
     Ok(gathered.differentiated(position))
 }
 
-/// Reads a recording in which nothing moves: positions as they are, without velocity and acceleration.
+/// Reads a recording without motion: positions are not filtered; velocity and acceleration are zero.
 ///
 /// # Errors
-/// What reading gives.
+/// Errors of the reader.
 pub fn at_rest(recording: &dyn Recording) -> Result<Vec<Run>, PrepareError> {
     let mut gathered = Gathered::new(&recording.label(), 0, 0.0);
     recording.each_block(65_536, &mut |block| {
@@ -288,10 +288,10 @@ pub fn at_rest(recording: &dyn Recording) -> Result<Vec<Run>, PrepareError> {
     Ok(runs)
 }
 
-/// [`runs_of`] over blocks that are there.
+/// Does the same as [`runs_of`] for blocks in memory.
 ///
 /// # Errors
-/// Those of the blocks.
+/// Errors of the blocks.
 pub fn runs_of_blocks(
     blocks: impl Iterator<Item = Result<Block, PrepareError>>,
     label: &str,
@@ -306,7 +306,7 @@ pub fn runs_of_blocks(
     Ok(gathered.differentiated(position))
 }
 
-/// Stretches as they are read.
+/// Stretches collected during reading.
 struct Gathered {
     empty: Run,
     runs: Vec<Run>,
@@ -368,8 +368,8 @@ impl Gathered {
     }
 }
 
-/// Moves the zero of the encoders on the links to that of the joints' own, on average over the recording: the model's gravity
-/// is to be taken where the link is.
+/// Shifts the zero of the link encoders to that of the joint encoders, on average over the recording. The gravity model
+/// needs the position of the link.
 fn zero(runs: &mut [Run]) {
     let joints = runs.first().map_or(0, |run| run.joints.len());
     for j in 0..joints {
@@ -434,8 +434,8 @@ fn append(run: &mut Run, block: Block) {
 mod tests {
     use super::*;
 
-    /// A joint that speeds up without ever turning back, 1 to 3 rad/s at 500 Hz, and the same as an encoder of 8192 counts reads it
-    /// and a file of six decimals holds it.
+    /// A joint accelerates from 1 to 3 rad/s without a reversal, at 500 Hz. One reading is continuous, the other comes
+    /// from an encoder of 8192 counts in a file with six decimals.
     #[test]
     fn a_joint_that_never_turns_back_has_counts_only_where_it_is_read_in_counts() {
         let read = |of: &dyn Fn(f64) -> f64| {

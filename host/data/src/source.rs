@@ -1,4 +1,4 @@
-//! A recording as a stream of blocks, as often as asked.
+//! A recording as a stream of blocks that can be read repeatedly.
 
 use std::fs::File;
 use std::io::Read;
@@ -19,7 +19,7 @@ use super::{Block, JointColumns};
 use rig_model::robot::Robot;
 use rig_output::format_trimmed;
 
-/// Rows that decide on the sample period.
+/// Number of rows that determine the sample period.
 const PROBED_ROWS: usize = 1001;
 
 /// Spread of the intervals (5th to 95th percentile over the median) above which the recording counts
@@ -27,28 +27,28 @@ const PROBED_ROWS: usize = 1001;
 /// begin at 0.07.
 const IRREGULAR: f64 = 0.05;
 
-/// Intervals longer than this many periods are a gap: one sample is missing.
+/// Intervals longer than this multiple of the period are a gap: one sample is missing.
 const GAP: f64 = 1.5;
 
-/// The same for irregular recordings, whose intervals vary by nature.
+/// The same for irregular recordings, whose intervals vary.
 const IRREGULAR_GAP: f64 = 5.0;
 
-/// In a regular recording an interval that differs from the period by more than this share parts the rows before
-/// it from those after it: controllers whose loop settles over the first rows (3.6 instead of 2 ms), a row sent
-/// twice. Time stamps in single precision and clocks that jitter stay well below; a single stamp off the grid between
-/// rows that are on it (KUKA LWR over a network: 3.4 and 6.5 ms instead of 5 ms twice) parts nothing.
+/// Relative deviation of an interval from the period that splits a regular recording. Causes are controllers whose loop
+/// settles over the first rows (3.6 instead of 2 ms) and rows sent twice. Stamps in single precision and clocks with
+/// jitter stay well below. A single stamp off the grid (KUKA LWR over a network: 3.4 and 6.5 ms instead of twice 5 ms)
+/// does not split.
 const UNEVEN: f64 = 0.2;
 
-/// Warnings of a recording that are kept; more are only counted, so that memory does not grow.
+/// Number of warnings kept per recording; more are only counted, so that memory does not grow.
 pub const KEPT_WARNINGS: usize = 1000;
 
-/// How a recording is sampled, judged by its first 1001 rows.
+/// Sampling of a recording, determined from its first 1001 rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Median interval, s; 0 where there is a single row.
+    /// Median interval, s; 0 for a single row.
     pub period: f64,
-    /// Whether the intervals vary so much (5th to 95th percentile more than 5 % of the median apart)
-    /// that the rows must not be taken as evenly spaced.
+    /// True if the intervals vary (5th to 95th percentile more than 5 % of the median apart). The rows must then not be
+    /// treated as evenly spaced.
     pub irregular: bool,
 }
 
@@ -74,18 +74,18 @@ impl Sampling {
         }
     }
 
-    /// Longest interval that is not a gap, s.
+    /// Returns the longest interval that is not a gap, s.
     pub fn longest_interval(&self) -> f64 {
         self.period * if self.irregular { IRREGULAR_GAP } else { GAP }
     }
 
-    /// Whether rows so far apart in time belong to different blocks.
+    /// Returns true if this interval separates two blocks.
     fn parts(&self, interval: f64) -> bool {
         let uneven = !self.irregular && (interval - self.period).abs() > UNEVEN * self.period;
         uneven || interval > self.longest_interval()
     }
 
-    /// What is said of it.
+    /// Returns the warning for such an interval.
     fn parting(&self, place: Place, from: f64, now: f64) -> Warning {
         if now - from > self.longest_interval() {
             Warning::Gap {
@@ -106,18 +106,18 @@ impl Sampling {
 /// Columns of a file.
 #[derive(Debug, Default)]
 pub(super) struct Header {
-    /// Names by which the columns find their meaning.
+    /// Names that determine the meaning of the columns.
     pub names: Vec<String>,
-    /// What messages call them, one per name.
+    /// Names for messages, one per column.
     pub labels: Vec<String>,
-    /// Line on which they stand; none where the file has no lines.
+    /// Line of the header; `None` if the file has no lines.
     pub line: Option<u64>,
-    /// Why there is no torque, where the file could have one.
+    /// Reason for the missing torque, if the file could have one.
     pub without_effort: Option<String>,
 }
 
 impl Header {
-    /// Of columns that messages call by their names.
+    /// Builds a header whose messages use the column names.
     pub(super) fn of(names: Vec<String>) -> Self {
         Self {
             labels: names.clone(),
@@ -127,7 +127,7 @@ impl Header {
     }
 }
 
-/// A recording that was opened and whose header fits the robot.
+/// A recording whose header fits the robot.
 #[derive(Clone, Debug)]
 pub struct Source {
     path: PathBuf,
@@ -153,7 +153,7 @@ impl Rows {
         }
     }
 
-    /// What was assumed and passed over so far.
+    /// Returns the assumptions and omissions so far.
     fn remarks(&self) -> Vec<Remark> {
         match self {
             Self::Csv(r) => r.remarks().to_vec(),
@@ -161,7 +161,7 @@ impl Rows {
         }
     }
 
-    /// Time that grows from row to row.
+    /// Checks that time grows from row to row.
     fn check_growth(
         &self,
         path: &Path,
@@ -201,15 +201,14 @@ impl Rows {
 }
 
 impl Source {
-    /// Opens a recording (CSV or MCAP, told by its first bytes and not by its name) in which every joint has its torque.
+    /// Opens a recording (CSV or MCAP, detected from its first bytes) in which every joint has its torque.
     ///
-    /// Reads the header and the first 1001 rows; what is wrong with them is said here, what is wrong
-    /// later by [`Blocks`].
+    /// Reads the header and the first 1001 rows and reports their errors; [`Blocks`] reports later ones.
     pub fn open(path: &Path, robot: &Robot) -> Result<Self, DataError> {
         Self::open_with(path, robot, EffortNeed::Required)
     }
 
-    /// As [`Source::open`], saying whether the torque may be missing.
+    /// Opens a recording like [`Source::open`]; `need` says whether the torque may be missing.
     pub fn open_with(path: &Path, robot: &Robot, need: EffortNeed) -> Result<Self, DataError> {
         let failed = |source| DataError::Read {
             path: path.into(),
@@ -219,14 +218,14 @@ impl Source {
         if metadata.is_dir() {
             return Err(DataError::Directory { path: path.into() });
         }
-        // Opening a pipe that nobody writes to would wait for ever.
+        // Opening a pipe without a writer would block forever.
         if !metadata.is_file() {
             return Err(DataError::NotAFile { path: path.into() });
         }
         let mut start = Vec::new();
         let mut head = File::open(path).map_err(failed)?.take(HEAD as u64);
         head.read_to_end(&mut start).map_err(failed)?;
-        // By what it holds: endings are often wrong.
+        // By content, because file extensions are often wrong.
         let is_mcap = start.starts_with(&MAGIC[..5]);
         if !is_mcap && let Some(format) = ForeignFormat::of(&start) {
             return Err(DataError::Foreign {
@@ -257,7 +256,7 @@ impl Source {
             });
         }
         let sampling = Sampling::of(&times);
-        // Where the file breaks off is said by the pass that comes to it.
+        // A cut-off file is reported by the pass that reaches its end.
         let remarks = rows.remarks().into_iter();
         let said = remarks.filter(|remark| !matches!(remark, Remark::CutOff { .. }));
         layout
@@ -273,54 +272,54 @@ impl Source {
         })
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Length of the file in bytes, for progress.
+    /// Returns the length of the file in bytes, for progress.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// How the recording is sampled.
+    /// Returns the sampling of the recording.
     pub fn sampling(&self) -> Sampling {
         self.sampling
     }
 
-    /// Whether the joints have a torque: their own, or from the motors' currents or torques.
+    /// Returns true if the joints have a torque: their own, or from motor currents or torques.
     pub fn has_effort(&self) -> bool {
         let effort = |role| matches!(role, Role::Effort(..) | Role::MotorEffort(..));
         self.layout.columns.iter().any(|c| effort(c.role))
     }
 
-    /// Whether the joints have a motor voltage: their own, or a duty cycle with its supply.
+    /// Returns true if the joints have a motor voltage: their own, or a duty cycle with its supply.
     pub fn has_voltage(&self) -> bool {
         let voltage = |role| matches!(role, Role::Voltage(_) | Role::Duty(..));
         self.layout.columns.iter().any(|c| voltage(c.role))
     }
 
-    /// Joints of the robot that the recording was opened for.
+    /// Returns the number of joints of the robot.
     pub fn joint_count(&self) -> usize {
         self.layout.joints
     }
 
-    /// Names of the file's columns in their order.
+    /// Returns the names of the file's columns in order.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         self.layout.columns.iter().map(|c| c.name.as_str())
     }
 
-    /// What the file calls the column that a joint's values come from, without quotation marks around it: `i1` where the
-    /// torque of the first joint is turned from its current, `qm2` where its position is that of its motor,
-    /// `effort of joint "elbow"` in a ROS 2 recording, and `tau2 (from i1, i2)` where several columns make one. The name
-    /// of the contract (`tau1`) where the file has no such column.
+    /// Returns the file's name, without quotation marks, for the column that a joint's values come from. Examples: `i1`
+    /// for a torque computed from a current, `qm2` for a motor position, `effort of joint "elbow"` in a ROS 2
+    /// recording, and `tau2 (from i1, i2)` for several columns. Returns the standard name (`tau1`) if the file has no
+    /// such column.
     ///
-    /// `joint` counts from 0. Messages name a column by this, so that it is found in the file.
+    /// `joint` counts from 0. Messages use this name so that the user finds the column in the file.
     pub fn column_name(&self, joint: usize, quantity: Quantity) -> String {
         self.layout.column_name(joint, quantity)
     }
 
-    /// The row with this number as its user finds it: line of a text file, message of an MCAP file.
+    /// Returns the place of a row as its user finds it: line of a text file, message of an MCAP file.
     pub fn place(&self, row: u64) -> Place {
         if self.is_mcap {
             Place::Message(row)
@@ -329,13 +328,13 @@ impl Source {
         }
     }
 
-    /// What the header makes worth saying; [`Blocks::warnings`] adds what the rows do.
+    /// Returns the warnings about the header; [`Blocks::warnings`] adds those about the rows.
     pub fn warnings(&self) -> &[Warning] {
         &self.layout.warnings
     }
 
-    /// One pass over the recording in blocks of at most `rows_per_block` rows (at least 1); a block ends
-    /// early before a gap or an uneven step in time. After an error there are no further blocks.
+    /// Reads the recording once, in blocks of at most `rows_per_block` rows (at least 1). A block ends early before a
+    /// gap or an uneven step in time. After an error there are no further blocks.
     pub fn blocks(&self, rows_per_block: usize) -> Blocks<'_> {
         Blocks {
             source: self,
@@ -355,7 +354,7 @@ impl Source {
         }
     }
 
-    /// The whole recording, one block per evenly sampled stretch, and the warnings.
+    /// Reads the whole recording: one block per evenly sampled stretch, and the warnings.
     pub fn read_all(&self) -> Result<(Vec<Block>, Vec<Warning>), DataError> {
         let mut blocks = self.blocks(usize::MAX);
         let mut all = Vec::new();
@@ -373,12 +372,12 @@ pub struct Blocks<'a> {
     rows_per_block: usize,
     rows: Option<Rows>,
     values: Vec<f64>,
-    /// Line of the row in `values` that is not in a block yet.
+    /// Line of the row in `values` that is not yet in a block.
     pending: Option<u64>,
     previous: Option<f64>,
-    /// A row that was read to judge the one before it.
+    /// A row that was read to check the one before it.
     ahead: Option<(u64, Vec<f64>)>,
-    /// Whether the interval to come makes up for a misplaced time stamp.
+    /// True if the next interval compensates for a misplaced time stamp.
     pardoned: bool,
     continues: bool,
     finished: bool,
@@ -389,17 +388,17 @@ pub struct Blocks<'a> {
 }
 
 impl Blocks<'_> {
-    /// What the rows read so far make worth saying; at most 1000 are kept.
+    /// Returns the warnings about the rows so far; at most 1000 are kept.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    /// Gaps and uneven steps in time so far.
+    /// Returns the number of gaps and uneven steps so far.
     pub fn gaps(&self) -> u64 {
         self.gaps
     }
 
-    /// Bytes read so far, for progress.
+    /// Returns the number of bytes read so far, for progress.
     pub fn bytes_read(&self) -> u64 {
         self.rows.as_ref().map_or(0, Rows::bytes_read)
     }
@@ -410,7 +409,7 @@ impl Blocks<'_> {
         }
     }
 
-    /// Warns of what the whole file made worth saying beyond its beginning.
+    /// Adds the warnings that concern the whole file.
     fn hear_the_rows(&mut self) {
         let remarks = self.rows.as_ref().map(Rows::remarks).unwrap_or_default();
         for remark in remarks {
@@ -469,7 +468,7 @@ impl Blocks<'_> {
                 column.push(value);
                 if value.is_nan() && !self.named_extras[i] {
                     self.named_extras[i] = true;
-                    // At most one per column: no cap needed.
+                    // At most one per column, so no limit is needed.
                     self.warnings.push(Warning::ExtraNotANumber {
                         place: source.place(line),
                         column: c.name.clone(),
@@ -532,7 +531,7 @@ impl Blocks<'_> {
         Ok(())
     }
 
-    /// The next row into `values`; its line.
+    /// Reads the next row into `values` and returns its line.
     fn fetch(&mut self) -> Result<Option<u64>, DataError> {
         if let Some((line, values)) = self.ahead.take() {
             self.values = values;
@@ -544,8 +543,8 @@ impl Blocks<'_> {
         }
     }
 
-    /// Whether only the time stamp of the row just read lies off the even grid: the next row is back on it. A clock
-    /// that is read late now and then does that; no row is missing or doubled.
+    /// Returns true if only the last time stamp is off the even grid: the next row is on it again. A clock that is read
+    /// late causes this; no row is missing or doubled.
     fn misplaced(&mut self, line: u64, from: f64, now: f64) -> Result<bool, DataError> {
         let sampling = self.source.sampling;
         if sampling.irregular {
@@ -624,7 +623,7 @@ impl Blocks<'_> {
     }
 }
 
-/// The joint that a role belongs to.
+/// Returns the joint that a role belongs to.
 fn joint_of(role: Role) -> Option<usize> {
     match role {
         Role::Time | Role::None => None,
@@ -642,8 +641,8 @@ fn joint_of(role: Role) -> Option<usize> {
     }
 }
 
-/// Duty cycles are read from registers of 16 bits: what lies in the upper half of one is negative (two's complement), as
-/// no duty cycle is so large.
+/// Restores the sign of a duty cycle from a 16-bit register (two's complement). No real duty cycle is in the upper half
+/// of its range.
 fn signed_register(value: f64) -> f64 {
     if value > f64::from(i16::MAX) && value <= f64::from(u16::MAX) {
         value - 65_536.0

@@ -1,30 +1,30 @@
-//! A single row of a torque that stands far out of those around it: a lost bit, a loose contact.
+//! Spikes of a torque in a single row, far away from the rows around it: a flipped bit, a loose contact.
 
 /// Rows on either side that a row is compared with.
 const BESIDE: usize = 2;
-/// Fewest rows that say what is usual.
+/// Minimum number of rows for the percentiles.
 const FEWEST: usize = 200;
-/// A spike stands out by so many times what one row in a hundred does …
+/// A spike deviates from its neighbours by this multiple of the 99th percentile of such deviations …
 const STANDS_OUT: f64 = 50.0;
-/// … and is so many times as much as its neighbours, and as the torque ever is but for one row in a thousand.
+/// … and is more than this multiple of its neighbours, and of the 99.9th percentile of the torque.
 const LARGER: f64 = 2.0;
-/// Share of the rows that may be spikes, at most: more are no accident.
+/// Maximum share of rows that may be spikes: more are not an accident.
 const A_FEW: f64 = 1e-3;
 
 /// The largest spike of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spike {
-    /// Its row.
+    /// Row of the spike.
     pub row: usize,
-    /// What stands there.
+    /// Value in this row.
     pub value: f64,
-    /// How many there are.
+    /// Number of spikes.
     pub count: usize,
-    /// Largest of the other rows, but for one in a thousand.
+    /// 99.9th percentile of the absolute torque.
     pub usual: f64,
 }
 
-/// The largest spike; none where there is none. An impact lasts for some rows, and so does a touch.
+/// Returns the largest spike, if any. An impact or a disturbance lasts several rows and is not a spike.
 pub(super) fn spike(tau: &[f64]) -> Option<Spike> {
     if tau.len() < FEWEST {
         return None;

@@ -1,4 +1,4 @@
-//! Reading, writing and what is said about wrong recordings.
+//! Tests of reading, writing and the messages about faulty recordings.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::BTreeMap;
@@ -410,7 +410,7 @@ fn csv_and_mcap_read_back_bit_for_bit_and_are_deterministic() {
             );
         }
     }
-    // Nothing else was left in the folder.
+    // No other file remained in the folder.
     assert_eq!(std::fs::read_dir(folder.0.path()).unwrap().count(), 4);
 }
 
@@ -464,7 +464,7 @@ fn damaged_mcap_gets_a_sentence() {
             "{cut}: {said}"
         );
     }
-    // What was written before the break is read, and the break is told.
+    // The part before the break is read, and the break is reported.
     let all = &whole[0];
     for cut in [good.len() / 3, good.len() / 2, good.len() - 1] {
         let (blocks, warnings) = said_of(&good[..cut]).unwrap();
@@ -568,7 +568,7 @@ fn wrong_units_are_named_and_right_ones_are_not() {
         )
     );
     assert!(referred(-1.0).contains("it moves -1.0000 times as far, the other way"));
-    // A limit that stands for none is no measure of the torque.
+    // A placeholder limit says nothing about the torque.
     let mut open = rig();
     open.joints[0].friction = None;
     open.joints[0].inertial = None;
@@ -578,7 +578,7 @@ fn wrong_units_are_named_and_right_ones_are_not() {
         let peak = b.joints[0].tau.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         all(&mut b.joints[0].tau, 0.1 / peak);
         assert_eq!(plausibility(&b, &open).len(), found, "{limit}");
-        // Nor is any limit where the link is described: what that says of the torque is for the comparison of models.
+        // If the link is described, no limit is compared with the torque; the models are compared later.
         let mut described = open.clone();
         described.joints[0].inertial = rig().joints[0].inertial.clone();
         assert_eq!(plausibility(&b, &described), [], "{limit}");
@@ -639,7 +639,7 @@ fn real_recordings_are_accepted_without_false_alarm() {
             Some(false),
         );
     }
-    // Millimetres and millinewtons do raise it.
+    // Millimetres and millinewtons trigger it.
     for factor in [1000.0, 1e-3] {
         let mut block = read(&data.join("emps/train.csv"), &emps)
             .unwrap()
@@ -687,7 +687,7 @@ fn real_recordings_are_accepted_without_false_alarm() {
         count += 1;
     }
     assert!(count > 0);
-    // Motor positions under their own names: no `q1`, and it says so.
+    // Motor positions in columns of their own: no `q1`, and the message says so.
     let tx40 = Robot::load(&data.join("staubli_tx40/tx40.urdf")).unwrap();
     let said = Source::open(&data.join("staubli_tx40/motor_1kHz.csv"), &tx40)
         .unwrap_err()
@@ -715,7 +715,7 @@ fn reading_speed() {
             let mut row = vec![0.0; columns.len()];
             for i in 0..rows {
                 for (c, v) in row.iter_mut().enumerate() {
-                    // Nine digits, as recorders print them.
+                    // Nine digits, as recorders write them.
                     *v = ((i as f64 * 1e-3 * (c as f64 + 0.1)).sin() * 1e8).round() / 1e8;
                 }
                 row[0] = (i as f64) / 1000.0;

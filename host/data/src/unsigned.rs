@@ -1,37 +1,37 @@
-//! A register that holds a signed number and was read as an unsigned one.
+//! A signed register that was read as an unsigned one.
 //!
-//! Values below zero then stand far above all others: x reads as 2ᵏ + x where the register holds the two's complement, and as
-//! 2ᵏ⁻¹ − x where its highest bit is the sign (k bits). The values form two groups with nothing between them.
+//! A negative value x then lies far above all others. With k bits it reads as 2ᵏ + x in two's complement, and as 2ᵏ⁻¹ −
+//! x if the highest bit is the sign. The values form two groups with a gap.
 //!
-//! Leaves out: registers of which more than half of the range is used, whose groups have no gap; and values that were filtered
-//! after they were read.
+//! Not detected: values that use more than half of the register's range, which leave no gap, and values filtered after
+//! reading.
 
-/// Share of the rows that each group has at least.
+/// Minimum share of the rows in each group.
 const BOTH: f64 = 0.02;
-/// Share of the range that is empty between the groups, at least.
+/// Minimum share of the range that the gap between the groups takes.
 const GAP: f64 = 0.5;
-/// Largest change from row to row where the sign changes over the largest elsewhere, at most, once the sign is put back.
+/// Maximum ratio of the largest change at a change of sign to the largest change elsewhere, after the correction.
 const JUMP: f64 = 2.0;
-/// Bits of a register.
+/// Possible numbers of bits of a register.
 const BITS: std::ops::RangeInclusive<i32> = 7..=32;
-/// Share by which the distance of the groups may differ from a power of two of the smallest change.
+/// Allowed relative deviation of the distance between the groups from a power of two counts.
 const POWER_OF_TWO: f64 = 0.05;
 
-/// Share of the highest value by which two equal ones may differ.
+/// Relative difference, to the highest value, below which two values are equal.
 const ROUNDING: f64 = 1e-12;
 
 /// How the sign was lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Unsigned {
-    /// What a value below zero reads too high by (two's complement), or what the sign bit stands for.
+    /// Excess of the reading over a negative value (two's complement), or value of the sign bit.
     pub offset: f64,
-    /// Whether the highest bit is a sign; else it is the two's complement.
+    /// True if the highest bit is a sign; false for two's complement.
     pub sign_bit: bool,
-    /// Share of the rows whose sign was lost.
+    /// Share of the rows with a lost sign.
     pub share: f64,
 }
 
-/// How `values` have lost their sign; none where they have not.
+/// Returns how `values` lost their sign; `None` if they did not.
 pub(super) fn unsigned(values: &[f64]) -> Option<Unsigned> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -48,7 +48,7 @@ pub(super) fn unsigned(values: &[f64]) -> Option<Unsigned> {
     if gap < GAP * (highest - lowest) || (below as f64) < least || (above as f64) < least {
         return None;
     }
-    // The smallest change is one count, but for rounding.
+    // The smallest change above rounding is one count.
     let count = gaps()
         .filter(|by| *by > ROUNDING * highest)
         .fold(f64::INFINITY, f64::min);
@@ -59,7 +59,7 @@ pub(super) fn unsigned(values: &[f64]) -> Option<Unsigned> {
             .map(|pair| (signed(pair[1]) - signed(pair[0])).abs())
             .fold(0.0, f64::max)
     };
-    // Values next to zero are one count from the offset.
+    // Values next to zero are one count away from the offset.
     let forms = [(false, highest + count), (true, first - count)];
     (forms
         .into_iter()
@@ -86,7 +86,7 @@ pub(super) fn unsigned(values: &[f64]) -> Option<Unsigned> {
     .map(|(_, found)| found)
 }
 
-/// Whether a register has so many counts.
+/// Returns true if a register can have this number of counts.
 fn is_register(counts: f64) -> bool {
     BITS.into_iter()
         .any(|bits| (counts / f64::from(bits).exp2() - 1.0).abs() < POWER_OF_TWO)
@@ -144,7 +144,7 @@ mod tests {
         let own = counts(900.0, 5.0);
         let signed: Vec<f64> = own.iter().map(|c| *c as f64 * 2.69e-3).collect();
         let magnitude: Vec<f64> = signed.iter().map(|x| x.abs()).collect();
-        // A load that hangs on the joint for half of the time.
+        // A load that acts on the joint for half of the time.
         let steps: Vec<f64> = (signed.iter().enumerate())
             .map(|(k, x)| 0.1 * x.abs() + if (k / 1000) % 2 == 0 { 0.0 } else { 7.0 })
             .collect();

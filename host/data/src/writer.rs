@@ -1,4 +1,4 @@
-//! Recordings out: whole or not at all, and the same bytes from the same rows.
+//! Writes recordings atomically; equal rows give equal bytes.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use super::mcap_rows::TOPIC;
 use rig_output::format_short;
 use rig_output::{persist, temporary};
 
-/// A column to be written.
+/// A column to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     /// Name as in the contract, for instance `tau1`.
@@ -23,7 +23,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// From name and unit.
+    /// Creates a column from name and unit.
     pub fn new(name: &str, unit: &str) -> Self {
         Self {
             name: name.into(),
@@ -32,7 +32,7 @@ impl Column {
     }
 }
 
-/// Writes one recording; the file appears under its name at [`RecordingWriter::finish`].
+/// Writer of one recording; the file gets its name in [`RecordingWriter::finish`].
 pub enum RecordingWriter {
     /// `.csv`
     Csv(CsvWriter),
@@ -41,9 +41,9 @@ pub enum RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Begins a recording in the format that the path ends in; the first column must be `t`.
+    /// Starts a recording in the format of the file extension; the first column must be `t`.
     ///
-    /// Units and metadata go into MCAP; CSV has one header line and no place for them.
+    /// MCAP stores units and metadata; CSV has only a header line and cannot.
     pub fn create(
         path: &Path,
         columns: &[Column],
@@ -70,8 +70,8 @@ impl RecordingWriter {
         }
     }
 
-    /// The hidden file that is written until [`RecordingWriter::finish`], for whoever must remove it: a program that ends at
-    /// once leaves it behind.
+    /// Returns the path of the hidden temporary file used until [`RecordingWriter::finish`]. A program that exits at
+    /// once must remove it first.
     pub fn temporary(&self) -> &Path {
         match self {
             Self::Csv(w) => &w.rows.hidden,
@@ -79,7 +79,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Completes the file and gives it its name; without this call nothing is left behind.
+    /// Completes the file and renames it; without this call no file remains.
     pub fn finish(self) -> Result<(), DataError> {
         match self {
             Self::Csv(w) => w.finish(),
@@ -88,10 +88,10 @@ impl RecordingWriter {
     }
 }
 
-/// What both formats share: names, the row counter and the checks.
+/// Common part of both formats: names, row counter and checks.
 struct Rows {
     path: PathBuf,
-    /// Where they are written until the file is whole.
+    /// Temporary file until the recording is complete.
     hidden: PathBuf,
     names: Vec<String>,
     count: u64,
@@ -158,14 +158,14 @@ impl Rows {
     }
 }
 
-/// CSV: a header line, then one line per row, numbers in the shortest form that reads back the same.
+/// CSV writer: a header line, then one line per row; numbers have the shortest form that reads back equal.
 pub struct CsvWriter {
     rows: Rows,
     out: BufWriter<NamedTempFile>,
 }
 
 impl CsvWriter {
-    /// Begins the file; see [`RecordingWriter::create`].
+    /// Starts the file; see [`RecordingWriter::create`].
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, DataError> {
         let mut rows = Rows::new(path, columns)?;
         let file = temporary(path).map_err(|e| rows.failed(e))?;
@@ -200,9 +200,9 @@ impl CsvWriter {
     }
 }
 
-/// Shortest form that reads back to the same number; whole numbers without a point.
+/// Writes the shortest form that reads back to the same number; whole numbers have no point.
 fn push_number(text: &mut String, value: f64) {
-    // Plain notation of very large or small numbers would be hundreds of digits long.
+    // Very large or small numbers in plain notation would have hundreds of digits.
     let magnitude = value.abs();
     let plain = value == 0.0 || (1e-5..1e16).contains(&magnitude);
     // Writing to a String cannot fail.
@@ -213,7 +213,7 @@ fn push_number(text: &mut String, value: f64) {
     };
 }
 
-/// MCAP: one JSON message per row on `/joint/state`, with a JSON schema that names the units.
+/// MCAP writer: one JSON message per row on `/joint/state`, with a JSON schema that names the units.
 ///
 /// Log and publish time are `t` in nanoseconds, so that players show the recording's own time.
 pub struct McapWriter {
@@ -223,7 +223,7 @@ pub struct McapWriter {
 }
 
 impl McapWriter {
-    /// Begins the file; see [`RecordingWriter::create`].
+    /// Starts the file; see [`RecordingWriter::create`].
     pub fn create(
         path: &Path,
         columns: &[Column],

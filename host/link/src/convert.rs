@@ -1,4 +1,4 @@
-//! Samples as they come over the wire → rows of SI quantities.
+//! Converts samples of the wire protocol to rows of SI quantities.
 
 use std::f64::consts::TAU;
 
@@ -12,8 +12,8 @@ pub const COLUMNS: [&str; 9] = [
 /// Units of [`COLUMNS`], ASCII; empty for a plain number.
 pub const UNITS: [&str; COLUMNS.len()] = ["s", "rad", "A", "V", "rad", "rad/s", "N*m", "", ""];
 
-/// One sample in SI units, joint-side unless said. Position, velocity, current, voltage, reference and
-/// torque command are means over the window and belong to its middle, `t`; limits and mode are as [`StateSample`] says.
+/// One sample in SI units, on the joint side unless stated. Position, velocity, current, voltage, reference and torque
+/// command are means over the window and apply to its middle, `t`. Limits and mode are as in [`StateSample`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row {
     /// Middle of the averaging window, s since control tick 0.
@@ -26,18 +26,18 @@ pub struct Row {
     pub u1: f64,
     /// Reference position, rad.
     pub ref1: f64,
-    /// Velocity as the rig estimates it, rad/s.
+    /// Velocity estimated by the rig, rad/s.
     pub qd1: f64,
     /// Commanded torque, N·m.
     pub tau_cmd1: f64,
-    /// Limits that acted, the bits of [`LimitSet`](rig_shared::safety::LimitSet) as a number.
+    /// Active limits, the bits of [`LimitSet`](rig_shared::safety::LimitSet) as a number.
     pub limits: f64,
-    /// Mode, counted in the order of [`Mode`](rig_shared::safety::Mode) from 0.
+    /// Mode, in the order of [`Mode`](rig_shared::safety::Mode) from 0.
     pub mode: f64,
 }
 
 impl Row {
-    /// The values in the order of [`COLUMNS`].
+    /// Returns the values in the order of [`COLUMNS`].
     pub fn values(&self) -> [f64; COLUMNS.len()] {
         [
             self.t,
@@ -53,7 +53,7 @@ impl Row {
     }
 }
 
-/// Turns samples into rows by what the rig has said of itself.
+/// Converter from samples to rows, from the values in the rig's greeting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converter {
     rate: f64,
@@ -62,7 +62,7 @@ pub struct Converter {
 }
 
 impl Converter {
-    /// For the samples of the rig that greeted so ([`Session`](super::Session) has checked it).
+    /// Creates a converter for the rig with this greeting ([`Session`](super::Session) has checked it).
     pub fn new(greeting: &Greeting) -> Self {
         let decimation = f64::from(greeting.telemetry_decimation);
         let counts_per_joint_turn =
@@ -74,15 +74,15 @@ impl Converter {
         }
     }
 
-    /// Time from one sample to the next, s.
+    /// Returns the time from one sample to the next, s.
     pub fn period(&self) -> f64 {
         self.decimation / self.rate
     }
 
-    /// Sample `k` of those whose first window began at control tick `first_tick`.
+    /// Converts sample `k` of a batch whose first window started at control tick `first_tick`.
     ///
-    /// The window's readings were taken at `decimation` ticks from its first on, so that their mean belongs to
-    /// tick first + (decimation − 1)/2.
+    /// The window has `decimation` readings from its first tick on, so their mean applies to tick
+    /// first + (decimation − 1)/2.
     pub fn row(&self, first_tick: u64, k: usize, sample: &StateSample) -> Row {
         let tick = first_tick as f64 + (k as f64 + 0.5) * self.decimation - 0.5;
         Row {
@@ -103,7 +103,7 @@ impl Converter {
 mod test {
     use super::*;
 
-    /// A joint in uniform motion, read tick by tick: mean position and time must lie on its line.
+    /// A joint in uniform motion, read at every tick: mean position and time must lie on its line.
     #[test]
     fn a_uniform_motion_stays_on_its_line() {
         let greeting = Greeting {

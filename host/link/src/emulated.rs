@@ -1,4 +1,4 @@
-//! A rig in this process in place of a serial line.
+//! A rig in this process instead of a serial line.
 
 use std::collections::VecDeque;
 use std::io;
@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use super::port::Port;
 
-/// Whatever stands at the other end: the emulated rig, or a test.
+/// The other end of the line: the emulated rig, or a test.
 pub trait Device {
-    /// One slice of the device's time: takes what the host has sent, appends what it sends.
+    /// Runs one time slice of the device: takes the bytes from the host and appends its own.
     fn exchange(&mut self, from_host: &[u8], to_host: &mut Vec<u8>);
 
-    /// Length of one slice; 1 ms unless said otherwise.
+    /// Returns the length of one slice; 1 ms by default.
     fn slice(&self) -> Duration {
         Duration::from_millis(1)
     }
@@ -23,8 +23,8 @@ impl<F: FnMut(&[u8], &mut Vec<u8>)> Device for F {
     }
 }
 
-/// A line to a [`Device`], which lives only while the host waits for it: time is the device's, so that runs
-/// are repeatable and as fast as the computer can.
+/// A line to a [`Device`] that runs only while the host waits for it. The clock is the device's, so runs are repeatable
+/// and as fast as the computer allows.
 pub struct EmulatedPort<D> {
     device: D,
     now: Duration,
@@ -34,7 +34,7 @@ pub struct EmulatedPort<D> {
 }
 
 impl<D: Device> EmulatedPort<D> {
-    /// A line to `device`.
+    /// Creates a line to `device`.
     pub fn new(device: D) -> Self {
         Self {
             device,
@@ -45,12 +45,12 @@ impl<D: Device> EmulatedPort<D> {
         }
     }
 
-    /// The device, to look into after a run.
+    /// Returns the device, for inspection after a run.
     pub fn device(&self) -> &D {
         &self.device
     }
 
-    /// The device, to act upon between reads.
+    /// Returns the device, for changes between reads.
     pub fn device_mut(&mut self) -> &mut D {
         &mut self.device
     }
@@ -59,7 +59,7 @@ impl<D: Device> EmulatedPort<D> {
         self.device.exchange(&self.to_device, &mut self.scratch);
         self.to_device.clear();
         self.to_host.extend(self.scratch.drain(..));
-        // A device without a time of its own must not stop the clock of time-outs.
+        // A device with a slice of zero must not stop the clock of the time-outs.
         self.now += self.device.slice().max(Duration::from_nanos(1));
     }
 }

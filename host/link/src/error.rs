@@ -1,4 +1,4 @@
-//! What can go wrong on the line.
+//! Errors of the line.
 
 use std::borrow::Cow;
 use std::io;
@@ -8,62 +8,62 @@ use rig_shared::compensation::Role;
 use rig_shared::wire::message::Refusal;
 use rig_shared::wire::{EncodeError, EndMismatch};
 
-/// What can go wrong on the line; each text is a whole sentence.
+/// An error of the line; each text is a whole sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// No such port.
     #[error("There is no serial port {name}; {available}.")]
     PortNotFound {
-        /// As asked for.
+        /// Requested name.
         name: String,
-        /// What there is instead, as a clause.
+        /// Available ports, as a clause.
         available: String,
     },
     /// The user may not open it.
     #[error("The serial port {name} may not be opened by this user; {mend}.")]
     PermissionDenied {
-        /// As asked for.
+        /// Requested name.
         name: String,
-        /// What to do, as a clause.
+        /// Remedy, as a clause.
         mend: String,
     },
-    /// Another program has it, or it is gone.
+    /// Another program uses the port, or it was removed.
     #[error(
         "The serial port {name} cannot be used ({source}); close the program that has it, or plug the rig in again."
     )]
     PortBusy {
-        /// As asked for.
+        /// Requested name.
         name: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: serialport::Error,
     },
     /// The port cannot be opened for another reason.
     #[error("The serial port {name} cannot be opened: {source}; check that it is a serial port.")]
     Open {
-        /// As asked for.
+        /// Requested name.
         name: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: serialport::Error,
     },
-    /// The debug probe.
+    /// An error of the debug probe.
     #[error(
         "The debug probe cannot reach the rig: {0}; check that the board is plugged in at its ST-LINK socket, that no other program uses it, and that the rig's firmware is on it (`rig flash`)."
     )]
     Probe(String),
-    /// None to talk to, or more than one.
+    /// No debug probe, or more than one.
     #[error(
         "There are {0} debug probes at this computer, and one is needed; plug the rig's board in, and no other."
     )]
     ProbeCount(usize),
-    /// The line broke.
+    /// The line failed.
     #[error("The line to the rig has broken: {0}; check the cable and the rig's supply.")]
     Io(#[from] io::Error),
     /// A request does not fit a frame.
     #[error("The request {request} cannot be sent: {source}")]
     Encode {
-        /// Which.
+        /// The request.
         request: String,
-        /// Why.
+        /// Reason.
         source: EncodeError,
     },
     /// No answer.
@@ -72,68 +72,68 @@ pub enum LinkError {
         .each.as_millis()
     )]
     NoAnswer {
-        /// Which.
+        /// The request.
         request: String,
-        /// How often it was sent.
+        /// Number of attempts.
         attempts: u32,
-        /// How long each waited.
+        /// Waiting time of each attempt.
         each: Duration,
     },
-    /// The rig said no.
+    /// The rig refused a request.
     #[error("The rig has refused the request {request}: {}.", describe(*.refusal))]
     Refused {
-        /// Which.
+        /// The request.
         request: String,
-        /// Why.
+        /// Reason.
         refusal: Refusal,
     },
-    /// Another protocol.
+    /// A different protocol version.
     #[error(
         "The rig speaks protocol version {rig} and this program version {host}; flash the firmware that belongs to this program, or use the program that belongs to the firmware."
     )]
     WrongProtocol {
-        /// The rig's.
+        /// Version of the rig.
         rig: u16,
-        /// This program's.
+        /// Version of this program.
         host: u16,
     },
-    /// Other message types.
+    /// Different message types.
     #[error(
         "The rig's messages have the schema {rig:016x} and this program's {host:016x}; flash the firmware that belongs to this program, or use the program that belongs to the firmware."
     )]
     WrongSchema {
-        /// The rig's.
+        /// Schema of the rig.
         rig: u64,
-        /// This program's.
+        /// Schema of this program.
         host: u64,
     },
-    /// A greeting that cannot be true.
+    /// A greeting with an impossible value.
     #[error(
         "The rig's greeting says {what} = {value}, which cannot be; its firmware is configured wrongly."
     )]
     BadGreeting {
-        /// Which field.
+        /// Name of the field.
         what: &'static str,
         /// Its value.
         value: f64,
     },
-    /// The stream fell silent.
+    /// The stream stopped.
     #[error("The rig has sent nothing for {} ms while it should stream; check the cable and the rig's supply.", .0.as_millis())]
     Silent(Duration),
-    /// The stream's end never came.
+    /// The totals at the end of the stream are missing.
     #[error(
         "The rig has not told the totals of its stream in {attempts} attempts, so that losses at its end are unknown; record again."
     )]
     NoEnd {
-        /// How often it was asked.
+        /// Number of attempts.
         attempts: u32,
     },
-    /// The stream's end is not that of this stream.
+    /// The totals belong to another stream.
     #[error(transparent)]
     EndMismatch(#[from] EndMismatch),
 }
 
-/// A refusal as a clause that says what to do.
+/// Describes a refusal as a clause with its remedy.
 pub fn describe(refusal: Refusal) -> Cow<'static, str> {
     Cow::Borrowed(match refusal {
         Refusal::WrongMode => {

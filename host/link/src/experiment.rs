@@ -1,4 +1,4 @@
-//! An experiment on the rig: settings up, armed, a trajectory run and recorded, off again.
+//! An experiment on the rig: send settings, arm, run and record a trajectory, disarm.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -13,29 +13,30 @@ use super::session::Session;
 
 /// Longest wait for a rig that is still measuring its current offset.
 const CALIBRATION_PATIENCE: Duration = Duration::from_secs(3);
-/// Time for a controlled stop where the experiment states no limits: five times what the template's rig needs, from 6 rad/s at
-/// 60 rad/s².
+/// Time for a controlled stop if the experiment has no limits: five times the need of the template's rig, from 6 rad/s
+/// at 60 rad/s².
 const STOP_PATIENCE: Duration = Duration::from_millis(500);
-/// How much more of it than speed over deceleration: the link comes to rest after its reference.
+/// Ratio of the stop time to speed over deceleration: the link comes to rest after its reference.
 const STOP_MARGIN: f32 = 1.5;
 /// Pause between two attempts to arm.
 const CALIBRATION_PAUSE: Duration = Duration::from_millis(50);
 
-/// What to do on the rig.
+/// Description of an experiment.
 #[derive(Clone, Debug, Default)]
 pub struct Experiment {
-    /// Requests carried out first, while the rig is disarmed.
+    /// Requests sent first, while the rig is disarmed.
     pub settings: Vec<RequestBody>,
-    /// The motion; none to record a rig at rest, disarmed.
+    /// The motion; `None` records a disarmed rig at rest.
     pub trajectory: Option<Trajectory<f32>>,
-    /// When to switch the bridge off in the middle of it, so that the joint coasts, s after its start.
+    /// Time to switch the bridge off during the motion, so that the joint coasts, s after its start.
     pub drive_off: Option<f64>,
-    /// How long to record after the trajectory has ended or the bridge is off, or in all without one, s.
+    /// Recording time after the end of the trajectory or after the bridge is off, s; without a trajectory the total
+    /// time.
     pub rest: f64,
 }
 
 impl Experiment {
-    /// How long a controlled stop takes at most.
+    /// Returns the maximum time of a controlled stop.
     fn stop_time(&self) -> Duration {
         let limits = self.settings.iter().rev().find_map(|body| match body {
             RequestBody::SetLimits(limits) => Some(limits),
@@ -47,7 +48,7 @@ impl Experiment {
             .map_or(STOP_PATIENCE, |time| time.max(STOP_PATIENCE))
     }
 
-    /// Telemetry samples that the experiment takes.
+    /// Returns the number of telemetry samples of the experiment.
     pub fn samples(&self, sample_rate: f64) -> u64 {
         let whole = self
             .trajectory
@@ -58,11 +59,11 @@ impl Experiment {
     }
 }
 
-/// Runs an experiment; every sample and every hole goes to `on_event`. The rig is disarmed afterwards, also
-/// when the recording was broken off or failed: a motion under way is brought to rest before.
+/// Runs an experiment; every sample and every gap goes to `on_event`. Afterwards the rig is disarmed, also after an
+/// aborted or failed recording: a running motion is first brought to rest.
 ///
 /// # Errors
-/// What the link says: a refused request, a silent rig, a broken line.
+/// Errors of the link: a refused request, a silent rig, a failed line.
 pub fn run<P: Port>(
     session: &mut Session<P>,
     experiment: &Experiment,
@@ -83,7 +84,7 @@ pub fn run<P: Port>(
         session.request(RequestBody::SetTrajectory(trajectory.clone()))?;
         when_calibrated(session, RequestBody::Arm)?;
         settings.at_start = vec![RequestBody::Start];
-        // The host's clock is as good as needed: it coasts from wherever it is told to.
+        // The accuracy of the host's clock suffices: the joint coasts from any position.
         settings.later =
             (experiment.drive_off).map(|after| ((after * rate).ceil() as u64, RequestBody::Disarm));
     }
@@ -99,7 +100,7 @@ pub fn run<P: Port>(
     } else {
         Ok(())
     };
-    // Off in any case; the recording's own error comes first, because it says more.
+    // Disarm in any case; an error of the recording is returned first, because it is more specific.
     let off = session.request(RequestBody::Disarm);
     let losses = recorded?;
     rested?;
@@ -107,7 +108,7 @@ pub fn run<P: Port>(
     Ok(losses)
 }
 
-/// Lets a stop that has been asked for come to its end.
+/// Waits for the end of a requested stop.
 fn rest<P: Port>(session: &mut Session<P>, time: Duration) -> Result<(), LinkError> {
     let until = session.port().now() + time;
     loop {
@@ -119,10 +120,10 @@ fn rest<P: Port>(session: &mut Session<P>, time: Duration) -> Result<(), LinkErr
     }
 }
 
-/// A request that the rig refuses only because it is still calibrating.
+/// Repeats a request while the rig refuses it because of its calibration.
 ///
 /// # Errors
-/// What the link says.
+/// Errors of the link.
 pub fn when_calibrated<P: Port>(
     session: &mut Session<P>,
     body: RequestBody,

@@ -1,16 +1,16 @@
-//! Faults of the board in words: what happened, the value with its unit, and what to do.
+//! Faults of the board in words: the event, its value with unit, and the remedy.
 //!
-//! The table of docs/firmware.md says the same in more detail.
+//! The table in docs/firmware.md gives more detail.
 
 use rig_shared::safety::{Fault, FaultRecord};
 
 use rig_output::format_significant;
 
-/// Returns what a latched fault means, when it happened, and what to do about it: sentences. The name of the fault stands in
-/// brackets, as in docs/firmware.md. `control_rate` is in ticks per second, as the rig's greeting says it.
+/// Describes a latched fault, its time and its remedy in sentences. The name of the fault is in brackets, as in
+/// docs/firmware.md. `control_rate` is the rate in the rig's greeting, ticks per second.
 ///
 /// # Errors
-/// None: a value that is no number is written as such.
+/// None: a value that is not a number is written as such.
 pub fn describe_fault(record: &FaultRecord, control_rate: f64) -> String {
     let at = record.tick as f64 / control_rate.max(f64::MIN_POSITIVE);
     format!(
@@ -21,7 +21,7 @@ pub fn describe_fault(record: &FaultRecord, control_rate: f64) -> String {
     )
 }
 
-/// What happened, with the value in its unit; a clause without a full stop.
+/// Describes the event, with the value in its unit; a clause without a full stop.
 fn happened(fault: Fault, value: f64) -> String {
     let number = format_significant(value, 4);
     match fault {
@@ -58,7 +58,7 @@ fn happened(fault: Fault, value: f64) -> String {
         ),
         Fault::Deadline => "A control tick did not finish in its period".to_owned(),
         Fault::HostSilent => format!("The rig heard nothing from this program for {number} s"),
-        // Channels that changed at once have no count.
+        // If both channels change at once, there is no count.
         Fault::EncoderSignal if value == 0.0 => {
             "Both channels of the encoder changed at the same time".to_owned()
         }
@@ -73,7 +73,7 @@ fn happened(fault: Fault, value: f64) -> String {
     }
 }
 
-/// What to do: likely causes and their remedy, sentences.
+/// Returns likely causes and their remedy, as sentences.
 fn remedy(fault: Fault) -> &'static str {
     match fault {
         Fault::Driver => {
@@ -156,7 +156,7 @@ mod tests {
                 "{said}"
             );
             assert!(said.ends_with('.'), "{said}");
-            // No number of more digits than anybody measures.
+            // No number has more digits than a measurement.
             assert!(!said.contains("1.4706"), "{said}");
             for sentence in said.split(". ") {
                 let words = sentence.split_whitespace().count();

@@ -1,9 +1,9 @@
 //! The line to the rig: ports, the conversation over them, and recording.
 //!
-//! [`port`] is the seam: a [`serial`] device, a debug probe (feature `probe`), an [`emulated`] rig in this process, or either of
-//! them behind a [`lossy`] line. [`session`] greets the rig and has requests carried out exactly once; [`recorder`] runs a stream
-//! and counts what is missing; [`recorded_run`] writes one experiment to a file; [`convert`] turns samples into rows of SI
-//! quantities; [`fault`] says in words what stopped the rig.
+//! [`port`] is the interface of all lines: a [`serial`] device, a debug probe (feature `probe`), an [`emulated`] rig in
+//! this process, or one of them behind a [`lossy`] line. [`session`] greets the rig and sends requests that are carried
+//! out exactly once. [`recorder`] runs a stream and counts missing samples; [`recorded_run`] writes one experiment to a
+//! file. [`convert`] converts samples to rows of SI quantities; [`fault`] describes the fault that stopped the rig.
 //!
 //! ```no_run
 //! use rig_link::{SerialLine, Session, SessionSettings};

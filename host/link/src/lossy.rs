@@ -1,4 +1,4 @@
-//! A line that flips bits and loses or repeats bytes, to show what recordings are worth on a bad one.
+//! A line with flipped bits and with lost or repeated bytes, to test recordings over a bad line.
 
 use std::collections::VecDeque;
 use std::io;
@@ -9,25 +9,25 @@ use rand_pcg::Pcg64Mcg;
 
 use super::port::Port;
 
-/// How often the line errs; each a probability, 0 to 1.
+/// Error rates of the line; each is a probability, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Disturbance {
     /// A byte has one bit flipped.
     pub flip: f64,
     /// A byte is lost.
     pub drop_byte: f64,
-    /// A whole chunk (what is written or read at once) is lost.
+    /// A whole chunk (the bytes of one write or read) is lost.
     pub drop_chunk: f64,
-    /// A whole chunk comes twice.
+    /// A whole chunk is repeated.
     pub repeat_chunk: f64,
 }
 
-/// What a line did to the bytes.
+/// Number of errors of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DisturbanceCounts {
     /// Bits flipped.
     pub flipped: u64,
-    /// Bytes lost singly.
+    /// Single bytes lost.
     pub dropped_bytes: u64,
     /// Chunks lost.
     pub dropped_chunks: u64,
@@ -35,7 +35,7 @@ pub struct DisturbanceCounts {
     pub repeated_chunks: u64,
 }
 
-/// A disturbed line in both directions in front of another port; the same seed errs the same way.
+/// A line with errors in both directions in front of another port; equal seeds give equal errors.
 pub struct Lossy<P> {
     inner: P,
     disturbance: Disturbance,
@@ -45,7 +45,7 @@ pub struct Lossy<P> {
 }
 
 impl<P: Port> Lossy<P> {
-    /// Puts a bad line in front of `inner`.
+    /// Creates a line with errors in front of `inner`.
     pub fn new(inner: P, disturbance: Disturbance, seed: u64) -> Self {
         Self {
             inner,
@@ -56,17 +56,17 @@ impl<P: Port> Lossy<P> {
         }
     }
 
-    /// What happened so far.
+    /// Returns the errors so far.
     pub fn counts(&self) -> DisturbanceCounts {
         self.counts
     }
 
-    /// The port behind.
+    /// Returns the port behind.
     pub fn inner(&self) -> &P {
         &self.inner
     }
 
-    /// What of `chunk` comes out at the other end.
+    /// Returns the bytes of `chunk` that reach the other end.
     fn disturb(&mut self, chunk: &[u8]) -> Vec<u8> {
         let mut out = Vec::with_capacity(chunk.len());
         if self.rng.random_bool(self.disturbance.drop_chunk) {

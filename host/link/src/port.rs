@@ -1,23 +1,23 @@
-//! What a line to the rig must offer.
+//! Interface of a line to the rig.
 
 use std::io;
 use std::time::Duration;
 
-/// A line of bytes in both directions, with the clock by which its time-outs run.
+/// A bidirectional byte stream, with the clock of its time-outs.
 pub trait Port {
-    /// Waits for bytes and puts them to the front of `into`; gives their number, 0 when `timeout` has passed.
+    /// Waits for bytes and writes them to the start of `into`; returns their number, 0 after `timeout`.
     ///
     /// # Errors
-    /// What the line says when it has broken.
+    /// The error of a failed line.
     fn read(&mut self, into: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// What the line says when it has broken.
+    /// The error of a failed line.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Time since some fixed moment; real for hardware, emulated where the rig is.
+    /// Returns the time since a fixed moment; real for hardware, emulated for an emulated rig.
     fn now(&self) -> Duration;
 }
 

@@ -1,6 +1,6 @@
-//! The board's debug probe as a line: the rig's frames through SEGGER RTT, by probe-rs.
+//! The board's debug probe as a line: frames over SEGGER RTT, with probe-rs.
 //!
-//! Not tried on a board yet.
+//! Not tested on a board yet.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -12,13 +12,13 @@ use probe_rs::{Permissions, Session};
 use super::error::LinkError;
 use super::port::Port;
 
-/// The chip, as probe-rs calls it.
+/// Name of the chip in probe-rs.
 const CHIP: &str = "STM32G474RETx";
-/// Channel of the rig's frames from the board; 0 are its logs.
+/// Channel of the rig's frames from the board; channel 0 has its logs.
 const FROM_BOARD: usize = 1;
 /// Channel to the board.
 const TO_BOARD: usize = 0;
-/// Pause between two looks at the board's buffer, which holds some 40 ms of telemetry.
+/// Pause between two reads of the board's buffer, which holds some 40 ms of telemetry.
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// The rig behind a debug probe.
@@ -29,10 +29,10 @@ pub struct ProbeLine {
 }
 
 impl ProbeLine {
-    /// Attaches to the one probe that is plugged in, and to the program that runs on its board.
+    /// Attaches to the only connected probe, and to the program that runs on its board.
     ///
     /// # Errors
-    /// [`LinkError::Probe`] with what probe-rs says, [`LinkError::ProbeCount`].
+    /// [`LinkError::Probe`] with the error of probe-rs; [`LinkError::ProbeCount`].
     pub fn open() -> Result<Self, LinkError> {
         let probes = Lister::new().list_all();
         let [probe] = probes.as_slice() else {
@@ -67,7 +67,7 @@ fn missing() -> io::Error {
     io::Error::other("the program on the board is not the rig's: it has other channels")
 }
 
-/// What an error says, with everything behind it.
+/// Returns the text of an error with all its causes.
 fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();

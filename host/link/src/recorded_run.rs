@@ -1,4 +1,4 @@
-//! One experiment, recorded to a file and kept in memory.
+//! One experiment, recorded to a file and in memory.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -14,10 +14,10 @@ use super::{
     COLUMNS, Converter, Event, LinkError, LossReport, Port, Row, Session, UNITS, describe_fault,
 };
 
-/// Lets a rig hang at rest, disarmed, for some seconds of its own time.
+/// Leaves a rig at rest, disarmed, for `seconds` of its own time.
 ///
 /// # Errors
-/// What the link says.
+/// Errors of the link.
 pub fn pause<P: Port>(session: &mut Session<P>, seconds: f64) -> Result<(), LinkError> {
     let waiting = Experiment {
         rest: seconds,
@@ -27,7 +27,7 @@ pub fn pause<P: Port>(session: &mut Session<P>, seconds: f64) -> Result<(), Link
     Ok(())
 }
 
-/// Why an experiment was not recorded whole.
+/// Reason why an experiment was not recorded completely.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The line to the rig.
@@ -36,28 +36,28 @@ pub enum RunError {
     /// The file.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The rig has stopped by itself.
+    /// The rig stopped by itself.
     #[error("The rig has stopped. {0}")]
     Fault(String),
 }
 
 /// A recorded run.
 pub struct RecordedRun {
-    /// Every sample that came.
+    /// All samples received.
     pub rows: Vec<Row>,
-    /// Every on-line estimate that came, with its time, s.
+    /// All on-line estimates received, with their time, s.
     pub estimates: Vec<(f64, Estimate)>,
-    /// What became of the samples.
+    /// Counts of received and lost samples.
     pub losses: LossReport,
-    /// Time at which the trajectory ended and the rest began, s.
+    /// Time at which the trajectory ended and the rest started, s.
     pub motion_end: f64,
 }
 
 impl RecordedRun {
-    /// Runs a trajectory and writes what came to `path`.
+    /// Runs a trajectory and writes the received samples to `path`.
     ///
     /// # Errors
-    /// The link, the file, or a fault of the rig.
+    /// An error of the link or the file, or a fault of the rig.
     pub fn record<P: Port>(
         session: &mut Session<P>,
         settings: Vec<RequestBody>,
@@ -121,7 +121,7 @@ impl RecordedRun {
         })
     }
 
-    /// RMS tracking error while the trajectory ran, rad.
+    /// Returns the RMS tracking error during the trajectory, rad.
     pub fn tracking_rms(&self) -> f64 {
         let moving = self.rows.iter().filter(|row| row.t < self.motion_end);
         let (sum, count) = moving.fold((0.0, 0u32), |(sum, n), row| {
@@ -130,7 +130,7 @@ impl RecordedRun {
         (sum / f64::from(count.max(1))).sqrt()
     }
 
-    /// Distance between the furthest positions during the last half of the rest, rad: a limit cycle shows here.
+    /// Returns the range of positions during the last half of the rest, rad; it shows a limit cycle.
     pub fn rest_span(&self) -> f64 {
         let end = self.rows.last().map_or(0.0, |row| row.t);
         let late = self

@@ -1,4 +1,4 @@
-//! Runs a stream and knows what of it is missing.
+//! Runs a stream and detects its missing parts.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -14,21 +14,21 @@ use super::error::LinkError;
 use super::port::Port;
 use super::session::Session;
 
-/// What comes out of a recording, in the order of the stream.
+/// An event of a recording, in the order of the stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<'a> {
-    /// Consecutive samples; the first one's window began at `first_tick`.
+    /// Consecutive samples; the window of the first one started at `first_tick`.
     Samples {
         /// Control tick.
         first_tick: u64,
         /// One per telemetry period.
         samples: &'a [StateSample],
     },
-    /// Samples that are missing here.
+    /// Missing samples.
     Gap {
-        /// Control tick at which the first missing window began.
+        /// Control tick at which the first missing window started.
         first_tick: u64,
-        /// How many.
+        /// Number of missing samples.
         missing: u64,
     },
     /// The on-line estimate.
@@ -39,20 +39,20 @@ pub enum Event<'a> {
     Snapshot(&'a SnapshotPart),
     /// Part of the capture of single control ticks.
     Capture(&'a SnapshotPart),
-    /// How the board is.
+    /// State of the board.
     Health(&'a Health),
 }
 
-/// What to record.
+/// Settings of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordSettings {
-    /// Stop after so many samples, received or missing; `None`: only when the callback breaks.
+    /// Number of samples, received or missing, after which it stops; `None`: only the callback stops it.
     pub samples: Option<u64>,
-    /// Requests to send as soon as the stream runs, in this order (`Arm`, `Start`, …).
+    /// Requests sent as soon as the stream runs, in this order (`Arm`, `Start`, …).
     pub at_start: Vec<RequestBody>,
-    /// A request to send once so many samples have come or are known to be missing.
+    /// A request sent after this number of samples, received or known to be missing.
     pub later: Option<(u64, RequestBody)>,
-    /// Longest silence of the rig before the recording is given up.
+    /// Longest silence of the rig before the recording fails.
     pub silence: Duration,
 }
 
@@ -67,32 +67,32 @@ impl Default for RecordSettings {
     }
 }
 
-/// What became of every sample of a recording: `taken` = `received` + `lost`.
+/// Counts of the samples of a recording: `taken` = `received` + `lost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LossReport {
-    /// Samples the rig took.
+    /// Samples taken by the rig.
     pub taken: u64,
-    /// Samples the rig sent.
+    /// Samples sent by the rig.
     pub sent: u64,
     /// Samples received.
     pub received: u64,
-    /// Samples missing, wherever they were lost.
+    /// Samples missing for any reason.
     pub lost: u64,
-    /// Of these, dropped by the rig because its transmit queue was full.
+    /// Part of `lost`: dropped by the rig because its transmit queue was full.
     pub dropped_by_rig: u64,
-    /// Of these, lost on the line.
+    /// Part of `lost`: lost on the line.
     pub lost_on_line: u64,
-    /// Holes in the stream.
+    /// Gaps in the stream.
     pub gaps: u64,
-    /// Batches that came twice and were not used again.
+    /// Batches received twice; the second is not used.
     pub duplicates: u64,
-    /// Batches that came after a later one and were not used.
+    /// Batches received after a later one; not used.
     pub late: u64,
-    /// Batches that contradicted the rest and were not used.
+    /// Batches that contradict the rest; not used.
     pub inconsistent: u64,
-    /// Frames spoilt by the line, of any message.
+    /// Frames of any message that the line damaged.
     pub bad_frames: u64,
-    /// All frames of the recording, by fate.
+    /// All frames of the recording, by result.
     pub frames: FrameCounts,
 }
 
@@ -114,13 +114,13 @@ impl fmt::Display for LossReport {
     }
 }
 
-/// Records one stream: every sample that comes, and every hole, goes to `on_event`, which may break it off.
+/// Records one stream: every sample and every gap goes to `on_event`, which may stop the recording.
 ///
-/// Whatever stream ran before is ended first, so that nothing of it can get in.
+/// A stream that ran before is ended first, so that its samples cannot get in.
 ///
 /// # Errors
-/// A refused request, a rig that falls silent, or a broken line; what was recorded until then has gone to
-/// `on_event`, but losses at the end are unknown.
+/// A refused request, a rig that falls silent, or a failed line. Samples before the error were passed to `on_event`,
+/// but losses at the end are unknown.
 pub fn record<P: Port>(
     session: &mut Session<P>,
     settings: &RecordSettings,
@@ -133,7 +133,7 @@ pub fn record<P: Port>(
         broken_off: false,
         on_event,
     };
-    // On a line that keeps the order, nothing of an old stream comes after its end.
+    // On a line that keeps the order, no sample of an old stream arrives after its end.
     run.end(session, Phase::Before)?;
     session.request(RequestBody::StartStream)?;
     for body in &settings.at_start {
@@ -146,9 +146,9 @@ pub fn record<P: Port>(
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Phase {
-    /// Of the stream that may have run before: its samples are nobody's.
+    /// A stream that may have run before: its samples are discarded.
     Before,
-    /// Of the stream that is recorded.
+    /// The stream that is recorded.
     After,
 }
 
@@ -173,13 +173,13 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
             let Some(report) = session.next_report(settings.silence)? else {
                 return Err(LinkError::Silent(settings.silence));
             };
-            // An end that comes before it is asked for is the old stream's, said twice.
+            // An end before the request for it is a repeated end of the old stream.
             self.take(&report);
         }
         Ok(())
     }
 
-    /// Samples that have come or are known to be missing.
+    /// Returns the number of samples received or known to be missing.
     fn so_far(&self) -> u64 {
         let counts = self.reassembly.counts();
         counts.received + counts.missing
@@ -190,7 +190,7 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         self.broken_off || settings.samples.is_some_and(|wanted| so_far >= wanted)
     }
 
-    /// Ends the stream and gives its totals. They come once per request, so that a new request asks again.
+    /// Ends the stream and returns its totals. They come once per request, so a new request asks again.
     fn end<P: Port>(
         &mut self,
         session: &mut Session<P>,
@@ -201,7 +201,7 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
         for _ in 0..patience.attempts {
             session.request(RequestBody::StopStream)?;
             let deadline = session.port().now() + patience.timeout;
-            // Estimates may go on for ever: what counts is the time since the question.
+            // Estimates may continue forever, so the time counts from the request.
             while let Some(report) =
                 session.next_report(deadline.saturating_sub(session.port().now()))?
             {
@@ -230,7 +230,7 @@ impl<F: FnMut(Event<'_>) -> ControlFlow<()>> Run<F> {
     fn take(&mut self, report: &Report) {
         match report {
             Report::Batch(batch) => {
-                // A refused batch is counted by the reassembly.
+                // The reassembly counts a refused batch.
                 if let Ok(gap) = self.reassembly.accept(batch) {
                     self.gap(gap);
                     self.emit(Event::Samples {

@@ -8,8 +8,8 @@ use serialport::{ErrorKind, SerialPort};
 use super::error::LinkError;
 use super::port::Port;
 
-/// Bit rate where the line has one; a USB serial device ignores it. 125 batches/s of at most 280 bytes need
-/// 0.35 Mbit/s in frames of ten bits, so that 921600 leaves more than half of the line free.
+/// Bit rate of a line that has one; a USB serial device ignores it. 125 batches/s of at most 280 bytes need 0.35 Mbit/s
+/// in frames of ten bits, so 921600 leaves more than half of the line free.
 pub const DEFAULT_BAUD: u32 = 921_600;
 
 /// A serial port of this computer.
@@ -19,10 +19,10 @@ pub struct SerialLine {
 }
 
 impl SerialLine {
-    /// Opens the port called `name` (`/dev/ttyACM0`, `COM3`) at `baud` bit/s.
+    /// Opens the port `name` (`/dev/ttyACM0`, `COM3`) at `baud` bit/s.
     ///
     /// # Errors
-    /// [`LinkError`] with what there is instead, or who may open it.
+    /// [`LinkError`] with the available ports, or with the group that may open it.
     pub fn open(name: &str, baud: u32) -> Result<Self, LinkError> {
         let port = serialport::new(name, baud)
             .timeout(Duration::from_millis(10))
@@ -83,7 +83,7 @@ fn permission(_name: &str) -> String {
     "close the program that has it".to_owned()
 }
 
-/// Name of group `gid` in a table in the form of `/etc/group`.
+/// Returns the name of group `gid` in a table in the format of `/etc/group`.
 #[cfg(unix)]
 fn group_name(table: &str, gid: u32) -> Option<String> {
     table.lines().find_map(|line| {
@@ -107,7 +107,7 @@ impl Port for SerialLine {
             {
                 Ok(0)
             }
-            // A serial line has no end; a device that was pulled out reads as empty.
+            // A serial line has no end; a disconnected device reads as empty.
             Ok(0) if !into.is_empty() => Err(io::ErrorKind::UnexpectedEof.into()),
             other => other,
         }

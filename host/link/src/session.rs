@@ -1,8 +1,8 @@
-//! The conversation with the rig: greeting, requests that are carried out once, signs of life.
+//! The conversation with the rig: greeting, requests that are carried out once, keep-alive messages.
 //!
-//! One request is under way at a time. It keeps its number when it is sent again, and the rig only answers a
-//! number again that it has answered before ([`Ledger`](rig_shared::wire::Ledger)): a request is carried out
-//! once, however often the line loses it or its answer. `Hello` has the rig forget the numbers.
+//! One request is active at a time and keeps its number when it is sent again. If the rig has already answered a
+//! number, it only repeats the answer ([`Ledger`](rig_shared::wire::Ledger)). A request is thus carried out once, even
+//! if the line loses it or its answer. `Hello` clears the numbers in the rig.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -17,20 +17,20 @@ use rig_shared::wire::{
 use super::error::LinkError;
 use super::port::Port;
 
-/// How patient a session is.
+/// Time-outs of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SessionSettings {
-    /// Wait for an acknowledgement before a request is sent again.
+    /// Waiting time for an acknowledgement before a request is sent again.
     pub timeout: Duration,
-    /// How often a request is sent in all.
+    /// Total number of attempts per request.
     pub attempts: u32,
-    /// Longest silence towards the rig.
+    /// Longest silence towards the rig before a keep-alive message.
     pub keep_alive: Duration,
 }
 
 impl Default for SessionSettings {
-    /// 100 ms are many times the way to the rig and back over USB; ten attempts fail by chance once in 10⁷
-    /// times on a line that loses a fifth of all frames. 100 ms of silence are a fraction of a rig's patience.
+    /// 100 ms are many times the round trip over USB. Ten attempts fail by chance once in 10⁷ times on a line that
+    /// loses a fifth of all frames. A silence of 100 ms is a fraction of the rig's time-out.
     fn default() -> Self {
         Self {
             timeout: Duration::from_millis(100),
@@ -40,7 +40,7 @@ impl Default for SessionSettings {
     }
 }
 
-/// A conversation with a rig that has been greeted.
+/// A conversation with a rig after its greeting.
 pub struct Session<P> {
     port: P,
     settings: SessionSettings,
@@ -55,11 +55,11 @@ pub struct Session<P> {
 }
 
 impl<P: Port> Session<P> {
-    /// Greets the rig at the other end of `port`.
+    /// Greets the rig on `port`.
     ///
     /// # Errors
     /// [`LinkError::NoAnswer`], [`LinkError::WrongProtocol`], [`LinkError::WrongSchema`],
-    /// [`LinkError::BadGreeting`], or a broken line.
+    /// [`LinkError::BadGreeting`], or a failed line.
     pub fn open(port: P, settings: SessionSettings) -> Result<Self, LinkError> {
         let mut session = Self {
             last_sent: port.now(),
@@ -87,27 +87,27 @@ impl<P: Port> Session<P> {
         Ok(session)
     }
 
-    /// What the rig said of itself.
+    /// Returns the rig's greeting.
     pub fn greeting(&self) -> &Greeting {
         &self.greeting
     }
 
-    /// How patient this session is.
+    /// Returns the time-outs of this session.
     pub fn settings(&self) -> SessionSettings {
         self.settings
     }
 
-    /// The port, to look into.
+    /// Returns the port, for inspection.
     pub fn port(&self) -> &P {
         &self.port
     }
 
-    /// The port, to act upon (an emulated rig's surroundings, say).
+    /// Returns the port, for changes (for example of an emulated rig's environment).
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// Frames seen so far.
+    /// Returns the frames so far.
     pub fn frames(&self) -> FrameCounts {
         FrameCounts {
             bad_message: self.unknown_messages,
@@ -115,11 +115,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Has the rig carry out `body`, once, and waits for its answer. Reports that come meanwhile are kept for
-    /// [`Session::next_report`].
+    /// Sends `body`, which the rig carries out once, and waits for the answer. Reports received in the meantime are
+    /// kept for [`Session::next_report`].
     ///
     /// # Errors
-    /// [`LinkError::Refused`], [`LinkError::NoAnswer`], or a broken line.
+    /// [`LinkError::Refused`], [`LinkError::NoAnswer`], or a failed line.
     pub fn request(&mut self, body: RequestBody) -> Result<(), LinkError> {
         let name = name_of(&body);
         let (id, frame) = self.frame(body)?;
@@ -134,11 +134,11 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// The next report that is neither greeting nor acknowledgement; `None` when `timeout` has passed.
-    /// Gives signs of life meanwhile.
+    /// Returns the next report other than greeting and acknowledgement, or `None` after `timeout`. Sends keep-alive
+    /// messages in the meantime.
     ///
     /// # Errors
-    /// A broken line.
+    /// A failed line.
     pub fn next_report(&mut self, timeout: Duration) -> Result<Option<Report>, LinkError> {
         let deadline = self.port.now() + timeout;
         loop {
@@ -154,13 +154,13 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends a sign of life where the last thing sent is too long ago; nobody waits for its answer.
+    /// Sends a keep-alive message if the last message is too old; its answer is not awaited.
     ///
     /// # Errors
-    /// A broken line.
+    /// A failed line.
     pub fn keep_alive(&mut self) -> Result<(), LinkError> {
         if self.port.now().saturating_sub(self.last_sent) >= self.settings.keep_alive {
-            // Nobody waits for the answers to the signs of life before.
+            // Answers to earlier keep-alive messages are not used.
             self.acknowledgements.clear();
             let (_, frame) = self.frame(RequestBody::KeepAlive)?;
             self.send(&frame)?;
@@ -206,7 +206,7 @@ impl<P: Port> Session<P> {
         Ok(greeting)
     }
 
-    /// Sends `frame` until `found` finds the answer among what has come.
+    /// Sends `frame` until `found` returns the answer from the received reports.
     fn exchange<T>(
         &mut self,
         name: &str,
@@ -234,7 +234,7 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// A new request as a frame. A delimiter before it ends whatever the line may have left half-sent.
+    /// Encodes a new request as a frame. A delimiter before it ends any incomplete frame on the line.
     fn frame(&mut self, body: RequestBody) -> Result<(u16, Vec<u8>), LinkError> {
         let request = name_of(&body);
         let id = self.next_id;
@@ -253,7 +253,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Waits for bytes once and sorts the reports in them.
+    /// Waits once for bytes and sorts the reports in them.
     fn pump(&mut self, timeout: Duration) -> Result<(), LinkError> {
         let mut bytes = [0; 4096];
         let count = self.port.read(&mut bytes, timeout)?;
@@ -280,7 +280,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// A request's name without its content.
+/// Returns the name of a request without its content.
 fn name_of(body: &RequestBody) -> String {
     let text = format!("{body:?}");
     text.split(['(', ' ', '{'])

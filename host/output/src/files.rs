@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Atomic writing of files.
 
 use std::fs;
 use std::io::{self, Write};
@@ -13,17 +13,17 @@ use thiserror::Error;
 pub struct WriteError {
     /// The file or folder.
     pub path: PathBuf,
-    /// What the system said.
+    /// Error of the operating system.
     #[source]
     pub cause: io::Error,
 }
 
-/// A temporary file beside `path`, to be filled and then given that name by [`persist`].
+/// Creates a temporary file beside `path`, to be filled and then renamed by [`persist`].
 ///
-/// It is as readable as any other file (the user's umask decides): a result is for everybody in the laboratory.
+/// Its permissions follow the user's umask like those of any other file: everybody in the laboratory may read results.
 ///
 /// # Errors
-/// What the system says, or that the folder does not exist.
+/// Errors of the operating system, or a folder that does not exist.
 pub fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -45,16 +45,16 @@ pub fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Gives a filled temporary file its name, in one step.
+/// Renames a filled temporary file to its final name, in one step.
 ///
 /// # Errors
-/// What the system says; the file under that name is then as it was.
+/// Errors of the operating system; an existing file of that name is then unchanged.
 pub fn persist(file: NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map(drop).map_err(|error| error.error)
 }
 
-/// Writes a whole file: to a temporary one beside it first, which then takes its name.
+/// Writes a whole file: first to a temporary file beside it, which is then renamed.
 ///
 /// # Errors
 /// [`WriteError`] naming the file.
@@ -69,10 +69,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     })
 }
 
-/// Refuses a folder that cannot take results of these names, before the work that they cost; makes nothing.
+/// Checks, before long computations, that a folder can take results of these names; creates nothing.
 ///
 /// # Errors
-/// [`WriteError`] naming what is in the way.
+/// [`WriteError`] naming the obstacle.
 pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
     let refuse = |path: &Path, cause| {
         Err(WriteError {
@@ -91,7 +91,7 @@ pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
         );
         return refuse(&taken, cause);
     }
-    // What is not there yet will be made in what is; a link to nothing is there and no folder.
+    // Missing folders will be created in the first existing one; a broken link exists but is not a folder.
     let there = path
         .ancestors()
         .find(|p| p.as_os_str().is_empty() || p.symlink_metadata().is_ok());
@@ -111,7 +111,7 @@ pub fn can_take(path: &Path, names: &[&str]) -> Result<(), WriteError> {
     }
 }
 
-/// Makes sure that a folder for results is there.
+/// Creates a folder for results if it does not exist.
 ///
 /// # Errors
 /// [`WriteError`] naming the folder.
@@ -131,16 +131,16 @@ pub fn folder(path: &Path) -> Result<(), WriteError> {
     })
 }
 
-/// Folder of real recordings: the environment variable `RIG_DATA`, else `../shared/data` beside the
-/// project; none where neither is there.
+/// Returns the folder of real recordings: the environment variable `RIG_DATA`, otherwise `../shared/data` beside the
+/// project; `None` if neither exists.
 pub fn data_dir() -> Option<std::path::PathBuf> {
     if let Some(named) = std::env::var_os("RIG_DATA") {
         return Some(std::path::PathBuf::from(named)).filter(|p| p.is_dir());
     }
-    // Cargo names the crate's folder while it runs something; a program run by hand starts where it is.
+    // Cargo sets the crate's folder when it runs a program; otherwise the search starts in the working directory.
     let start = std::env::var_os("CARGO_MANIFEST_DIR").map(std::path::PathBuf::from);
     let start = start.or_else(|| std::env::current_dir().ok())?;
-    // Crate, folder of the crates, project, folder of the project, and one more for projects checked out one level deeper.
+    // Crate, folder of the crates, project, parent of the project, and one more for projects one level deeper.
     let mut folders = start.ancestors().skip(1).take(4);
     folders.find_map(|f| Some(f.join("shared/data")).filter(|p| p.is_dir()))
 }

@@ -1,20 +1,20 @@
-//! Sentences of one kind, told once.
+//! Groups similar sentences into one.
 
-/// A sentence about one joint or recording of several that may deserve the same.
+/// A sentence about one of several joints or recordings to which the same may apply.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What kind of sentence it is.
+    /// Kind of the sentence.
     pub kind: &'static str,
-    /// How bad it is among its kind: the larger the worse.
+    /// Severity within its kind: larger is worse.
     pub size: f64,
     /// The whole sentence.
     pub sentence: String,
-    /// What it is about and its figure, in a few words: `elbow (31 %)`.
+    /// Subject and value in a few words: `elbow (31 %)`.
     pub short: String,
 }
 
-/// Things of one kind together, the worst of each kind first; `rank` gives the kind and how bad a thing is. The kinds keep the
-/// order of their first.
+/// Groups things by kind, the worst of each kind first. `rank` returns the kind and the severity. The kinds keep the
+/// order of their first members.
 pub fn worst_first<T, K: PartialEq>(
     things: impl IntoIterator<Item = T>,
     rank: impl Fn(&T) -> (K, f64),
@@ -34,7 +34,7 @@ pub fn worst_first<T, K: PartialEq>(
     kinds.into_iter().map(sorted).collect()
 }
 
-/// One line a kind: the sentence of the worst of it, then whom else it holds for.
+/// Returns one line per kind: the worst sentence, then the other subjects for which it holds.
 pub fn one_a_kind(findings: Vec<Finding>) -> Vec<String> {
     let line = |own: Vec<Finding>| {
         let mut own = own.into_iter();

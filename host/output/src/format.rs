@@ -1,11 +1,11 @@
-//! Numbers as a reader wants them: as many digits as are known, and no more.
+//! Numbers as text, with as many digits as are known.
 
-/// Minus sign of typography, as wide as a digit.
+/// Typographic minus sign, as wide as a digit.
 const MINUS: char = '−';
-/// What stands where there is no value.
+/// Text for a missing value.
 const NONE: &str = "–";
 
-/// A power of ten as it is printed: `10⁻⁵`.
+/// Formats a power of ten: `10⁻⁵`.
 pub fn power_of_ten(exponent: i32) -> String {
     let mut text = String::from("10");
     for c in exponent.to_string().chars() {
@@ -26,7 +26,7 @@ pub fn power_of_ten(exponent: i32) -> String {
     text
 }
 
-/// A number with a fixed count of decimals; never `−0`.
+/// Formats a number with a fixed count of decimals; never `−0`.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -36,7 +36,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Decimal exponent of a value after rounding to so many significant digits, and that mantissa.
+/// Returns mantissa and decimal exponent of a value after rounding to `digits` significant digits.
 fn scientific(value: f64, digits: usize) -> (f64, i32) {
     let text = format!("{value:.*e}", digits.saturating_sub(1));
     let mut parts = text.split('e');
@@ -45,13 +45,13 @@ fn scientific(value: f64, digits: usize) -> (f64, i32) {
     (mantissa, exponent)
 }
 
-/// Whether a number of this decimal exponent reads better as a plain decimal.
+/// Returns true if a number of this decimal exponent is written as a plain decimal.
 fn plain(exponent: i32) -> bool {
     (-4..6).contains(&exponent)
 }
 
-/// A value with so many significant digits, trailing zeros kept because they are known:
-/// `format_significant(0.50012, 3)` is `0.500`, `1.2345e-7` is `1.23·10⁻⁷`, no value is `–`.
+/// Formats a value with `digits` significant digits, with trailing zeros because they are known:
+/// `format_significant(0.50012, 3)` is `0.500`, `1.2345e-7` is `1.23·10⁻⁷`, a missing value is `–`.
 #[must_use]
 pub fn format_significant(value: f64, digits: usize) -> String {
     if value.is_nan() {
@@ -73,7 +73,7 @@ pub fn format_significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// [`format_significant`] without zeros at the end: `6` for 6.000.
+/// Formats like [`format_significant`] without trailing zeros: `6` for 6.000.
 #[must_use]
 pub fn format_trimmed(value: f64, digits: usize) -> String {
     let text = format_significant(value, digits);
@@ -83,7 +83,7 @@ pub fn format_trimmed(value: f64, digits: usize) -> String {
     }
 }
 
-/// A value as messages have it: at most six significant digits, without trailing zeros: `250`, `0.5`, `1.04·10²²⁴`.
+/// Formats a value for messages: at most six significant digits, no trailing zeros: `250`, `0.5`, `1.04·10²²⁴`.
 #[must_use]
 pub fn format_short(value: f64) -> String {
     match value.is_nan() {
@@ -92,10 +92,10 @@ pub fn format_short(value: f64) -> String {
     }
 }
 
-/// A time stamp in s as messages have it: to the microsecond, as six digits would not find a row in a long recording.
+/// Formats a time stamp in s for messages, to the microsecond: six digits would not find a row in a long recording.
 #[must_use]
 pub fn format_time(seconds: f64) -> String {
-    // Below this, a microsecond is more than the resolution of the number.
+    // Below this, a microsecond is larger than the resolution of the number.
     if seconds.abs() < 4e9 {
         without_zeros(&fixed(seconds, 6)).to_owned()
     } else {
@@ -103,7 +103,7 @@ pub fn format_time(seconds: f64) -> String {
     }
 }
 
-/// Items in words: `a`, `a and b`, `a, b and c`.
+/// Lists items in words: `a`, `a and b`, `a, b and c`.
 pub fn listed(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -112,7 +112,7 @@ pub fn listed(items: &[String]) -> String {
     }
 }
 
-/// A decimal number without the zeros at its end.
+/// Returns a decimal number without trailing zeros.
 fn without_zeros(text: &str) -> &str {
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.')
@@ -121,18 +121,18 @@ fn without_zeros(text: &str) -> &str {
     }
 }
 
-/// A unit as print has it: `kg*m^2` is `kg·m²`.
+/// Formats a unit for print: `kg*m^2` is `kg·m²`.
 #[must_use]
 pub fn format_unit(ascii: &str) -> String {
     ascii.replace("^2", "²").replace('*', "·")
 }
 
-/// A value and its standard deviation, both rounded to the deviation's two significant digits
-/// (the rule of the Guide to the Expression of Uncertainty in Measurement, JCGM 100:2008, 7.2.6):
-/// `format_value(95.1123, 0.1083)` is `95.11 ± 0.11`.
+/// Formats a value and its standard deviation, both rounded to the deviation's two significant digits (the rule of the
+/// Guide to the Expression of Uncertainty in Measurement, JCGM 100:2008, 7.2.6): `format_value(95.1123, 0.1083)` is
+/// `95.11 ± 0.11`.
 ///
-/// Very large or small ones share a power of ten: `(1.235 ± 0.012)·10⁻⁵`. A deviation of zero means
-/// an exact value; one that is not a number, an unknown uncertainty: `95.11 ± –`.
+/// Very large or small values share a power of ten: `(1.235 ± 0.012)·10⁻⁵`. A deviation of zero means an exact value;
+/// NaN means an unknown uncertainty: `95.11 ± –`.
 #[must_use]
 pub fn format_value(value: f64, std: f64) -> String {
     let std = std.abs();
@@ -163,7 +163,7 @@ pub fn format_value(value: f64, std: f64) -> String {
     }
 }
 
-/// The ends of an interval about a value, rounded as [`format_value`] rounds the value: `94.90 to 95.33`.
+/// Formats the ends of an interval, rounded as [`format_value`] rounds the value: `94.90 to 95.33`.
 #[must_use]
 pub fn format_interval(ends: [f64; 2], value: f64, std: f64) -> String {
     let std = std.abs();
@@ -189,13 +189,13 @@ pub fn format_interval(ends: [f64; 2], value: f64, std: f64) -> String {
     }
 }
 
-/// How a value is rounded to the two significant digits of its deviation.
+/// Rounding of a value to the two significant digits of its deviation.
 enum Rounding {
-    /// To so many decimals, before the point where below zero.
+    /// To this number of decimals; negative before the decimal point.
     Plain(i32),
     /// With a power of ten.
     Power { exponent: i32, decimals: usize },
-    /// A deviation far below the value's own digits: writing them all would claim nothing.
+    /// The deviation is far below the value's own digits, so not all digits are written.
     Digits,
 }
 
@@ -222,7 +222,7 @@ impl Rounding {
     }
 }
 
-/// A number to so many decimals, or to tens, hundreds and so on where below zero.
+/// Formats a number with `decimals` decimals; rounds to tens, hundreds and so on if negative.
 fn plainly(value: f64, decimals: i32) -> String {
     match usize::try_from(decimals) {
         Ok(decimals) => fixed(value, decimals),
@@ -233,7 +233,7 @@ fn plainly(value: f64, decimals: i32) -> String {
     }
 }
 
-/// A value over a power of ten, through text and not through powi: 10^-320 has no exact double.
+/// Divides a value by a power of ten, through text instead of powi: 10^-320 has no exact double.
 fn shifted(value: f64, exponent: i32) -> f64 {
     format!("{value:e}")
         .split_once('e')
@@ -244,7 +244,7 @@ fn shifted(value: f64, exponent: i32) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// A probability: `0.031`, `4·10⁻¹²`, and `< 10⁻³⁰⁰` where the computation ran out of exponents.
+/// Formats a probability: `0.031`, `4·10⁻¹²`, and `< 10⁻³⁰⁰` below the range of the computation.
 #[must_use]
 pub fn format_p_value(p: f64) -> String {
     if p.is_nan() {

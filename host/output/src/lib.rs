@@ -1,6 +1,6 @@
-//! Numbers as text, sentences that occur once, and files that appear whole or not at all.
+//! Numbers as text, grouped sentences, and atomic writing of files.
 //!
-//! The other crates use it for messages and results. It knows nothing of robots.
+//! The other crates use it for messages and results. It does not depend on robots.
 //!
 //! ```
 //! assert_eq!(rig_output::format_value(1.23456, 0.02), "1.235 ± 0.020");

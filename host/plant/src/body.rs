@@ -1,4 +1,4 @@
-//! Rigid bodies on the link: masses with a place, summed by the parallel-axis theorem.
+//! Rigid bodies on the link: masses and their positions, summed with the parallel-axis theorem.
 
 /// One rigid body fixed to the link, in the plane of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Body {
     pub inertia: f64,
 }
 
-/// What a set of bodies amounts to at the joint.
+/// Inertia and first moment of a set of bodies at the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Load {
     /// kg·m² about the joint axis.
@@ -35,9 +35,9 @@ impl Load {
         }
     }
 
-    /// Coefficients (gc, gs) of the gravity torque gc·cos q + gs·sin q that a drive has to hold. The joint
-    /// turns about the base's −y (modified Denavit–Hartenberg with α = π/2): the link's x axis is
-    /// (cos q, 0, sin q), its y axis (−sin q, 0, cos q), and U = −g·(mx·x + my·y).
+    /// Returns the coefficients (gc, gs) of the gravity torque gc·cos q + gs·sin q that a drive must hold. The joint
+    /// turns about the base's −y (modified Denavit–Hartenberg with α = π/2). The link's x axis is (cos q, 0, sin q),
+    /// its y axis (−sin q, 0, cos q), and U = −g·(mx·x + my·y).
     pub(crate) fn gravity(&self, [gx, _, gz]: [f64; 3]) -> (f64, f64) {
         let [mx, my] = self.first_moment;
         (my * gx - mx * gz, mx * gx + my * gz)

@@ -1,4 +1,4 @@
-//! Everything that is true of one emulated rig.
+//! Configuration of an emulated rig: its true values.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -32,7 +32,7 @@ pub struct Motor {
     pub torque_constant: f64,
     /// Rotor with pinion, kg·m².
     pub rotor_inertia: f64,
-    /// In rotor units.
+    /// Friction in rotor units.
     pub friction: Friction,
     /// J/K of winding and iron.
     pub heat_capacity: f64,
@@ -66,27 +66,27 @@ pub struct Bridge {
 pub struct Mechanism {
     /// Motor turns per joint turn.
     pub ratio: f64,
-    /// What the joint carries.
+    /// Bodies that the joint carries.
     pub bodies: Vec<Body>,
     /// Gravity in the base frame, m/s².
     pub gravity: [f64; 3],
-    /// Base not level.
+    /// Base that is not level.
     pub tilt: Option<Tilt>,
     /// Friction of the joint's own bearing, in joint units.
     pub friction: Friction,
-    /// Friction falling with warm-up, motor and joint alike.
+    /// Friction that decreases with warm-up, in motor and joint.
     pub warmup: Option<FrictionWarmup>,
     /// Elastic instead of rigid gear.
     pub elasticity: Option<Elasticity>,
-    /// Gap in the gear.
+    /// Backlash of the gear.
     pub backlash: Option<Backlash>,
-    /// Torque once per motor turn.
+    /// Torque with the period of a motor turn.
     pub eccentricity: Option<GearEccentricity>,
     /// Cable or hose.
     pub spring: Option<Spring>,
     /// Ends of the range.
     pub end_stops: Option<EndStops>,
-    /// Constant torque to overcome, N·m at the joint, in the sense of `off`.
+    /// Constant torque to overcome, N·m at the joint, with the sign of `off`.
     pub torque_offset: Option<f64>,
     /// Random torque.
     pub disturbance: Option<Disturbance>,
@@ -110,35 +110,35 @@ pub struct Channel {
 pub struct Encoder {
     /// Counts per motor turn after quadrature.
     pub counts_per_turn: f64,
-    /// Joint angle at which the counter stands at 0, rad.
+    /// Joint angle at which the counter is 0, rad.
     pub zero: f64,
     /// Once-per-turn reading error.
     pub eccentricity: Option<EncoderEccentricity>,
-    /// Edges that are not evenly spaced.
+    /// Unevenly spaced edges.
     pub unequal_lines: Option<UnequalLines>,
-    /// A timer captures when the last edge came.
+    /// True if a timer captures the time of the last edge.
     pub timed: bool,
 }
 
-/// Encoder on the link's side of the gear, absolute.
+/// Absolute encoder on the link side of the gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkEncoder {
     /// Counts per turn of the joint.
     pub counts_per_turn: f64,
     /// Joint angle at which it reads 0, rad.
     pub zero: f64,
-    /// Standard deviation of one reading before it is counted, rad.
+    /// Standard deviation of one reading before quantisation, rad.
     pub noise: Option<f64>,
-    /// Once-per-turn reading error, of the joint's turn.
+    /// Reading error with the period of a joint turn.
     pub eccentricity: Option<EncoderEccentricity>,
 }
 
-/// What the controller gets to see.
+/// Sensors of the rig, as inputs of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     /// Position.
     pub encoder: Encoder,
-    /// Position of the link, which the controller does not see.
+    /// Position of the link, not available to the controller.
     pub link_encoder: Option<LinkEncoder>,
     /// Motor current.
     pub current: Channel,
@@ -146,9 +146,9 @@ pub struct Sensors {
     pub supply: Channel,
     /// Winding temperature.
     pub temperature: Channel,
-    /// Whole ticks by which the current reading is late.
+    /// Delay of the current reading in whole ticks.
     pub current_delay: Option<usize>,
-    /// What the codes nominally mean.
+    /// Nominal scaling of the codes.
     pub scaling: Scaling,
 }
 
@@ -161,7 +161,7 @@ pub struct PlantConfig {
     pub substeps: u32,
     /// Joint angle at start, at rest, rad.
     pub initial_position: f64,
-    /// Whether a hand holds the link there until the bridge is switched on.
+    /// True if the link is held there by hand until the bridge is switched on.
     pub held: bool,
     /// Temperature of the surroundings and of everything at start, °C.
     pub ambient: f64,
@@ -175,10 +175,10 @@ pub struct PlantConfig {
     pub sensors: Sensors,
 }
 
-/// Drive and encoder as a data sheet states them: what a description can make another rig of.
+/// Drive and encoder as in a data sheet: the values that a description can replace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {
-    /// Motor turns per joint turn, negative where the gear reverses; not 0.
+    /// Motor turns per joint turn, negative for a gear that reverses; not 0.
     pub gear_ratio: f64,
     /// Encoder counts per motor turn after quadrature.
     pub counts_per_turn: f64,
@@ -206,7 +206,7 @@ impl Default for Hardware {
     }
 }
 
-/// The six one-link parameters this rig has in steady sliding, joint-side:
+/// The six one-link parameters of this rig in steady sliding, joint-side:
 /// τ = J·q̈ + gc·cos q + gs·sin q + fv·q̇ + fc·sgn q̇ + off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equivalent {
@@ -225,8 +225,7 @@ pub struct Equivalent {
 }
 
 impl Equivalent {
-    /// The same parameters for an angle that is zero where the joint's own angle is `zero`, as an
-    /// incremental encoder counts it.
+    /// Returns the parameters for an angle that is zero at the joint angle `zero`, as an incremental encoder counts it.
     pub fn about(self, zero: f64) -> Self {
         let (s, c) = zero.sin_cos();
         Self {
@@ -236,7 +235,7 @@ impl Equivalent {
         }
     }
 
-    /// In the order J, gc, gs, fv, fc, off.
+    /// Returns the parameters in the order J, gc, gs, fv, fc, off.
     pub fn to_array(self) -> [f64; 6] {
         [
             self.inertia,
@@ -250,9 +249,9 @@ impl Equivalent {
 }
 
 impl PlantConfig {
-    /// The true six parameters from masses and geometry, for the joint's own angle
-    /// ([`Equivalent::about`] turns them to the encoder's zero). Cold, without payload, and without
-    /// what the six cannot express (effects switched on, velocity weakening, presliding).
+    /// Returns the true six parameters from masses and geometry, for the joint's own angle ([`Equivalent::about`]
+    /// converts them to the encoder's zero). They apply to a cold rig without payload. They exclude effects that the
+    /// six cannot express (optional effects, velocity weakening, presliding).
     pub fn equivalent(&self) -> Equivalent {
         let ratio = self.mechanism.ratio;
         let load = self.load();
@@ -271,8 +270,8 @@ impl PlantConfig {
         }
     }
 
-    /// Joint-side torque at which the unloaded joint gives way, in the positive and the negative
-    /// direction, N·m, both counted positive and without gravity and offset.
+    /// Returns the joint-side breakaway torque of the unloaded joint in the positive and the negative direction, N·m.
+    /// Both are positive and exclude gravity and offset.
     pub fn breakaway(&self) -> [f64; 2] {
         let motor = self
             .motor
@@ -283,8 +282,9 @@ impl PlantConfig {
         [motor[0] + link[0], motor[1] + link[1]]
     }
 
-    /// The one-link rig of the documentation with another drive and encoder: a geared 24 V motor and a 1 kg arm, powered up
-    /// hanging at rest, its incremental counter at 0 there. Link and friction seen at the joint are the same for every drive.
+    /// Returns the one-link rig of the documentation with another drive and encoder: a geared 24 V motor and a 1 kg
+    /// arm. It starts hanging at rest, where its incremental counter is 0. Link and friction at the joint are equal for
+    /// every drive.
     pub fn with_hardware(hardware: &Hardware) -> Self {
         let weakening = Some(VelocityWeakening {
             breakaway_ratio: 1.33,
@@ -295,7 +295,7 @@ impl PlantConfig {
             damping_time: 1.0e-3,
             lag: 1.0e-3,
         };
-        // Friction has no sign of the gear's.
+        // The sign of the gear ratio does not affect friction.
         let ratio = hardware.gear_ratio.abs();
         Self {
             tick: 1.0e-4,
@@ -308,7 +308,7 @@ impl PlantConfig {
                 inductance: hardware.inductance,
                 torque_constant: hardware.torque_constant,
                 rotor_inertia: hardware.rotor_inertia,
-                // 0.1 N·m and 0.1 N·m·s/rad of the joint's friction sit on the rotor.
+                // 0.1 N·m and 0.1 N·m·s/rad of the joint's friction act on the rotor.
                 friction: Friction {
                     coulomb: 0.1 / ratio,
                     asymmetry: 0.0,

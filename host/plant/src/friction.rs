@@ -1,9 +1,8 @@
 //! Friction with memory: generalised Maxwell-slip elements over a velocity-weakening curve.
 //!
-//! Sources: Lampaert, Al-Bender & Swevers (2003), "A generalized Maxwell-slip friction model
-//! appropriate for control purposes", eqs. 8–10 (elements that stick or slip, slip state pulled towards
-//! its share of the steady curve); Hess & Soom (1990), the rational velocity-weakening form
-//! Fc + (Fs − Fc)/(1 + (v/vs)²).
+//! Sources: Lampaert, Al-Bender & Swevers (2003), "A generalized Maxwell-slip friction model appropriate for control
+//! purposes", eqs. 8–10 (elements stick or slip; the slip state is pulled towards its share of the steady curve); Hess
+//! & Soom (1990), the rational velocity-weakening form Fc + (Fs − Fc)/(1 + (v/vs)²).
 //!
 //! Leaves out: strengthening with dwell time, dependence of the stiffness on load, wear.
 
@@ -13,22 +12,22 @@ use super::effect::position_friction::PositionFriction;
 
 /// Elements per contact.
 const ELEMENTS: usize = 4;
-/// Share of the friction torque each element carries; they sum to 1.
+/// Share of the friction torque per element; they sum to 1.
 const SHARE: [f64; ELEMENTS] = [0.4, 0.3, 0.2, 0.1];
-/// Displacement at which each element yields, as a fraction of the presliding stroke: a virgin curve
-/// that bends early and flattens late, as measured ones do (Swevers et al. 2000, fig. 2).
+/// Displacement at which each element yields, as a fraction of the presliding stroke. The virgin curve bends early and
+/// flattens late, as measured ones do (Swevers et al. 2000, fig. 2).
 const YIELD: [f64; ELEMENTS] = [0.1, 0.3, 0.6, 1.0];
 
 /// Velocity weakening after Hess & Soom (1990).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityWeakening {
-    /// Torque at vanishing speed over that at high speed, Fs/Fc.
+    /// Ratio of the torque at vanishing speed to that at high speed, Fs/Fc.
     pub breakaway_ratio: f64,
-    /// Speed at which half the excess is gone, rad/s.
+    /// Speed at which half of the excess has vanished, rad/s.
     pub velocity: f64,
 }
 
-/// The elastic contact before gross sliding.
+/// Elastic contact before gross sliding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Presliding {
     /// Displacement from rest to gross sliding, rad.
@@ -39,18 +38,18 @@ pub struct Presliding {
     pub lag: f64,
 }
 
-/// One sliding contact, in the units of the shaft it sits on.
+/// One sliding contact, in the units of its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// Coulomb torque at high speed, mean of both directions, N·m.
     pub coulomb: f64,
-    /// Relative difference of direction: Coulomb torque is coulomb·(1 ± asymmetry).
+    /// Relative difference between the directions: the Coulomb torque is coulomb·(1 ± asymmetry).
     pub asymmetry: f64,
     /// Viscous coefficient, N·m·s/rad.
     pub viscous: f64,
-    /// Velocity weakening; absent: the breakaway torque is the Coulomb torque.
+    /// Velocity weakening; if absent, the breakaway torque is the Coulomb torque.
     pub weakening: Option<VelocityWeakening>,
-    /// Contact compliance; a small stroke stands for none.
+    /// Contact compliance; a small stroke means almost none.
     pub presliding: Presliding,
     /// Rise of friction with the torque transmitted.
     pub load: Option<LoadFriction>,
@@ -61,10 +60,10 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// The same contact as seen from the far side of a reduction: the torque grows with `ratio`, the
-    /// angle shrinks by it. Position dependence turns `ratio` times faster.
+    /// Returns the same contact on the far side of a reduction: the torque is multiplied by `ratio`, the angle divided
+    /// by it. The order of the position dependence is multiplied by `ratio`.
     pub fn seen_through(self, ratio: f64) -> Self {
-        // A gear that reverses exchanges the directions and makes no friction negative.
+        // A gear that reverses swaps the directions; friction stays positive.
         let (turn, ratio) = (ratio.signum(), ratio.abs());
         Self {
             coulomb: self.coulomb * ratio,
@@ -89,14 +88,14 @@ impl Friction {
         }
     }
 
-    /// Torque at which it gives way from rest in the positive and the negative direction, unloaded, N·m.
+    /// Returns the breakaway torque in the positive and the negative direction, unloaded, N·m.
     pub fn breakaway(&self) -> [f64; 2] {
         let ratio = self.weakening.map_or(1.0, |w| w.breakaway_ratio);
         [1.0 + self.asymmetry, 1.0 - self.asymmetry].map(|side| ratio * self.coulomb * side)
     }
 }
 
-/// What the contact asks of the integrator: a torque, and a damping to be taken implicitly.
+/// Reaction of the contact for the integrator: a torque, and a damping for implicit integration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reaction {
     /// Torque against positive motion, N·m.
@@ -105,7 +104,7 @@ pub(super) struct Reaction {
     pub(super) damping: f64,
 }
 
-/// Multipliers that change slowly enough to be held over a tick.
+/// Multipliers that change slowly enough to be constant over a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     /// On the Coulomb and breakaway torques.
@@ -114,11 +113,11 @@ pub(super) struct Scale {
     pub(super) load: f64,
 }
 
-/// State of one contact, with its constants worked out for one substep length.
+/// State of one contact, with its constants for one substep length.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     torque: [f64; ELEMENTS],
-    /// 1 where the element slips, 0 where it sticks: a number, so that the elements share vector lanes.
+    /// 1 for a slipping element, 0 for a sticking one: numbers, so that the elements share vector lanes.
     slipping: [f64; ELEMENTS],
     forward: bool,
     stiffness: [f64; ELEMENTS],
@@ -153,7 +152,7 @@ impl Contact {
         }
     }
 
-    /// Moves the contact on by `displacement` at `velocity`.
+    /// Advances the contact by `displacement` at `velocity`.
     #[inline]
     pub(super) fn advance(&mut self, velocity: f64, displacement: f64, scale: Scale) -> Reaction {
         let forward = if velocity == 0.0 {
@@ -161,7 +160,7 @@ impl Contact {
         } else {
             velocity > 0.0
         };
-        // A reversal catches every element where it is.
+        // At a reversal every element sticks at its current deflection.
         let kept = forward == self.forward;
         self.forward = forward;
         let relative = velocity * self.inverse_velocity;
@@ -198,7 +197,7 @@ impl Contact {
         }
     }
 
-    /// Energy held by the bent elements, J.
+    /// Energy stored in the bent elements, J.
     pub(super) fn stored(&self) -> f64 {
         self.torque
             .iter()

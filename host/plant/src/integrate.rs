@@ -1,11 +1,11 @@
-//! The equations of motion of winding, rotor, gear and link, one substep at a time.
+//! Equations of motion of winding, rotor, gear and link, integrated in substeps.
 
 use super::config::PlantConfig;
 use super::effect::transmission::Transmission;
 use super::friction::{Contact, Friction, Reaction, Scale};
 use super::truth::{Energy, Truth};
 
-/// Held between two sampling instants.
+/// Values that are constant between two sampling instants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held {
     pub(super) duty: f64,
@@ -25,7 +25,7 @@ pub(super) struct Held {
     pub(super) viscous_scale: f64,
 }
 
-/// Heat since it was last asked for, J.
+/// Heat since the last query, J.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Heat {
     pub(super) winding: f64,
@@ -37,7 +37,7 @@ pub(super) struct Heat {
 struct Mass {
     angle: f64,
     speed: f64,
-    /// Speed one substep ago, to extrapolate damping to the middle of the next.
+    /// Speed one substep ago, to extrapolate the damping to the middle of the next.
     last: f64,
 }
 
@@ -53,7 +53,7 @@ impl Mass {
     }
 }
 
-/// What the winding does to the rotor in one substep: torque = offset − slope·speed.
+/// Effect of the winding on the rotor in one substep: torque = offset − slope·speed.
 struct Winding {
     voltage: f64,
     inverse: f64,
@@ -137,13 +137,13 @@ impl Dynamics {
         core::mem::take(&mut self.heat)
     }
 
-    /// Kinetic and gravitational energy of bodies of this inertia and gravity on the link, J.
+    /// Returns the kinetic and gravitational energy of bodies of this inertia and gravity on the link, J.
     pub(super) fn body_energy(&self, inertia: f64, (gc, gs): (f64, f64)) -> f64 {
         let (s, c) = self.link.angle.sin_cos();
         0.5 * inertia * self.link.speed * self.link.speed + gc * s - gs * c
     }
 
-    /// Books energy that came from outside.
+    /// Adds energy from outside to the balance.
     pub(super) fn receive(&mut self, energy: f64) {
         self.flows.external += energy;
     }
@@ -152,7 +152,7 @@ impl Dynamics {
     pub(super) fn tick(&mut self, config: &PlantConfig, held: &Held) {
         let (s, c) = self.link.angle.sin_cos();
         let (gc, gs) = held.gravity;
-        // Gravity about the tick's start to second order: within 100 µs the third is below 1e-9 of it.
+        // Gravity about the start of the tick, to second order: within 100 µs the third order is below 1e-9 of it.
         let gravity = (self.link.angle, gc * c + gs * s, gs * c - gc * s);
         let place =
             |friction: &Friction, angle: f64| friction.position.map_or(1.0, |p| p.scale(angle));
@@ -171,7 +171,7 @@ impl Dynamics {
         self.bus = if held.on {
             held.supply - config.bridge.supply_resistance * held.duty * self.current
         } else {
-            // Free-wheeling current flows back whatever its sign.
+            // The free-wheeling current flows back into the supply, with either sign.
             held.supply + config.bridge.supply_resistance * self.current.abs()
         };
     }
@@ -250,7 +250,7 @@ impl Dynamics {
         let half = 0.5 * self.dt;
         let (rotor_speed, link_speed) = (self.rotor.speed, self.link.speed);
         let (rotor_angle, link_angle) = (self.rotor.half(half), self.link.half(half));
-        // Relative speed extrapolated to the middle, so that damping is of second order too.
+        // Relative speed extrapolated to the middle, so that the damping is of second order too.
         let rate = rotor_speed - link_speed
             + 0.5 * (rotor_speed - self.rotor.last - link_speed + self.link.last);
         let twist = rotor_angle - link_angle;
@@ -307,7 +307,7 @@ impl Dynamics {
         self.link.set(link_angle, link_middle, half);
     }
 
-    /// Conservative torques on the link and the end stops.
+    /// Returns the conservative torques on the link plus the torque of the end stops.
     #[inline]
     fn link_torque(
         &self,
@@ -326,7 +326,7 @@ impl Dynamics {
         torque
     }
 
-    /// Conservative torques on the rotor, joint-side.
+    /// Returns the conservative torques on the rotor, joint-side.
     #[inline]
     fn rotor_torque(&self, config: &PlantConfig, angle: f64) -> f64 {
         let mut torque = 0.0;
@@ -339,8 +339,8 @@ impl Dynamics {
         torque
     }
 
-    /// Winding and the mass on the rotor's side together over one substep, by the implicit midpoint rule.
-    /// Returns the speed in the middle and the electromagnetic torque.
+    /// Integrates winding and rotor-side mass together over one substep, with the implicit midpoint rule. Returns the
+    /// speed in the middle and the electromagnetic torque.
     #[inline]
     fn kick(
         &mut self,
@@ -385,8 +385,8 @@ impl Dynamics {
         self.freewheel(config, held, constant, speed, rate + damping, moved)
     }
 
-    /// Bridge off: the current can only run down through the diodes into the supply, unless the back-EMF
-    /// exceeds the supply and drives it on.
+    /// Integrates with the bridge off: the current decays through the diodes into the supply, unless the back-EMF
+    /// exceeds the supply and sustains it.
     #[cold]
     fn freewheel(
         &mut self,
@@ -417,7 +417,7 @@ impl Dynamics {
         let mut current = (winding.source - constant * middle) * winding.inverse;
         let mut next = 2.0 * current - self.current;
         if next * sign < 0.0 {
-            // It ran out on the way: a triangle, and then nothing.
+            // The current reached zero within the substep: a triangle, then zero.
             current = 0.5 * self.current * self.current / (self.current - next);
             next = 0.0;
             middle = (moved + constant * current) / mass;
@@ -469,7 +469,7 @@ impl Dynamics {
         }
     }
 
-    /// The state as a report; time and temperatures are the caller's.
+    /// Returns the state as a report; the caller adds time and temperatures.
     pub(super) fn truth(
         &self,
         config: &PlantConfig,

@@ -1,29 +1,25 @@
-//! The emulated rig that stands in for hardware: motor, bridge, gear, link, friction and sensors, from a
-//! [`Command`] per control tick to the raw [`Sample`] of the next.
+//! The emulated rig that replaces hardware: motor, bridge, gear, link, friction and sensors. It turns a [`Command`] per
+//! control tick into the raw [`Sample`] of the next.
 //!
-//! It describes the rig in its own, richer terms and shares no equation with the model that is
-//! identified: masses and centres of mass instead of lumped parameters, friction with memory and a
-//! velocity weakening of another functional form, a winding with inductance, a bridge that can be
-//! open-circuit.
+//! It has a richer description than the identified model and shares no equation with it. It uses masses and centres of
+//! mass instead of lumped parameters, and friction with memory and another form of velocity weakening. Its winding has
+//! inductance, and its bridge can be open-circuit.
 //!
-//! In by default: winding R–L with back-EMF, mean-voltage bridge, free-wheeling diodes, one-period
-//! command delay of preloaded PWM; generalised Maxwell-slip friction on rotor and link (Lampaert,
-//! Al-Bender & Swevers 2003) over a rational weakening curve (Hess & Soom 1990); rigid bodies by the
-//! parallel-axis theorem; winding temperature; end stops; wrapping encoder counter, 12-bit converters with
-//! noise and offset.
+//! On by default: winding R–L with back-EMF, mean-voltage bridge, free-wheeling diodes, one-period command delay of
+//! preloaded PWM; generalised Maxwell-slip friction on rotor and link (Lampaert, Al-Bender & Swevers 2003) over a
+//! rational weakening curve (Hess & Soom 1990); rigid bodies by the parallel-axis theorem; winding temperature; end
+//! stops; wrapping encoder counter, 12-bit converters with noise and offset.
 //!
-//! To switch on, one block of parameters each ([`effect`]): cogging, torque ripple, torque saturation,
-//! winding temperature coefficients, dead time, supply resistance, joint elasticity with hardening
-//! (Spong 1987), backlash (Nordin & Gutman 2002), gear eccentricity, asymmetric, load- and
-//! position-dependent friction, quadratic drag, friction warm-up (Bittencourt & Gunnarsson 2012), cable
-//! spring, base tilt, torque offset, coloured disturbance, encoder eccentricity and unequal lines, sensor lag and delay.
-//! [`Faults`] go wrong while it runs.
+//! Optional, one block of parameters each ([`effect`]): cogging, torque ripple, torque saturation, winding temperature
+//! coefficients, dead time, supply resistance, joint elasticity with hardening (Spong 1987), backlash (Nordin & Gutman
+//! 2002), gear eccentricity, asymmetric, load- and position-dependent friction, quadratic drag, friction warm-up
+//! (Bittencourt & Gunnarsson 2012), cable spring, base tilt, torque offset, coloured disturbance, encoder eccentricity
+//! and unequal lines, sensor lag and delay. [`Faults`] can be injected while it runs.
 //!
-//! Integration: leapfrog. Positions and asperity deflections live at the middle of a substep, speeds and
-//! current at its ends; winding, viscous friction and asperity damping are taken by the implicit midpoint
-//! rule together with the motion, so that electrical, kinetic and frictional energies balance exactly
-//! and what is left is the second-order error of the conservative torques (Hairer, Lubich & Wanner 2006,
-//! ch. I and VI).
+//! Integration: leapfrog. Positions and asperity deflections are computed at the middle of a substep, speeds and
+//! current at its ends. Winding, viscous friction and asperity damping are integrated together with the motion by the
+//! implicit midpoint rule, so electrical, kinetic and frictional energies balance exactly. The remaining error is the
+//! second-order error of the conservative torques (Hairer, Lubich & Wanner 2006, ch. I and VI).
 //!
 //! ```
 //! use rig_firmware::sample::Command;
@@ -34,9 +30,9 @@
 //! println!("{sample:?}");
 //! ```
 //!
-//! Leaves out: the three phases and their commutation (one equivalent winding), current ripple within a
-//! PWM period, iron loss, strengthening of friction with rest, kinematic error of the gear,
-//! flexibility of link and base, missed encoder counts, jitter of the sampling instant.
+//! Not modelled: the three phases and their commutation (one equivalent winding), current ripple within a PWM period,
+//! iron loss, strengthening of friction with dwell time, kinematic error of the gear, flexibility of link and base,
+//! missed encoder counts, jitter of the sampling instant.
 
 mod body;
 mod config;
@@ -79,9 +75,9 @@ pub struct Plant {
     config: PlantConfig,
     dynamics: Dynamics,
     faults: Faults,
-    /// Takes effect from the next sampling instant on.
+    /// Command in force since the last sampling instant.
     active: Command,
-    /// Whether the bridge has been on.
+    /// True if the bridge has been on.
     driven: bool,
     ticks: u64,
     load: Load,
@@ -101,8 +97,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// A rig at rest at its initial position, bridge off. Equal configurations and seeds give equal
-    /// samples.
+    /// Creates a rig at rest at its initial position, bridge off. Equal configurations and seeds give equal samples.
     pub fn new(config: PlantConfig, seed: u64) -> Self {
         let scaling = config.sensors.scaling;
         let tick = config.tick;
@@ -159,23 +154,24 @@ impl Plant {
         }
     }
 
-    /// What the rig was made from.
+    /// Returns the configuration of the rig.
     pub fn config(&self) -> &PlantConfig {
         &self.config
     }
 
-    /// The faults in force from the next tick on.
+    /// Returns the faults in force from the next tick on.
     pub fn faults_mut(&mut self) -> &mut Faults {
         &mut self.faults
     }
 
-    /// Replaces the command in force since the last sampling instant, for a bridge that does not wait for one.
+    /// Replaces the command in force since the last sampling instant, for a bridge that takes commands between
+    /// instants.
     pub fn order(&mut self, command: Command) {
         self.active = command;
     }
 
-    /// One control tick: the rig moves on under the command given before, is sampled, and takes `command`
-    /// for the tick to come.
+    /// Runs one control tick: the rig moves under the previous command, is sampled, and takes `command` for the next
+    /// tick.
     pub fn advance(&mut self, command: Command) -> Sample {
         let held = self.hold();
         self.driven |= self.active.bridge;
@@ -188,7 +184,7 @@ impl Plant {
         self.sample()
     }
 
-    /// What stays as it is between two sampling instants.
+    /// Computes the values that are constant between two sampling instants.
     fn hold(&mut self) -> Held {
         if self.faults.payload != self.payload {
             let before = self
@@ -221,7 +217,7 @@ impl Plant {
             .map_or((1.0, 1.0), |w| w.scales(self.gear_rise));
         let mechanism = &self.config.mechanism;
         Held {
-            // No bridge can give more than its supply, and a command that is no number gives nothing.
+            // A bridge cannot exceed its supply; a NaN command gives zero.
             duty: if duty.is_nan() {
                 0.0
             } else {
@@ -266,7 +262,7 @@ impl Plant {
             self.late_current.push_back(current);
             current = self.late_current.pop_front().unwrap_or(current);
         }
-        // Every converter runs, stuck or not: its noise goes on as it would have.
+        // Every converter runs even if stuck, so that its noise sequence does not change.
         let current = self.current.convert(current);
         let supply = self.supply.convert(self.dynamics.bus());
         let temperature = self
@@ -275,7 +271,7 @@ impl Plant {
         let faults = &self.faults;
         Sample {
             encoder: sensors::register(self.held_count + i64::from(faults.encoder_jump)),
-            // The cast saturates, and says so after 25 s.
+            // The cast saturates after 25 s.
             edge_age: age.map(|ticks| (ticks * self.config.tick * f64::from(EDGE_CLOCK_HZ)) as u32),
             current: faults.current_stuck.map_or(current, AdcCode),
             supply: faults.supply_stuck.map_or(supply, AdcCode),
@@ -283,20 +279,20 @@ impl Plant {
             driver_fault: faults.driver,
             comparator: false,
             overrun: faults.overrun,
-            // The plant has no board around it.
+            // The plant has no board.
             encoder_wrong: None,
             encoder_open: false,
             stack_left: None,
         }
     }
 
-    /// What an encoder on the link reads at the last sampling instant, rad; none where the rig has none.
+    /// Returns the reading of the link encoder at the last sampling instant, rad; `None` if the rig has none.
     pub fn link_angle(&mut self) -> Option<f64> {
         let angle = self.truth().position;
         self.link.as_mut().map(|link| link.read(angle))
     }
 
-    /// The true state at the last sampling instant.
+    /// Returns the true state at the last sampling instant.
     pub fn truth(&self) -> Truth {
         Truth {
             time: self.ticks as f64 * self.config.tick,

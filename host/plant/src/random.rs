@@ -8,12 +8,12 @@ use super::config::{Hardware, PlantConfig};
 use super::effect::disturbance::Disturbance;
 use super::friction::Friction;
 
-/// Largest relative departure from the default.
+/// Largest relative deviation from the default.
 const SPREAD: f64 = 0.3;
-/// Torque disturbance of a bench, N·m rms at the joint: a hundredth of the gravity torque of a 1 kg arm, what
-/// cables, table and air leave on a small geared rig.
+/// Torque disturbance of a bench, N·m rms at the joint: a hundredth of the gravity torque of a 1 kg arm. Cables, table
+/// and air cause this much on a small geared rig.
 const DISTURBANCE: f64 = 0.03;
-/// Its correlation time, s: slower than the position loop, within the band that identification looks at.
+/// Its correlation time, s: slower than the position loop, within the band of the identification.
 const CORRELATION: f64 = 0.05;
 /// Noise of one current sample, A rms: six codes of a 12-bit converter that spans ±16.5 A.
 const CURRENT_NOISE: f64 = 0.05;
@@ -32,7 +32,7 @@ impl Draw {
         self.vary(&mut friction.coulomb);
         self.vary(&mut friction.viscous);
         if let Some(weakening) = &mut friction.weakening {
-            // The excess of breakaway varies, so that it stays one.
+            // The excess of the breakaway torque varies, so that it stays positive.
             let mut excess = weakening.breakaway_ratio - 1.0;
             self.vary(&mut excess);
             weakening.breakaway_ratio = 1.0 + excess;
@@ -43,17 +43,17 @@ impl Draw {
 }
 
 impl PlantConfig {
-    /// The default rig with its motor, masses, friction and current sensor varied uniformly by up to
-    /// ±30 %, the centre of mass up to 0.3 rad off the link's axis, and Coulomb friction up to ±10 %
-    /// different with direction. Gear ratio, encoder, supply and codes stay.
+    /// Returns the default rig with its motor, masses, friction and current sensor varied uniformly by up to ±30 %. The
+    /// centre of mass is up to 0.3 rad off the link's axis, and Coulomb friction differs by up to ±10 % with direction.
+    /// Gear ratio, encoder, supply and codes are unchanged.
     pub fn random(seed: u64) -> Self {
         Self::random_with(&Hardware::default(), seed)
     }
 
-    /// [`PlantConfig::random`] about a rig with another drive and encoder: motor values vary about the stated ones.
+    /// Returns [`PlantConfig::random`] for another drive and encoder; motor values vary about the described ones.
     pub fn random_with(hardware: &Hardware, seed: u64) -> Self {
         let mut config = Self::with_hardware(hardware);
-        // The bounds are constants in order, so the distribution always exists; the default stands else.
+        // The bounds are ordered constants, so the distribution always exists; otherwise the default is returned.
         let (Ok(factor), Ok(signed)) = (
             Uniform::new(1.0 - SPREAD, 1.0 + SPREAD),
             Uniform::new(-1.0, 1.0),
@@ -87,21 +87,21 @@ impl PlantConfig {
         if let Some(noise) = &mut config.sensors.current.noise {
             draw.vary(noise);
         }
-        // Hanging at rest is where the gravity torque vanishes and the potential is least.
+        // At hanging rest the gravity torque is zero and the potential energy is minimal.
         let equivalent = config.equivalent();
         config.initial_position = f64::atan2(-equivalent.gravity_cos, equivalent.gravity_sin);
         config.sensors.encoder.zero = config.initial_position;
         config
     }
 
-    /// A rig of [`PlantConfig::random`] as it stands on a bench: a coloured torque disturbance of 0.03 N·m rms
-    /// with a correlation time of 50 ms, 0.05 A rms of noise in every current sample, and a counter that
-    /// stands anywhere in its range at power on.
+    /// Returns a rig of [`PlantConfig::random`] on a bench. It has a coloured torque disturbance of 0.03 N·m rms with a
+    /// correlation time of 50 ms, and 0.05 A rms of noise in every current sample. Its counter starts anywhere in its
+    /// range at power on.
     pub fn laboratory(seed: u64) -> Self {
         Self::laboratory_with(&Hardware::default(), seed)
     }
 
-    /// [`PlantConfig::laboratory`] with another drive and encoder.
+    /// Returns [`PlantConfig::laboratory`] with another drive and encoder.
     pub fn laboratory_with(hardware: &Hardware, seed: u64) -> Self {
         let mut config = Self::random_with(hardware, seed);
         config.mechanism.disturbance = Some(Disturbance {
@@ -109,7 +109,7 @@ impl PlantConfig {
             correlation_time: CORRELATION,
         });
         config.sensors.current.noise = Some(CURRENT_NOISE);
-        // A stream of its own, so that the rig is otherwise the one that `random` draws.
+        // A separate stream, so that the rig otherwise equals the one drawn by `random`.
         let mut rng = super::sensors::stream(seed, 4);
         let turns: f64 = StandardUniform.sample(&mut rng);
         let range = 65536.0 / config.sensors.encoder.counts_per_turn / config.mechanism.ratio;

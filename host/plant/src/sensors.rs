@@ -1,7 +1,6 @@
-//! From the rig's true state to raw codes.
+//! Sensors: from the rig's true state to raw codes.
 //!
-//! Leaves out: converter nonlinearity, drift of offsets, missed counts (see the injected faults),
-//! sampling jitter.
+//! Not modelled: converter nonlinearity, drift of offsets, missed counts (see the injected faults), sampling jitter.
 
 use core::f64::consts::TAU;
 
@@ -12,13 +11,13 @@ use rig_shared::units::{AdcCode, EncoderCount};
 
 use super::config::{Channel, Encoder, LinkEncoder};
 
-/// An independent random stream for one purpose, so that one noise switched off leaves the others as they
-/// were. The odd multiplier spreads the streams over the seeds (Steele, Lea & Flood 2014, γ of SplitMix64).
+/// Returns an independent random stream for one purpose, so that disabling one noise does not change the others. The
+/// odd multiplier spreads the streams over the seeds (Steele, Lea & Flood 2014, γ of SplitMix64).
 pub fn stream(seed: u64, purpose: u64) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(seed ^ (purpose + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
-/// A running analogue channel.
+/// State of an analogue channel.
 #[derive(Clone, Debug)]
 pub(crate) struct Converter {
     channel: Channel,
@@ -30,7 +29,7 @@ pub(crate) struct Converter {
 }
 
 impl Converter {
-    /// A channel whose code is nominally `zero` at 0 and grows by one per `per_code`.
+    /// Creates a channel whose code is nominally `zero` at 0 and grows by one per `per_code`.
     pub(crate) fn new(
         channel: Channel,
         zero: f64,
@@ -48,7 +47,7 @@ impl Converter {
         }
     }
 
-    /// One conversion of the true `quantity`.
+    /// Converts the true `quantity` once.
     pub(crate) fn convert(&mut self, quantity: f64) -> AdcCode {
         let last = self.filtered.unwrap_or(quantity);
         let filtered = last + self.follow * (quantity - last);
@@ -58,19 +57,19 @@ impl Converter {
             std * normal
         });
         let sensed = filtered * (1.0 + self.channel.gain_error) + self.channel.offset + noise;
-        // A converter stops at its rails; the cast saturates there too and takes NaN to 0.
+        // A converter stops at its limits; the cast saturates there too and maps NaN to 0.
         let code = (sensed * self.codes_per_unit + self.zero + 0.5).floor();
         AdcCode(code.clamp(0.0, f64::from(AdcCode::FULL_SCALE)) as u16)
     }
 }
 
 impl Encoder {
-    /// Counts since the zero at true motor angle `angle` (0 where the joint's angle is 0), not wrapped.
+    /// Returns the counts since the zero at the true motor angle `angle` (0 at joint angle 0), not wrapped.
     pub(crate) fn count(&self, angle: f64, ratio: f64) -> i64 {
         self.reading(angle, ratio).floor() as i64
     }
 
-    /// What an encoder without steps would read at motor angle `angle`, rad: counts with their fraction.
+    /// Returns the reading of an encoder without steps at motor angle `angle` (rad), in fractional counts.
     pub fn reading(&self, angle: f64, ratio: f64) -> f64 {
         let shaft = angle - self.zero * ratio;
         let read = shaft
@@ -82,7 +81,7 @@ impl Encoder {
     }
 }
 
-/// A running encoder on the link.
+/// State of the link encoder.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkReader {
     encoder: LinkEncoder,
@@ -94,7 +93,7 @@ impl LinkReader {
         Self { encoder, rng }
     }
 
-    /// The angle that it reads at a true angle of the joint, rad: the middle of its count, not wrapped.
+    /// Returns the reading at a true joint angle, rad: the middle of its count, not wrapped.
     pub(crate) fn read(&mut self, angle: f64) -> f64 {
         let own = angle - self.encoder.zero;
         let error = self.encoder.eccentricity.map_or(0.0, |e| e.error(own));
@@ -107,7 +106,7 @@ impl LinkReader {
     }
 }
 
-/// When the encoder's last edge came, as a timer that captures it would say.
+/// Time of the encoder's last edge, as captured by a timer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EdgeClock {
     reading: f64,
@@ -116,13 +115,13 @@ pub(crate) struct EdgeClock {
 }
 
 impl EdgeClock {
-    /// Begins at a reading.
+    /// Starts at a reading.
     pub(crate) fn new(reading: f64) -> Self {
         Self { reading, age: 0.0 }
     }
 
-    /// One tick later the encoder reads so much: ticks since its last edge. Within a tick the reading goes straight: at
-    /// 60 rad/s² of the template's joint that is wrong by 0.5 % of a count.
+    /// Advances one tick to this reading and returns the ticks since the last edge. The reading is assumed linear
+    /// within a tick; at 60 rad/s² of the template's joint the error is 0.5 % of a count.
     pub(crate) fn tick(&mut self, reading: f64) -> f64 {
         let before = core::mem::replace(&mut self.reading, reading);
         self.age += 1.0;
@@ -138,7 +137,7 @@ impl EdgeClock {
     }
 }
 
-/// The counter register: the low sixteen bits.
+/// Returns the counter register: the low sixteen bits.
 pub(crate) fn register(count: i64) -> EncoderCount {
     EncoderCount(count.rem_euclid(1 << 16) as u16)
 }

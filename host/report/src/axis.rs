@@ -2,15 +2,15 @@
 
 use rig_output::{fixed, power_of_ten};
 
-/// Beyond this magnitude a value is no measurement, and spans of such values overflow: a gap.
+/// Magnitude above which a value is not a measurement and counts as a gap: spans of such values overflow.
 pub(crate) const LARGEST: f64 = 1e150;
 
-/// A value that can be drawn on the axis.
+/// Returns true if the value can be drawn on the axis.
 pub(crate) fn drawable(value: f64, log: bool) -> bool {
     value.is_finite() && value.abs() < LARGEST && (!log || value > 1.0 / LARGEST)
 }
 
-/// Smallest range that holds every drawable value, `None` where there is none.
+/// Returns the smallest range that holds every drawable value, or `None` if there is none.
 pub(crate) fn extent(values: impl Iterator<Item = f64>, log: bool) -> Option<(f64, f64)> {
     values
         .filter(|v| drawable(*v, log))
@@ -20,7 +20,7 @@ pub(crate) fn extent(values: impl Iterator<Item = f64>, log: bool) -> Option<(f6
         })
 }
 
-/// The range with a little air on both sides, and never of zero length.
+/// Returns the range with a margin on both sides; its length is never zero.
 pub(crate) fn padded((low, high): (f64, f64), log: bool, share: f64) -> (f64, f64) {
     if log {
         let (a, b) = (low.log10(), high.log10());
@@ -45,14 +45,14 @@ pub(crate) fn padded((low, high): (f64, f64), log: bool, share: f64) -> (f64, f6
     (low - air, high + air)
 }
 
-/// A tick: its place and its label, which is empty for a minor tick.
+/// A tick: its position and its label, which is empty for a minor tick.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tick {
     pub(crate) at: f64,
     pub(crate) label: String,
 }
 
-/// About `count` ticks at multiples of 1, 2 or 5 times a power of ten within the range.
+/// Returns about `count` ticks at multiples of 1, 2 or 5 times a power of ten within the range.
 pub(crate) fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) || count == 0 {
@@ -74,7 +74,7 @@ pub(crate) fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     let largest = low.abs().max(high.abs()).log10().floor() as i32;
     let mut ticks = Vec::new();
     let mut k = first;
-    // Where the step is below the resolution of the numbers, k + 1 is k: the bound ends the loop.
+    // If the step is below the resolution of the numbers, k + 1 equals k: the bound ends the loop.
     while k <= last && ticks.len() < 4 * count + 4 {
         let at = k * step;
         let label = if k == 0.0 {
@@ -92,8 +92,8 @@ pub(crate) fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     ticks
 }
 
-/// Ticks of a logarithmic axis: labelled decades, labelled 2 and 5 where few decades are in sight,
-/// minor ticks between; linear ones where the range is within one decade.
+/// Returns the ticks of a logarithmic axis: labelled decades, labelled 2 and 5 if there are few decades, and minor
+/// ticks between them. Returns linear ticks if the range is within one decade.
 pub(crate) fn log_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {
     if !(low > 0.0 && high > low) || count == 0 {
         return Vec::new();

@@ -1,55 +1,55 @@
-//! What a document is made of, before anyone thinks of HTML.
+//! Content of a document, independent of HTML.
 
 use super::plot::Plot;
 
-/// A whole document: one page that can be read, printed and passed on.
+/// A whole document: one page to read, print and share.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
-    /// The one heading of the page.
+    /// Heading of the page.
     pub title: String,
     /// One sentence below the title.
     pub subtitle: String,
-    /// The answer before the explanation: verdict and key figures, shown as cards.
+    /// Results before their explanation: verdict and key figures, shown as cards.
     pub summary: Vec<Fact>,
-    /// The chapters in reading order; their titles make the table of contents.
+    /// Chapters in reading order; their titles form the table of contents.
     pub sections: Vec<Section>,
-    /// Closing line: version and command that made the document. May be empty.
+    /// Footer: version and command that created the document. May be empty.
     pub footer: String,
 }
 
-/// How a fact or note is to be taken; shown by a word or mark as well as by colour.
+/// Rating of a fact or note, shown by a word or mark as well as by colour.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Tone {
     /// Neither good nor bad.
     #[default]
     Plain,
-    /// As it should be.
+    /// As expected.
     Good,
-    /// News that is neither good nor bad, to be seen at once.
+    /// Neutral, but important.
     Notice,
     /// Needs the reader's attention.
     Warning,
-    /// Nothing can be concluded before it is mended.
+    /// Must be corrected before any conclusion.
     Fault,
 }
 
 /// One key figure of the summary.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fact {
-    /// What it is.
+    /// Name of the figure.
     pub label: String,
-    /// The value as it is to be read; see [`rig_output::format_value`].
+    /// Value as text; see [`rig_output::format_value`].
     pub value: String,
-    /// Unit, where the value has one.
+    /// Unit, if the value has one.
     pub unit: Option<String>,
-    /// One line on how to read it. May be empty.
+    /// One line of explanation. May be empty.
     pub note: String,
-    /// Whether it is good news.
+    /// Rating.
     pub tone: Tone,
 }
 
 impl Fact {
-    /// A neutral fact without unit or note.
+    /// Creates a neutral fact without unit or note.
     pub fn new(label: impl Into<String>, value: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -58,21 +58,21 @@ impl Fact {
         }
     }
 
-    /// With the unit of its value.
+    /// Sets the unit of the value.
     #[must_use]
     pub fn unit(mut self, unit: impl Into<String>) -> Self {
         self.unit = Some(unit.into());
         self
     }
 
-    /// With one line on how to read it.
+    /// Sets the line of explanation.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// Marked as good news or as a warning.
+    /// Sets the rating.
     #[must_use]
     pub fn tone(mut self, tone: Tone) -> Self {
         self.tone = tone;
@@ -87,14 +87,14 @@ pub struct Section {
     pub id: String,
     /// Heading.
     pub title: String,
-    /// The paragraph that says what the chapter shows. May be empty.
+    /// Introductory paragraph. May be empty.
     pub lead: String,
     /// Contents in order.
     pub blocks: Vec<Block>,
 }
 
 impl Section {
-    /// An empty chapter.
+    /// Creates an empty chapter.
     pub fn new(id: impl Into<String>, title: impl Into<String>, lead: impl Into<String>) -> Self {
         Self {
             id: id.into(),
@@ -104,7 +104,7 @@ impl Section {
         }
     }
 
-    /// With one more block at its end.
+    /// Appends a block.
     #[must_use]
     pub fn with(mut self, block: Block) -> Self {
         self.blocks.push(block);
@@ -117,11 +117,11 @@ impl Section {
 pub enum NoteKind {
     /// Worth knowing.
     Info,
-    /// Limits what may be concluded.
+    /// Limits the possible conclusions.
     Warning,
     /// Confirmed.
     Good,
-    /// Nothing can be concluded before it is mended.
+    /// Must be corrected before any conclusion.
     Fault,
 }
 
@@ -136,16 +136,16 @@ pub enum Block {
     Table(Table),
     /// A figure.
     Plot(Plot),
-    /// Blocks behind a line that unfolds them; on paper always unfolded.
+    /// Blocks that unfold on a click; in print always unfolded.
     Details {
         /// The line that stays visible.
         summary: String,
-        /// What unfolds.
+        /// The blocks that unfold.
         blocks: Vec<Block>,
     },
-    /// A remark that stands out.
+    /// A highlighted remark.
     Note {
-        /// What sort of remark.
+        /// Kind of the remark.
         kind: NoteKind,
         /// Its text.
         text: String,
@@ -154,13 +154,13 @@ pub enum Block {
     Code(String),
 }
 
-/// Which side the cells of a column keep to.
+/// Horizontal alignment of the cells of a column.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Alignment {
     /// Words.
     #[default]
     Left,
-    /// Numbers, so that digits of equal worth stand below each other.
+    /// Numbers, so that digits of equal value align.
     Right,
     /// Marks.
     Center,
@@ -169,7 +169,7 @@ pub enum Alignment {
 /// Head of a table column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
-    /// What stands in the column.
+    /// Content of the column.
     pub name: String,
     /// Unit of every number in the column.
     pub unit: Option<String>,
@@ -178,7 +178,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column of words.
+    /// Creates a column of words.
     pub fn text(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -186,7 +186,7 @@ impl Column {
         }
     }
 
-    /// A column of numbers; an empty unit means that they have none.
+    /// Creates a column of numbers; an empty unit means no unit.
     pub fn number(name: impl Into<String>, unit: &str) -> Self {
         Self {
             name: name.into(),
@@ -196,15 +196,15 @@ impl Column {
     }
 }
 
-/// A table: the first cell of a row names the row.
+/// A table; the first cell of a row names the row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What the table shows.
+    /// Content of the table.
     pub caption: String,
     /// Column heads.
     pub columns: Vec<Column>,
-    /// Cells, one inner vector a row, as long as `columns`.
+    /// Cells: one inner vector per row, as long as `columns`.
     pub rows: Vec<Vec<String>>,
-    /// What is to be known for reading it. May be empty.
+    /// Explanation for the reader. May be empty.
     pub note: String,
 }

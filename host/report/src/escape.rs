@@ -1,7 +1,7 @@
-//! Text from outside on its way into a page: it must arrive as text.
+//! Escapes text from outside for a page.
 
-/// Characters that a page must not carry as they are: controls, which XML forbids, and the
-/// overrides of writing direction, with which a name could make its surroundings read backwards.
+/// Replaces characters that a page must not contain: control characters, which XML forbids, and overrides of the
+/// writing direction, with which a name could reverse its surroundings.
 fn visible(c: char) -> char {
     match c {
         '\n' | '\t' => c,
@@ -12,7 +12,7 @@ fn visible(c: char) -> char {
     }
 }
 
-/// Text for HTML and SVG, in element content and in quoted attributes alike.
+/// Escapes text for HTML and SVG, in element content and in quoted attributes.
 pub(crate) fn text(source: &str) -> String {
     let mut out = String::with_capacity(source.len());
     for c in source.chars().map(visible) {
@@ -28,7 +28,7 @@ pub(crate) fn text(source: &str) -> String {
     out
 }
 
-/// A JSON string, quotes included, that neither ends a script element nor a line of one.
+/// Returns a JSON string with quotes that ends neither a script element nor a line in it.
 pub(crate) fn json(source: &str) -> String {
     use std::fmt::Write;
     let mut out = String::with_capacity(source.len() + 2);

@@ -1,4 +1,4 @@
-//! A document as one HTML page that needs nothing but itself.
+//! A document as one self-contained HTML page.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -16,10 +16,10 @@ const PLOT_STYLE: &str = include_str!("../assets/uplot/uPlot.min.css");
 const PLOT_SCRIPT: &str = include_str!("../assets/uplot/uPlot.iife.min.js");
 const PLOT_LICENCE: &str = include_str!("../assets/uplot/LICENSE");
 
-/// The page of a document. The same document gives the same bytes.
+/// Returns the page of a document. The same document gives the same bytes.
 ///
 /// # Errors
-/// [`ReportError`] where a table's rows, a plot's series or the sections' ids do not fit.
+/// [`ReportError`] if the rows of a table, the series of a plot or the ids of the sections are inconsistent.
 pub fn render(document: &Document) -> Result<String, ReportError> {
     check_ids(&document.sections)?;
     let mut page = Page::default();
@@ -27,7 +27,7 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
         page.section(section)?;
     }
     let mut out = String::with_capacity(page.body.len() + 120_000);
-    // Writing into a String cannot fail: the results of `write!` in this file are dropped on purpose.
+    // Writing into a String cannot fail: the results of `write!` in this file are ignored on purpose.
     let _ = writeln!(
         out,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -64,7 +64,7 @@ pub fn render(document: &Document) -> Result<String, ReportError> {
     Ok(out)
 }
 
-/// The colours of the roles as style-sheet variables: light, dark, and light again on paper.
+/// Returns the colours of the roles as style-sheet variables: light, dark, and light again for print.
 fn palette() -> String {
     let list = |colour: fn(Role) -> &'static str| -> String {
         Role::ALL
@@ -84,7 +84,7 @@ fn check_ids(sections: &[Section]) -> Result<(), ReportError> {
             && id
                 .chars()
                 .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
-        // These ids are the page's own.
+        // These ids are reserved for the page.
         let own = id == "contents" || id.starts_with("figure-");
         if !formed || own || !seen.insert(id) {
             return Err(ReportError::SectionId { id: id.to_owned() });
@@ -168,13 +168,13 @@ fn contents(out: &mut String, sections: &[Section]) {
     out.push_str("</nav>\n");
 }
 
-/// The body under construction, with the numbers given so far.
+/// The body under construction, with the counters of figures and tables.
 #[derive(Default)]
 struct Page {
     body: String,
     figures: usize,
     tables: usize,
-    /// Figures that have something to zoom.
+    /// Number of zoomable figures.
     plots: usize,
 }
 

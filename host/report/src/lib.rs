@@ -1,11 +1,10 @@
 //! Documents of text, tables and plots, and their one-file HTML form.
 //!
-//! Compose a [`Document`], then [`write()`] it: the page holds everything it needs, asks nothing of any
-//! network, reads without JavaScript (every plot is there as a still picture), zooms with it, and
-//! prints on paper with everything unfolded. The same document gives the same bytes. Every text is
-//! taken as text: a name read from a file cannot become mark-up.
+//! Compose a [`Document`], then [`write()`] it. The page is self-contained and needs no network. Without JavaScript
+//! every plot is a still picture; with JavaScript it can be zoomed. In print, everything is unfolded. The same document
+//! gives the same bytes. Every text is escaped: a name from a file cannot become mark-up.
 //!
-//! [`svg`] and [`write_svg`] give one plot as a picture of its own.
+//! [`svg`] and [`write_svg`] return one plot as a separate picture.
 //!
 //! ```
 //! use rig_report::{Axis, Plot, Role, Series, svg};
@@ -39,17 +38,17 @@ pub use thin::thin;
 /// Why a document could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The file could not be made or replaced.
+    /// The file could not be created or replaced.
     #[error(
         "{path} could not be written: {source}; check that its folder exists and may be written to."
     )]
     File {
-        /// The file that was to be written.
+        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A series' columns differ in length.
+    /// Columns of a series that differ in length.
     #[error(
         "The series \"{series}\" of the figure \"{figure}\" has {found} {what} but {expected} abscissae; each sample needs one of each."
     )]
@@ -58,9 +57,9 @@ pub enum ReportError {
         figure: String,
         /// Name of the series.
         series: String,
-        /// Which column.
+        /// Name of the column.
         what: &'static str,
-        /// Its length.
+        /// Length of the column.
         found: usize,
         /// Number of abscissae.
         expected: usize,
@@ -73,14 +72,14 @@ pub enum ReportError {
         /// Title of the figure.
         figure: String,
     },
-    /// A height outside what a page can hold.
+    /// A height that a page cannot hold.
     #[error(
         "The figure \"{figure}\" is to be {height} px high; heights from 120 to 2000 px are possible."
     )]
     Height {
         /// Title of the figure.
         figure: String,
-        /// What was asked for.
+        /// The requested height, px.
         height: u32,
     },
     /// No finite point in any series.
@@ -89,7 +88,7 @@ pub enum ReportError {
         /// Title of the figure.
         figure: String,
     },
-    /// A row of a table that does not fit its heads.
+    /// A row of a table whose length differs from the head.
     #[error(
         "Row {row} of the table \"{table}\" has {cells} cells; its {columns} columns need {columns}."
     )]
@@ -98,12 +97,12 @@ pub enum ReportError {
         table: String,
         /// Number of the row, from 1.
         row: usize,
-        /// Its cells.
+        /// Number of its cells.
         cells: usize,
-        /// Columns of the table.
+        /// Number of columns of the table.
         columns: usize,
     },
-    /// A section's anchor that is taken or malformed.
+    /// An anchor of a section that is used twice or malformed.
     #[error(
         "The section id \"{id}\" is used twice or is not a letter followed by letters, digits, - and _; give each section its own."
     )]
@@ -113,23 +112,23 @@ pub enum ReportError {
     },
 }
 
-/// Writes a document as one HTML file, which appears whole or not at all.
+/// Writes a document as one HTML file, atomically.
 ///
 /// # Errors
-/// [`ReportError`] where the document contradicts itself or the file cannot be written.
+/// [`ReportError`] if the document contradicts itself or the file cannot be written.
 pub fn write(path: &Path, document: &Document) -> Result<(), ReportError> {
     replace(path, &render(document)?)
 }
 
-/// Writes one plot as a standalone SVG file, which appears whole or not at all.
+/// Writes one plot as a standalone SVG file, atomically.
 ///
 /// # Errors
-/// [`ReportError`] where the plot contradicts itself, is empty, or the file cannot be written.
+/// [`ReportError`] if the plot contradicts itself or is empty, or if the file cannot be written.
 pub fn write_svg(path: &Path, plot: &Plot) -> Result<(), ReportError> {
     replace(path, &svg(plot)?)
 }
 
-/// Puts a text in the place of a file in one step.
+/// Replaces a file by a text in one step.
 fn replace(path: &Path, text: &str) -> Result<(), ReportError> {
     write_whole(path, text.as_bytes()).map_err(|error| ReportError::File {
         path: error.path,

@@ -1,33 +1,33 @@
-//! What a figure is: series over two axes, marks, and the words that go with them.
+//! Content of a figure: series over two axes, markers, and texts.
 
 use super::ReportError;
 
-/// What a series stands for; each role has one colour throughout a document.
+/// Meaning of a series; each role has one colour throughout a document.
 ///
-/// Colours are those of Okabe and Ito (2008), "Color Universal Design", told apart by readers with
-/// any of the common colour-vision deficiencies.
+/// The colours are those of Okabe and Ito (2008), "Color Universal Design"; readers with common colour-vision
+/// deficiencies can distinguish them.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Role {
-    /// What was measured (blue).
+    /// A measurement (blue).
     Measured,
-    /// What a model says (vermillion).
+    /// A model (vermillion).
     Model,
-    /// What is left between the two (reddish purple).
+    /// Residual between the two (reddish purple).
     Residual,
     /// A command, a nominal or a true value (ink).
     Reference,
-    /// Noise floor, tolerance, anything in the background (grey).
+    /// Noise floor, tolerance, or background (grey).
     Noise,
-    /// State before a step, or data used for fitting (orange).
+    /// State before a step, or training data (orange).
     Before,
-    /// State after a step, or data held back (bluish green).
+    /// State after a step, or hold-out data (bluish green).
     After,
     /// A further series (sky blue).
     Other,
 }
 
 impl Role {
-    /// Every role, in the order in which series without a natural role best take them.
+    /// All roles, in the order recommended for series without a natural role.
     pub const ALL: [Role; 8] = [
         Role::Measured,
         Role::Model,
@@ -67,7 +67,7 @@ impl Role {
         }
     }
 
-    /// The same hue, lifted for a dark background.
+    /// The same hue, lighter for a dark background.
     pub(crate) fn dark(self) -> &'static str {
         match self {
             Role::Measured => "#4aa8e0",
@@ -91,18 +91,18 @@ pub enum Style {
     Points,
     /// Held from each sample to the next.
     Steps,
-    /// The area between two curves; `y` may be empty, or holds the curve drawn within.
+    /// The area between two curves; `y` is empty or holds a curve within it.
     Band {
-        /// Lower edge, one value a sample.
+        /// Lower edge, one value per sample.
         low: Vec<f64>,
-        /// Upper edge, one value a sample.
+        /// Upper edge, one value per sample.
         high: Vec<f64>,
     },
     /// Bars from zero; several series of bars stand side by side.
     Bars,
     /// Dots with a vertical bar of `y` ± half width.
     ErrorBars {
-        /// Half the bar's height, one value a sample.
+        /// Half the bar's height, one value per sample.
         half_width: Vec<f64>,
     },
 }
@@ -116,16 +116,16 @@ pub struct Series {
     pub x: Vec<f64>,
     /// Ordinates in the unit of the y axis; a value that is not finite is a gap.
     pub y: Vec<f64>,
-    /// How it is drawn.
+    /// Style of drawing.
     pub style: Style,
-    /// What it stands for.
+    /// Meaning of the series.
     pub role: Role,
-    /// Broken line, for a second curve of the same role.
+    /// True for a dashed line, for a second curve of the same role.
     pub dashed: bool,
 }
 
 impl Series {
-    /// A series of the given style.
+    /// Creates a series of the given style.
     pub fn new(
         name: impl Into<String>,
         role: Role,
@@ -143,17 +143,17 @@ impl Series {
         }
     }
 
-    /// A line.
+    /// Creates a line.
     pub fn line(name: impl Into<String>, role: Role, x: Vec<f64>, y: Vec<f64>) -> Self {
         Self::new(name, role, Style::Line, x, y)
     }
 
-    /// A cloud of dots.
+    /// Creates a cloud of dots.
     pub fn points(name: impl Into<String>, role: Role, x: Vec<f64>, y: Vec<f64>) -> Self {
         Self::new(name, role, Style::Points, x, y)
     }
 
-    /// An area between two curves.
+    /// Creates an area between two curves.
     pub fn band(
         name: impl Into<String>,
         role: Role,
@@ -164,7 +164,7 @@ impl Series {
         Self::new(name, role, Style::Band { low, high }, x, Vec::new())
     }
 
-    /// Drawn with a broken line.
+    /// Makes the line dashed.
     #[must_use]
     pub fn dashed(mut self) -> Self {
         self.dashed = true;
@@ -177,16 +177,16 @@ impl Series {
 pub struct Axis {
     /// Quantity.
     pub label: String,
-    /// Its unit, where it has one.
+    /// Unit, if the quantity has one.
     pub unit: Option<String>,
-    /// Logarithmic; values that are not positive are gaps, counted in the figure's note.
+    /// True for a logarithmic axis. Values that are not positive are gaps, counted in the figure's note.
     pub log: bool,
-    /// Names for the places 0, 1, 2, …; not empty: no numbers are written on the axis.
+    /// Names of the positions 0, 1, 2, …; if not empty, the axis shows no numbers.
     pub categories: Vec<String>,
 }
 
 impl Axis {
-    /// A linear axis; an empty unit means that the quantity has none.
+    /// Creates a linear axis; an empty unit means no unit.
     pub fn new(label: impl Into<String>, unit: &str) -> Self {
         Self {
             label: label.into(),
@@ -195,7 +195,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis.
+    /// Creates a logarithmic axis.
     pub fn log(label: impl Into<String>, unit: &str) -> Self {
         Self {
             log: true,
@@ -203,7 +203,7 @@ impl Axis {
         }
     }
 
-    /// An axis of named places 0, 1, 2, ….
+    /// Creates an axis of named positions 0, 1, 2, ….
     pub fn categories(label: impl Into<String>, names: Vec<String>) -> Self {
         Self {
             categories: names,
@@ -211,7 +211,7 @@ impl Axis {
         }
     }
 
-    /// Quantity and unit as written beside the axis.
+    /// Returns quantity and unit as written beside the axis.
     pub(crate) fn title(&self) -> String {
         match (&self.unit, self.label.is_empty()) {
             (Some(unit), false) => format!("{} ({unit})", self.label),
@@ -235,14 +235,14 @@ pub enum Direction {
 pub struct Marker {
     /// Direction of the line.
     pub direction: Direction,
-    /// Where it crosses its axis, in that axis' unit.
+    /// Position on its axis, in the unit of the axis.
     pub at: f64,
-    /// What it marks.
+    /// Text beside the line.
     pub label: String,
 }
 
 impl Marker {
-    /// A line at one abscissa.
+    /// Creates a line at one abscissa.
     pub fn vertical(at: f64, label: impl Into<String>) -> Self {
         Self {
             direction: Direction::Vertical,
@@ -251,7 +251,7 @@ impl Marker {
         }
     }
 
-    /// A line at one ordinate.
+    /// Creates a line at one ordinate.
     pub fn horizontal(at: f64, label: impl Into<String>) -> Self {
         Self {
             direction: Direction::Horizontal,
@@ -264,29 +264,29 @@ impl Marker {
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// What the figure shows, in words; also its text alternative.
+    /// Description of the figure in words; also its alternative text.
     pub title: String,
     /// Abscissa.
     pub x: Axis,
     /// Ordinate.
     pub y: Axis,
-    /// Drawn in this order, later ones on top.
+    /// Series in the order of drawing, later ones on top.
     pub series: Vec<Series>,
     /// Labelled lines.
     pub markers: Vec<Marker>,
-    /// One unit of x as long as one unit of y, for ellipses and paths. Linear axes only.
+    /// True for equal scales on both axes, for ellipses and paths. Linear axes only.
     pub equal_aspect: bool,
-    /// Number of samples, RMS, the command that made it. May be empty.
+    /// Note, for example number of samples, RMS and command. May be empty.
     pub note: String,
     /// Height in px at a width of 760 px.
     pub height: u32,
 }
 
 impl Plot {
-    /// Height of a figure that says nothing about it, px.
+    /// Default height of a figure, px.
     pub const HEIGHT: u32 = 320;
 
-    /// A figure without series yet.
+    /// Creates a figure without series.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
             title: title.into(),
@@ -300,29 +300,29 @@ impl Plot {
         }
     }
 
-    /// With one more series on top.
+    /// Adds a series on top.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// With one more marker.
+    /// Adds a marker.
     #[must_use]
     pub fn mark(mut self, marker: Marker) -> Self {
         self.markers.push(marker);
         self
     }
 
-    /// With its note.
+    /// Sets the note.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// Checks that every series has as many ordinates (and edges) as abscissae, and that the
-    /// settings do not contradict each other.
+    /// Checks that every series has equal numbers of ordinates (and edges) and abscissae, and that the settings are
+    /// consistent.
     ///
     /// # Errors
     /// [`ReportError::Lengths`], [`ReportError::Aspect`] or [`ReportError::Height`].

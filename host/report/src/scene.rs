@@ -1,16 +1,16 @@
-//! A plot made ready to draw: checked, thinned, every style reduced to a few shapes, ranges chosen.
-//! Both writers, the still picture and the data of the zoomable one, start from here.
+//! A plot prepared for drawing: checked, thinned, reduced to a few shapes, with chosen ranges. The still picture and
+//! the data of the zoomable figure both start from here.
 
 use super::axis::{drawable, extent, padded};
 use super::plot::{Direction, Plot, Role, Series, Style};
 use super::thin::thin;
 use super::{ReportError, escape};
 
-/// Most points a series brings into a page.
+/// Maximum number of points of a series in a page.
 pub(crate) const POINTS: usize = 4000;
-/// Share of the range left free at each side.
+/// Margin at each side as a share of the range.
 const AIR: f64 = 0.04;
-/// Share of the room between two abscissae that bars fill.
+/// Share of the distance between two abscissae that bars fill.
 const BAR_FILL: f64 = 0.78;
 
 /// Basic shape of a series.
@@ -41,35 +41,35 @@ impl Shape {
     }
 }
 
-/// A series with its gaps as NaN and no more than [`POINTS`] points.
+/// A series with NaN for gaps and at most [`POINTS`] points.
 pub(crate) struct Drawn<'a> {
     pub(crate) name: &'a str,
     pub(crate) role: Role,
     pub(crate) dashed: bool,
     pub(crate) shape: Shape,
     pub(crate) x: Vec<f64>,
-    /// Empty for a band without a middle.
+    /// Empty for a band without a middle curve.
     pub(crate) y: Vec<f64>,
-    /// Lower and upper edges; empty where the shape has none.
+    /// Lower and upper edges; empty if the shape has none.
     pub(crate) low: Vec<f64>,
     pub(crate) high: Vec<f64>,
 }
 
-/// A plot ready to draw.
+/// A plot prepared for drawing.
 pub(crate) struct Scene<'a> {
     pub(crate) plot: &'a Plot,
     pub(crate) series: Vec<Drawn<'a>>,
     pub(crate) x_range: (f64, f64),
     pub(crate) y_range: (f64, f64),
-    /// What was done to the data on their way here; empty when nothing was.
+    /// Changes to the data, as sentences; empty if there were none.
     pub(crate) remarks: Vec<String>,
 }
 
 impl<'a> Scene<'a> {
-    /// Makes a plot ready; `None` where no series has a point that can be drawn.
+    /// Prepares a plot; returns `None` if no series has a drawable point.
     ///
     /// # Errors
-    /// Those of [`Plot::check`].
+    /// Errors of [`Plot::check`].
     pub(crate) fn new(plot: &'a Plot) -> Result<Option<Self>, ReportError> {
         plot.check()?;
         let bars: Vec<&Series> = plot
@@ -109,7 +109,7 @@ impl<'a> Scene<'a> {
         }))
     }
 
-    /// One sentence or more in place of the picture, for those who do not see it.
+    /// Returns the alternative text for readers who cannot see the picture.
     pub(crate) fn description(&self) -> String {
         use rig_output::format_significant as g;
         let plot = self.plot;
@@ -130,7 +130,7 @@ impl<'a> Scene<'a> {
         )
     }
 
-    /// The data of the zoomable figure as JSON, fit to stand in a script element.
+    /// Returns the data of the zoomable figure as JSON for a script element.
     pub(crate) fn json(&self) -> String {
         let plot = self.plot;
         let x_digits = Digits::of(self.x_range, plot.x.log);
@@ -181,7 +181,7 @@ impl<'a> Scene<'a> {
                 )
             })
             .collect();
-        // The ranges stand in full: rounded they could cut a bar's edge.
+        // The ranges are written in full: rounding could cut off the edge of a bar.
         format!(
             "{{\"x\":{},\"y\":{},\"range\":[{:e},{:e},{:e},{:e}],\"equal\":{},\"height\":{},\
              \"series\":[{}],\"markers\":[{}]}}",
@@ -199,7 +199,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Whether a marker's place exists on its axis.
+/// Returns true if the marker's position can be drawn on its axis.
 pub(crate) fn marker_drawable(plot: &Plot, marker: &super::plot::Marker) -> bool {
     let axis = match marker.direction {
         Direction::Vertical => &plot.x,
@@ -208,7 +208,7 @@ pub(crate) fn marker_drawable(plot: &Plot, marker: &super::plot::Marker) -> bool
     drawable(marker.at, axis.log)
 }
 
-/// Least distance between the abscissae of bars; one where there is a single bar.
+/// Returns the smallest distance between the abscissae of bars; one for a single bar.
 fn bar_slot(bars: &[&Series]) -> f64 {
     let mut places: Vec<f64> = bars
         .iter()
@@ -303,7 +303,7 @@ fn drawn<'a>(
 /// A range from its lower to its upper end.
 type Range = (f64, f64);
 
-/// Ranges of both axes; `None` where nothing can be drawn.
+/// Returns the ranges of both axes, or `None` if nothing can be drawn.
 fn ranges(plot: &Plot, series: &[Drawn<'_>]) -> Option<(Range, Range)> {
     let visible = |s: &Drawn<'_>, i: usize| {
         let there = |c: &[f64]| c.get(i).is_some_and(|v| !v.is_nan());
@@ -356,7 +356,7 @@ fn ranges(plot: &Plot, series: &[Drawn<'_>]) -> Option<(Range, Range)> {
         plot.y.log,
         air(&plot.y.categories) * 1.5,
     );
-    // Bars stand on the axis, not above it.
+    // Bars start on the axis, not above it.
     if series.iter().any(|s| matches!(s.shape, Shape::Bars { .. })) && !plot.y.log {
         if y.0 == 0.0 && y.1 > 0.0 {
             y_padded.0 = 0.0;
@@ -367,8 +367,7 @@ fn ranges(plot: &Plot, series: &[Drawn<'_>]) -> Option<(Range, Range)> {
     Some((x, y_padded))
 }
 
-/// How many digits the data of an axis need: a millionth of its span, or six significant ones where
-/// the axis is logarithmic.
+/// Number of digits for the data of an axis: a millionth of its span, or six significant digits on a logarithmic axis.
 struct Digits {
     /// Decimal exponent of the last digit written; `None` for six significant digits.
     last: Option<i32>,
@@ -410,7 +409,7 @@ impl Digits {
     }
 }
 
-/// A number with so many digits after its first, without trailing zeros.
+/// Formats a number with `digits` digits after the first one, without trailing zeros.
 fn shortest(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$e}");
     match text.parse::<f64>() {

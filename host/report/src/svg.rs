@@ -1,4 +1,4 @@
-//! A plot as a still picture: scalable, printable, readable without any program.
+//! A plot as a still picture: scalable and printable, readable without JavaScript.
 
 use std::fmt::Write;
 
@@ -9,19 +9,19 @@ use super::plot::{Axis, Direction, Plot, Role};
 use super::scene::{Drawn, Scene, Shape, marker_drawable};
 use super::thin::thin;
 
-/// Width of every picture in its own units.
+/// Width of every picture in SVG units.
 const WIDTH: f64 = 760.0;
-/// Size of the letters.
+/// Font size.
 const FONT: f64 = 13.0;
-/// Most points of a curve in the picture: two a unit of width.
+/// Maximum number of points of a curve in the picture: about two per unit of width.
 const POINTS: usize = 1600;
 
-/// Where the colours come from.
+/// Source of the colours.
 #[derive(Clone, Copy, PartialEq)]
 enum Palette {
-    /// The page's style sheet, which knows light, dark and paper.
+    /// Style sheet of the page, for light and dark display and print.
     Page,
-    /// Written out, on white: for a picture that stands alone.
+    /// Literal colours on white, for a standalone picture.
     Own,
 }
 
@@ -41,11 +41,11 @@ impl Palette {
     }
 }
 
-/// A plot as the text of a standalone SVG file on white, with title and legend in the picture.
+/// Returns a plot as a standalone SVG text on white, with title and legend in the picture.
 ///
 /// # Errors
-/// [`ReportError::Lengths`], [`ReportError::Aspect`], [`ReportError::Height`] as the plot's data
-/// require; [`ReportError::NothingToDraw`] where no series has a finite point.
+/// [`ReportError::Lengths`], [`ReportError::Aspect`], [`ReportError::Height`] for inconsistent data;
+/// [`ReportError::NothingToDraw`] if no series has a finite point.
 pub fn svg(plot: &Plot) -> Result<String, ReportError> {
     let scene = Scene::new(plot)?.ok_or_else(|| ReportError::NothingToDraw {
         figure: plot.title.clone(),
@@ -56,14 +56,14 @@ pub fn svg(plot: &Plot) -> Result<String, ReportError> {
     Ok(out)
 }
 
-/// The picture for a page, which has its own heading and legend; `id` is unique in the page.
+/// Returns the picture for a page, which has its own heading and legend; `id` is unique in the page.
 pub(crate) fn inline(scene: &Scene<'_>, id: &str) -> String {
     let mut out = String::new();
     Canvas::new(scene, Palette::Page, id).draw(&mut out);
     out
 }
 
-/// Width of a text in the letters of most sans-serif fonts, somewhat generous.
+/// Estimates the width of a text in most sans-serif fonts, rather too large than too small.
 fn width_of(text: &str) -> f64 {
     text.chars().count() as f64 * FONT * 0.58
 }
@@ -188,7 +188,7 @@ impl<'a> Canvas<'a> {
                     .to_owned()
             }
         };
-        // Writing into a String cannot fail: the results of `write!` below are dropped on purpose.
+        // Writing into a String cannot fail: the results of `write!` below are ignored on purpose.
         let _ = write!(
             out,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {}\" role=\"img\" \
@@ -288,7 +288,7 @@ impl<'a> Canvas<'a> {
                 continue;
             }
             free = x + half + 6.0;
-            // A label below the last tick keeps within the picture.
+            // A label below the last tick must not leave the picture.
             let x = x.min(WIDTH - half).max(half);
             let _ = write!(
                 out,
@@ -331,7 +331,7 @@ impl<'a> Canvas<'a> {
         out.push_str("</g>");
     }
 
-    /// Indices to draw: in a still picture there are fewer than a zoom could show.
+    /// Returns the indices to draw: fewer than in the zoomable figure.
     fn chosen(&self, series: &Drawn<'_>) -> Vec<usize> {
         let channels: Vec<&[f64]> = [&series.x, &series.y, &series.low, &series.high]
             .into_iter()
@@ -443,7 +443,7 @@ impl<'a> Canvas<'a> {
                         continue;
                     }
                     dot(x, y);
-                    // An edge that a logarithmic axis cannot show runs to the end of the axis.
+                    // An edge that a logarithmic axis cannot show extends to the end of the axis.
                     let low = Some(series.low[i]).filter(|v| !v.is_nan());
                     let high = Some(series.high[i]).filter(|v| !v.is_nan());
                     let (Some(bottom), Some(top)) = (
@@ -471,7 +471,7 @@ impl<'a> Canvas<'a> {
         }
     }
 
-    /// The closed outline of a band, one piece for each run without gaps.
+    /// Returns the closed outline of a band, one piece for each run without gaps.
     fn area(&self, series: &Drawn<'_>) -> String {
         let mut path = String::new();
         let mut run: Vec<usize> = Vec::new();
@@ -568,7 +568,7 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// A sample of how a series looks, 22 by 9, with its left middle at the given place.
+/// Returns a legend sample of a series, 22 by 9, with its left middle at the given position.
 pub(crate) fn swatch(shape: Shape, dashed: bool, colour: &str, x: f64, y: f64) -> String {
     let dash = if dashed { ";stroke-dasharray:5 3" } else { "" };
     let (x0, y0) = (coordinate(x), coordinate(y));
@@ -606,7 +606,7 @@ pub(crate) fn swatch(shape: Shape, dashed: bool, colour: &str, x: f64, y: f64) -
     }
 }
 
-/// Where in a range a value lies, 0 to 1 within it.
+/// Returns the relative position of a value in a range; 0 to 1 inside it.
 fn share(value: f64, (low, high): (f64, f64), log: bool) -> f64 {
     if log {
         (value.log10() - low.log10()) / (high.log10() - low.log10())
@@ -615,7 +615,7 @@ fn share(value: f64, (low, high): (f64, f64), log: bool) -> f64 {
     }
 }
 
-/// Widens one of the ranges about its middle until a unit is as long on both axes.
+/// Widens one of the ranges about its middle until both axes have the same scale.
 fn equalise(x: &mut (f64, f64), y: &mut (f64, f64), width: f64, height: f64) {
     let scale = ((x.1 - x.0) / width).max((y.1 - y.0) / height);
     for (range, length) in [(x, width), (y, height)] {
@@ -624,9 +624,9 @@ fn equalise(x: &mut (f64, f64), y: &mut (f64, f64), width: f64, height: f64) {
     }
 }
 
-/// A coordinate with one decimal: a tenth of a unit is finer than any screen or printer shows.
+/// Formats a coordinate with one decimal: a tenth of a unit is below the resolution of screens and printers.
 fn coordinate(value: f64) -> String {
-    // Far outside the picture everything looks alike, and renderers limit what they accept.
+    // The exact position far outside the picture does not matter, and renderers limit the values.
     let text = format!("{:.1}", value.clamp(-1e5, 1e5));
     let text = text.strip_suffix(".0").unwrap_or(&text);
     if text == "-0" { "0" } else { text }.to_owned()

@@ -1,15 +1,14 @@
-//! Fewer points that look the same.
+//! Reduces the number of points of a curve without a visible change.
 
-/// Indices of at most `limit` samples (at least 8) that draw as all of them do.
+/// Returns the indices of at most `limit` samples (at least 8) that look like all samples when drawn.
 ///
-/// The samples are taken in runs of equal length; of each run the first, the last, and the least and
-/// greatest of every channel remain, so that no spike is lost and no gap closed: of each run that
-/// holds a value which is not finite, one such sample remains too. M4 aggregation (Jugel, Jerzak,
-/// Hackenbroich and Markl, "M4: A Visualization-Oriented Time Series Data Aggregation", 2014, §4),
-/// by sample number, so that curves that turn back can be thinned as well.
+/// The samples are divided into runs of equal length. Of each run the first, the last, and the minimum and maximum of
+/// every channel remain, so no spike is lost. One sample of each run with a value that is not finite remains too, so no
+/// gap is closed. This is M4 aggregation (Jugel, Jerzak, Hackenbroich and Markl, "M4: A Visualization-Oriented Time
+/// Series Data Aggregation", 2014, §4), by sample number, so that curves with reversals can be thinned too.
 ///
-/// `channels` hold what is drawn of each sample: ordinates, band edges, and the abscissae where the
-/// curve may turn back. Shapes: every channel has `count` values; missing ones count as gaps.
+/// `channels` hold the drawn values of each sample: ordinates, band edges, and the abscissae if the curve may reverse.
+/// Every channel has `count` values; missing ones count as gaps.
 #[must_use]
 pub fn thin(count: usize, channels: &[&[f64]], limit: usize) -> Vec<usize> {
     let limit = limit.max(8);

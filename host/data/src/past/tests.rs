@@ -20,7 +20,7 @@ fn run(recording: usize, began: f64, t: &[f64]) -> Run {
 
 #[test]
 fn what_goes_on_by_one_clock_is_one_session() {
-    // A pause of 5 s, a stretch of the same recording behind a gap, a clock that begins anew, an hour's rest.
+    // A pause of 5 s, a stretch of the same recording after a gap, a clock that restarts, a pause of one hour.
     let mut runs = vec![
         run(0, 100.0, &[100.0, 190.0]),
         run(1, 195.0, &[195.0, 220.0]),
@@ -40,7 +40,7 @@ fn what_goes_on_by_one_clock_is_one_session() {
     assert_eq!(pauses(&held[0]), [5.0, 10.0, 1.0]);
 }
 
-/// Two recordings whose clocks both begin at 0, each with a gap: neither goes on from the other.
+/// Two recordings with a gap whose clocks both start at 0: neither continues the other.
 #[test]
 fn of_equal_clocks_each_stretch_goes_on_from_its_own_recording() {
     let mut runs = Vec::new();
@@ -60,7 +60,7 @@ fn of_equal_clocks_each_stretch_goes_on_from_its_own_recording() {
     assert_eq!(held[0].past, Past::default());
 }
 
-/// Heat over 40 s of a swinging joint and a pause, sample by sample at 1 kHz and by what is kept of it.
+/// Heat over 40 s of a swinging joint and a pause: sample by sample at 1 kHz, and from the stored means.
 #[test]
 fn heat_by_means_is_heat_sample_by_sample() {
     let friction = [0.4, 0.7];

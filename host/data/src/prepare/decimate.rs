@@ -1,36 +1,36 @@
-//! Zero-phase low-pass of many signals at once, worked out only at the rows that are kept.
+//! Zero-phase low-pass of many signals at once, computed only at the rows that are kept.
 //!
-//! Forward and backward through H is one convolution with the two-sided response of H(z)·H(1/z). All its poles are
-//! simple, so that partial fractions turn it into h(m) = d·δ(m) + Σ ρₖ·pₖ^|m| over the poles pₖ of H (the parallel
-//! form; Oppenheim & Schafer, Discrete-Time Signal Processing, §6.3), a sum over the past and a sum over the future
-//! of the sample. Of both sums only the values at kept rows are wanted. Between two of them a block of samples acts
-//! through its sums Σ p^i·x, two real ones a pole and direction, and everything recursive runs at the rate of the
-//! kept rows: at one row in 33 and order 8 a sample costs 16 multiplications instead of the 40 of the sections, with
-//! no recursion from sample to sample. Rounding apart it gives what [`LowPass::zero_phase`] gives, the ends included.
+//! A forward and a backward pass through H are one convolution with the two-sided response of H(z)·H(1/z). All poles of
+//! H are simple, so partial fractions give h(m) = d·δ(m) + Σ ρₖ·pₖ^|m| over the poles pₖ (the parallel form; Oppenheim
+//! & Schafer, Discrete-Time Signal Processing, §6.3): a sum over the past and a sum over the future of the sample. Both
+//! sums are needed only at kept rows. A block of samples between two kept rows enters by its sums Σ p^i·x, two real
+//! ones per pole and direction. All recursions run at the rate of the kept rows. At one row in 33 and order 8 a sample
+//! costs 16 multiplications instead of the 40 of the sections, without a recursion from sample to sample. Except for
+//! rounding the result equals that of [`LowPass::zero_phase`], including the ends.
 
 use nalgebra::Complex;
 
 use super::filter::LowPass;
 
-/// Poles that are worked on together: conjugate pairs, or a real one alone.
+/// Poles that are processed together: conjugate pairs, or a single real pole.
 const POLES: usize = 4;
-/// Real and imaginary part for each of them.
+/// Real and imaginary part of each pole in a group.
 const PARTS: usize = 2 * POLES;
-/// Blocks beyond those that the future needs, at least: the more, the seldomer the future is summed twice.
+/// Minimum number of buffered blocks beyond the future memory: more blocks mean fewer repeated sums over the future.
 const WINDOW: usize = 128;
 
-/// Some of the poles: real parts first, then imaginary parts. Unused places are zero.
+/// A group of poles: real parts first, then imaginary parts. Unused places are zero.
 #[derive(Clone, Debug, PartialEq)]
 struct Group {
     /// Row i of a block: p^(step−1−i) for the past, then p^(i+1) for the future.
     weights: Vec<[f64; 2 * PARTS]>,
     /// p^step.
     power: [f64; PARTS],
-    /// ρ, twice that where the pole stands for a pair.
+    /// ρ, doubled where the pole stands for a conjugate pair.
     residue: [f64; PARTS],
-    /// 1/(1 − p): the sum over a constant past.
+    /// 1/(1 − p): sum over a constant past.
     past: [f64; PARTS],
-    /// p/(1 − p): the sum over a constant future.
+    /// p/(1 − p): sum over a constant future.
     future: [f64; PARTS],
 }
 
@@ -64,18 +64,18 @@ fn real_part(state: &[f64; PARTS], residue: &[f64; PARTS]) -> f64 {
     (terms[0] + terms[1]) + (terms[2] + terms[3])
 }
 
-/// A low-pass in parallel form for one row kept in every `step`.
+/// A low-pass in parallel form that keeps one row in every `step`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decimator {
     groups: Vec<Group>,
     direct: f64,
     step: usize,
-    /// Blocks after which the future counts nothing any more.
+    /// Blocks after which the future has no effect any more.
     memory: usize,
 }
 
 impl Decimator {
-    /// For `filter` forward and backward, one row kept in every `step` ≥ 1.
+    /// Builds the form for `filter` forward and backward, with one row kept in every `step` ≥ 1.
     pub fn new(filter: &LowPass, step: usize) -> Self {
         let step = step.max(1);
         let one = Complex::new(1.0, 0.0);
@@ -89,7 +89,7 @@ impl Decimator {
         let residue = |p: Complex<f64>| {
             let ratio = (one + p) * (one + p) / p;
             let mut value = Complex::new(gain, 0.0);
-            // Factor by factor, so that powers of high order neither overflow nor vanish on the way.
+            // Factor by factor, so that powers of high order neither overflow nor underflow.
             for other in &all {
                 value *= ratio / (one - other * p);
                 if *other != p {
@@ -132,12 +132,12 @@ impl Decimator {
         }
     }
 
-    /// Every how many rows one is kept.
+    /// Returns the step: one row in this number is kept.
     pub fn step(&self) -> usize {
         self.step
     }
 
-    /// A stream of `columns` signals.
+    /// Returns a stream for `columns` signals.
     pub fn stream(&self, columns: usize) -> Stream<'_> {
         let capacity = self.memory + self.memory.max(WINDOW);
         let groups = self.groups.len();
@@ -156,25 +156,25 @@ impl Decimator {
     }
 }
 
-/// Signals on their way through a [`Decimator`], in constant memory.
+/// Signals that pass through a [`Decimator`], in constant memory.
 ///
-/// Rows come in blocks of [`Decimator::step`], each of which ends at a kept row. Before the first row and after the
-/// last one the signals are taken as constant.
+/// Rows come in blocks of [`Decimator::step`]; each block ends at a kept row. The signals are assumed constant before
+/// the first row and after the last one.
 #[derive(Clone, Debug)]
 pub struct Stream<'a> {
     form: &'a Decimator,
     columns: usize,
-    /// Blocks that are held.
+    /// Number of blocks in the buffer.
     capacity: usize,
     filled: usize,
-    /// Blocks given out.
+    /// Number of blocks already returned.
     done: usize,
     started: bool,
     /// Sums over the past at the last kept row, [group][column].
     past: Vec<[f64; PARTS]>,
-    /// Sums over each block as future of the kept row before it, [group][column][block].
+    /// Sums over each block as the future of the kept row before it, [group][column][block].
     future: Vec<[f64; PARTS]>,
-    /// Part of the past, [column][block].
+    /// Contribution of the past, [column][block].
     outputs: Vec<f64>,
     /// Last value of each column.
     last: Vec<f64>,
@@ -192,7 +192,7 @@ fn block_sums(rows: &[f64], weights: &[[f64; 2 * PARTS]]) -> [f64; 2 * PARTS] {
 }
 
 impl Stream<'_> {
-    /// Takes `blocks` blocks; column c lies at `chunk[c·stride ..]`. What is ready goes to `take(first, c, values)`:
+    /// Takes `blocks` blocks; column c starts at `chunk[c·stride]`. Calls `take(first, c, values)` with the finished
     /// filtered values of column c at the kept rows `first`, `first + 1`, …, counted from the first block.
     pub fn push(
         &mut self,
@@ -250,7 +250,7 @@ impl Stream<'_> {
         }
     }
 
-    /// Sums the future backwards and gives out all kept rows whose future is known, or all at the end.
+    /// Sums the future backwards and returns all kept rows whose future is known, or all rows at the end.
     fn hand_out(&mut self, end: bool, take: &mut dyn FnMut(usize, usize, &[f64])) {
         let capacity = self.capacity;
         let ready = if end {
@@ -283,7 +283,7 @@ impl Stream<'_> {
         self.done += ready;
     }
 
-    /// Gives out the rest; the signals stay constant after their last row.
+    /// Returns the remaining rows; the signals are assumed constant after their last row.
     pub fn finish(mut self, take: &mut dyn FnMut(usize, usize, &[f64])) {
         self.hand_out(true, take);
     }
@@ -295,7 +295,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Against the sections run forward and backward, which is how the filter is defined.
+    /// Compares with the sections run forward and backward, which define the filter.
     #[test]
     fn parallel_form_gives_what_the_sections_give() {
         let mut g = rand_pcg::Pcg64::seed_from_u64(5);
@@ -348,7 +348,7 @@ mod tests {
                 length = length % 17 + 3;
             }
             stream.finish(&mut take);
-            // The sections see the same constant continuation, long enough to settle.
+            // The sections get the same constant continuation, long enough to settle.
             let pad = 2 * filter.settle_samples();
             for (signal, found) in signals.iter().zip(&found) {
                 let mut long = vec![signal[0]; pad];

@@ -1,4 +1,4 @@
-//! Recordings as every command takes them: as they are, or brought to an even step.
+//! Recordings as all commands take them: unchanged, or interpolated to an even step.
 
 use super::PrepareError;
 use super::pieces::Recording;
@@ -6,16 +6,16 @@ use super::resample::{LONGEST_STEP, Resampled};
 use super::survey::Survey;
 use crate::Block;
 
-/// A recording at an even step.
+/// A recording with an even step.
 pub enum Evened<'a> {
-    /// Its rows come at an even step.
+    /// Its rows have an even step already.
     AsItIs(&'a dyn Recording),
-    /// They were interpolated.
+    /// Its rows were interpolated.
     Resampled(Resampled<'a>),
 }
 
-/// How a recording is interpolated that could not be surveyed: at what step, s, and a sentence that says so. None where that is not
-/// what it lacks: rows at steps that differ from their mean by more than a fifth, and are never longer than five times of it.
+/// Returns the step (s) for interpolating a recording that could not be surveyed, and a sentence that says so. Returns
+/// `None` for other errors, and if a step is longer than five times the mean.
 pub fn interpolation(error: &PrepareError) -> Option<(f64, String)> {
     let PrepareError::Irregular {
         label,
@@ -65,15 +65,15 @@ impl Evened<'_> {
     }
 }
 
-/// Any recordings as such.
+/// Returns the recordings as trait objects.
 pub fn as_recordings<R: Recording>(list: &[R]) -> Vec<&dyn Recording> {
     list.iter()
         .map(|recording| recording as &dyn Recording)
         .collect()
 }
 
-/// Surveys of recordings, and the recordings as they are to be used: those at uneven steps interpolated, which their
-/// [`Survey::note`] says.
+/// Surveys recordings and returns them ready for use. Those with uneven steps are interpolated, and their
+/// [`Survey::note`] says so.
 ///
 /// # Errors
 /// As [`Survey::take`].

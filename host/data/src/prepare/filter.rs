@@ -13,7 +13,7 @@ struct Section {
 }
 
 impl Section {
-    /// State that a constant input of one leaves in the section when the output has settled.
+    /// Returns the steady state of the section for a constant input of one.
     fn settled(&self) -> [f64; 2] {
         let gain = (self.b[0] + self.b[1] + self.b[2]) / (1.0 + self.a[0] + self.a[1]);
         let second = self.b[2] - self.a[1] * gain;
@@ -25,15 +25,15 @@ impl Section {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LowPass {
     sections: Vec<Section>,
-    /// Poles in z: real ones, and of conjugate pairs the one in the upper half plane.
+    /// Poles in z: real poles, and the pole in the upper half plane of each conjugate pair.
     poles: Vec<Complex<f64>>,
     settle: usize,
 }
 
 impl LowPass {
-    /// Butterworth of `order` ≥ 1 whose gain is 1/√2 at `cutoff_hz`, by the bilinear transform with the
-    /// cut-off prewarped (Oppenheim & Schafer, Discrete-Time Signal Processing, §7.1). The cut-off must lie
-    /// between 0 and half of `sample_rate`; `None` otherwise.
+    /// Returns a Butterworth filter of `order` ≥ 1 with gain 1/√2 at `cutoff_hz`. Uses the bilinear transform with a
+    /// prewarped cut-off (Oppenheim & Schafer, Discrete-Time Signal Processing, §7.1). The cut-off must lie between 0
+    /// and half of `sample_rate`; otherwise returns `None`.
     pub fn butterworth(order: usize, cutoff_hz: f64, sample_rate: f64) -> Option<Self> {
         let poles = (0..order).map(|k| {
             let angle = PI * (2 * k + order + 1) as f64 / (2 * order) as f64;
@@ -42,9 +42,9 @@ impl LowPass {
         Self::from_poles(poles.collect(), cutoff_hz, sample_rate)
     }
 
-    /// Chebyshev type I of `order` with `ripple_db` in the pass band, which ends at `edge_hz`. Unlike the
-    /// textbook form the gain at zero frequency is one for even orders too: the same filter goes over both
-    /// sides of the model, so a constant factor changes no parameter, and torques keep their size.
+    /// Returns a Chebyshev type I filter of `order` with `ripple_db` in the pass band, which ends at `edge_hz`. Unlike
+    /// the textbook form, the gain at zero frequency is one for even orders too. The filter acts on both sides of the
+    /// model, so a constant factor changes no parameter; a gain of one keeps the size of the torques.
     pub fn chebyshev(order: usize, ripple_db: f64, edge_hz: f64, sample_rate: f64) -> Option<Self> {
         let epsilon = (10f64.powf(ripple_db / 10.0) - 1.0).sqrt();
         let mu = (1.0 / epsilon).asinh() / order as f64;
@@ -55,7 +55,8 @@ impl LowPass {
         Self::from_poles(poles.collect(), edge_hz, sample_rate)
     }
 
-    /// The anti-alias filter of the customary `decimate`: Chebyshev I, order 8, 0.05 dB, to 80 % of the new Nyquist frequency.
+    /// Returns the usual anti-alias filter of `decimate`: Chebyshev I, order 8, 0.05 dB, up to 80 % of the new Nyquist
+    /// frequency.
     pub fn decimator(factor: usize, sample_rate: f64) -> Option<Self> {
         Self::chebyshev(8, 0.05, decimator_edge(factor, sample_rate), sample_rate)
     }
@@ -98,8 +99,8 @@ impl LowPass {
         if radius >= 1.0 || radius.is_nan() {
             return None;
         }
-        // 1e-13 and one quarter more: what a wrong initial state leaves is then below rounding, and the
-        // polynomial factors of nearly equal poles are covered (checked in the tests by streaming).
+        // 1e-13 and a quarter more: the error of a wrong initial state is then below rounding. The margin covers the
+        // polynomial factors of nearly equal poles (checked in the tests by streaming).
         let settle =
             (1.25 * 1e-13f64.ln() / radius.max(1e-6).ln()).ceil() as usize + 2 * sections.len() + 1;
         Some(Self {
@@ -109,7 +110,7 @@ impl LowPass {
         })
     }
 
-    /// Poles in z: real ones, and of conjugate pairs the one in the upper half plane. All zeros lie at −1.
+    /// Poles in z: real poles, and the pole in the upper half plane of each conjugate pair. All zeros lie at −1.
     pub(super) fn poles(&self) -> &[Complex<f64>] {
         &self.poles
     }
@@ -119,12 +120,12 @@ impl LowPass {
         self.sections.iter().map(|s| s.b[0]).product()
     }
 
-    /// Samples after which a wrong initial state has died away (below 1e-13 of its size).
+    /// Samples until the effect of a wrong initial state has decayed below 1e-13 of its size.
     pub fn settle_samples(&self) -> usize {
         self.settle
     }
 
-    /// |H(f)| of ONE pass.
+    /// Returns |H(f)| of ONE pass.
     pub fn gain(&self, frequency_hz: f64, sample_rate: f64) -> f64 {
         let w = 2.0 * PI * frequency_hz / sample_rate;
         self.sections
@@ -139,7 +140,8 @@ impl LowPass {
             .product()
     }
 
-    /// Four sections at a time: each waits for its own last output only, so that the machine works on them side by side.
+    /// Runs four sections at a time: each depends only on its own last output, so the processor computes them in
+    /// parallel.
     fn run<T: Real>(&self, signal: &mut [T]) {
         let (fours, rest) = self.sections.as_chunks::<4>();
         for four in fours {
@@ -150,16 +152,16 @@ impl LowPass {
         }
     }
 
-    /// Forward and backward over `signal`: no phase shift, |H|² in gain. The ends are extended by the odd
-    /// reflection 2·x₀ − x₋ₖ and each pass starts in the steady state of its first sample (Gustafsson 1996).
+    /// Filters `signal` forward and backward: no phase shift, gain |H|². The ends are extended by the odd reflection
+    /// 2·x₀ − x₋ₖ, and each pass starts in the steady state of its first sample (Gustafsson 1996).
     ///
-    /// `T` may be several signals side by side, which take hardly longer than one.
+    /// `T` may hold several signals side by side; they take hardly longer than one.
     pub fn zero_phase<T: Real>(&self, signal: &[T]) -> Vec<T> {
         self.both_ways(signal, |end, inside| end + end - inside)
     }
 
-    /// The same with the ends extended by the even reflection x₋ₖ = xₖ: there it follows no slope, but noise of the end sample
-    /// counts hardly more than any other's. For signals that are only compared with each other.
+    /// Filters with the even reflection x₋ₖ = xₖ at the ends. The result does not follow a slope there, but noise of
+    /// the end sample has hardly more weight than that of others. For signals that are only compared with each other.
     pub fn zero_phase_even<T: Real>(&self, signal: &[T]) -> Vec<T> {
         self.both_ways(signal, |_, inside| inside)
     }
@@ -184,12 +186,12 @@ impl LowPass {
     }
 }
 
-/// One pass through sections in a row, from the steady state of the first sample.
+/// Runs one pass through sections in series, from the steady state of the first sample.
 fn together<T: Real, const N: usize>(sections: &[Section; N], signal: &mut [T]) {
     let Some(&first) = signal.first() else { return };
     let number = |list: [f64; 2]| list.map(T::from_f64);
     let taps = sections.map(|s| (T::from_f64(s.b[0]), number([s.b[1], s.b[2]]), number(s.a)));
-    // Unit gain: what one section settles at goes into the next.
+    // Unit gain: the settled output of one section is the input of the next.
     let mut settled = first;
     let mut states = sections.map(|section| {
         let state = number(section.settled()).map(|z| z * settled);
@@ -208,14 +210,15 @@ fn together<T: Real, const N: usize>(sections: &[Section; N], signal: &mut [T]) 
     }
 }
 
-/// End of the pass band of [`LowPass::decimator`], Hz.
+/// Returns the end of the pass band of [`LowPass::decimator`], Hz.
 pub fn decimator_edge(factor: usize, sample_rate: f64) -> f64 {
     0.8 * sample_rate / (2.0 * factor as f64)
 }
 
-/// First derivative by five points, (x₋₂ − 8x₋₁ + 8x₊₁ − x₊₂)/12Δ (Abramowitz and Stegun 1964, table 25.2); by fewer at the ends.
+/// First derivative by five points, (x₋₂ − 8x₋₁ + 8x₊₁ − x₊₂)/12Δ (Abramowitz and Stegun 1964, table 25.2); by fewer
+/// points at the ends.
 ///
-/// What it is off by falls with Δ⁴: at twenty samples a period 0.03 %, by three points 1.6 %.
+/// The error falls with Δ⁴: at 20 samples per period it is 0.03 %, with three points 1.6 %.
 pub fn central_difference(x: &[f64], dt: f64) -> Vec<f64> {
     let n = x.len();
     (0..n)
@@ -233,8 +236,8 @@ pub fn central_difference(x: &[f64], dt: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Second derivative by five points, (−x₋₂ + 16x₋₁ − 30x + 16x₊₁ − x₊₂)/12Δ² (Abramowitz and Stegun 1964, table 25.2); by three
-/// beside the ends, which repeat their neighbours.
+/// Second derivative by five points, (−x₋₂ + 16x₋₁ − 30x + 16x₊₁ − x₊₂)/12Δ² (Abramowitz and Stegun 1964, table 25.2);
+/// by three points next to the ends. The ends repeat their neighbours.
 pub fn second_difference(x: &[f64], dt: f64) -> Vec<f64> {
     let n = x.len();
     if n < 3 {

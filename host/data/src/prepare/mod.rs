@@ -1,13 +1,13 @@
-//! From a recording to filtered, differentiated, masked motion, with a record of what was done to it.
+//! Preparation of a recording: filtered, differentiated and masked motion, with a record of each step.
 //!
-//! Two passes: a [`Survey`] looks at the whole recording (rate, ranges, spectrum of the position) and a
-//! [`Treatment`] is decided from it; then [`each_motion`] gives the motion piece by piece. Filters are
-//! zero-phase and the pieces overlap by what the filters remember, so the result does not depend on the cuts.
+//! There are two passes. A [`Survey`] reads the whole recording (rate, ranges, spectrum of the position), and a
+//! [`Treatment`] is decided from it. Then [`each_motion`] returns the motion piece by piece. Filters are zero-phase,
+//! and the pieces overlap by the memory of the filters, so the result does not depend on the cuts.
 //!
-//! Steps in time that differ by up to a fifth are taken as even; recordings whose steps differ by more are
-//! interpolated to an even step, and refused where two rows or more are missing ([`surveyed`]).
+//! Over 8 rows, the time may deviate from an even grid by 0.4 of a step. Recordings that deviate more are interpolated
+//! to an even step; they are refused if a step is longer than five mean steps ([`surveyed`]).
 //!
-//! Leaves out: correction of a delay between torque and position.
+//! A delay between torque and position is not corrected here.
 
 mod decimate;
 mod even;
@@ -46,7 +46,7 @@ use rig_output::format_short;
 /// Why a recording cannot be prepared.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepareError {
-    /// The reader of the recording has failed; its own sentence.
+    /// The reader of the recording failed; its own sentence.
     #[error("{0}")]
     Read(String),
     /// Too few rows.
@@ -100,7 +100,7 @@ pub enum PrepareError {
         label: String,
         /// Number of the first joint, from 1.
         joint: usize,
-        /// Where it stands.
+        /// Its position.
         position: f64,
     },
     /// The recordings have different rates.
@@ -141,7 +141,7 @@ pub enum PrepareError {
         /// Joints of the robot.
         expected: usize,
     },
-    /// A cut-off that no filter can have.
+    /// A cut-off outside the possible range.
     #[error(
         "A cut-off of {} Hz is not possible at {} Hz; it must lie between 0 and {} Hz.",
         rig_model::robot::written(*cutoff),
@@ -156,7 +156,7 @@ pub enum PrepareError {
         /// Half of it, Hz.
         nyquist: f64,
     },
-    /// A decimation that leaves too little.
+    /// A decimation that leaves too few rows.
     #[error(
         "Decimation by {factor} is not possible for {rows} rows; it must lie between 1 and {most}."
     )]
@@ -168,7 +168,7 @@ pub enum PrepareError {
         /// Highest possible.
         most: u64,
     },
-    /// Measured derivatives were asked for and are not in the recording.
+    /// Measured derivatives were requested but are not in the recording.
     #[error(
         "{label} has no column {column}; record it or let the derivative be taken from the position."
     )]
@@ -178,7 +178,7 @@ pub enum PrepareError {
         /// Missing column.
         column: String,
     },
-    /// What takes the rows has failed; its own sentence.
+    /// The consumer of the rows failed; its own sentence.
     #[error("{0}")]
     Stopped(String),
 }

@@ -6,7 +6,7 @@ use super::pieces::{Piece, Recording, each_piece};
 use super::treatment::Treatment;
 use super::workers::{in_order, threads};
 
-/// One joint over a piece, at the full rate.
+/// Motion of one joint over a piece, at the full rate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointMotion {
     /// Filtered position, rad or m.
@@ -15,38 +15,39 @@ pub struct JointMotion {
     pub qd: Vec<f64>,
     /// Acceleration, rad/s² or m/s².
     pub qdd: Vec<f64>,
-    /// Torque as recorded less that of the description's effects, N·m or N.
+    /// Recorded torque minus that of the described effects, N·m or N.
     pub tau: Vec<f64>,
-    /// Whether the speed is below the joint's threshold.
+    /// True where the speed is below the joint's threshold.
     pub slow: Vec<bool>,
-    /// Whether the torque is at a limit.
+    /// True where the torque is at a limit.
     pub saturated: Vec<bool>,
 }
 
-/// A piece of motion with margins; only rows `usable.0 .. usable.1` are to be taken from it.
+/// A piece of motion with margins; only rows `usable.0 .. usable.1` may be used.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
     /// s
     pub t: Vec<f64>,
-    /// One entry a joint.
+    /// One entry per joint.
     pub joints: Vec<JointMotion>,
-    /// First row and one past the last row of this piece's own, ends of the segment trimmed.
+    /// First row and one past the last row that belong to this piece; ends of the segment are trimmed.
     pub usable: (usize, usize),
-    /// First row and one past the last that are not spoilt by an end of the segment: windows and filters may reach up to them.
+    /// First row and one past the last row that an end of the segment does not affect: windows and filters may use
+    /// these.
     pub sound: (usize, usize),
     /// Index of row 0 in its segment.
     pub offset: u64,
-    /// Number of the stretch without a gap.
+    /// Number of the stretch (between gaps in time).
     pub segment: usize,
-    /// Whether the rows start and end where the segment does.
+    /// True where the rows start and end with the segment.
     pub at_ends: [bool; 2],
 }
 
-/// Calls `take` with the whole recording's motion in order. `reach` is the number of rows beyond a row that
-/// the caller will look at (the length of a window).
+/// Calls `take` with the motion of the whole recording, in order. `reach` is the number of rows that the caller looks
+/// ahead of or behind a row (the length of a window).
 ///
 /// # Errors
-/// What reading or `take` gives; [`PrepareError::NoDerivative`].
+/// Errors of the reader or of `take`; [`PrepareError::NoDerivative`].
 pub fn each_motion(
     recording: &dyn Recording,
     treatment: &Treatment,
@@ -58,11 +59,11 @@ pub fn each_motion(
     })
 }
 
-/// Calls `take` with what `work` makes of the whole recording's motion, in order; the work is spread over
+/// Calls `take` with the results of `work` on the motion of the whole recording, in order. The work is spread over
 /// [`Treatment::threads`].
 ///
 /// # Errors
-/// What reading, `work` or `take` gives; [`PrepareError::NoDerivative`].
+/// Errors of the reader, `work` or `take`; [`PrepareError::NoDerivative`].
 pub fn worked_motion<R: Send>(
     recording: &dyn Recording,
     treatment: &Treatment,
@@ -162,7 +163,7 @@ fn without(mut torque: Vec<f64>, effects: Option<&[f64]>) -> Vec<f64> {
     torque
 }
 
-/// The motion `lead` seconds later, by Taylor's series: the filtered position is smooth over a few samples.
+/// Shifts the motion by `lead` seconds with a Taylor series: the filtered position is smooth over a few samples.
 pub fn later(
     q: Vec<f64>,
     qd: Vec<f64>,
@@ -202,7 +203,7 @@ mod tests {
             let t: Vec<f64> = (start..(start + cut).min(rows))
                 .map(|k| k as f64 * 1e-3)
                 .collect();
-            // Not smooth on purpose: the noise is what the margins must carry.
+            // Not smooth on purpose: the margins must handle the noise.
             let q = t
                 .iter()
                 .map(|t| 0.3 + (3.0 * t).sin() + 1e-4 * (1e5 * t * t).sin())

@@ -1,9 +1,9 @@
-//! A recording in pieces with margins: whole-recording filters in constant memory.
+//! A recording in pieces with margins: filters over whole recordings in constant memory.
 
 use super::PrepareError;
 use crate::{Block, JointColumns};
 
-/// Something that gives its rows in blocks, as often as asked.
+/// A source of rows in blocks that can be read repeatedly.
 pub trait Recording {
     /// Name for messages and reports.
     fn label(&self) -> String;
@@ -13,21 +13,21 @@ pub trait Recording {
         rows: usize,
         take: &mut dyn FnMut(Block) -> Result<(), PrepareError>,
     ) -> Result<(), PrepareError>;
-    /// Told when `share` of it has been gone through once more without reading it: for progress.
+    /// Called when `share` of the recording has been processed again without reading it: for progress.
     fn passed(&self, share: f64) {
         let _ = share;
     }
-    /// Whether everything that could pull on the joints from outside had been taken off.
+    /// Returns true if all external loads on the joints had been removed.
     fn unburdened(&self) -> bool {
         false
     }
 }
 
-/// The first rows of a recording, at most `rows`, as far as they follow without a gap; none where it has none. What comes
-/// after them is not read.
+/// Returns the first rows of a recording up to its first gap, at most `rows`; `None` if it is empty. Rows after them
+/// are not read.
 ///
 /// # Errors
-/// What reading as far as that gives.
+/// Errors of the reader up to there.
 pub fn first_block(recording: &dyn Recording, rows: usize) -> Result<Option<Block>, PrepareError> {
     let mut first = None;
     let read = recording.each_block(rows, &mut |block| {
@@ -43,7 +43,7 @@ pub fn first_block(recording: &dyn Recording, rows: usize) -> Result<Option<Bloc
     }
 }
 
-/// A recording of the rig with everything taken off that could pull on its joints from outside.
+/// A recording of the rig with all external loads on its joints removed.
 pub struct Unburdened<'a>(pub &'a dyn Recording);
 
 impl Recording for Unburdened<'_> {
@@ -72,7 +72,7 @@ impl Recording for Unburdened<'_> {
 pub struct Beginning<'a> {
     /// The whole recording.
     pub recording: &'a dyn Recording,
-    /// How many rows of it.
+    /// Number of rows.
     pub rows: usize,
 }
 
@@ -144,7 +144,7 @@ impl Recording for crate::Source {
     }
 }
 
-/// Rows that are processed together, and which of them are to be used.
+/// Rows that are processed together, and the range of those to be used.
 #[derive(Clone, Debug)]
 pub struct Piece {
     /// The rows with margins on both sides (no margin where the segment ends).
@@ -155,9 +155,9 @@ pub struct Piece {
     pub core_end: usize,
     /// Index of the first row of `rows` within its segment.
     pub offset: u64,
-    /// Stretches of the recording without a gap in time are numbered from zero.
+    /// Number of the stretch (between gaps in time), from zero.
     pub segment: usize,
-    /// Whether `rows` starts and ends where the segment does.
+    /// True where `rows` starts and ends with the segment.
     pub at_ends: [bool; 2],
 }
 
@@ -245,8 +245,8 @@ fn drop_front(block: &mut Block, rows: usize) {
     }
 }
 
-/// Calls `take` with pieces of `core` rows and `margin` rows beside them, in order; a segment that fits
-/// into one piece is one. Holds at most `2·(core + 2·margin)` rows.
+/// Calls `take` with pieces of `core` rows and `margin` rows on each side, in order. A segment that fits into one piece
+/// is one piece. Holds at most `2·(core + 2·margin)` rows.
 pub fn each_piece(
     recording: &dyn Recording,
     core: usize,
@@ -288,7 +288,7 @@ pub fn each_piece(
         }
         started = true;
         append(&mut buffer, block);
-        // Twice the margin: what is left for the last piece is then never only a margin.
+        // Twice the margin: the last piece then always has rows beyond its margin.
         while buffer.len() >= done + core + 2 * margin {
             let piece_len = done + core + margin;
             let piece = Piece {
@@ -315,7 +315,7 @@ pub fn each_piece(
 mod tests {
     use super::*;
 
-    /// Gives an empty block and these, then cannot be read on.
+    /// Returns an empty block and then these blocks, then fails.
     struct Broken(Vec<Block>);
 
     impl Recording for Broken {

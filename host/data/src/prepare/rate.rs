@@ -1,4 +1,4 @@
-//! What was decided for recordings of one rate, for a recording of another.
+//! Adapts a treatment that was decided at one sample rate to a recording of another rate.
 
 use super::PrepareError;
 use super::filter::decimator_edge;
@@ -7,11 +7,12 @@ use super::treatment::{HIGHEST, Treatment};
 use rig_output::format_short;
 
 impl Treatment {
-    /// The same for a further recording (a hold-out), at that recording's own rate: the band of torque and regressor as near
-    /// as a whole number of rows allows, masks and lead as they are. Unchanged where the rates agree within 1 %.
+    /// Returns the treatment for a further recording (a hold-out) at that recording's own rate. The band of torque and
+    /// regressor is as close as a whole number of rows allows; masks and torque lead are kept. Returns it unchanged if
+    /// the rates agree within 1 %.
     ///
-    /// A slower recording may need a lower cut-off of the position; as long as that lies above the band it passes all that is
-    /// compared.
+    /// A slower recording may need a lower cut-off of the position. Above the band, that cut-off changes no compared
+    /// value.
     ///
     /// # Errors
     /// [`PrepareError::BandBeyondRate`].
@@ -31,7 +32,7 @@ impl Treatment {
         }
         let cutoff = self.cutoff.min(most);
         let decimation = if self.decimation == 1 {
-            // The low-pass over torque and regressor is then that of the position, whatever the rate.
+            // Without decimation, the low-pass over torque and regressor is that of the position, at any rate.
             1
         } else {
             (rate / self.kept_rate()).round().max(1.0) as usize
@@ -57,7 +58,7 @@ impl Treatment {
     }
 }
 
-/// Pass band of the low-pass over torque and regressor, Hz, and what it is.
+/// Returns the pass band of the low-pass over torque and regressor, Hz, and a description of the filter.
 pub(super) fn parallel_pass(
     order: usize,
     cutoff: f64,

@@ -1,20 +1,20 @@
-//! Numbers in temporary files: what does not fit into constant memory is kept there between passes.
+//! Numbers in temporary files: data that do not fit into constant memory are kept there between passes.
 //!
-//! A record is its length in bytes and then whatever it holds, in the byte order of the file's only reader.
+//! A record is its length in bytes followed by its content, in little-endian byte order.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 
 use super::PrepareError;
 
-/// The sentence for a temporary file that does not work.
+/// Returns the error for a temporary file that cannot be used.
 pub fn unusable(e: std::io::Error) -> PrepareError {
     PrepareError::Stopped(format!(
         "The temporary file for prepared rows cannot be used ({e}); make room in the folder for temporary files."
     ))
 }
 
-/// Empties a record, to be filled.
+/// Clears a record and reserves the space for its length.
 pub fn begin(record: &mut Vec<u8>) {
     record.clear();
     put_count(record, 0);
@@ -27,7 +27,7 @@ pub fn write(to: &mut File, record: &mut [u8]) -> std::io::Result<()> {
     to.write_all(record)
 }
 
-/// Reads the next record, without its length; false at the end of the file.
+/// Reads the next record without its length; returns false at the end of the file.
 pub fn read(from: &mut File, record: &mut Vec<u8>) -> std::io::Result<bool> {
     let mut length = [0; 8];
     match from.read_exact(&mut length) {
@@ -49,17 +49,17 @@ pub fn put_numbers<'a>(to: &mut Vec<u8>, list: impl ExactSizeIterator<Item = &'a
     put_count(to, list.len());
     let start = to.len();
     to.resize(start + 8 * list.len(), 0);
-    // In place, eight bytes each: the compiler makes a plain copy of it.
+    // In place, eight bytes each: the compiler turns this into a plain copy.
     for (bytes, x) in to[start..].as_chunks_mut::<8>().0.iter_mut().zip(list) {
         *bytes = x.to_le_bytes();
     }
 }
 
-/// What is left of a record.
+/// The unread rest of a record.
 pub struct Record<'a>(pub &'a [u8]);
 
 impl Record<'_> {
-    /// The next bytes.
+    /// Returns the next bytes.
     pub fn bytes(&mut self, count: usize) -> std::io::Result<&[u8]> {
         let (head, rest) = self
             .0
@@ -69,7 +69,7 @@ impl Record<'_> {
         Ok(head)
     }
 
-    /// The next count.
+    /// Returns the next count.
     pub fn count(&mut self) -> std::io::Result<usize> {
         let bytes = self
             .bytes(8)?
@@ -92,7 +92,7 @@ impl Record<'_> {
         Ok(())
     }
 
-    /// The next list.
+    /// Returns the next list.
     pub fn list(&mut self) -> std::io::Result<Vec<f64>> {
         let mut list = Vec::new();
         self.numbers(&mut list)?;

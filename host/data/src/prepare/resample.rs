@@ -1,20 +1,20 @@
-//! Rows at uneven instants brought to an even step.
+//! Interpolation of rows with uneven time stamps to an even step.
 
 use super::PrepareError;
 use super::pieces::Recording;
 use crate::{Block, JointColumns};
 
-/// Longest step between neighbouring rows, as a multiple of the mean one, over which it is interpolated. Reading parts a recording
-/// at five usual steps already, so that recordings of a file are never refused for it.
+/// Longest step between neighbouring rows that is interpolated, as a multiple of the mean step. The reader already
+/// splits recordings at five usual steps, so no recording from a file is refused for this.
 pub(super) const LONGEST_STEP: f64 = 5.0;
 
-/// A recording of which every stretch between gaps is interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …, its time stamps believed.
+/// A recording whose stretches between gaps are interpolated at t₀, t₀ + Δ, t₀ + 2Δ, …; its time stamps are trusted.
 ///
-/// Between two rows runs the cubic that has their values and, at either, the slope of the parabola through it and its
-/// neighbours (at the ends of a stretch through the last three rows): exact for parabolas, and for a sine of n
-/// rows a period off by about (2π/n)³/60 of its amplitude with rows jittered by half a step. Columns that belong to no joint are
-/// interpolated by a line, and between two whole numbers, which may be a mode or a flag, taken from the nearer row. What the
-/// controller took for the effects is left out.
+/// The curve between two rows is a cubic with their values. Its slope at each row is that of the parabola through the
+/// row and its neighbours (at the ends of a stretch, through the last three rows). It is exact for parabolas. For a
+/// sine of n rows a period and a jitter of half a step, the error is about (2π/n)³/60 of the amplitude. Columns that
+/// belong to no joint are interpolated linearly; between two whole numbers (a mode or a flag) the nearer row counts.
+/// The controller's own torque of the effects is left out.
 pub struct Resampled<'a> {
     source: &'a dyn Recording,
     period: f64,
@@ -27,7 +27,7 @@ impl<'a> Resampled<'a> {
     }
 }
 
-/// Signals of a block in a fixed order: position, torque, then what else was recorded.
+/// Signals of a block in a fixed order: position, torque, then the other recorded columns.
 fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
     let optional = [
         &joint.qd,
@@ -40,7 +40,7 @@ fn signals(joint: &JointColumns) -> impl Iterator<Item = &Vec<f64>> {
     ([&joint.q, &joint.tau].into_iter()).chain(optional.into_iter().flatten())
 }
 
-/// The same to be filled.
+/// The same signals, mutable.
 fn signals_mut(joint: &mut JointColumns) -> impl Iterator<Item = &mut Vec<f64>> {
     let optional = [
         &mut joint.qd,
@@ -53,7 +53,7 @@ fn signals_mut(joint: &mut JointColumns) -> impl Iterator<Item = &mut Vec<f64>> 
     ([&mut joint.q, &mut joint.tau].into_iter()).chain(optional.into_iter().flatten())
 }
 
-/// No rows of the same columns.
+/// Returns a block of the same columns without rows.
 fn empty_as(block: &Block) -> Block {
     let none = |column: &Option<Vec<f64>>| column.as_ref().map(|_| Vec::new());
     let joints = (block.joints.iter())
@@ -88,7 +88,7 @@ struct Row {
     extra: Vec<f64>,
 }
 
-/// The value at a share `u` of the way from a row to the next.
+/// Interpolates at the fraction `u` from `a` to `b`; between two whole numbers returns the nearer one.
 fn between(a: f64, b: f64, u: f64) -> f64 {
     match a.fract() == 0.0 && b.fract() == 0.0 {
         true if u < 0.5 => a,
@@ -97,7 +97,7 @@ fn between(a: f64, b: f64, u: f64) -> f64 {
     }
 }
 
-/// Slope of the parabola through three points at the one of them with number `at`.
+/// Slope of the parabola through three points at point number `at`.
 fn slope(points: [(f64, f64); 3], at: usize) -> f64 {
     let [(t0, x0), (t1, x1), (t2, x2)] = points;
     let (left, right) = ((x1 - x0) / (t1 - t0), (x2 - x1) / (t2 - t1));
@@ -109,10 +109,10 @@ fn slope(points: [(f64, f64); 3], at: usize) -> f64 {
     }
 }
 
-/// Rows waiting to be interpolated between, and what has come out of them.
+/// Rows waiting for interpolation, and the interpolated rows.
 struct Grid {
     period: f64,
-    /// At most four: the interval lies between the second and the third, or starts or ends the stretch.
+    /// At most four rows: the interval lies between the second and the third, or at an end of the stretch.
     rows: Vec<Row>,
     /// First instant of the stretch, and number of the next instant.
     start: f64,
@@ -136,12 +136,13 @@ impl Grid {
         };
         let u = (t - t0) / width;
         let (d0, d1) = (slope_at(from) * width, slope_at(from + 1) * width);
-        // Hermite's cubic.
+        // Cubic Hermite interpolation.
         let (a, b) = (d0 - (x1 - x0), (x1 - x0) - d1);
         x0 + u * (x1 - x0) + u * (1.0 - u) * ((1.0 - u) * a + u * b)
     }
 
-    /// Instants between the rows `from` and `from + 1`, the later one left to the next interval unless it is the last.
+    /// Interpolates between the rows `from` and `from + 1`. The later row belongs to the next interval unless it is the
+    /// last.
     fn interval(&mut self, from: usize, last: bool) {
         if self.rows.len() < from + 2 {
             return;
@@ -204,7 +205,7 @@ impl Grid {
         self.rows.clear();
     }
 
-    /// What is ready, as a block.
+    /// Returns the finished rows as a block.
     fn take(&mut self) -> Block {
         let empty = Block {
             continues: true,
@@ -349,12 +350,12 @@ mod tests {
                         assert!((t - before - step).abs() < 1e-12);
                     }
                     before = Some(*t);
-                    // 200 rows a period of the sine.
+                    // 200 rows per period of the sine.
                     assert!((joint.q[k] - (3.0 * t).sin()).abs() < 3e-5, "{t}");
-                    // A parabola comes back as it is.
+                    // A parabola is reproduced exactly.
                     assert!((joint.tau[k] - (1.0 - 2.0 * t + 0.5 * t * t)).abs() < 1e-12);
                     assert!((joint.qd.as_ref().unwrap()[k] - 3.0 * (3.0 * t).cos()).abs() < 1e-3);
-                    // A line, and modes never in between.
+                    // A line is exact; modes have no intermediate values.
                     assert!((block.extra[0].1[k] - (0.1 + 2.0 * t)).abs() < 1e-12);
                     assert!([0.0, 1.0, 2.0].contains(&block.extra[1].1[k]));
                 }

@@ -1,4 +1,4 @@
-//! Power spectral density of the position (Welch), and what it says about a cut-off.
+//! Power spectral density of the position (Welch), and the cut-off frequencies that follow from it.
 
 use std::f64::consts::PI;
 
@@ -7,9 +7,8 @@ use serde::Serialize;
 
 /// Welch's estimate, accumulated sample by sample (Welch 1967; Hann window, half overlapping).
 ///
-/// The second difference of the position is what is transformed, and its transfer |2·sin(ω/2)|⁴ is divided
-/// out again: the position falls by many decades with frequency, and a window's side lobes would otherwise
-/// bury its noise floor.
+/// The second difference of the position is transformed, and its transfer |2·sin(ω/2)|⁴ is then divided out. Without
+/// this, the side lobes of the window would hide the noise floor: the position falls by many decades with frequency.
 pub struct Welch {
     segment: usize,
     window: Vec<f64>,
@@ -22,7 +21,7 @@ pub struct Welch {
 }
 
 impl Welch {
-    /// Segments of `segment` samples (a power of two is fastest).
+    /// Uses segments of `segment` samples (a power of two is fastest).
     pub fn new(segment: usize) -> Self {
         let segment = segment.max(16);
         Self {
@@ -39,7 +38,7 @@ impl Welch {
         }
     }
 
-    /// Forgets the last samples: the next one does not follow them.
+    /// Clears the last samples: the next sample does not follow them.
     pub fn interrupt(&mut self) {
         self.buffer.clear();
         self.seen = 0;
@@ -60,7 +59,7 @@ impl Welch {
                 .map(|(x, w)| x * w)
                 .collect();
             let mut output = self.fft.make_output_vec();
-            // The lengths are those of the plan; the only error of this call is another length.
+            // The lengths are those of the plan; a wrong length is the only error of this call.
             if self.fft.process(&mut input, &mut output).is_ok() {
                 for (s, z) in self.sum.iter_mut().zip(&output) {
                     *s += z.norm_sqr();
@@ -71,7 +70,7 @@ impl Welch {
         }
     }
 
-    /// Frequencies in Hz and the one-sided density of the POSITION in unit²/Hz, without zero frequency.
+    /// Returns frequencies in Hz and the one-sided density of the POSITION in unit²/Hz, without zero frequency.
     pub fn density(&self, sample_rate: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         if self.count == 0 {
             return None;
@@ -90,7 +89,7 @@ impl Welch {
     }
 }
 
-/// What the spectrum of one joint's position says.
+/// Spectrum of one joint's position and the frequencies derived from it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PositionSpectrum {
     /// Hz
@@ -99,7 +98,7 @@ pub struct PositionSpectrum {
     pub density: Vec<f64>,
     /// Level of the white noise floor, same unit.
     pub floor: f64,
-    /// Where the signal sinks to the floor, Hz.
+    /// Frequency at which the signal falls to the noise floor, Hz.
     pub crossing: f64,
     /// Frequency below which 99 % of the power of the velocity lies, Hz.
     pub motion: f64,
@@ -107,28 +106,29 @@ pub struct PositionSpectrum {
     pub clean: f64,
 }
 
-/// Share of noise in the power of the filtered acceleration that the automatic cut-off allows. Least squares
-/// with a noisy regressor column underestimates its parameter by about this share (attenuation; Fuller 1987,
-/// §1.1): a thousandth is well below what such a test bench repeats to.
+/// Share of noise in the power of the filtered acceleration that the automatic cut-off allows. Least squares with a
+/// noisy regressor column underestimates its parameter by about this share (attenuation; Fuller 1987, §1.1). A
+/// thousandth is well below the repeatability of a test bench.
 pub const NOISE_SHARE: f64 = 1e-3;
 
-/// Factor by which the density of a position falls at least from one octave to the next where it is motion. 4, between the 16
-/// of a speed that jumps (an impact; its position has a density of f⁻⁴, that of bounded torque f⁻⁶) and the 1 of white noise.
+/// Minimum factor by which the density of a position falls from one octave to the next if it is motion. 4 lies between
+/// the 16 of a jump in speed and the 1 of white noise. (After an impact the density of the position falls with f⁻⁴, for
+/// bounded torque with f⁻⁶.)
 const FLAT: f64 = 4.0;
 
-/// The signal counts as sunk where the density stays below this multiple of the floor: there the
-/// signal-to-noise ratio is one, and the best linear filter (Wiener) passes half.
+/// Multiple of the noise floor below which the signal counts as ended. At 2 the signal-to-noise ratio is one, and the
+/// best linear filter (Wiener) passes half.
 const SUNK: f64 = 2.0;
 
 impl PositionSpectrum {
-    /// Judges a density estimate.
+    /// Derives the spectrum's frequencies from a density estimate.
     pub fn judge(frequency: Vec<f64>, density: Vec<f64>) -> Self {
         let n = density.len();
-        // The floor: median over the upper quarter of the band, where a mechanism no longer moves.
+        // Noise floor: median over the upper quarter of the band, where a mechanism no longer moves.
         let mut top: Vec<f64> = density[n - n / 4 - 1..].to_vec();
         top.sort_by(f64::total_cmp);
         let floor = top[top.len() / 2];
-        // A tenth of a decade of smoothing, so that one low bin does not end the signal.
+        // Smoothing over a tenth of a decade, so that one low bin does not end the signal.
         let smooth: Vec<f64> = (0..n)
             .map(|k| {
                 let reach = (k as f64 * 0.12) as usize;
@@ -137,7 +137,7 @@ impl PositionSpectrum {
             })
             .collect();
         let sunk = (0..n).find(|&k| {
-            // Sunk for good means: over the next half octave too.
+            // The density must stay low over the next half octave too.
             let end = ((k as f64 + 1.0) * 1.4) as usize;
             smooth[k..end.clamp(k + 1, n)]
                 .iter()
@@ -147,7 +147,7 @@ impl PositionSpectrum {
         Self::with(frequency, density, floor, crossing)
     }
 
-    /// Works out what follows from the level of the noise and from where the signal ends.
+    /// Computes the other values from the noise floor and the end of the signal.
     fn with(frequency: Vec<f64>, density: Vec<f64>, floor: f64, crossing: f64) -> Self {
         let signal = |d: f64| (d - floor).max(0.0);
         let bins = || frequency.iter().zip(&density);
@@ -177,9 +177,9 @@ impl PositionSpectrum {
         }
     }
 
-    /// Returns the same spectrum where the signal is known to end at `end` Hz at the latest: the density there counts as the
-    /// level of the noise if it is above the floor. Noise that is not white (a position that the drive has filtered, a coarse
-    /// encoder, time stamps with jitter) stands above the floor of the top of the band, so the spectrum alone takes it for motion.
+    /// Returns the same spectrum for a signal that ends at `end` Hz at the latest. The density at `end` becomes the
+    /// noise floor if it is above the old one. Noise that is not white lies above the floor at the top of the band, and
+    /// the spectrum alone takes it for motion. Examples are a filter in the drive, a coarse encoder and time jitter.
     pub fn ending_at(&self, end: f64) -> Self {
         if self.crossing <= end {
             return self.clone();
@@ -192,8 +192,8 @@ impl PositionSpectrum {
         Self::with(frequency, density, self.floor.max(level), end)
     }
 
-    /// Returns true if the density falls by less than a factor of four from one octave to the next somewhere between `from` and
-    /// `to` Hz, as noise does and no motion.
+    /// Returns true if the density falls by less than a factor of four from one octave to the next somewhere between
+    /// `from` and `to` Hz. Noise does this, motion does not.
     pub fn flattens(&self, from: f64, to: f64) -> bool {
         let mean = |low: f64, high: f64| {
             let bins = self.frequency.iter().zip(&self.density);
@@ -213,13 +213,13 @@ impl PositionSpectrum {
         false
     }
 
-    /// Frequency below which 99.9 % of the power of the POSITION lies, Hz. A mechanism moves far more than its encoder errs, so
-    /// no error of the encoder or of the time stamps changes this frequency.
+    /// Returns the frequency below which 99.9 % of the power of the POSITION lies, Hz. The motion is far larger than
+    /// the encoder error, so errors of the encoder or of the time stamps do not change this frequency.
     pub fn swing(&self) -> f64 {
         quantile(&self.frequency, &self.density, 0.999)
     }
 
-    /// Of a position that never changes: nothing, which limits no cut-off.
+    /// Returns the spectrum of a position that never changes: zero density and no limit on the cut-off.
     pub fn still(frequency: Vec<f64>) -> Self {
         let [first, last] =
             [frequency.first(), frequency.last()].map(|f| f.copied().unwrap_or(0.0));
@@ -233,12 +233,12 @@ impl PositionSpectrum {
         }
     }
 
-    /// RMS of the velocity, rad/s or m/s, noise beyond the crossing left out.
+    /// Returns the RMS of the velocity up to the crossing, without the noise beyond it, rad/s or m/s.
     pub fn velocity_rms(&self) -> f64 {
         self.velocity_rms_below(self.crossing)
     }
 
-    /// RMS of the velocity up to `most` Hz, rad/s or m/s.
+    /// Returns the RMS of the velocity up to `most` Hz, rad/s or m/s.
     pub fn velocity_rms_below(&self, most: f64) -> f64 {
         let step = self.frequency[0];
         let sum: f64 = self
@@ -251,14 +251,14 @@ impl PositionSpectrum {
         sum.sqrt()
     }
 
-    /// Standard deviation of the noise that remains in the velocity behind a cut-off, rad/s or m/s.
+    /// Returns the standard deviation of the velocity noise that passes the cut-off, rad/s or m/s.
     pub fn velocity_noise(&self, cutoff: f64) -> f64 {
         // ∫₀^fc N·(2πf)² df
         (self.floor * (2.0 * PI).powi(2) * cutoff.powi(3) / 3.0).sqrt()
     }
 }
 
-/// First frequency at which the sum of `power` reaches `share` of its whole.
+/// Returns the first frequency at which the sum of `power` reaches `share` of its total.
 fn quantile(frequency: &[f64], power: &[f64], share: f64) -> f64 {
     let total: f64 = power.iter().sum();
     let mut sum = 0.0;
@@ -279,7 +279,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Between two frequencies of f⁻⁴, which an impact leaves, and of noise that ends at 100 Hz.
+    /// Compares a density of f⁻⁴, as after an impact, with noise that ends at 100 Hz.
     #[test]
     fn noise_flattens_and_a_motion_with_impacts_does_not() {
         let frequency: Vec<f64> = (1..2000).map(|k| 0.25 * f64::from(k)).collect();

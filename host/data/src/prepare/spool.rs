@@ -1,4 +1,4 @@
-//! A recording that is read from its file once, however often it is gone through.
+//! A recording that is read from its file only once.
 
 use std::fs::File;
 use std::io::Seek;
@@ -9,16 +9,16 @@ use super::pieces::{Recording, stretch};
 use super::record::{self, Record, begin, put_count, put_numbers, unusable};
 use crate::{Block, JointColumns};
 
-/// A recording whose time, position, torque, measured derivatives and temperature are written to a temporary file while they
-/// are read for the first time, and taken from there afterwards: text is parsed once, memory stays constant. Other
-/// columns are left out.
+/// A recording that is written to a temporary file while it is first read, and read from there afterwards. Text is thus
+/// parsed once and memory stays constant. Keeps time, position, torque, measured derivatives and temperature; drops
+/// other columns.
 pub struct Spooled<'a> {
     source: &'a dyn Recording,
     kept: Mutex<Option<(File, u64)>>,
 }
 
 impl<'a> Spooled<'a> {
-    /// Nothing is read yet.
+    /// Prepares the recording without reading it.
     pub fn new(source: &'a dyn Recording) -> Self {
         Self {
             source,
@@ -26,7 +26,7 @@ impl<'a> Spooled<'a> {
         }
     }
 
-    /// Each of several recordings.
+    /// Prepares each of several recordings.
     pub fn all(sources: &[&'a dyn Recording]) -> Vec<Self> {
         sources.iter().map(|source| Self::new(*source)).collect()
     }
@@ -77,7 +77,7 @@ impl Recording for Spooled<'_> {
     }
 }
 
-/// Without the columns that are not kept.
+/// Removes the columns that are not kept.
 fn bare(block: Block) -> Block {
     Block {
         joints: block
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
     use crate::prepare::InMemory;
 
-    /// Counts how often it is gone through.
+    /// Counts how often it is read.
     struct Counted(InMemory, Cell<usize>);
 
     impl Recording for Counted {
@@ -218,7 +218,7 @@ mod tests {
         for _ in 0..3 {
             assert_eq!(collect(&spooled, 64), expected);
         }
-        // Smaller blocks than are kept.
+        // Smaller blocks than those stored.
         assert_eq!(collect(&spooled, 32).len(), 12);
         assert_eq!(source.1.get(), 1);
     }

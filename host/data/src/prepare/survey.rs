@@ -1,4 +1,4 @@
-//! The first look at a recording: rate, ranges and spectrum.
+//! First pass over a recording: rate, ranges and spectrum.
 
 use serde::Serialize;
 
@@ -6,42 +6,41 @@ use super::PrepareError;
 use super::pieces::Recording;
 use super::spectrum::{PositionSpectrum, Welch};
 
-/// Over up to [`STEPS_TOGETHER`] rows the time may run off the even grid by this share of a step: time stamps written
-/// with single precision or by a jittery clock pass, and a stamp off the grid between rows that are on it; a lost or
-/// doubled row does not.
+/// Allowed deviation of the time from the even grid over [`STEPS_TOGETHER`] rows, as a share of a step. Accepts stamps
+/// of single precision, a clock with jitter and single stamps off the grid. A lost or doubled row exceeds it.
 const STEP_TOLERANCE: f64 = 0.4;
 
-/// Rows over which the grid is watched.
+/// Number of rows over which the deviation from the grid is measured.
 const STEPS_TOGETHER: usize = 8;
 
-/// Steps that are this much alike count as equal: the first of them is named.
+/// Relative difference below which steps count as equal: the first of them is reported.
 const ROUNDING: f64 = 1e-9;
 
-/// Rows below which a spectrum says nothing.
+/// Minimum number of rows for a spectrum.
 const FEWEST_ROWS: u64 = 256;
 
-/// One joint over a whole recording.
+/// Survey of one joint over a whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSurvey {
     /// Lowest and highest position, rad or m.
     pub position: [f64; 2],
-    /// Highest speed between neighbouring rows, rad/s or m/s: an upper bound, noise included.
+    /// Highest speed between neighbouring rows, rad/s or m/s: an upper bound that includes noise.
     pub peak_speed: f64,
     /// RMS of the torque, N·m or N.
     pub torque_rms: f64,
     /// Lowest and highest torque.
     pub torque: [f64; 2],
-    /// Torques at which the recording rests at its extreme for at least `CLIPPED_RUN` rows: it was clipped there.
+    /// Torque limits at which the recording was clipped: its extreme value repeats for at least `CLIPPED_RUN` rows.
     pub clipped: [Option<f64>; 2],
     /// Spectrum of the position.
     pub spectrum: PositionSpectrum,
 }
 
-/// Rows in a row at the extreme torque that count as clipping; noise never repeats a value that often, but a
-/// command held at a limit does.
+/// Number of consecutive rows at the extreme torque that counts as clipping. Noise never repeats a value that often,
+/// but a command held at a limit does.
 pub(super) const CLIPPED_RUN: usize = 5;
 
-/// A recording as a whole.
+/// Survey of a whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Survey {
     /// Name of the recording.
@@ -52,9 +51,9 @@ pub struct Survey {
     pub longest: u64,
     /// Hz
     pub sample_rate: f64,
-    /// One entry a joint.
+    /// One entry per joint.
     pub joints: Vec<JointSurvey>,
-    /// What was done to its time stamps, a sentence; none where nothing was.
+    /// Changes to its time stamps, as a sentence; `None` if there were none.
     pub note: Option<String>,
 }
 
@@ -97,22 +96,22 @@ struct Running {
     welch: Delayed,
 }
 
-/// Rows of the longest segments of the spectrum up to 1 kHz, where they resolve 0.25 Hz.
+/// Number of rows of the longest spectrum segments up to 1 kHz; there they resolve 0.25 Hz.
 const LONGEST_SEGMENT: usize = 4096;
-/// Rate up to which the segments have [`LONGEST_SEGMENT`] rows, Hz. Beyond it they last as long as at this rate: a segment that
-/// is shorter than the motion's period takes the RMS speed for a fraction of what it is (a quarter at 5 kHz).
+/// Rate up to which the segments have [`LONGEST_SEGMENT`] rows, Hz. At higher rates they keep the duration they have at
+/// this rate. A segment shorter than the period of the motion underestimates the RMS speed (to a quarter at 5 kHz).
 const SEGMENT_RATE: f64 = 1000.0;
 
-/// Returns the rows of the longest segments at a rate in Hz, a power of two.
+/// Returns the number of rows of the longest segments at a rate in Hz, a power of two.
 fn longest_segment(rate: f64) -> usize {
-    // A rate from stamps with jitter must not decide between two powers.
+    // The rate comes from stamps with jitter, which must not decide between two powers.
     let times = (0.99 * rate / SEGMENT_RATE).ceil();
     let most = f64::from(1 << 8);
     LONGEST_SEGMENT * (if times > 1.0 { times.min(most) } else { 1.0 } as usize).next_power_of_two()
 }
 
-/// A spectrum whose segments are as long as the recording and its stretches without a gap allow: of a whole one at least seven
-/// of them, half overlapping. Rows wait until it is known that the recording is long enough for the longest segments.
+/// A spectrum with segments as long as the recording and its stretches without a gap allow. A recording without gaps
+/// has at least seven segments, half overlapping. Rows wait until the recording is known to fill the longest segments.
 #[derive(Default)]
 struct Delayed {
     /// Value, and whether it follows the one before without a gap.
@@ -121,7 +120,7 @@ struct Delayed {
 }
 
 impl Delayed {
-    /// Takes a value of a recording of `rate` Hz, as far as that is known.
+    /// Takes a value of a recording of `rate` Hz, as far as the rate is known.
     fn push(&mut self, x: f64, follows: bool, rate: f64) {
         if let Some(welch) = &mut self.welch {
             if !follows {
@@ -156,13 +155,13 @@ impl Delayed {
 }
 
 impl JointSurvey {
-    /// Whether the joint stands still throughout.
+    /// Returns true if the joint stands still throughout.
     pub fn still(&self) -> bool {
         self.position[0] == self.position[1]
     }
 
-    /// Whether the position spreads no further than white noise of its spectrum's floor does, sampled at `sample_rate` Hz: by
-    /// six standard deviations to both sides, which one row in 10⁹ leaves.
+    /// Returns true if the position range is explained by white noise at the spectrum's noise floor, sampled at
+    /// `sample_rate` Hz. The range may be six standard deviations to both sides; one row in 10⁹ exceeds this.
     pub fn only_noise(&self, sample_rate: f64) -> bool {
         let noise = (0.5 * self.spectrum.floor * sample_rate).sqrt();
         self.position[1] - self.position[0] <= 12.0 * noise
@@ -170,7 +169,7 @@ impl JointSurvey {
 }
 
 impl Survey {
-    /// Returns the same survey where each joint's signal ends at its frequency in `ends` at the latest, Hz; see
+    /// Returns the survey with the signal of each joint ending at its frequency in `ends` at the latest, Hz; see
     /// [`PositionSpectrum::ending_at`].
     pub fn ending_at(&self, ends: &[f64]) -> Self {
         let mut survey = self.clone();
@@ -259,11 +258,11 @@ impl Survey {
         }
         let mean = span / steps.max(1) as f64;
         for (together, line) in [shortest, widest] {
-            // No stretch was long enough to be watched where there is none of them.
+            // Skipped if no stretch was long enough.
             if !together.is_finite() || line == 0 {
                 continue;
             }
-            // The step that the row would have made alone.
+            // The step if a single row caused the whole deviation.
             let step = together - (STEPS_TOGETHER - 1) as f64 * mean;
             let deviation = (step / mean - 1.0).abs();
             if deviation > STEP_TOLERANCE || deviation.is_nan() {
@@ -326,8 +325,7 @@ mod tests {
     use crate::prepare::InMemory;
     use crate::{Block, JointColumns};
 
-    /// Lost rows part a recording in stretches that are shorter than the longest segments of a spectrum: it is looked at with
-    /// shorter ones.
+    /// Lost rows split a recording into stretches shorter than the longest spectrum segments: shorter ones are used.
     #[test]
     fn a_recording_in_many_stretches_is_surveyed() {
         let stretch = |first: usize| {

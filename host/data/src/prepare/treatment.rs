@@ -1,4 +1,4 @@
-//! What is done to the recordings, decided once and written down.
+//! Treatment of the recordings, decided once and recorded.
 
 use rig_model::robot::IdentifiedBand;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use super::spectrum::{NOISE_SHARE, PositionSpectrum};
 use super::survey::Survey;
 use rig_output::format_short;
 
-/// A setting that the data choose or that is given.
+/// A setting that is chosen from the data or given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Choice<T> {
@@ -28,19 +28,19 @@ pub struct PrepareOptions {
     pub cutoff: Choice<f64>,
     /// Order of the Butterworth filter, run forward and backward.
     pub order: usize,
-    /// Every how many rows one is kept after the parallel low-pass.
+    /// Decimation after the parallel low-pass: one row in this number is kept.
     pub decimation: Choice<usize>,
     /// Speed below which a row is masked, rad/s or m/s, the same for all joints; 0 masks nothing.
     pub speed_threshold: Choice<f64>,
-    /// Velocity and acceleration from the recording's own columns where the position would be differentiated.
+    /// Uses the recording's own velocity and acceleration instead of differentiating the position.
     pub measured_derivatives: bool,
-    /// How much later the torque recorded at an instant acts, s: half a sample for a command that is held until
-    /// the next one, plus dead time. The motion is taken that much later. Left at zero, such a lead L shifts
+    /// Torque lead, s: time from the recorded instant of a torque to its action. A command that is held until the next
+    /// one has half a sample, plus dead time. The motion is shifted by the same time. At zero, an actual lead L shifts
     /// viscous friction by about −J·L·ω² for a motion of angular frequency ω.
     pub torque_lead: f64,
-    /// Rows that are processed together; memory grows with it, results do not depend on it.
+    /// Rows processed together. Memory grows with it; results do not depend on it.
     pub piece_rows: usize,
-    /// Threads; 0 for as many as the machine has. Results do not depend on it, to the last bit.
+    /// Number of threads; 0 uses all processors. Results are identical to the last bit.
     pub threads: usize,
 }
 
@@ -59,94 +59,93 @@ impl Default for PrepareOptions {
     }
 }
 
-/// Rows left out, and why.
+/// Rows left out, and the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Masked {
-    /// Number of the joint, from 1; 0 where it concerns all.
+    /// Number of the joint, from 1; 0 for all joints.
     pub joint: usize,
-    /// Rows (after decimation), or windows of the integral model.
+    /// Number of rows (after decimation), or of windows of the integral model.
     pub rows: u64,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
-/// What is done to every recording of an identification.
+/// Treatment of every recording of an identification.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Treatment {
     /// Hz
     pub sample_rate: f64,
     /// Cut-off of the position filter, Hz.
     pub cutoff: f64,
-    /// Why this cut-off, a sentence.
+    /// Reason for this cut-off, a sentence.
     pub cutoff_reason: String,
-    /// Cut-offs that were tried on the torque, lowest first; empty where none was.
+    /// Cut-offs that were tried on the torque, lowest first; empty if none was tried.
     pub trials: Vec<CutoffTrial>,
-    /// Cut-off that the spectrum of the position alone gives, where the torque gave another one, Hz.
+    /// Cut-off from the spectrum of the position alone, if the torque led to a different one, Hz.
     pub spectral_cutoff: Option<f64>,
     /// Order of the Butterworth filter, forward and backward.
     pub order: usize,
-    /// Every how many rows one is kept.
+    /// Decimation: one row in this number is kept.
     pub decimation: usize,
-    /// Why this decimation, a sentence.
+    /// Reason for this decimation, a sentence.
     pub decimation_reason: String,
     /// Pass band of the parallel low-pass over torque and regressor, Hz.
     pub parallel_edge: f64,
-    /// What the parallel low-pass is, a sentence.
+    /// Description of the parallel low-pass, a sentence.
     pub parallel_filter: String,
-    /// How velocity and acceleration were got, a sentence.
+    /// Source of velocity and acceleration, a sentence.
     pub derivatives: String,
-    /// Whether the recording's own velocity and acceleration are used.
+    /// True if the recording's own velocity and acceleration are used.
     pub measured_derivatives: bool,
-    /// How much later the torque recorded at an instant is taken to act, s.
+    /// Torque lead, s: assumed time from the recorded instant of a torque to its action.
     pub torque_lead: f64,
     /// Per joint, speed below which rows are masked, rad/s or m/s.
     pub speed_threshold: Vec<f64>,
-    /// The same where values are judged by recordings that they were not fitted to: no higher, as rows that are left out of a
-    /// fit because they bend it still say how good it is.
+    /// The same for judging values on recordings that they were not fitted to; never higher. Rows that are left out of
+    /// a fit because they bias it still show how good it is.
     pub judged_speed: Vec<f64>,
-    /// Why these thresholds, a sentence.
+    /// Reason for these thresholds, a sentence.
     pub speed_reason: String,
     /// Per joint, torques beyond which rows count as saturated (lowest, highest).
     pub saturation: Vec<[Option<f64>; 2]>,
     /// Rows left out at both ends of every stretch, before decimation.
     pub trimmed: usize,
-    /// Per joint, the spectrum of the position that the cut-off was read from.
+    /// Per joint, the spectrum of the position from which the cut-off was determined.
     pub spectra: Vec<PositionSpectrum>,
     /// Highest frequency of the motion over all joints, Hz (99 % of the power of the velocity).
     pub motion_frequency: f64,
-    /// Rows that one piece holds.
+    /// Number of rows in one piece.
     #[serde(skip)]
     pub piece_rows: usize,
-    /// Threads; 0 for as many as the machine has.
+    /// Number of threads; 0 uses all processors.
     #[serde(skip)]
     pub threads: usize,
 }
 
-/// Lowest cut-off as a multiple of the highest frequency of the motion; below it the filter would bend the
-/// motion itself.
+/// Lowest cut-off as a multiple of the highest frequency of the motion. A lower one would distort the motion itself.
 const LEAST_HEADROOM: f64 = 5.0;
 
-/// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion: reversals of
-/// friction have harmonics well above the motion itself, and the residual is to show them.
+/// Pass band of the parallel low-pass as a multiple of the highest frequency of the motion. Reversals of friction have
+/// harmonics well above the motion, and the residual must show them.
 const PARALLEL_HEADROOM: f64 = 10.0;
 
 /// Highest cut-off as a share of the Nyquist frequency.
 pub const HIGHEST: f64 = 0.8;
 
-/// Above what rounding leaves of the velocity of a joint that stands still, below what any encoder shows, rad/s or m/s.
+/// Speed below which a joint stands still, rad/s or m/s: above the rounding error, below the resolution of any encoder.
 const STILL: f64 = 1e-6;
 
-/// A cut-off that was tried, and how well the torque is explained with it.
+/// A cut-off that was tried, and the torque error with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CutoffTrial {
     /// Hz
     pub cutoff: f64,
-    /// Per joint, RMS of the torque residual over RMS of the torque; not a number where no row of the joint was usable.
+    /// Per joint, RMS of the torque residual over RMS of the torque; NaN if no row of the joint was usable.
     pub relative_error: Vec<f64>,
 }
 
 impl Treatment {
-    /// Band and rows for the description, in which values identified by it are judged.
+    /// Returns the band for the description, in which the identified values are judged.
     #[must_use]
     pub fn band(&self) -> IdentifiedBand {
         IdentifiedBand {
@@ -157,7 +156,7 @@ impl Treatment {
         }
     }
 
-    /// Decides from the surveys of all training recordings and the robot's torque limits.
+    /// Decides the treatment from the surveys of all training recordings and the robot's torque limits.
     ///
     /// # Errors
     /// [`PrepareError`]: different rates, impossible cut-off or decimation.
@@ -240,9 +239,9 @@ impl Treatment {
         })
     }
 
-    /// The same with fewer rows: the low-pass before decimation passes only what the model explains, up to `band` in Hz,
-    /// as long as `rows` of the shortest recording are left; unchanged where that keeps as many rows, or where the
-    /// decimation was given.
+    /// Returns the treatment with a stronger decimation. Its low-pass passes only the band that the model explains, up
+    /// to `band` in Hz, as long as `rows` of the shortest recording remain. Returns it unchanged if this does not
+    /// reduce the rows, or if the decimation was given.
     ///
     /// # Errors
     /// As [`Self::decide`].
@@ -269,7 +268,7 @@ impl Treatment {
         Ok(narrow)
     }
 
-    /// The same with one row in `decimation` kept.
+    /// Returns the treatment with one row in `decimation` kept.
     ///
     /// # Errors
     /// As [`Self::decide`].
@@ -293,7 +292,7 @@ impl Treatment {
         })
     }
 
-    /// The same for recordings that fitted values are judged by.
+    /// Returns the treatment for recordings on which fitted values are judged.
     pub fn judging(&self) -> Self {
         Self {
             speed_threshold: self.judged_speed.clone(),
@@ -301,17 +300,17 @@ impl Treatment {
         }
     }
 
-    /// s
+    /// Sample period, s.
     pub fn dt(&self) -> f64 {
         1.0 / self.sample_rate
     }
 
-    /// Filter over the position.
+    /// Returns the filter of the position.
     pub fn position_filter(&self) -> Option<LowPass> {
         LowPass::butterworth(self.order, self.cutoff, self.sample_rate)
     }
 
-    /// Filter over torque and regressor.
+    /// Returns the filter of torque and regressor.
     pub fn parallel_low_pass(&self) -> Option<LowPass> {
         if self.decimation > 1 {
             LowPass::decimator(self.decimation, self.sample_rate)
@@ -320,16 +319,16 @@ impl Treatment {
         }
     }
 
-    /// Rows per second after decimation.
+    /// Returns the number of rows per second after decimation.
     pub fn kept_rate(&self) -> f64 {
         self.sample_rate / self.decimation as f64
     }
 }
 
-/// Rows that must be left after decimation.
+/// Minimum number of rows after decimation.
 const FEWEST_KEPT: u64 = 50;
 
-/// Spectrum of each joint. The longest recording speaks for it, for a joint the longest in which it moves.
+/// Returns the spectrum of each joint, from the longest recording in which the joint moves.
 fn spectra_of(surveys: &[Survey], first: &Survey) -> Vec<PositionSpectrum> {
     let speaker = surveys.iter().max_by_key(|s| s.rows).unwrap_or(first);
     (0..speaker.joints.len())
@@ -341,7 +340,7 @@ fn spectra_of(surveys: &[Survey], first: &Survey) -> Vec<PositionSpectrum> {
         .collect()
 }
 
-/// Returns the highest decimation that leaves `kept` rows of the shortest stretch of `rows` rows once both its ends are trimmed.
+/// Returns the highest decimation that leaves `kept` rows of a stretch of `rows` rows after trimming both ends.
 fn most_decimated(rows: u64, kept: u64, cutoff: f64, rate: f64) -> u64 {
     let fits = |n: u64| kept * n + 2 * trimmed_rows(cutoff, n as usize, rate) as u64 <= rows;
     let mut most = rows / kept;
@@ -351,7 +350,7 @@ fn most_decimated(rows: u64, kept: u64, cutoff: f64, rate: f64) -> u64 {
     most.max(1)
 }
 
-/// Every how many rows one is kept. Torque and regressor pass the same filter, so its band costs no bias; it drops noise.
+/// Chooses the decimation. Torque and regressor pass the same filter, so its band causes no bias and removes noise.
 fn choose_decimation(motion: f64, cutoff: f64, rate: f64, most: u64) -> (usize, String) {
     let band = (PARALLEL_HEADROOM * motion).min(cutoff);
     let n = ((0.4 * rate / band).floor() as u64).clamp(1, most) as usize;
@@ -368,7 +367,7 @@ fn choose_decimation(motion: f64, cutoff: f64, rate: f64, most: u64) -> (usize, 
     )
 }
 
-/// Per joint, the speed below which rows are masked, and why.
+/// Chooses, per joint, the speed below which rows are masked; returns the reason too.
 fn choose_speeds(
     surveys: &[Survey],
     spectra: &[PositionSpectrum],
@@ -384,7 +383,7 @@ fn choose_speeds(
             "Five standard deviations of the velocity's noise behind the filter, at least 1 % of its RMS: below it the sign of the velocity, and with it Coulomb friction, is not known.".into(),
         ),
     };
-    // At rest friction, or a brake, carries any part of the torque: no row of such a joint tells anything.
+    // At rest, friction or a brake carries any part of the torque, so rows of such a joint contain no information.
     for (j, speed) in speeds.iter_mut().enumerate() {
         if surveys.iter().all(|s| s.joints[j].still()) {
             *speed = speed.max(STILL);
@@ -393,7 +392,7 @@ fn choose_speeds(
     (speeds, reason)
 }
 
-/// Per joint, the torques beyond which rows count as saturated: the limit that is stated, or where a recording rests.
+/// Returns, per joint, the torques beyond which rows count as saturated: the described limit or the clipping level.
 fn saturation(surveys: &[Survey], limits: &[Option<f64>], joints: usize) -> Vec<[Option<f64>; 2]> {
     let of = |j: usize| {
         let limit = limits.get(j).copied().flatten();
@@ -428,8 +427,8 @@ fn enough_rows(surveys: &[Survey], needed: u64) -> Result<(), PrepareError> {
     })
 }
 
-/// The lowest frequency at which some joint's signal sinks into its noise, or less where that still leaves
-/// too much noise in the acceleration.
+/// Chooses the lowest frequency at which the signal of a joint falls to its noise floor. Chooses a lower one if the
+/// acceleration would still be too noisy.
 fn choose_cutoff(spectra: &[PositionSpectrum], motion: f64, nyquist: f64) -> (f64, String) {
     let crossing = spectra
         .iter()

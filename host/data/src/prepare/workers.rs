@@ -1,14 +1,14 @@
-//! Work on pieces in several threads, results in the order of the pieces.
+//! Processes pieces in several threads and returns the results in the order of the pieces.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError, mpsc};
 
 use super::PrepareError;
 
-/// Most threads that are used: what is on its way grows with them, and with it memory.
+/// Maximum number of threads: the number of items in memory grows with it.
 const MOST_THREADS: usize = 16;
 
-/// Threads to use, where 0 means as many as the machine has.
+/// Returns the number of threads to use; 0 means all processors.
 pub fn threads(wanted: usize) -> usize {
     match wanted {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -17,14 +17,14 @@ pub fn threads(wanted: usize) -> usize {
     .min(MOST_THREADS)
 }
 
-/// What `work` gives for everything that `produce` hands over, to `take` in the order of handing over.
+/// Passes every item of `produce` to `work`, and the results to `take` in the order of the items.
 ///
-/// `produce` and `take` run in the calling thread, `work` in `threads` others (in the calling one where `threads` is
-/// 1). At most `threads` items are on their way. The results are the same for any number of threads as long as
-/// `work` depends on its argument alone.
+/// `produce` and `take` run in the calling thread, `work` in `threads` others (in the calling thread if `threads` is
+/// 1). At most `threads` items are in progress. The results do not depend on the number of threads if `work` depends
+/// only on its argument.
 ///
 /// # Errors
-/// The first of `work` or `take` in the order of the items, else that of `produce`.
+/// The first error of `work` or `take` in the order of the items, otherwise that of `produce`.
 pub(super) fn in_order<T: Send, R: Send>(
     threads: usize,
     produce: impl FnOnce(&mut dyn FnMut(T) -> Result<(), PrepareError>) -> Result<(), PrepareError>,
@@ -72,7 +72,7 @@ pub(super) fn in_order<T: Send, R: Send>(
             }
             Ok(())
         });
-        // Ends the threads, which hold nothing else that waits.
+        // Ends the threads, which wait for nothing else.
         drop(items);
         result
     })
@@ -82,7 +82,7 @@ fn stopped() -> PrepareError {
     PrepareError::Stopped("A thread that prepares rows has ended early.".into())
 }
 
-/// Results that came before their turn.
+/// Buffer for results that arrive out of order.
 struct Queue<R> {
     done: mpsc::Receiver<(usize, Result<R, PrepareError>)>,
     early: BTreeMap<usize, Result<R, PrepareError>>,
@@ -106,7 +106,7 @@ impl<R> Queue<R> {
     }
 }
 
-/// Calls `work` with the number of each item and the item, spread over `threads`.
+/// Calls `work` with the index of each item and the item, spread over `threads`.
 pub fn each_of<T: Send>(threads: usize, items: &mut [T], work: &(dyn Fn(usize, &mut T) + Sync)) {
     if threads <= 1 || items.len() <= 1 {
         items
@@ -143,7 +143,7 @@ mod tests {
             threads,
             |push| (0..100).try_for_each(push),
             &|k: usize| {
-                // Later items are done sooner.
+                // Later items finish earlier.
                 std::thread::sleep(std::time::Duration::from_micros(
                     ((100 - k) * 7 % 50) as u64,
                 ));

@@ -1,4 +1,4 @@
-//! Cogging: the rotor's magnets find preferred angles without any current.
+//! Cogging: the rotor's magnets prefer certain angles even without current.
 
 /// Torque amplitude·sin(order·θ + phase) at the rotor, conservative (θ: rotor angle).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ impl Cogging {
         self.amplitude * (self.order * angle + self.phase).sin()
     }
 
-    /// Its potential energy, J: the torque is minus the slope.
+    /// Returns its potential energy, J: the torque is the negative slope.
     pub fn energy(&self, angle: f64) -> f64 {
         self.amplitude / self.order * (self.order * angle + self.phase).cos()
     }

@@ -1,4 +1,4 @@
-//! A small random torque on the joint: everything that moves the table, the cables and the air.
+//! A small random torque on the joint, caused by table, cables and air.
 
 /// Ornstein–Uhlenbeck torque: exponential autocorrelation, held over a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// The next value one tick on, from a standard normal draw (exact discretisation).
+    /// Returns the value one tick later, from a standard normal draw (exact discretisation).
     #[inline]
     pub fn next(&self, last: f64, tick: f64, normal: f64) -> f64 {
         let keep = (-tick / self.correlation_time).exp();

@@ -8,7 +8,7 @@ pub struct QuadraticDrag {
 }
 
 impl QuadraticDrag {
-    /// The viscous coefficient that gives the drag at this speed, N·m·s/rad.
+    /// Returns the viscous coefficient that is equivalent to the drag at this speed, N·m·s/rad.
     #[inline]
     pub fn viscous_at(&self, velocity: f64) -> f64 {
         self.coefficient * velocity.abs()

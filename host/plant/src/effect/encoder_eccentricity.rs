@@ -1,4 +1,4 @@
-//! Eccentric code disc or magnet: the angle read runs ahead and behind once a turn.
+//! Eccentric code disc or magnet: a periodic reading error per turn.
 
 /// Reading error amplitude·sin(θ + phase), on the encoder's own shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]

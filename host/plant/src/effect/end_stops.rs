@@ -3,7 +3,7 @@
 /// Stops at both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndStops {
-    /// Angles at which they touch, rad.
+    /// Angles at which contact starts, rad.
     pub range: [f64; 2],
     /// N·m/rad.
     pub stiffness: f64,
@@ -25,7 +25,7 @@ impl EndStops {
         }
     }
 
-    /// Energy held by the stop, J.
+    /// Energy stored in the stop, J.
     pub fn energy(&self, position: f64) -> f64 {
         let depth = (position - self.range[1])
             .max(self.range[0] - position)

@@ -1,18 +1,18 @@
-//! Friction falling as the grease warms: one thermal mass heated by the friction's own losses.
+//! Friction that decreases as the grease warms: one thermal mass, heated by the friction losses.
 //!
-//! Source: Bittencourt & Gunnarsson (2012), exponential fall of the viscous part with temperature.
-//! Leaves out: gradients within the gear, heat from the motor.
+//! Source: Bittencourt & Gunnarsson (2012), exponential decrease of the viscous part with temperature. Not modelled:
+//! gradients within the gear, heat from the motor.
 
-/// Thermal mass of gear and grease, and how friction follows it.
+/// Thermal mass of gear and grease, and the dependence of friction on its temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionWarmup {
     /// J/K.
     pub heat_capacity: f64,
     /// To the surroundings, K/W.
     pub thermal_resistance: f64,
-    /// Relative fall of the viscous coefficient per kelvin, 1/K.
+    /// Relative decrease of the viscous coefficient per kelvin, 1/K.
     pub viscous_rate: f64,
-    /// Relative fall of the Coulomb torque per kelvin, 1/K.
+    /// Relative decrease of the Coulomb torque per kelvin, 1/K.
     pub coulomb_rate: f64,
 }
 

@@ -1,7 +1,7 @@
-//! Eccentric gear: a torque once (or `order` times) per motor turn from the varying lever arm of
-//! preloaded teeth.
+//! Eccentric gear: the lever arm of preloaded teeth varies, which causes a torque once (or `order` times) per motor
+//! turn.
 //!
-//! Leaves out: the kinematic error of the output angle itself; this is its static torque only.
+//! Not modelled: the kinematic error of the output angle; this is only its static torque.
 
 /// Torque amplitude·sin(order·θ + phase) on the joint, conservative (θ: rotor angle).
 #[derive(Clone, Copy, Debug, PartialEq)]

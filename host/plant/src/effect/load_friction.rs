@@ -1,4 +1,4 @@
-//! Friction that grows with the torque carried (tooth and bearing load).
+//! Friction that grows with the transmitted torque (tooth and bearing load).
 //!
 //! Source: Hamon, Gautier & Garrec (2010), friction proportional to |load|.
 
@@ -10,7 +10,7 @@ pub struct LoadFriction {
 }
 
 impl LoadFriction {
-    /// Friction added while `transmitted` N·m pass, N·m.
+    /// Additional friction at `transmitted` N·m, N·m.
     #[inline]
     pub fn torque(&self, transmitted: f64) -> f64 {
         self.ratio * transmitted.abs()

@@ -1,4 +1,4 @@
-//! Effects that can be switched on one by one, each a block of parameters and one function.
+//! Optional effects, each a block of parameters and its functions.
 
 pub mod cogging;
 pub mod dead_time;

@@ -5,7 +5,7 @@
 pub struct PositionFriction {
     /// Relative, below 1.
     pub amplitude: f64,
-    /// Periods per turn of the shaft the contact sits on.
+    /// Periods per turn of the contact's shaft.
     pub order: f64,
     /// rad.
     pub phase: f64,

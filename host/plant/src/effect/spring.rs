@@ -1,13 +1,13 @@
 //! A cable or hose that pulls the joint back.
 //!
-//! Leaves out: the cable's own hysteresis.
+//! Not modelled: the cable's hysteresis.
 
 /// Linear torsion spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
     /// N·m/rad.
     pub stiffness: f64,
-    /// Angle at which it pulls nothing, rad.
+    /// Angle without torque, rad.
     pub rest: f64,
 }
 
@@ -18,7 +18,7 @@ impl Spring {
         -self.stiffness * (position - self.rest)
     }
 
-    /// Energy held, J.
+    /// Stored energy, J.
     pub fn energy(&self, position: f64) -> f64 {
         0.5 * self.stiffness * (position - self.rest) * (position - self.rest)
     }

@@ -1,12 +1,12 @@
-//! Iron saturation: the torque constant falls at high current.
+//! Iron saturation: the torque constant decreases at high current.
 //!
-//! Leaves out: the fall of the inductance. The back-EMF constant falls alike, which keeps the power
+//! Not modelled: the decrease of the inductance. The back-EMF constant decreases equally, which keeps the power
 //! balance.
 
 /// Torque constant multiplied by 1/(1 + (i/knee)²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueSaturation {
-    /// Current at which half the torque constant is gone, A (far above rated).
+    /// Current at which the torque constant is halved, A (far above rated).
     pub knee: f64,
 }
 

@@ -1,8 +1,7 @@
-//! Compliance and lost motion between rotor and link: two masses, a spring and a gap.
+//! Compliance and backlash between rotor and link: two masses, a spring and a gap.
 //!
-//! Sources: Spong (1987), the elastic joint; Nordin & Gutman (2002), a gap in series with a damped
-//! shaft whose contact never pulls.
-//! Leaves out: hysteresis of the gear's stiffness, tooth-by-tooth mesh.
+//! Sources: Spong (1987), the elastic joint; Nordin & Gutman (2002), a gap in series with a damped shaft whose contact
+//! never pulls. Not modelled: hysteresis of the gear's stiffness, tooth-by-tooth mesh.
 
 /// Elastic gear or shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,18 +14,18 @@ pub struct Elasticity {
     pub damping: f64,
 }
 
-/// Play between teeth.
+/// Backlash of a gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Backlash {
     /// Whole gap, joint-side, rad.
     pub gap: f64,
-    /// Stiffness of the closed teeth, N·m/rad.
+    /// Contact stiffness, N·m/rad.
     pub stiffness: f64,
-    /// Damping of the closed teeth, N·m·s/rad.
+    /// Contact damping, N·m·s/rad.
     pub damping: f64,
 }
 
-/// Elasticity, gap or both in one chain.
+/// Elasticity, backlash or both in series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Transmission {
     half_gap: f64,
@@ -36,7 +35,7 @@ pub(crate) struct Transmission {
 }
 
 impl Transmission {
-    /// The chain of both; `None` where the gear is rigid.
+    /// Combines both; returns `None` for a rigid gear.
     pub(crate) fn new(elasticity: Option<Elasticity>, backlash: Option<Backlash>) -> Option<Self> {
         let series = |a: f64, b: f64| if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
         match (elasticity, backlash) {
@@ -62,7 +61,7 @@ impl Transmission {
         }
     }
 
-    /// Torque passed from rotor to link at `twist` (rotor minus link, joint-side) and its rate, N·m.
+    /// Returns the torque from rotor to link at `twist` (rotor minus link, joint-side) and its rate, N·m.
     #[inline]
     pub(crate) fn torque(&self, twist: f64, rate: f64) -> f64 {
         let bend = self.bend(twist);
@@ -70,7 +69,7 @@ impl Transmission {
             return 0.0;
         }
         let torque = self.torque_elastic(twist) + self.damping * rate;
-        // With a gap the teeth only push; a plain elastic shaft may do both.
+        // With a gap the contact can only push; a shaft without a gap can push and pull.
         if self.half_gap > 0.0 && torque * bend < 0.0 {
             0.0
         } else {
@@ -78,14 +77,14 @@ impl Transmission {
         }
     }
 
-    /// Its conservative part, N·m.
+    /// Returns the conservative part of the torque, N·m.
     #[inline]
     pub(crate) fn torque_elastic(&self, twist: f64) -> f64 {
         let bend = self.bend(twist);
         bend * (self.stiffness + self.hardening * bend * bend)
     }
 
-    /// Energy of the bent shaft, J.
+    /// Returns the energy of the bent shaft, J.
     pub(crate) fn energy(&self, twist: f64) -> f64 {
         let square = self.bend(twist).powi(2);
         square * (0.5 * self.stiffness + 0.25 * self.hardening * square)

@@ -1,4 +1,4 @@
-//! Copper and magnets change with temperature.
+//! Temperature dependence of copper and magnets.
 
 /// Temperature coefficients about the temperature of the nameplate.
 #[derive(Clone, Copy, Debug, PartialEq)]

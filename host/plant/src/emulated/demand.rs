@@ -1,9 +1,9 @@
-//! What a motion asks of the emulated rig's motor, against what the description's motor and the rig's sensors give.
+//! Compares the demand of a motion on the emulated rig's motor with the described motor and the rig's sensors.
 //!
-//! The link, its friction and the supply of the emulated rig are its own, whatever the description says: a described motor may
-//! be too weak for them. This is found from the reference motion, rigid and without the controller's error.
+//! Link, friction and supply of the emulated rig do not depend on the description, so a described motor may be too
+//! weak. The demand is computed from the reference motion, for a rigid rig without controller error.
 //!
-//! Leaves out: presliding, breakaway, disturbance, warming of the winding, inductance.
+//! Not modelled: presliding, breakaway, disturbance, warming of the winding, inductance.
 
 use rig_shared::trajectory::Trajectory;
 
@@ -12,30 +12,30 @@ use crate::{Equivalent, PlantConfig};
 use rig_model::robot::Robot;
 use rig_output::format_significant;
 
-/// Time from one evaluation of the motion to the next, s: a tenth of the fastest ramp that a trajectory has.
+/// Time step of the evaluation, s: a tenth of the fastest ramp of a trajectory.
 const STEP: f64 = 1e-3;
-/// Factor between the described and the emulated link's weight or inertia beyond which they are different links. The emulated
-/// rigs vary by factors of up to 2.2 among themselves.
+/// Ratio of the described to the emulated link's weight or inertia above which they are different links. The emulated
+/// rigs vary by factors of up to 2.2.
 const OTHER_LINK: f64 = 3.0;
-/// Angle between the directions of the described and the emulated weight beyond which the joint's zero is another one, rad.
-/// The emulated rigs' centres of mass are up to 0.3 rad off the link's axis.
+/// Angle between the described and the emulated weight above which the joint's zero is a different one, rad. The
+/// emulated rigs' centres of mass are up to 0.3 rad off the link's axis.
 const OTHER_ZERO: f64 = 0.6;
 
-/// Largest values that a motion needs of a motor.
+/// Largest motor values that a motion needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Demand {
     /// N·m at the joint.
     torque: f64,
     /// A.
     current: f64,
-    /// Highest thermal mean of the current, A.
+    /// Highest thermal mean (RMS) of the current, A.
     thermal: f64,
     /// V at the motor's terminals.
     voltage: f64,
 }
 
 impl Demand {
-    /// That of a motion about `start`, rad.
+    /// Computes the demand of a motion about `start`, rad.
     fn of(plant: &PlantConfig, thermal_time: f64, motion: &Trajectory<f64>, start: f64) -> Self {
         let own = plant.equivalent();
         let constant = plant.motor.torque_constant * plant.mechanism.ratio;
@@ -56,7 +56,7 @@ impl Demand {
     }
 }
 
-/// Torque of the six parameters, N·m.
+/// Returns the torque of the model with six parameters, N·m.
 fn needed(own: &Equivalent, q: f64, qd: f64, qdd: f64) -> f64 {
     let dry = if qd == 0.0 { 0.0 } else { qd.signum() };
     own.inertia * qdd
@@ -67,8 +67,8 @@ fn needed(own: &Equivalent, q: f64, qd: f64, qdd: f64) -> f64 {
         + own.offset
 }
 
-/// Returns one sentence for each value that the motion needs and that the described motor, the supply or the current sensor of
-/// the emulated rig does not give; empty where all are enough. The motion is relative to `start`, rad.
+/// Returns one sentence for each value of the motion that exceeds the described motor, the supply or the current sensor
+/// of the emulated rig; empty if all suffice. The motion is relative to `start`, rad.
 pub fn shortfalls(
     plant: &PlantConfig,
     nameplate: &Nameplate,
@@ -121,8 +121,8 @@ pub fn shortfalls(
     said
 }
 
-/// Returns a sentence where the description states another link than the emulated rig can be; none where both are alike or the
-/// description states no link.
+/// Returns a sentence if the described link differs from that of the emulated rig. Returns `None` if they are similar,
+/// or if no link is described.
 pub fn other_link(plant: &PlantConfig, nameplate: &Nameplate, robot: &Robot) -> Option<String> {
     robot.joints.first()?.inertial.as_ref()?;
     let own = plant.equivalent();

@@ -1,4 +1,4 @@
-//! The rig without hardware: the firmware's own control application closed around the emulated rig.
+//! The rig without hardware: the firmware's own control application in a closed loop with the emulated rig.
 
 mod demand;
 mod nameplate;
@@ -18,7 +18,7 @@ use rig_link::Device;
 pub use demand::{other_link, shortfalls};
 pub use nameplate::{Nameplate, NameplateError, hardware_of, link_parameters};
 
-/// The control application, run tick by tick against the plant, with the real wire protocol at its end.
+/// The control application, run tick by tick against the plant, with the real wire protocol.
 pub struct EmulatedRig {
     config: Config,
     state: State,
@@ -28,10 +28,10 @@ pub struct EmulatedRig {
 }
 
 impl EmulatedRig {
-    /// A rig at power on. `nameplate` is what the firmware was told, `plant` what is true.
+    /// Creates a rig at power on. `nameplate` holds the firmware's values, `plant` the true ones.
     ///
     /// # Errors
-    /// What is wrong with the nameplate's estimator settings.
+    /// Invalid estimator settings of the nameplate.
     pub fn new(
         nameplate: &Nameplate,
         plant: PlantConfig,
@@ -47,22 +47,22 @@ impl EmulatedRig {
         })
     }
 
-    /// The plant, to look into.
+    /// Returns the plant, for inspection.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The plant, to injure or to load.
+    /// Returns the plant, for faults or loads.
     pub fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
 
-    /// The control application's state.
+    /// Returns the state of the control application.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// One control tick, without the wire.
+    /// Runs one control tick, without the wire.
     pub fn tick(&mut self) -> Output {
         let sample = self.plant.advance(self.command);
         let output = step(&self.config, &mut self.state, sample);
@@ -70,7 +70,7 @@ impl EmulatedRig {
         output
     }
 
-    /// Control ticks in the slice of time that one [`Device::exchange`] takes.
+    /// Returns the number of control ticks in the time slice of one [`Device::exchange`].
     fn ticks_per_slice(&self) -> u32 {
         (self.config.rates.control_hz / 1000).max(1)
     }

@@ -1,4 +1,4 @@
-//! From a robot description to what the firmware is told.
+//! Converts a robot description to the configuration of the firmware.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -18,24 +18,24 @@ use crate::Hardware;
 use rig_model::robot::{Joint, JointKind, Robot};
 use rig_model::simulate::{Model, SimulateError};
 
-/// Natural frequency of the position loop, Hz: slow enough for the current loop ten times as fast to stay
-/// below a twentieth of the 10 kHz control rate.
+/// Natural frequency of the position loop, Hz: the current loop, ten times as fast, stays below a twentieth of the 10
+/// kHz control rate.
 const POSITION_BANDWIDTH: f64 = 6.0;
-/// Bandwidth of the velocity observer, Hz: ten times the position loop, so that its phase does not show.
+/// Bandwidth of the velocity observer, Hz: far above the position loop, so that its phase lag has no effect.
 const OBSERVER_BANDWIDTH: f32 = 200.0;
-/// Speed below which the measured velocity says nothing about the direction, rad/s.
+/// Speed below which the measured velocity does not determine the direction, rad/s.
 const DIRECTION_THRESHOLD: f32 = 0.01;
 
-/// Speed above which the on-line estimator takes friction to be Coulomb and viscous alone, rad/s. Geared
-/// servo drives weaken with speed up to some 0.05 to 0.1 rad/s at the joint, with tails beyond that the parameters
-/// fc and fv would absorb (with half of the excess gone at 0.025 rad/s, 1.5 % of it is left at 0.2 rad/s,
-/// a fifth at 0.05 rad/s). An excitation at 1 to 3 rad/s loses a tenth of its samples to it.
+/// Speed above which the on-line estimator assumes only Coulomb and viscous friction, rad/s. Friction of geared servo
+/// drives decreases with speed up to some 0.05 to 0.1 rad/s at the joint. The parameters fc and fv would absorb the
+/// tail. If half of the excess vanishes at 0.025 rad/s, 1.5 % of it remains at 0.2 rad/s; at 0.05 rad/s a fifth
+/// remains. An excitation at 1 to 3 rad/s loses a tenth of its samples by this threshold.
 const SLIP_VELOCITY: f32 = 0.2;
 
-/// Why a description does not make a one-link rig.
+/// Reason why a description does not define a one-link rig.
 #[derive(Debug, Error)]
 pub enum NameplateError {
-    /// Not one joint.
+    /// A number of joints other than one.
     #[error(
         "the one-link rig has one joint, but \"{robot}\" has {joints}: give the description of a one-link rig (`rig init one-link` writes one)."
     )]
@@ -45,7 +45,7 @@ pub enum NameplateError {
         /// Joints it has.
         joints: usize,
     },
-    /// More effects than a rig compensates.
+    /// More effects than a rig can compensate.
     #[error(
         "{robot} has {effects} effects, but the rig compensates at most {EFFECTS}; leave the smallest out."
     )]
@@ -55,51 +55,51 @@ pub enum NameplateError {
         /// Effects it has.
         effects: usize,
     },
-    /// An effect that the rig would refuse.
+    /// An effect that the rig refuses.
     #[error("{robot}: the rig does not take an effect: {what}.")]
     UnusableEffect {
         /// Name of the robot.
         robot: String,
-        /// Which, and why.
+        /// The effect and the reason.
         what: String,
     },
-    /// Effects that nothing can be done about.
+    /// Effects that the rig cannot compensate.
     #[error(
         "{robot} has effects that the rig cannot compensate: {}; leave them out with --leave-out.", left_out.join("; ")
     )]
     NotCompensable {
         /// Name of the robot.
         robot: String,
-        /// Which, and why: a sentence each.
+        /// Effects and reasons: a sentence each.
         left_out: Vec<String>,
     },
-    /// Not a revolute joint.
+    /// A joint that is not revolute.
     #[error("joint \"{0}\" is prismatic: the rig's link turns, so its kind must be \"revolute\".")]
     Prismatic(String),
-    /// A drive without one ratio for all positions.
+    /// A drive without a single constant gear ratio.
     #[error(
         "the drive of joint \"{joint}\" {what}: the firmware of the one-link rig knows one gear ratio only; give drive.gear_ratio a finite value other than 0, and no drive.screw or drive.couples."
     )]
     Drive {
         /// Name of the joint.
         joint: String,
-        /// What is in the way.
+        /// The obstacle.
         what: String,
     },
-    /// A value that the firmware cannot do without.
+    /// A missing value that the firmware needs.
     #[error("joint \"{joint}\" has no {what}: the firmware needs it to run the rig.")]
     Missing {
         /// Name of the joint.
         joint: String,
-        /// What is missing, with its key.
+        /// Name and key of the missing value.
         what: &'static str,
     },
-    /// The model behind the feed-forward.
+    /// An error of the feed-forward model.
     #[error(transparent)]
     Model(#[from] SimulateError),
 }
 
-/// What the firmware is told at its start: fixed configuration, and the settings that the host may replace.
+/// Values for the firmware at its start: fixed configuration, and settings that the host may replace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nameplate {
     /// Fixed while the rig runs.
@@ -109,10 +109,10 @@ pub struct Nameplate {
 }
 
 impl Nameplate {
-    /// The nameplate of a one-link rig.
+    /// Builds the nameplate of a one-link rig.
     ///
     /// # Errors
-    /// [`NameplateError`] naming what is missing.
+    /// [`NameplateError`] naming the missing value.
     pub fn from_robot(robot: &Robot) -> Result<Self, NameplateError> {
         let [joint] = robot.joints.as_slice() else {
             return Err(NameplateError::JointCount {
@@ -167,7 +167,7 @@ impl Nameplate {
                 proportional: gains.proportional as f32,
                 derivative: gains.derivative as f32,
                 adaptation: gains.adaptation as f32,
-                // A twentieth of the control rate is the fastest that the one-period delay allows.
+                // A twentieth of the control rate is the maximum with the one-period delay.
                 current_bandwidth: rates.control_hz as f32 / 20.0,
             },
             model,
@@ -186,10 +186,10 @@ impl Nameplate {
     }
 }
 
-/// The drive and encoder that a description states for the first joint: what the emulated rig is made of.
+/// Returns the described drive and encoder of the first joint, for the emulated rig.
 ///
 /// # Errors
-/// [`NameplateError::Missing`] naming the value that is not stated.
+/// [`NameplateError::Missing`] naming the missing value.
 pub fn hardware_of(robot: &Robot) -> Result<Hardware, NameplateError> {
     let joint = robot.joints.first().ok_or(NameplateError::JointCount {
         robot: robot.name.clone(),
@@ -204,7 +204,7 @@ pub fn hardware_of(robot: &Robot) -> Result<Hardware, NameplateError> {
         .drive
         .as_ref()
         .ok_or_else(|| missing("[joint.drive]"))?;
-    // A torque constant of 0 stands for an unknown one.
+    // A torque constant of 0 means unknown.
     let constant = Some(drive.torque_constant).filter(|constant| *constant != 0.0);
     Ok(Hardware {
         gear_ratio: drive.gear_ratio,
@@ -217,10 +217,10 @@ pub fn hardware_of(robot: &Robot) -> Result<Hardware, NameplateError> {
     })
 }
 
-/// The six one-link parameters that a description states.
+/// Returns the six one-link parameters of a description.
 ///
 /// # Errors
-/// [`NameplateError::Model`] where the description makes no chain, [`NameplateError::Missing`] without inertia.
+/// [`NameplateError::Model`] if the description defines no chain, [`NameplateError::Missing`] without inertia.
 pub fn link_parameters(robot: &Robot) -> Result<LinkParameters<f32>, NameplateError> {
     let model = Model::from_robot(robot)?;
     let mut inertia = [0.0];
@@ -287,7 +287,7 @@ fn limits(joint: &Joint, drive: &rig_model::robot::Drive) -> Result<Limits<f32>,
             .acceleration
             .ok_or_else(|| missing("limits.acceleration"))? as f32,
         torque: torque as f32,
-        // The description has one torque; a small motor stands about half of its peak current for good.
+        // The description has one torque; a small motor withstands about half of its peak current continuously.
         continuous_current: (0.5 * peak) as f32,
         peak_current: peak as f32,
     })
@@ -302,7 +302,7 @@ fn friction(joint: &Joint) -> Friction<f32> {
     }
 }
 
-/// Bands wide enough for any rig that the description could be wrong about, narrow enough to catch a run-away.
+/// Returns bounds wide enough for any error of the description, narrow enough to detect a divergent estimate.
 fn estimator(model: &LinkParameters<f32>, limits: &Limits<f32>) -> EstimatorSettings<f32> {
     let torque = limits.torque;
     let lower = [
@@ -362,7 +362,7 @@ mod tests {
         assert!(by_ratio.contains("gear_ratio = 0"), "{by_ratio}");
     }
 
-    /// With the template the emulated rig is, bit by bit, the one of the documentation.
+    /// With the template, the emulated rig equals that of the documentation bit by bit.
     #[test]
     fn the_templates_drive_is_the_emulated_rigs_own() {
         use crate::{Hardware, PlantConfig};
@@ -405,14 +405,14 @@ mod tests {
         );
     }
 
-    /// The board must start as the emulated rig does: else their recordings would differ.
+    /// The board and the emulated rig must start equally: otherwise their recordings would differ.
     #[test]
     fn the_board_is_told_what_the_template_says() {
         let robot = Robot::from_toml(ONE_LINK_TEMPLATE, Path::new("one-link.toml")).unwrap();
         let told = Nameplate::from_robot(&robot).unwrap();
         let (config, mut settings) = one_link();
         assert_eq!(config, told.config);
-        // The description's axis is tilted by a rounded π/2.
+        // The axis in the description is tilted by a rounded π/2.
         assert!((settings.model.gravity_sin - told.settings.model.gravity_sin).abs() < 1e-12);
         settings.model.gravity_sin = told.settings.model.gravity_sin;
         for (board, host) in [

@@ -1,4 +1,4 @@
-//! What a description asks a rig to be told.
+//! Requests that send a description to a rig.
 
 use rig_firmware::usable;
 use rig_shared::compensation::{Compensation, EFFECTS, Effects, Role};
@@ -8,7 +8,7 @@ use rig_shared::wire::message::RequestBody;
 use super::nameplate::{Nameplate, NameplateError};
 use rig_model::robot::Robot;
 
-/// Limits, model, friction, gains and estimator; friction is compensated where `precompensation` says so.
+/// Returns limits, model, friction, gains and estimator; friction is compensated if `precompensation` is true.
 pub fn settings(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody> {
     let settings = &nameplate.settings;
     let mut compensation = settings.precompensation;
@@ -23,20 +23,22 @@ pub fn settings(nameplate: &Nameplate, precompensation: bool) -> Vec<RequestBody
     ]
 }
 
-/// What a description comes to for the rig.
+/// Requests for a description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Upload {
-    /// What it is told, in this order.
+    /// Requests in their order.
     pub requests: Vec<RequestBody>,
-    /// Effects that nothing is done about, with the reason: a sentence each.
+    /// Effects that are not compensated, with the reason: a sentence each.
     pub left_out: Vec<String>,
 }
 
-/// All of a description: the settings, precompensation on, and the effects. A payload goes into the link's inertial
-/// parameters. Effects that nothing can be done about are left out where that is wanted, and an error where it is not.
+/// Returns the requests for a description: settings with precompensation, and effects. A payload is added to the link's
+/// inertial parameters. Effects that cannot be compensated are left out if `leave_out` is true; otherwise they are an
+/// error.
 ///
 /// # Errors
-/// A description that is none of a one-link rig, has more effects than a rig compensates, or one that it cannot or will not.
+/// A description that is not a one-link rig, has too many effects, or has effects that the rig cannot or will not
+/// compensate.
 pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError> {
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
     for Effect {
@@ -46,7 +48,7 @@ pub fn requests(robot: &Robot, leave_out: bool) -> Result<Upload, NameplateError
     } in robot.placed_effects().into_iter().map(|one| one.effect)
     {
         if kind == Kind::Payload {
-            // The nameplate's model has it already.
+            // The nameplate's model already includes it.
             continue;
         }
         if let Some(reason) = Role::refusal(kind) {
@@ -131,7 +133,7 @@ mod tests {
         ));
     }
 
-    /// What the rig would refuse without a reason is named before it is sent.
+    /// An effect that the rig would refuse is named before it is sent.
     #[test]
     fn a_correction_beyond_what_a_sensor_can_be_wrong_by_is_named() {
         let offset = "[[effect]]\nkind = 'current_offset'\njoint = 'link'\noffset = 3.0\n";

@@ -1,4 +1,4 @@
-//! Nothing comes from nowhere, in every configuration.
+//! Energy is conserved in every configuration.
 
 use super::{Plant, PlantConfig, run, shake};
 use crate::Body;
@@ -17,7 +17,7 @@ use crate::effect::torque_saturation::TorqueSaturation;
 use crate::effect::transmission::{Backlash, Elasticity};
 use crate::effect::winding_temperature::WindingTemperature;
 
-/// Largest energy defect over the run relative to what went into losses.
+/// Returns the largest energy defect over the run relative to the losses.
 fn defect(config: PlantConfig, seconds: f64) -> f64 {
     let mut plant = Plant::new(config, 1);
     let start = plant.truth().energy;
@@ -136,7 +136,7 @@ fn the_defect_falls_with_the_square_of_the_substep() {
     );
 }
 
-/// The ledger against a sum over samples that knows nothing of it.
+/// Compares the energy balance with an independent sum over samples.
 #[test]
 fn losses_in_the_ledger_are_those_of_the_samples() {
     let mut plant = Plant::new(PlantConfig::default(), 1);

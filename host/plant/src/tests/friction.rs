@@ -1,8 +1,8 @@
-//! Stick, slip and what lies between.
+//! Sticking, slipping and presliding.
 
 use super::{Friction, OFF, Plant, PlantConfig, horizontal, run};
 
-/// Duty that holds `torque` N·m at the joint at standstill.
+/// Returns the duty that holds `torque` N·m at the joint at standstill.
 fn duty_for(torque: f64) -> f64 {
     torque / (50.0 * 0.05) * 0.6 / 24.0
 }
@@ -32,8 +32,8 @@ fn slips_just_above_breakaway_and_not_just_below() {
     assert!((1.25..1.40).contains(&(breakaway / config.equivalent().coulomb)));
     let moved = |torque: f64| {
         let mut plant = Plant::new(config.clone(), 1);
-        // A ramp slow enough that only the static torque counts, on an open motor: a voltage would let
-        // the back-EMF hold the joint back.
+        // The ramp is so slow that only the static torque matters. The motor is open: with a voltage, the back-EMF
+        // would hold the joint back.
         for k in 0..40_000 {
             plant.faults_mut().external_torque = torque * (f64::from(k) / 30_000.0).min(1.0);
             plant.advance(OFF);
@@ -44,7 +44,7 @@ fn slips_just_above_breakaway_and_not_just_below() {
     assert!(moved(1.03 * breakaway) > 0.02);
 }
 
-/// The presliding curve from torque against displacement, driven by a slow cyclic torque.
+/// Returns the presliding curve of torque against displacement, driven by a slow cyclic torque.
 fn loop_of(period: f64) -> Vec<(f64, f64)> {
     let config = horizontal(PlantConfig::default());
     let amplitude = 0.7 * config.breakaway()[0];
@@ -113,7 +113,7 @@ fn steady_sliding_shows_the_equivalent_parameters() {
     }
 }
 
-/// Moves the stops out of the way of a long slide.
+/// Moves the stops away for a long slide.
 fn plant_free(plant: &mut Plant) {
     let mut config = plant.config().clone();
     config.mechanism.end_stops = None;

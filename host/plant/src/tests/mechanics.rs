@@ -1,4 +1,4 @@
-//! Link, gear and the effects on them.
+//! Link, gear and their effects.
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 

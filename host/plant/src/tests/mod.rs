@@ -12,7 +12,7 @@ use rig_shared::units::Duty;
 
 use super::{Friction, Plant, PlantConfig, Truth};
 
-/// Bridge on at a mean terminal voltage of `duty` times the supply.
+/// Returns the command for the bridge on at a mean terminal voltage of `duty` times the supply.
 fn drive(duty: f64) -> Command {
     Command {
         duty: Duty(duty as f32),
@@ -25,7 +25,7 @@ const OFF: Command = Command {
     bridge: false,
 };
 
-/// No friction, no noise.
+/// Removes friction and noise.
 fn frictionless(mut config: PlantConfig) -> PlantConfig {
     for friction in [&mut config.motor.friction, &mut config.mechanism.friction] {
         *friction = Friction {
@@ -38,13 +38,13 @@ fn frictionless(mut config: PlantConfig) -> PlantConfig {
     config
 }
 
-/// An axis without gravity, so that the link stays wherever friction holds it.
+/// Removes gravity from the axis, so that the link stays where friction holds it.
 fn horizontal(mut config: PlantConfig) -> PlantConfig {
     config.mechanism.gravity = [0.0, -9.81, 0.0];
     config
 }
 
-/// Runs `seconds` under a voltage that is a function of time, reporting every tick.
+/// Runs `seconds` with a voltage as a function of time and reports every tick.
 fn run(plant: &mut Plant, seconds: f64, duty: impl Fn(f64) -> f64, mut each: impl FnMut(&Truth)) {
     let tick = plant.config().tick;
     for _ in 0..(seconds / tick).round() as usize {

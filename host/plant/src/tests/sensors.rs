@@ -186,7 +186,7 @@ fn faults_do_what_they_say() {
     );
 }
 
-/// The encoder on the link sees the link alone, in counts from a zero of its own, and changes nothing else.
+/// The link encoder reads only the link, in counts from its own zero, and changes no other signal.
 #[test]
 fn an_encoder_on_the_link_reads_the_link() {
     let mut config = PlantConfig::default();
