@@ -128,8 +128,7 @@ const MOST_LOST: f64 = 0.5;
 /// Effects with a torque linear in the filtered motion, or nearly so: it has already passed the position filter.
 const OF_THE_FILTERED_MOTION: [Kind; 2] = [Kind::InertiaCoupling, Kind::JointElasticity];
 
-/// Returns the contact deflection of a presliding effect along a run. `beside` is the other friction through the
-/// contact.
+/// Returns the contact deflection of a presliding effect along a run. `beside` is other friction there.
 fn bent(effect: &Effect<f64>, velocities: &[f64], beside: &[f64], period: f64) -> Vec<f64> {
     let mut memory = Memory::default();
     let along = |(&velocity, &beside): (&f64, &f64)| {
@@ -446,8 +445,7 @@ impl Source<'_> {
         shapes.iter().map(of_one).collect()
     }
 
-    /// Returns the ratio of the effects' friction through the contact to the model's Coulomb friction, sample by
-    /// sample.
+    /// Returns the effects' contact friction over the model's Coulomb friction, sample by sample.
     fn beside(&self, joint: usize, r: usize, chosen: &[Profile], gains: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.runs[r].len()];
         let [_, coulomb] = self.friction(joint);

@@ -148,8 +148,7 @@ fn attempt(
     };
     let loaded = moved(&bench, loaded, &lead)?;
     let first = Pass::over(&bench, &loaded, options, progress)?;
-    // A missing effect may look like a torque lead, or hide one. A delay found beside a wrong lead compensates its
-    // error.
+    // A missing effect may look like a torque lead, or hide one. A delay may compensate a wrong lead.
     let found: Vec<Profile> = (first.found.iter())
         .filter(|p| p.candidate.kind != Kind::MeasurementDelay)
         .cloned()

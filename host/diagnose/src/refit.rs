@@ -338,8 +338,7 @@ impl Columns<'_> {
     }
 }
 
-/// Weights the joints by their inverse residual RMS beside these columns. Also returns the residual's correlation time,
-/// s.
+/// Weights the joints by their inverse residual RMS. Also returns the residual's correlation time, s.
 pub(super) fn weighed<'r>(rows: &'r Rows, columns: &[Column]) -> (Fit<'r>, f64) {
     let n = rows.joints();
     let first = Fit::new(rows, vec![1.0; n], 0.1).taking(columns);
@@ -526,8 +525,7 @@ fn difference_step(shape: &Parameter, value: f64) -> f64 {
 
 /// Estimates of the joint fit.
 pub(super) struct Joint {
-    /// Coefficients of the free nominal directions, then of the effects' columns. The covariance also contains the
-    /// shapes.
+    /// Coefficients of the free nominal directions, then of the columns. The covariance also contains the shapes.
     pub(super) solution: Solution,
     /// Standard deviations of each effect's shapes: 0 for an integer, infinite if not identifiable.
     stds: Vec<[f64; SHAPES]>,

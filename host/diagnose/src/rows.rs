@@ -80,8 +80,7 @@ pub(super) struct Thinning {
     /// The filter of the motion for link columns, if the position filter matters.
     wide: Option<(f64, LowPass)>,
     step: usize,
-    /// Samples at either end with transients of the position filter. They are cut before the low-pass, which would
-    /// spread them.
+    /// Samples with transients of the position filter at either end. They are cut before the low-pass.
     spoilt: usize,
     smear: f64,
 }

@@ -60,8 +60,7 @@ impl Source<'_> {
         self
     }
 
-    /// Returns the torque that a gear adds to its joint over a run, one signal per set of shapes. Zero if it cannot be
-    /// computed.
+    /// Returns the torque that a gear adds to its joint, one signal per set of shapes. Zero if it fails.
     pub(super) fn twisted(
         &self,
         candidate: &Candidate,

@@ -37,8 +37,7 @@ pub(super) struct Asked<'a, 'r> {
 const MOST_SAG: f64 = 0.02;
 /// Least backlash gap over its standard deviation. Two: the 95 % interval then excludes zero.
 const SURE_OF_A_GAP: f64 = 2.0;
-/// Standard deviations by which two joints' delays may differ on one recorder. Three: chance exceeds it in 1 pair of
-/// 400.
+/// Standard deviations by which two joints' delays on one recorder may differ. Three: by chance 1 pair in 400.
 const ONE_CLOCK: f64 = 3.0;
 
 const TABLE: [Belief; 4] = [

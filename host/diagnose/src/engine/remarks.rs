@@ -17,8 +17,7 @@ const LIGHT: f64 = 0.5;
 /// Standard deviations by which the fitted first moment must differ from the described one for that remark.
 const CLEAR: f64 = 5.0;
 
-/// Warns that a spring took part of a link's weight: a stiffening spring is nearly a linear one minus part of the
-/// weight.
+/// Warns that a spring took part of a link's weight: a stiffening spring is like a linear one with less weight.
 pub(super) fn weight_of_a_spring(
     bench: &Bench,
     chosen: &[Profile],
