@@ -66,7 +66,7 @@ pub fn diagnose(
     }
     let mut stated = Stated::of(robot);
     // A constant gets a name if sensor readings with the drive off were given, or if some recordings have all external
-    // loads removed. Only then it is searched for.
+    // loads removed. Then it is searched for.
     let unburdened = training.iter().filter(|r| r.unburdened()).count();
     stated.pulls_told = (1..training.len()).contains(&unburdened);
     let told = !options.sensor_zeros.is_empty() || stated.pulls_told;

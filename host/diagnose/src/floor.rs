@@ -13,7 +13,7 @@ const BANDS: usize = 6;
 /// Upper end of that band as a share of the sample rate: beyond it an anti-aliasing filter acts.
 const TOP: f64 = 0.45;
 /// Largest ratio of a part's density to the line of first-order noise. A median of some hundred averaged periodograms
-/// varies by less than 10 %; a spectral line of a drive, or a tail of the motion, is off by more than 50 %.
+/// varies by less than a tenth. A spectral line of a drive, or a tail of the motion, is off by more than half.
 const OFF_LINE: f64 = 1.5;
 /// Largest difference of the references (else positions) of two repeated runs, as a share of their spread.
 const ALIKE: f64 = 0.02;

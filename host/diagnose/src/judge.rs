@@ -390,8 +390,8 @@ impl Judge<'_, '_> {
         floor::from_repeats(self.rows, &self.pairs, residual, counts, joint)
     }
 
-    /// Returns residual and noise RMS of a joint if the residual exceeds the noise: over all rows (`all` is residual
-    /// and floor), or in the repeated runs. `besides` are squares from other sources.
+    /// Returns residual and noise RMS of a joint if the residual exceeds the noise. It tests all rows (`all` is
+    /// residual and floor), then the repeated runs. `besides` are squares from other sources.
     fn beyond_noise(
         &self,
         all: [f64; 2],
@@ -412,8 +412,8 @@ impl Judge<'_, '_> {
     }
 }
 
-/// Returns squares from other sources than noise and missing effects: the treatment, and the mismatch of the effects
-/// that reduce the RMS from `before` to `after`.
+/// Returns squares that neither noise nor missing effects cause. They come from the treatment, and from the mismatch of
+/// the effects that reduce the RMS from `before` to `after`.
 pub(super) fn besides(
     chosen: &[Profile],
     rows: &Rows,

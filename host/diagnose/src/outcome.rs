@@ -500,8 +500,8 @@ pub struct Treated {
     pub position_cutoff: f64,
     /// Reason for this cut-off, a sentence.
     pub position_cutoff_why: String,
-    /// Cut-off of the position for inertia and gravity, before they pass the low-pass above, Hz; null if that low-pass
-    /// has no loss in the band, so that the filtered position is used.
+    /// Cut-off of the position for inertia and gravity, Hz; they then pass the low-pass above. Null if that low-pass
+    /// has no loss in the band: then the filtered position is used.
     pub links_cutoff: Option<f64>,
     /// Upper end of the compared band, Hz.
     pub band: f64,
@@ -562,8 +562,8 @@ pub struct Diagnosis {
     pub described: Vec<Described>,
     /// The effects found, in their order.
     pub steps: Vec<Step>,
-    /// Closed share of the hold-out (else training) residual's excess over the noise floor, from the refitted
-    /// description on, or from the unchanged one if its values have changed; null if nothing was found.
+    /// Closed share of the hold-out (else training) residual's excess over the noise floor; null if nothing was found.
+    /// It starts from the refitted description, or from the unchanged one if its values have changed.
     pub gap_closed: Option<f64>,
     /// Nominal parameters changed by the effects, or without effects against the description. Empty if it states none.
     pub absorbed: Vec<Absorbed>,
@@ -594,7 +594,7 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Returns true if a step's name is certain: its set has no other name, its posterior probability is at least 95 %,
+    /// Returns true if a step's name is certain. Its set has no other name, its posterior probability is at least 95 %,
     /// and its joint has no residual for another name.
     pub fn is_certain(&self, step: &Step) -> bool {
         let own = self.left.iter().find(|left| left.joint == step.joint);

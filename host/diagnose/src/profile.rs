@@ -79,8 +79,8 @@ pub(super) struct Profile {
     pub(super) columns: Arc<Vec<Column>>,
     /// Test results of the columns.
     pub(super) evidence: Evidence,
-    /// Name of what degenerates: a shape at its lower search bound, the swing of an overdamped gear, the stiffness of a
-    /// spring that is a constant, or a gain outside its physical bounds.
+    /// Name of the degenerate part: a shape at its lower search bound, a gain outside its bounds, or the stiffness of a
+    /// spring that is a constant. For gears also an overdamped swing, or too small a share of the torque.
     pub(super) vanished: Option<&'static str>,
     /// True for a backlash that the observer supports.
     pub(super) heard: bool,

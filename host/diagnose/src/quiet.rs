@@ -1,10 +1,10 @@
 //! Row weights near gear contacts.
 //!
 //! At tooth contact every law has a timing error, whatever its shapes. Within 50 ms of a contact, the torque residual
-//! is ten times the noise of other rows, and two recordings of one motion differ by as much. In plain least squares
-//! such rows dominate, and an effect at noise level is invisible. So with a gear in the model, a row has a smaller
-//! weight if the residual around it is above the median (Carroll 1982, Annals of Statistics 10: weights from smoothed
-//! squares of residuals).
+//! is ten times the noise of other rows. Two recordings of one motion differ by as much. In plain least squares such
+//! rows dominate, and an effect at noise level is invisible. So with a gear in the model, rows count less where the
+//! residual around them is above the median. The method is that of Carroll (1982, Annals of Statistics 10): weights
+//! from smoothed squares of residuals.
 
 use super::transmission::STRETCH;
 

@@ -41,8 +41,8 @@ pub(super) fn solve(plain: &Fit, columns: &[&Column], slopes: &[Column]) -> Opti
     })
 }
 
-/// [`solve`] with a jackknife covariance over the blocks of `plain`. It is widened if blocks of one of the `strata`
-/// give more: a law's mismatch follows speed, position or load, with the same bias in all such rows.
+/// [`solve`] with a jackknife covariance over the blocks of `plain`, widened if blocks of one of the `strata` give
+/// more. A law's mismatch follows speed, position or load, with the same bias in all such rows.
 pub(super) fn jackknifed(
     plain: &Fit,
     strata: &[Fit],

@@ -1,9 +1,9 @@
 //! Described effects beyond the standard model, and their treatment.
 //!
-//! A described effect starts the search with its parameters, and is refitted with everything else. It is held as
-//! described, and its torque subtracted, if the recordings neither show nor contradict it, or if the search has no
-//! columns for it. A tilt is held until the recordings show another one, which then replaces it. A payload is a mass of
-//! its link.
+//! A described effect starts the search with its parameters, and is refitted with everything else. If the recordings
+//! neither show nor contradict it, it is held as described, and its torque subtracted. So is one without columns in the
+//! search. A tilt is held until the recordings show another one, which then replaces it. A payload is a mass of its
+//! link.
 //!
 //! Limit: held effects between motor and link cannot be subtracted from the torque of a given motion.
 

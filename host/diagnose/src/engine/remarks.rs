@@ -41,8 +41,8 @@ pub(super) fn weight_of_a_spring(
     })
 }
 
-/// Returns sentences on the recordings, on described parameters that stay held or are contradicted (`open`), on sensor
-/// readings with the drive off, and on the constants of the last model.
+/// Returns sentences on the recordings, the described parameters that are held or contradicted (`open`), the sensor
+/// readings with the drive off, and the constants of the last model.
 pub(super) fn remarks(
     bench: &Bench,
     loaded: &Loaded,

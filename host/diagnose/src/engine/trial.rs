@@ -12,8 +12,8 @@ use crate::outcome::Tried;
 use crate::profile::Profile;
 use crate::refit::Refit;
 
-/// Relative rise of the simulated error on the hold-out that drops an effect even if it is not significant: the
-/// hold-out is often too short for a significance test.
+/// Relative rise of the hold-out's simulated error that drops an effect without a significance test. The hold-out is
+/// often too short for one.
 const MUCH_WORSE: f64 = 0.1;
 
 /// Data for the acceptance tests.

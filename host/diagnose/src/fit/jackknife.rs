@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use super::{Fit, dot};
 
 impl Fit<'_> {
-    /// Returns the covariance of the coefficients of weighted columns by leaving out one cluster at a time (MacKinnon,
-    /// Nielsen and Webb 2023, Journal of Applied Econometrics 38: CV3). `rest` is their residual. The sandwich of
-    /// scores is too small if clusters are few or one of them has most information. None if the columns are collinear.
+    /// Returns the jackknife covariance of the coefficients of weighted columns, one cluster left out at a time
+    /// (MacKinnon, Nielsen and Webb 2023, Journal of Applied Econometrics 38: CV3). `rest` is their residual. The
+    /// sandwich of scores is too small if clusters are few or one of them has most information. None if the columns are
+    /// collinear.
     pub(crate) fn jackknife(
         &self,
         columns: &[impl AsRef<[f64]>],

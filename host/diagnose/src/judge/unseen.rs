@@ -120,7 +120,7 @@ pub(crate) fn taken_by_none(
     })
 }
 
-/// Returns the joint with the largest residual share, for recordings too short for effects. `why` says how short.
+/// Returns the residual of the joint with the largest share, if recordings are too short for effects. `why`: how short.
 pub(crate) fn too_short_for_names(
     robot: &Robot,
     base: &Fit,

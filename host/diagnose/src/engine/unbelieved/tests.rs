@@ -99,7 +99,7 @@ fn a_gear_stands_that_is_as_stiff_as_the_rig_and_not_one_that_is_too_stiff_or_mo
 }
 
 /// With creep, the friction of the rig lags a little. A link with all friction behind a spring of five times critical
-/// damping would remove a tenth of that residual, and 6 % without rows near standstill.
+/// damping would remove a tenth of that residual (6 % without rows near standstill).
 #[test]
 fn a_gear_that_does_not_swing_is_none() {
     let made = Scenario::short([], 900).make().unwrap();
